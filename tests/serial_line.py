@@ -1,4 +1,4 @@
-"""A serial line made of two pseudo-terminals, with a person's hand on the cable."""
+"""A serial line of two pseudo-terminals, with a person's hand on the cable; the checksum of its frames."""
 
 from __future__ import annotations
 
@@ -10,6 +10,16 @@ import tty
 from pathlib import Path
 from types import TracebackType
 from typing import Self
+
+
+def with_crc(frame: bytes) -> bytes:
+    """The frame and its CRC-16/MODBUS, low byte first."""
+    crc = 0xFFFF
+    for byte in frame:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ (0xA001 if crc & 1 else 0)
+    return frame + crc.to_bytes(2, "little")
 
 
 class SerialLine:

@@ -180,8 +180,7 @@ class ReconnectPolicy:
         self._keep("max_delay", 0.01, 60.0)
         if self.give_up_after is not None:
             self._keep("give_up_after", 0.0, 86400.0)
-        if not isinstance(self.activate, bool):
-            raise TypeError(f"activate must be True or False, got {self.activate!r}")
+        check_flag("activate", self.activate)
 
     def _keep(self, name: str, low: float, high: float) -> None:
         object.__setattr__(self, name, check_seconds(name, getattr(self, name), low, high))

@@ -7,7 +7,7 @@ import asyncio
 import pytest
 
 from robotiq_async import ConnectionLostError, Finger, RobotiqError, State
-from robotiq_async.simulator.physics.inbox import Write
+from robotiq_async.simulator.physics.gripper import Write
 from robotiq_async.values.request import Request
 from tests.fleet.cell import LEFT, move_slowly, told
 from tests.fleet.lab import Garbling, lab

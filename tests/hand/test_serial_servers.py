@@ -38,13 +38,6 @@ async def test_it_comes_back(words: str) -> None:
             await hand.move(100, A)
 
 
-@pytest.mark.parametrize("kind", ["exception", "wrong-transaction", "wrong-protocol"])
-def test_what_frames_of_a_line_do_not_have(kind: str) -> None:
-    server = RtuOverTcpSimulatorServer()
-    with pytest.raises(ValueError, match="does not fit"):
-        server.fault_injector.check([Trouble(kind)])
-
-
 @pytest.mark.parametrize("units", [(None, None), (9, 12)])
 async def test_a_serial_server_has_one_owner(units: tuple[int | None, int | None]) -> None:
     gripper = SimulatedGripper(asyncio.get_running_loop().time)

@@ -10,7 +10,6 @@ import contextlib
 import errno
 import logging
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
@@ -21,17 +20,10 @@ from robotiq_async.link.address import parse_address
 from robotiq_async.link.modbus import ModbusTransport
 from robotiq_async.link.serial_ports import FORBIDDEN, MISSING, NO_PORT, TAKEN
 from robotiq_async.values.registers import RTU_REGISTERS
-from tests.serial_line import SerialLine
+from tests.serial_line import SerialLine, with_crc
 from tests.virtual_line import VirtualLine
 
-
-def with_crc(frame: bytes) -> bytes:
-    crc = 0xFFFF
-    for byte in frame:
-        crc ^= byte
-        for _ in range(8):
-            crc = crc >> 1 ^ (0xA001 if crc & 1 else 0)
-    return frame + crc.to_bytes(2, "little")
+pytestmark = pytest.mark.virtual_time
 
 
 class Device:
@@ -87,24 +79,27 @@ class Device:
         return with_crc(bytes((9, 3, 2 * count)) + len(self.requests).to_bytes(2, "big") * count)
 
 
-@asynccontextmanager
-async def linked() -> AsyncIterator[tuple[ModbusTransport, Device]]:
-    """A transport and a device at the two ends of a line, in virtual time."""
-    with pytest.MonkeyPatch.context() as patch:
-        VirtualLine(patch)
-        device = Device(serial.serial_for_url(VirtualLine.FAR))
-        transport = ModbusTransport(
-            parse_address(f"rtu://{VirtualLine.NEAR}"),
-            RTU_REGISTERS,
-            connect_timeout=1.0,
-            response_timeout=0.05,
-        )
-        try:
-            await transport.open()
-            yield transport, device
-        finally:
-            await transport.close()
-            device.close()
+@pytest.fixture
+async def device(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Device]:
+    """At the far end of a line, in virtual time."""
+    VirtualLine(monkeypatch)
+    device = Device(serial.serial_for_url(VirtualLine.FAR))
+    yield device
+    device.close()
+
+
+@pytest.fixture
+async def transport(device: Device) -> AsyncIterator[ModbusTransport]:
+    """At the near end, open."""
+    transport = unopened(VirtualLine.NEAR)
+    await transport.open()
+    yield transport
+    await transport.close()
+
+
+def unopened(device: str) -> ModbusTransport:
+    address = parse_address(f"rtu://{device}")
+    return ModbusTransport(address, RTU_REGISTERS, connect_timeout=1.0, response_timeout=0.05)
 
 
 async def reopened(transport: ModbusTransport) -> int:
@@ -116,42 +111,42 @@ async def reopened(transport: ModbusTransport) -> int:
     raise AssertionError("never in step again")
 
 
-@pytest.mark.virtual_time
-async def test_read_and_write_use_the_addresses_of_the_serial_gripper() -> None:
-    async with linked() as (transport, device):
-        assert await transport.read() == (2,) * 8
-        await transport.write((0x0900, 0x0C00, 0, 0, 0, 0, 0, 0))
+async def test_read_and_write_use_the_addresses_of_the_serial_gripper(
+    transport: ModbusTransport, device: Device
+) -> None:
+    assert await transport.read() == (2,) * 8
+    await transport.write((0x0900, 0x0C00, 0, 0, 0, 0, 0, 0))
     probe, read, write = device.requests
     assert probe == with_crc(bytes.fromhex("09 03 07d0 0001"))
     assert read == with_crc(bytes.fromhex("09 03 07d0 0008"))
     assert write[:11] == bytes.fromhex("09 10 03e8 0008 10 0900 0c00")
 
 
-@pytest.mark.virtual_time
 @pytest.mark.parametrize("late", [1, 2, 8])
 @pytest.mark.parametrize("first", ["read", "write"])
-async def test_late_replies_never_answer_a_later_request(late: int, first: str) -> None:
-    async with linked() as (transport, device):
-        await transport.read()
-        device.keep = late
-        with pytest.raises(ResponseTimeoutError):
-            await (transport.read() if first == "read" else transport.write((0,) * 8))
-        await reopened(transport)
-        for _ in range(3):
-            assert await transport.read() == (len(device.requests),) * 8
-        await transport.write((0,) * 8)
+async def test_late_replies_never_answer_a_later_request(
+    transport: ModbusTransport, device: Device, late: int, first: str
+) -> None:
+    await transport.read()
+    device.keep = late
+    with pytest.raises(ResponseTimeoutError):
+        await (transport.read() if first == "read" else transport.write((0,) * 8))
+    await reopened(transport)
+    for _ in range(3):
         assert await transport.read() == (len(device.requests),) * 8
+    await transport.write((0,) * 8)
+    assert await transport.read() == (len(device.requests),) * 8
 
 
-@pytest.mark.virtual_time
-async def test_a_late_reply_is_found_out_while_the_port_is_opened() -> None:
-    async with linked() as (transport, device):
-        device.keep = 2  # the read, and what was asked when it was not answered
-        with pytest.raises(ResponseTimeoutError):
-            await transport.read()
-        with pytest.raises(ProtocolError):
-            await transport.open()
-        assert not transport.is_open
+async def test_a_late_reply_is_found_out_while_the_port_is_opened(
+    transport: ModbusTransport, device: Device
+) -> None:
+    device.keep = 2  # the read, and what was asked when it was not answered
+    with pytest.raises(ResponseTimeoutError):
+        await transport.read()
+    with pytest.raises(ProtocolError):
+        await transport.open()
+    assert not transport.is_open
 
 
 # -- a read that is asked once more ------------------------------------------------------------------------
@@ -172,169 +167,158 @@ SPOILT = {
 }
 
 
-@pytest.mark.virtual_time
 @pytest.mark.parametrize("how", SPOILT)
-async def test_a_read_is_asked_again_when_its_answer_is_lost_or_damaged(how: str) -> None:
-    async with linked() as (transport, device):
-        await transport.read()
-        for number in (1, 2):
-            asked = len(device.requests)
-            device.spoil = SPOILT[how]
-            assert await transport.read() == (len(device.requests),) * 8, "the last request is answered"
-            assert transport.repeats == number
-            first, probe, again = device.requests[asked:]
-            assert first == again
-            assert probe[:5] == first[:5], "a read, of the same registers"
-            assert probe[5] < 8, "and of fewer"
-        assert await transport.read() == (len(device.requests),) * 8
-
-
-@pytest.mark.virtual_time
-@pytest.mark.parametrize("how", SPOILT)
-async def test_a_write_is_never_sent_again(how: str) -> None:
-    async with linked() as (transport, device):
+async def test_a_read_is_asked_again_when_its_answer_is_lost_or_damaged(
+    transport: ModbusTransport, device: Device, how: str
+) -> None:
+    await transport.read()
+    for number in (1, 2):
         asked = len(device.requests)
         device.spoil = SPOILT[how]
-        with pytest.raises(RobotiqConnectionError):
-            await transport.write((0x0900,) * 8)
-        assert [request[1] for request in device.requests[asked:]] == [16]
-        assert not transport.is_open
-        assert transport.repeats == 0
+        assert await transport.read() == (len(device.requests),) * 8, "the last request is answered"
+        assert transport.repeats == number
+        first, probe, again = device.requests[asked:]
+        assert first == again
+        assert probe[:5] == first[:5], "a read, of the same registers"
+        assert probe[5] < 8, "and of fewer"
+    assert await transport.read() == (len(device.requests),) * 8
 
 
-@pytest.mark.virtual_time
+@pytest.mark.parametrize("how", SPOILT)
+async def test_a_write_is_never_sent_again(transport: ModbusTransport, device: Device, how: str) -> None:
+    asked = len(device.requests)
+    device.spoil = SPOILT[how]
+    with pytest.raises(RobotiqConnectionError):
+        await transport.write((0x0900,) * 8)
+    assert [request[1] for request in device.requests[asked:]] == [16]
+    assert not transport.is_open
+    assert transport.repeats == 0
+
+
 @pytest.mark.parametrize("spoilt", range(1, 3))
-async def test_a_read_is_asked_once_more_and_no_oftener(spoilt: int) -> None:
+async def test_a_read_is_asked_once_more_and_no_oftener(
+    transport: ModbusTransport, device: Device, spoilt: int
+) -> None:
     """The second time nothing may be wrong, neither with what brings the line in step nor with the answer."""
-    async with linked() as (transport, device):
-        counts: list[int] = []
+    counts: list[int] = []
 
-        def spoil(reply: bytes) -> bytes:
-            counts.append(reply[2] // 2)
-            return wrong_checksum(reply) if len(counts) in (1, 1 + spoilt) else reply
+    def spoil(reply: bytes) -> bytes:
+        counts.append(reply[2] // 2)
+        return wrong_checksum(reply) if len(counts) in (1, 1 + spoilt) else reply
 
-        device.spoil, device.spoils_all = spoil, True
-        with pytest.raises(ProtocolError, match="a wrong checksum"):
-            await transport.read()
-        assert len(counts) == 1 + spoilt
-        assert counts[0] == 8
-        assert not transport.is_open
-
-
-@pytest.mark.virtual_time
-@pytest.mark.parametrize("after", ["the silence", "the probe"])
-async def test_the_first_answer_that_was_only_late_is_not_the_second(after: str) -> None:
-    async with linked() as (transport, device):
+    device.spoil, device.spoils_all = spoil, True
+    with pytest.raises(ProtocolError, match="a wrong checksum"):
         await transport.read()
-        asked = len(device.requests)
-        device.keep = 1
-        reading = asyncio.ensure_future(transport.read())
-        while not device.kept:  # noqa: ASYNC110
-            await asyncio.sleep(0.001)
-        if after == "the silence":
-            await asyncio.sleep(0.055)  # the time-out has passed, and the silence has begun
-            device.send(device.kept.pop())
-            assert await reading == (asked + 3,) * 8
-            assert transport.is_open
-        else:
-            with pytest.raises(ResponseTimeoutError):  # the device answers in order: the late one comes first
-                await reading
-            assert not transport.is_open
-        await reopened(transport)
-        assert await transport.read() == (len(device.requests),) * 8
+    assert len(counts) == 1 + spoilt
+    assert counts[0] == 8
+    assert not transport.is_open
 
 
-@pytest.mark.virtual_time
-async def test_the_rest_of_a_damaged_answer_is_no_part_of_the_next() -> None:
-    async with linked() as (transport, device):
-        device.spoil = lambda reply: b"\xff" + reply[:10]
-        reading = asyncio.ensure_future(transport.read())
-        for _ in range(4):
-            await asyncio.sleep(0.005)
-            device.send(bytes.fromhex("09 03 10 00 00"))
-        assert await reading == (len(device.requests),) * 8
-
-
-@pytest.mark.virtual_time
-async def test_who_talks_all_the_time_is_given_up() -> None:
-    async with linked() as (transport, device):
-        device.spoil = lambda reply: b"\xff" + reply[:0]
-        reading = asyncio.ensure_future(transport.read())
-        began = asyncio.get_running_loop().time()
-        while not reading.done():
-            device.send(b"\xff")
-            await asyncio.sleep(0.005)
-        assert asyncio.get_running_loop().time() - began < 0.5
-        with pytest.raises(ProtocolError):
+@pytest.mark.parametrize("after", ["the silence", "the probe"])
+async def test_the_first_answer_that_was_only_late_is_not_the_second(
+    transport: ModbusTransport, device: Device, after: str
+) -> None:
+    await transport.read()
+    asked = len(device.requests)
+    device.keep = 1
+    reading = asyncio.ensure_future(transport.read())
+    while not device.kept:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+    if after == "the silence":
+        await asyncio.sleep(0.055)  # the time-out has passed, and the silence has begun
+        device.send(device.kept.pop())
+        assert await reading == (asked + 3,) * 8
+        assert transport.is_open
+    else:
+        with pytest.raises(ResponseTimeoutError):  # the device answers in order: the late one comes first
             await reading
         assert not transport.is_open
+    await reopened(transport)
+    assert await transport.read() == (len(device.requests),) * 8
 
 
-@pytest.mark.virtual_time
-async def test_a_read_that_is_never_answered_takes_two_response_timeouts() -> None:
-    async with linked() as (transport, device):
-        device.spoil, device.spoils_all = SPOILT["lost"], True
-        began = asyncio.get_running_loop().time()
-        with pytest.raises(ResponseTimeoutError):
-            await transport.read()
-        assert 0.099 <= asyncio.get_running_loop().time() - began < 0.15
-
-
-@pytest.mark.virtual_time
-async def test_cancelled_while_the_line_falls_silent() -> None:
-    async with linked() as (transport, device):
-        device.spoil = wrong_checksum
-        reading = asyncio.ensure_future(transport.read())
-        while len(device.requests) < 2:  # noqa: ASYNC110
-            await asyncio.sleep(0.001)
+async def test_the_rest_of_a_damaged_answer_is_no_part_of_the_next(
+    transport: ModbusTransport, device: Device
+) -> None:
+    device.spoil = lambda reply: b"\xff" + reply[:10]
+    reading = asyncio.ensure_future(transport.read())
+    for _ in range(4):
         await asyncio.sleep(0.005)
-        reading.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await reading
-        assert not transport.is_open
+        device.send(bytes.fromhex("09 03 10 00 00"))
+    assert await reading == (len(device.requests),) * 8
 
 
-@pytest.mark.virtual_time
-async def test_reads_asked_again_are_told_once_in_a_while(caplog: pytest.LogCaptureFixture) -> None:
+async def test_who_talks_all_the_time_is_given_up(transport: ModbusTransport, device: Device) -> None:
+    device.spoil = lambda reply: b"\xff" + reply[:0]
+    reading = asyncio.ensure_future(transport.read())
+    began = asyncio.get_running_loop().time()
+    while not reading.done():
+        device.send(b"\xff")
+        await asyncio.sleep(0.005)
+    assert asyncio.get_running_loop().time() - began < 0.5
+    with pytest.raises(ProtocolError):
+        await reading
+    assert not transport.is_open
+
+
+async def test_a_read_that_is_never_answered_takes_two_response_timeouts(
+    transport: ModbusTransport, device: Device
+) -> None:
+    device.spoil, device.spoils_all = SPOILT["lost"], True
+    began = asyncio.get_running_loop().time()
+    with pytest.raises(ResponseTimeoutError):
+        await transport.read()
+    assert 0.099 <= asyncio.get_running_loop().time() - began < 0.15
+
+
+async def test_cancelled_while_the_line_falls_silent(transport: ModbusTransport, device: Device) -> None:
+    device.spoil = wrong_checksum
+    reading = asyncio.ensure_future(transport.read())
+    while len(device.requests) < 2:  # noqa: ASYNC110
+        await asyncio.sleep(0.001)
+    await asyncio.sleep(0.005)
+    reading.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await reading
+    assert not transport.is_open
+
+
+async def test_reads_asked_again_are_told_once_in_a_while(
+    transport: ModbusTransport, device: Device, caplog: pytest.LogCaptureFixture
+) -> None:
     caplog.set_level(logging.WARNING, "robotiq_async")
-    async with linked() as (transport, device):
-        for _ in range(3):
-            device.spoil = wrong_checksum
-            await transport.read()
+    for _ in range(3):
+        device.spoil = wrong_checksum
+        await transport.read()
     said = [each.getMessage() for each in caplog.records if "asked again" in each.getMessage()]
     assert len(said) == 1
     assert "a wrong checksum" in said[0]
 
 
-@pytest.mark.virtual_time
-async def test_two_frames_keep_the_silence_of_the_standard() -> None:
-    async with linked() as (transport, device):
-        for _ in range(20):
-            await transport.read()
-            answered = asyncio.get_running_loop().time()
-            await transport.write((0,) * 8)
-            assert device.asked_at - answered >= 0.0016
-
-
-@pytest.mark.virtual_time
-@pytest.mark.parametrize("size", [600, 3000])
-async def test_a_burst_between_two_requests_is_found_out(size: int) -> None:
-    async with linked() as (transport, device):
+async def test_two_frames_keep_the_silence_of_the_standard(
+    transport: ModbusTransport, device: Device
+) -> None:
+    for _ in range(20):
         await transport.read()
-        device.send(bytes(size))
-        for _ in range(20):
-            await asyncio.sleep(0)
-        with pytest.raises(ProtocolError, match=r"without a request|not the answer"):  # as it arrives
-            await transport.read()
-        assert not transport.is_open
+        answered = asyncio.get_running_loop().time()
+        await transport.write((0,) * 8)
+        assert device.asked_at - answered >= 0.0016
+
+
+@pytest.mark.parametrize("size", [600, 3000])
+async def test_a_burst_between_two_requests_is_found_out(
+    transport: ModbusTransport, device: Device, size: int
+) -> None:
+    await transport.read()
+    device.send(bytes(size))
+    for _ in range(20):
+        await asyncio.sleep(0)
+    with pytest.raises(ProtocolError, match=r"without a request|not the answer"):  # as it arrives
+        await transport.read()
+    assert not transport.is_open
 
 
 # -- a port that cannot be opened --------------------------------------------------------------------------
-
-
-def unopened(device: str) -> ModbusTransport:
-    address = parse_address(f"rtu://{device}")
-    return ModbusTransport(address, RTU_REGISTERS, connect_timeout=1.0, response_timeout=0.05)
 
 
 @pytest.mark.parametrize(

@@ -4,29 +4,25 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import AsyncIterator, Awaitable
 from functools import partial
-from typing import Any
 
 import pytest
 
-from robotiq_async.link.worker import Worker
+from robotiq_async.link.guard import Worker
 from robotiq_async.runtime.clock import now
 from robotiq_async.runtime.concurrency import LateError
-from tests.virtual import run
+
+pytestmark = pytest.mark.virtual_time
 
 
-def in_virtual_time(
-    test: Callable[[Worker], Coroutine[Any, Any, None]],
-) -> Callable[[], None]:
-    """A test in virtual time; nothing may be left running at its end."""
-
-    def virtual() -> None:
-        run(lambda: test(Worker("worker")))
-
-    virtual.__name__ = virtual.__qualname__ = test.__name__
-    virtual.__doc__ = test.__doc__
-    return virtual
+@pytest.fixture
+async def worker() -> AsyncIterator[Worker]:
+    """At the end of a test its task ends, and with it whatever waits."""
+    worker = Worker("worker")
+    yield worker
+    worker.end(nothing)
+    assert await worker.ended(1.0)
 
 
 async def nothing() -> None:
@@ -45,7 +41,6 @@ async def never() -> None:
     await asyncio.Event().wait()
 
 
-@in_virtual_time
 async def test_calls_are_made_in_order_and_in_one_task(worker: Worker) -> None:
     tasks = []
 
@@ -61,7 +56,6 @@ async def test_calls_are_made_in_order_and_in_one_task(worker: Worker) -> None:
     assert len(set(tasks)) == 1
 
 
-@in_virtual_time
 async def test_what_a_call_raises_is_raised(worker: Worker) -> None:
     async def fail() -> None:
         raise KeyError("why")
@@ -80,11 +74,8 @@ async def test_what_a_call_raises_is_raised(worker: Worker) -> None:
         await worker.call(cancel_itself, 1.0)
     with pytest.raises(TypeError):
         await worker.call(lambda: 3, 1.0)  # type: ignore[arg-type,return-value]
-    worker.end(nothing)
-    assert await worker.ended(1.0)
 
 
-@in_virtual_time
 async def test_a_late_call_is_cancelled_and_the_next_goes_on_in_its_task(worker: Worker) -> None:
     async def in_time() -> int:
         async with asyncio.timeout(0.5):  # relies on the task not having been cancelled before
@@ -98,11 +89,8 @@ async def test_a_late_call_is_cancelled_and_the_next_goes_on_in_its_task(worker:
         await worker.call(never, 0.1)
     assert now() - began == pytest.approx(0.1)
     assert await worker.call(in_time, 1.0) == 0
-    worker.end(nothing)
-    assert await worker.ended(1.0)
 
 
-@in_virtual_time
 async def test_a_call_that_does_not_end_is_not_waited_for_and_nothing_is_made_meanwhile(
     worker: Worker,
 ) -> None:
@@ -123,18 +111,14 @@ async def test_a_call_that_does_not_end_is_not_waited_for_and_nothing_is_made_me
     assert made == ["end"]
 
 
-@in_virtual_time
 async def test_whoever_is_cancelled_gives_up_the_call(worker: Worker) -> None:
     waiting = asyncio.create_task(worker.call(never, 10.0))
     await asyncio.sleep(0.1)
     waiting.cancel()
     with pytest.raises(asyncio.CancelledError):
         await waiting
-    worker.end(nothing)
-    assert await worker.ended(0.1)
 
 
-@in_virtual_time
 async def test_a_call_after_the_end_begins_anew(worker: Worker) -> None:
     for _ in range(2):
         await worker.call(nothing, 1.0)
@@ -143,7 +127,6 @@ async def test_a_call_after_the_end_begins_anew(worker: Worker) -> None:
     assert await worker.ended(0.0)
 
 
-@in_virtual_time
 async def test_a_call_after_a_last_one_that_waits_is_made_after_it(worker: Worker) -> None:
     until = asyncio.Event()
     with pytest.raises(LateError):
@@ -154,11 +137,8 @@ async def test_a_call_after_a_last_one_that_waits_is_made_after_it(worker: Worke
     until.set()
     await again
     assert not await worker.ended(0.1)
-    worker.end(nothing)
-    assert await worker.ended(0.1)
 
 
-@in_virtual_time
 async def test_the_task_ends_though_the_last_call_ends_it_and_calls_wait_that_were_given_up(
     worker: Worker,
 ) -> None:

@@ -54,8 +54,7 @@ class Bench:
         self.write(go=True, axes=axes, **changes)
 
     def activate(self, **changes: Any) -> None:
-        self.write(activate=True, **changes)
-        self.settle()
+        self.write_and_settle(activate=True, **changes)
         assert self.status.initialization is Initialization.COMPLETE
 
     def activate_individually(self) -> None:
@@ -70,9 +69,16 @@ class Bench:
             self.wait(0.05)
             assert self.now < end, "it never stops moving"
 
-    def close(self, position: int = 255, **options: Any) -> None:
+    def reach(self, positions: int | dict[Finger, int], **options: Any) -> None:
         """Go there and wait for the end of the motion."""
-        self.go(position, **options)
+        self.go(positions, **options)
+        self.settle()
+
+    def close(self, **options: Any) -> None:
+        self.reach(255, **options)
+
+    def write_and_settle(self, **changes: Any) -> None:
+        self.write(**changes)
         self.settle()
 
     @property

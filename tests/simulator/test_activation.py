@@ -39,8 +39,7 @@ def test_activation_takes_the_scissor_to_the_mode(bench: Bench, mode: int, sciss
 
 def test_failed_activation(bench: Bench) -> None:
     bench.gripper.fail_activation = True
-    bench.write(activate=True)
-    bench.settle()
+    bench.write_and_settle(activate=True)
     assert bench.fault is Fault.ACTIVATION_FAULT
     assert bench.status.initialization is Initialization.ACTIVATING
     bench.go(255)

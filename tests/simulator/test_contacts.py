@@ -28,15 +28,14 @@ def where(bench: Bench, axis: Finger) -> tuple[int, ObjectStatus]:
 def holding(individual: Bench) -> Bench:
     """Finger A holds something at 150, on its way to 200 with force 100."""
     individual.gripper.place_object(Finger.A, 150)
-    individual.go({Finger.A: 200}, force=100)
-    individual.settle()
+    individual.reach({Finger.A: 200}, force=100)
     assert individual.status.finger_status(Finger.A) is CLOSING
     return individual
 
 
 def test_a_contact_stops_only_its_axis(individual: Bench) -> None:
     individual.gripper.place_object(Finger.B, 150)
-    individual.close(220)
+    individual.reach(220)
     assert individual.positions == (220, 150, 220, 220)
     assert individual.outcomes == (ARRIVED, CLOSING, ARRIVED, ARRIVED)
 
@@ -45,11 +44,9 @@ def test_a_contact_stops_only_its_axis(individual: Bench) -> None:
 def test_every_axis_feels_both_directions(individual: Bench, axis: Finger) -> None:
     individual.gripper.place_object(axis, 180)
     individual.gripper.place_object(axis, 60, opening=True)
-    individual.go({axis: 255})
-    individual.settle()
+    individual.reach({axis: 255})
     assert where(individual, axis) == (180, CLOSING)
-    individual.go({axis: 0})
-    individual.settle()
+    individual.reach({axis: 0})
     assert where(individual, axis) == (60, OPENING)
 
 
@@ -59,8 +56,7 @@ def test_an_axis_grips_while_it_is_driven_against_what_it_touches(individual: Be
     individual.gripper.habits = Habits(lets_go_on_halt=lets_go)
     individual.gripper.place_object(Finger.A, 150)
     individual.gripper.place_object(Finger.B, 60, opening=True)
-    individual.go({Finger.B: 255})
-    individual.settle()
+    individual.reach({Finger.B: 255})
     assert not individual.gripper.grips
     individual.go({Finger.A: 200, Finger.B: 0})
     assert not individual.gripper.grips, "they are on their way"
@@ -70,8 +66,7 @@ def test_an_axis_grips_while_it_is_driven_against_what_it_touches(individual: Be
     assert not individual.gripper.grips
     assert individual.gripper.holds == (NO_AXES if lets_go else Finger.A | Finger.B)
     assert where(individual, Finger.A) == (150, CLOSING), "it stands where it was, and still tells of it"
-    individual.write(go=True)
-    individual.settle()
+    individual.write_and_settle(go=True)
     assert individual.gripper.grips == individual.gripper.holds == Finger.A | Finger.B
     individual.go({Finger.A: 150})
     assert individual.gripper.grips == individual.gripper.holds == Finger.B, "asked to be where it is: let go"
@@ -79,8 +74,7 @@ def test_an_axis_grips_while_it_is_driven_against_what_it_touches(individual: Be
 
 def test_a_request_that_ends_at_the_object_is_no_contact(individual: Bench) -> None:
     individual.gripper.place_object(Finger.A, 150)
-    individual.go({Finger.A: 150})
-    individual.settle()
+    individual.reach({Finger.A: 150})
     assert individual.status.finger_status(Finger.A) is ARRIVED
 
 
@@ -113,8 +107,7 @@ def test_what_ends_a_contact_lets_the_axis_go_on_when_the_object_is_gone(holding
         holding.write(go=False)
         holding.write(go=True)
     else:
-        holding.go({Finger.A: 100}, force=100)
-        holding.settle()
+        holding.reach({Finger.A: 100}, force=100)
         assert where(holding, Finger.A) == (100, ARRIVED)
         holding.go({Finger.A: 200}, force=100)
     assert holding.status.finger_status(Finger.A) is MOVING
@@ -142,10 +135,9 @@ def test_retargeting_to_the_reading_ends_the_contact(holding: Bench) -> None:
 def pressing(request: pytest.FixtureRequest, individual: Bench) -> Bench:
     """Finger A presses into something soft at 120, which gives way by 51 counts under full force."""
     opening = request.param is OPENING
-    individual.close(0 if not opening else 255)
+    individual.reach(0 if not opening else 255)
     individual.gripper.place_object(Finger.A, 120, opening=opening, soft=51)
-    individual.go({Finger.A: 0 if opening else 255}, force=100)
-    individual.settle()
+    individual.reach({Finger.A: 0 if opening else 255}, force=100)
     assert depth(individual) == 20
     assert individual.status.finger_status(Finger.A) is request.param
     return individual
@@ -225,8 +217,7 @@ def test_a_thin_object_takes_the_place_of_another(individual: Bench) -> None:
 def test_going_again_tries_again(holding: Bench) -> None:
     holding.write(go=False)
     holding.gripper.place_object(Finger.A, 160)
-    holding.write(go=True)
-    holding.settle()
+    holding.write_and_settle(go=True)
     assert where(holding, Finger.A) == (160, CLOSING)
 
 
@@ -234,11 +225,10 @@ def test_going_again_tries_again(holding: Bench) -> None:
 def test_an_object_placed_behind_the_axis_is_met_from_the_other_side_only(
     individual: Bench, opening: bool, start: int, on: int, far: int
 ) -> None:
-    individual.close(start)
+    individual.reach(start)
     individual.gripper.place_object(Finger.A, 150, opening=opening)
     for target, reached in ((on, on), (far, far), (on, 150)):
-        individual.go({Finger.A: target})
-        individual.settle()
+        individual.reach({Finger.A: target})
         assert individual.gripper.position(Finger.A) == reached
 
 
@@ -266,8 +256,7 @@ def test_activation_with_something_fixed_in_the_way_fails(
     bench: Bench, axis: Finger, position: int, opening: bool
 ) -> None:
     bench.gripper.place_object(axis, position, opening=opening, fixed=True)
-    bench.write(activate=True, mode=Mode.PINCH)
-    bench.settle()
+    bench.write_and_settle(activate=True, mode=Mode.PINCH)
     assert bench.fault is Fault.ACTIVATION_FAULT
     assert bench.status.initialization is Initialization.ACTIVATING
     bench.gripper.remove_object()

@@ -39,8 +39,7 @@ def test_numbers_of_numpy_are_numbers() -> None:
 
 def test_simple_control_lets_a_drive_all_fingers_and_echoes_the_own_registers(active: Bench) -> None:
     """The trap: B and C stand at 200 and echo what nothing drives them to."""
-    active.go({Finger.A: 200, Finger.B: 30, Finger.C: 40, Finger.SCISSOR: 50})
-    active.settle()
+    active.reach({Finger.A: 200, Finger.B: 30, Finger.C: 40, Finger.SCISSOR: 50})
     assert active.positions == (200, 200, 200, 137)
     assert [active.status.requested_position(axis) for axis in THREE_FINGER.axes] == [200, 30, 40, 50]
 
@@ -54,20 +53,17 @@ def test_simple_control_uses_speed_and_force_of_a(active: Bench) -> None:
 
 
 def test_raising_individual_control_under_go_hands_over_at_once(active: Bench) -> None:
-    active.go({Finger.A: 200, Finger.B: 30, Finger.C: 40, Finger.SCISSOR: 50})
-    active.settle()
+    active.reach({Finger.A: 200, Finger.B: 30, Finger.C: 40, Finger.SCISSOR: 50})
     active.write(individual_fingers=True)
     assert active.gripper.is_moving
     active.settle()
     assert active.positions == (200, 30, 40, 137)
-    active.write(individual_scissor=True)
-    active.settle()
+    active.write_and_settle(individual_scissor=True)
     assert active.positions == (200, 30, 40, 50)
 
 
 def test_raising_individual_control_with_loaded_registers_moves_nothing(active: Bench) -> None:
-    active.go(200)
-    active.settle()
+    active.reach(200)
     active.write(axes=tuple(AxisRequest(active.gripper.position(axis)) for axis in THREE_FINGER.axes))
     before = [active.gripper.travel(axis) for axis in THREE_FINGER.axes]
     active.write(individual_fingers=True, individual_scissor=True)
@@ -77,7 +73,7 @@ def test_raising_individual_control_with_loaded_registers_moves_nothing(active: 
 
 @pytest.mark.parametrize(("mode", "scissor"), [(Mode.PINCH, 219), (Mode.WIDE, 24), (Mode.SCISSOR, 6)])
 def test_mode_change_opens_first_and_returns(active: Bench, mode: Mode, scissor: int) -> None:
-    active.close(100)
+    active.reach(100)
     active.write(mode=mode)
     status = active.status
     assert status.initialization is Initialization.CHANGING_MODE
@@ -96,7 +92,7 @@ def test_mode_change_opens_first_and_returns(active: Bench, mode: Mode, scissor:
 
 
 def test_mode_change_without_go_leaves_the_fingers_open(active: Bench) -> None:
-    active.close(100)
+    active.reach(100)
     active.write(go=False, mode=Mode.WIDE)
     assert active.fault is Fault.NONE
     active.settle()
@@ -105,13 +101,11 @@ def test_mode_change_without_go_leaves_the_fingers_open(active: Bench) -> None:
 
 
 def test_the_limit_of_the_pinch_mode_ends_with_the_mode(active: Bench) -> None:
-    active.write(mode=Mode.PINCH)
-    active.settle()
-    active.close(120)
+    active.write_and_settle(mode=Mode.PINCH)
+    active.reach(120)
     assert active.positions == (113, 113, 113, 219)
     assert active.outcomes == (ObjectStatus.AT_POSITION,) * 4
-    active.write(individual_fingers=True)
-    active.settle()
+    active.write_and_settle(individual_fingers=True)
     assert active.positions == (113, 113, 113, 219), "fingers of their own in the pinch mode"
     active.write(individual_scissor=True)
     assert active.outcomes == (ObjectStatus.IN_MOTION,) * 4
@@ -120,37 +114,31 @@ def test_the_limit_of_the_pinch_mode_ends_with_the_mode(active: Bench) -> None:
 
 
 def test_a_contact_outlasts_the_limit_of_the_pinch_mode(active: Bench) -> None:
-    active.write(mode=Mode.PINCH)
-    active.settle()
+    active.write_and_settle(mode=Mode.PINCH)
     active.gripper.place_object(Finger.B, 100)
-    active.close(120)
-    active.write(individual_fingers=True, individual_scissor=True)
-    active.settle()
+    active.reach(120)
+    active.write_and_settle(individual_fingers=True, individual_scissor=True)
     assert active.positions == (120, 100, 120, 120)
     assert active.outcomes[1] is ObjectStatus.CONTACT_CLOSING
 
 
 def test_scissor_mode_grips_with_the_scissor_alone(active: Bench) -> None:
-    active.write(mode=Mode.SCISSOR)
-    active.settle()
+    active.write_and_settle(mode=Mode.SCISSOR)
     fingers = [active.gripper.travel(axis) for axis in THREE_FINGER.axes[:3]]
     active.close()
     assert active.positions == (6, 6, 6, 232)
     assert active.outcomes == (ObjectStatus.AT_POSITION,) * 4
-    active.close(0)
+    active.reach(0)
     assert active.positions == (6, 6, 6, 15)
     assert [active.gripper.travel(axis) for axis in THREE_FINGER.axes[:3]] == fingers
 
 
 def test_scissor_mode_leaves_the_fingers_where_they_are_also_under_individual_control(active: Bench) -> None:
     """Individual control of the fingers, except in the scissor mode without that of the scissor (manual)."""
-    active.write(mode=Mode.SCISSOR)
-    active.settle()
-    active.go({Finger.A: 50, Finger.B: 100, Finger.C: 150}, individual_fingers=True)
-    active.settle()
+    active.write_and_settle(mode=Mode.SCISSOR)
+    active.reach({Finger.A: 50, Finger.B: 100, Finger.C: 150}, individual_fingers=True)
     assert active.positions == (6, 6, 6, 50)
-    active.write(individual_scissor=True)
-    active.settle()
+    active.write_and_settle(individual_scissor=True)
     assert active.positions[:3] == (50, 100, 150)
 
 
@@ -166,8 +154,7 @@ def test_the_mode_is_ignored_under_individual_scissor_control(individual: Bench)
 def test_another_mode_on_the_way_replaces_the_first(active: Bench) -> None:
     active.write(mode=Mode.PINCH)
     active.wait(0.1)
-    active.write(mode=Mode.WIDE)
-    active.settle()
+    active.write_and_settle(mode=Mode.WIDE)
     assert active.positions[3] == 24
 
 
@@ -184,14 +171,12 @@ def test_individual_scissor_control_abandons_a_mode_change(active: Bench) -> Non
 
 def test_a_mode_change_during_activation_follows_it(bench: Bench) -> None:
     bench.write(activate=True)
-    bench.write(mode=Mode.PINCH)
-    bench.settle()
+    bench.write_and_settle(mode=Mode.PINCH)
     assert bench.positions == (6, 6, 6, 219)
     assert bench.status.initialization is Initialization.COMPLETE
 
 
 def test_leaving_pinch_gives_the_fingers_their_stroke_back(bench: Bench) -> None:
     bench.activate(mode=Mode.PINCH)
-    bench.go(255, mode=Mode.BASIC)
-    bench.settle()
+    bench.reach(255, mode=Mode.BASIC)
     assert bench.positions == (241, 241, 241, 137)

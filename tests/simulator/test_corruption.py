@@ -9,6 +9,7 @@ import pytest
 from robotiq_async.simulator import Trouble
 from robotiq_async.simulator.troubles.corruption import Parts, Reply
 from robotiq_async.simulator.troubles.trouble import KINDS
+from tests.serial_line import with_crc
 
 READ = "04 04 1234 5678"
 """Two registers, as an answer to FC04."""
@@ -25,14 +26,8 @@ def tcp(pdu: str, *, transaction: str = "0a0b", protocol: str = "0000", unit: st
 
 
 def rtu(pdu: str, *, unit: str = "09") -> bytes:
-    """A Modbus RTU frame with its CRC-16/MODBUS, low byte first."""
-    body = bytes.fromhex(unit + pdu)
-    crc = 0xFFFF
-    for byte in body:
-        crc ^= byte
-        for _ in range(8):
-            crc = crc >> 1 ^ (0xA001 if crc & 1 else 0)
-    return body + crc.to_bytes(2, "little")
+    """A Modbus RTU frame."""
+    return with_crc(bytes.fromhex(unit + pdu))
 
 
 def corrupted(kind: str, frame: bytes, *, serial: bool = False, value: float | None = None) -> Parts:

@@ -63,7 +63,7 @@ def test_the_peak_of_a_contact_grows_with_the_force(active: Bench) -> None:
     active.gripper.place_object(Finger.ABC, 150)
     peaks = []
     for force in (0, 64, 128, 255):
-        active.close(0)
+        active.reach(0)
         active.go(255, force=force)
         peaks.append(max(course(active, Finger.A)))
     assert peaks == sorted(set(peaks))
@@ -75,7 +75,7 @@ def test_on_something_rigid_the_peak_is_there_at_once_in_foam_it_takes_time(acti
     risen = {}
     for soft in (0, 40):
         active.gripper.place_object(Finger.ABC, 150, soft=soft)
-        active.close(0)
+        active.reach(0)
         active.go(255, force=255)
         seen = course(active, Finger.A)
         above = [current for current in seen if current > 0x0F]

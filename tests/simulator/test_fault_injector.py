@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import re
 import struct
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
@@ -12,7 +13,14 @@ from typing import Any
 
 import pytest
 
-from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, Trouble
+from robotiq_async.runtime.clock import now
+from robotiq_async.simulator import (
+    RtuOverTcpSimulatorServer,
+    SerialSimulatorServer,
+    SimulatedGripper,
+    SimulatorServer,
+    Trouble,
+)
 from robotiq_async.simulator import parse_troubles as plan_of
 from robotiq_async.simulator.server.endpoint import SimulatorEndpoint
 from robotiq_async.simulator.troubles.trouble import KINDS
@@ -23,18 +31,21 @@ from robotiq_async.values.status import RobotiqStatus
 from tests.simulator.test_serial_frames import READ as READ_SERIAL
 from tests.simulator.test_serial_frames import RESET_READING, line
 from tests.simulator.test_server import RawClient, raw_client
-from tests.virtual import virtual
+
+pytestmark = pytest.mark.virtual_time
 
 READ = bytes.fromhex("04 0000 0001")
 AXES_ASKED = tuple(AxisRequest(10 * n, 100 + n, 200 + n) for n in range(1, 5))
 ACTIVE = Request(activate=True, axes=AXES_ASKED, individual_fingers=False, individual_scissor=False)
-ONLY_ON = dict.fromkeys(
-    (
+MISFITS = {
+    "tcp": {"wrong-checksum"},
+    "rtu": {
         *("wrong-transaction", "wrong-protocol", "exception", "reset", "close", "accept-silence", "refuse"),
         *("multiplexer", "wake-needed", "one-connection-only"),
-    ),
-    "tcp",
-) | {"wrong-checksum": "rtu"}
+    },
+    "rtu+tcp": {"wrong-transaction", "wrong-protocol", "exception"},
+}
+"""What cannot happen on a kind of link."""
 
 
 @asynccontextmanager
@@ -43,6 +54,18 @@ async def simulator(**options: Any) -> AsyncIterator[SimulatorServer]:
     gripper = SimulatedGripper(asyncio.get_running_loop().time, spread=False, **options)
     async with SimulatorServer(gripper) as server:
         yield server
+
+
+@pytest.fixture
+async def server() -> AsyncIterator[SimulatorServer]:
+    async with simulator() as server:
+        yield server
+
+
+@pytest.fixture
+async def client(server: SimulatorServer) -> AsyncIterator[RawClient]:
+    async with raw_client(server) as client:
+        yield client
 
 
 @asynccontextmanager
@@ -105,148 +128,117 @@ async def activate(server: SimulatorServer) -> None:
 # Replies.
 
 
-@virtual
-async def test_the_lost_reply_to_a_write() -> None:
-    async with simulator() as server, raw_client(server) as client:
-        lost = await server.fault_injector.begin(Trouble("drop", on="write"))
+async def test_the_lost_reply_to_a_write(server: SimulatorServer, client: RawClient) -> None:
+    lost = await server.fault_injector.begin(Trouble("drop", on="write"))
+    assert await is_answered(client)
+    assert not await is_answered(client, write(5))
+    assert server.gripper.request_registers[1] == 5, "it was carried out"
+    assert await is_answered(client, write(6))
+    assert lost.hits == 1
+    assert server.fault_injector.ongoing == ()
+
+
+async def test_all_replies_are_lost_until_the_last_of_two_ends(
+    server: SimulatorServer, client: RawClient
+) -> None:
+    one, other = [await server.fault_injector.begin(Trouble("drop", lasts=60)) for _ in range(2)]
+    assert [await is_answered(client) for _ in range(3)] == [False] * 3
+    assert (one.hits, other.hits) == (3, 0)
+    assert server.fault_injector.ongoing == (one, other)
+    await server.fault_injector.end(one)
+    assert server.fault_injector.ongoing == (other,)
+    assert not await is_answered(client)
+    await server.fault_injector.end(other)
+    assert await is_answered(client)
+
+
+async def test_the_oldest_trouble_acts(server: SimulatorServer, client: RawClient) -> None:
+    older = await server.fault_injector.begin(Trouble("delay", 0.3, on="read"))
+    newer = await server.fault_injector.begin(Trouble("drop"))
+    began = now()
+    assert await is_answered(client)
+    assert now() - began == pytest.approx(0.3, abs=0.01)
+    assert (older.hits, newer.hits) == (1, 0)
+    assert not await is_answered(client, write(5)), "the older one is not about writes"
+    assert server.fault_injector.ongoing == (older,)
+
+
+async def test_the_policy_decides_on_replies_that_no_trouble_is_about(
+    server: SimulatorServer, client: RawClient
+) -> None:
+    seen: list[bytes] = []
+
+    def policy(reply: bytes) -> list[tuple[float, bytes]]:
+        seen.append(reply)
+        return [(0.0, reply)]
+
+    server.policy = policy
+    async with server.fault_injector.making(Trouble("delay", 0.1, on="read")):
         assert await is_answered(client)
-        assert not await is_answered(client, write(5))
-        assert server.gripper.request_registers[1] == 5, "it was carried out"
-        assert await is_answered(client, write(6))
-        assert lost.hits == 1
-        assert server.fault_injector.ongoing == ()
-
-
-@virtual
-async def test_all_replies_are_lost_until_the_last_of_two_ends() -> None:
-    async with simulator() as server, raw_client(server) as client:
-        injector = server.fault_injector
-        one, other = [await injector.begin(Trouble("drop", lasts=60)) for _ in range(2)]
-        assert [await is_answered(client) for _ in range(3)] == [False] * 3
-        assert (one.hits, other.hits) == (3, 0)
-        assert injector.ongoing == (one, other)
-        await injector.end(one)
-        assert injector.ongoing == (other,)
-        assert not await is_answered(client)
-        await injector.end(other)
-        assert await is_answered(client)
-
-
-@virtual
-async def test_the_oldest_trouble_acts() -> None:
-    async with simulator() as server, raw_client(server) as client:
-        loop = asyncio.get_running_loop()
-        older = await server.fault_injector.begin(Trouble("delay", 0.3, on="read"))
-        newer = await server.fault_injector.begin(Trouble("drop"))
-        began = loop.time()
-        assert await is_answered(client)
-        assert loop.time() - began == pytest.approx(0.3, abs=0.01)
-        assert (older.hits, newer.hits) == (1, 0)
-        assert not await is_answered(client, write(5)), "the older one is not about writes"
-        assert server.fault_injector.ongoing == (older,)
-
-
-@virtual
-async def test_the_policy_decides_on_replies_that_no_trouble_is_about() -> None:
-    async with simulator() as server, raw_client(server) as client:
-        seen: list[bytes] = []
-
-        def policy(reply: bytes) -> list[tuple[float, bytes]]:
-            seen.append(reply)
-            return [(0.0, reply)]
-
-        server.policy = policy
-        async with server.fault_injector.making(Trouble("delay", 0.1, on="read")):
-            assert await is_answered(client)
-            assert seen == []
-            assert await is_answered(client, write(5))
-        assert await is_answered(client)
+        assert seen == []
+        assert await is_answered(client, write(5))
+    assert await is_answered(client)
     assert [reply[7] for reply in seen] == [6, 4]
 
 
 # Requests and connections.
 
 
-@virtual
-async def test_in_silence_nothing_is_heard_and_connections_stay() -> None:
-    async with simulator() as server, raw_client(server) as client:
-        async with server.fault_injector.making(Trouble("silence")) as silence:
-            assert not await is_answered(client, write(5))
-            assert not await is_answered(client)
-            assert not await is_let_in(server), "new connections are accepted and not answered"
-            assert silence.hits == 3
-        assert await is_answered(client)
-        assert server.gripper.writes == ()
-
-
-@virtual
-async def test_silence_for_once_is_one_request_that_is_not_heard() -> None:
-    async with simulator() as server, raw_client(server) as client:
-        await server.fault_injector.begin(Trouble("silence", lasts=0))
+async def test_in_silence_nothing_is_heard_and_connections_stay(
+    server: SimulatorServer, client: RawClient
+) -> None:
+    async with server.fault_injector.making(Trouble("silence")) as silence:
         assert not await is_answered(client, write(5))
-        assert await is_answered(client, write(6))
-        assert [each.registers[1] for each in server.gripper.writes] == [6]
+        assert not await is_answered(client)
+        assert not await is_let_in(server), "new connections are accepted and not answered"
+        assert silence.hits == 3
+    assert await is_answered(client)
+    assert server.gripper.writes == ()
 
 
-@pytest.mark.parametrize("kind", ["reset", "close", "accept-silence", "refuse", "power-cut"])
-async def test_connections_are_cut_and_new_ones_welcome_afterwards(kind: str) -> None:
-    async with SimulatorServer() as server, raw_client(server) as one, raw_client(server) as other:
-        port = server.port
-        for client in (one, other):
-            await client.read_status()
-        async with server.fault_injector.making(Trouble(kind)), asyncio.timeout(5):
-            for client in (one, other):
-                if kind == "close":
-                    assert await client.reader.read() == b"", "closed in order"
-                else:
-                    with pytest.raises(ConnectionResetError):
-                        await client.reader.read()
-            if kind in ("refuse", "power-cut"):
-                with pytest.raises(ConnectionRefusedError):
-                    await asyncio.open_connection("127.0.0.1", port)
-        assert server.port == port
-        async with raw_client(server) as client:
-            assert (await client.read_status()).is_reset
+async def test_silence_for_once_is_one_request_that_is_not_heard(
+    server: SimulatorServer, client: RawClient
+) -> None:
+    await server.fault_injector.begin(Trouble("silence", lasts=0))
+    assert not await is_answered(client, write(5))
+    assert await is_answered(client, write(6))
+    assert [each.registers[1] for each in server.gripper.writes] == [6]
 
 
-@virtual
-async def test_accepted_in_silence_and_answered_after_it() -> None:
-    async with simulator() as server:
-        silence = await server.fault_injector.begin(Trouble("accept-silence"))
-        async with raw_client(server) as client:
-            assert not await is_answered(client, write(5))
-            assert server.gripper.writes == ()
-            await server.fault_injector.end(silence)
-            assert await is_answered(client)
+async def test_accepted_in_silence_and_answered_after_it(server: SimulatorServer) -> None:
+    silence = await server.fault_injector.begin(Trouble("accept-silence"))
+    async with raw_client(server) as client:
+        assert not await is_answered(client, write(5))
+        assert server.gripper.writes == ()
+        await server.fault_injector.end(silence)
+        assert await is_answered(client)
 
 
-@virtual
-async def test_without_power_the_gripper_forgets_everything() -> None:
-    async with simulator() as server:
-        await activate(server)
-        async with server.fault_injector.making(Trouble("power-cut")):
-            assert not server.gripper.is_powered
-            assert not await is_let_in(server)
-        assert server.gripper.is_powered
-        assert await is_let_in(server)
-        assert status(server).is_reset
-        assert server.gripper.request_registers == (0,) * 8
+async def test_without_power_the_gripper_forgets_everything(server: SimulatorServer) -> None:
+    await activate(server)
+    async with server.fault_injector.making(Trouble("power-cut")):
+        assert not server.gripper.is_powered
+        assert not await is_let_in(server)
+    assert server.gripper.is_powered
+    assert await is_let_in(server)
+    assert status(server).is_reset
+    assert server.gripper.request_registers == (0,) * 8
 
 
-@virtual
 @pytest.mark.parametrize("first", ["refuse", "power-cut"])
 @pytest.mark.parametrize("second", ["refuse", "power-cut"])
 @pytest.mark.parametrize("in_order", [True, False])
-async def test_refused_until_the_last_of_two_ends(first: str, second: str, in_order: bool) -> None:
-    async with simulator() as server:
-        begun = [await server.fault_injector.begin(Trouble(kind)) for kind in (first, second)]
-        ending, lasting = begun if in_order else begun[::-1]
-        await server.fault_injector.end(ending)
-        assert not await is_let_in(server)
-        assert server.gripper.is_powered == (lasting.trouble.kind == "refuse")
-        await server.fault_injector.end(lasting)
-        assert await is_let_in(server)
-        assert server.gripper.is_powered
+async def test_refused_until_the_last_of_two_ends(
+    server: SimulatorServer, first: str, second: str, in_order: bool
+) -> None:
+    begun = [await server.fault_injector.begin(Trouble(kind)) for kind in (first, second)]
+    ending, lasting = begun if in_order else begun[::-1]
+    await server.fault_injector.end(ending)
+    assert not await is_let_in(server)
+    assert server.gripper.is_powered == (lasting.trouble.kind == "refuse")
+    await server.fault_injector.end(lasting)
+    assert await is_let_in(server)
+    assert server.gripper.is_powered
 
 
 async def ask_and_go(server: SimulatorServer, pdu: bytes = READ) -> bytes:
@@ -258,74 +250,64 @@ async def ask_and_go(server: SimulatorServer, pdu: bytes = READ) -> bytes:
     return request
 
 
-@virtual
-async def test_a_multiplexer_hands_late_replies_to_the_next_client() -> None:
-    async with simulator() as server:
-        await server.fault_injector.begin(Trouble("multiplexer", 0.1))
-        request = await ask_and_go(server)
-        await asyncio.sleep(1)
-        async with raw_client(server) as client:
-            transaction, _, answer = await client.reply()
-            assert (transaction, answer[0]) == (int.from_bytes(request[:2], "big"), request[7])
-            assert await is_answered(client), "its own follow"
-        async with raw_client(server) as client:
-            assert await is_answered(client), "nothing comes twice"
+async def test_a_multiplexer_hands_late_replies_to_the_next_client(server: SimulatorServer) -> None:
+    await server.fault_injector.begin(Trouble("multiplexer", 0.1))
+    request = await ask_and_go(server)
+    await asyncio.sleep(1)
+    async with raw_client(server) as client:
+        transaction, _, answer = await client.reply()
+        assert (transaction, answer[0]) == (int.from_bytes(request[:2], "big"), request[7])
+        assert await is_answered(client), "its own follow"
+    async with raw_client(server) as client:
+        assert await is_answered(client), "nothing comes twice"
 
 
-@virtual
-async def test_a_multiplexer_hands_a_late_reply_to_whoever_is_connected_then() -> None:
-    async with simulator() as server:
-        loop = asyncio.get_running_loop()
-        await server.fault_injector.begin(Trouble("multiplexer"))
-        began = loop.time()
-        await ask_and_go(server, write(5))
-        assert server.gripper.request_registers[1] == 5, "it was carried out"
-        async with raw_client(server), raw_client(server) as newest:
-            assert (await newest.reply())[2][0] == 6
-        assert loop.time() - began == pytest.approx(0.7, abs=0.01)
+async def test_a_multiplexer_hands_a_late_reply_to_whoever_is_connected_then(server: SimulatorServer) -> None:
+    await server.fault_injector.begin(Trouble("multiplexer"))
+    began = now()
+    await ask_and_go(server, write(5))
+    assert server.gripper.request_registers[1] == 5, "it was carried out"
+    async with raw_client(server), raw_client(server) as newest:
+        assert (await newest.reply())[2][0] == 6
+    assert now() - began == pytest.approx(0.7, abs=0.01)
 
 
-@virtual
 @pytest.mark.parametrize("kind", ["multiplexer", "delay"])
-async def test_without_a_multiplexer_replies_of_clients_that_are_gone_are_lost(kind: str) -> None:
-    async with simulator() as server:
-        async with server.fault_injector.making(Trouble(kind, 0.1)):
-            await ask_and_go(server)
-            await asyncio.sleep(0.2 if kind == "multiplexer" else 0)
-        await asyncio.sleep(0.2)
-        async with raw_client(server) as client:
-            assert await is_answered(client)
+async def test_without_a_multiplexer_replies_of_clients_that_are_gone_are_lost(
+    server: SimulatorServer, kind: str
+) -> None:
+    async with server.fault_injector.making(Trouble(kind, 0.1)):
+        await ask_and_go(server)
+        await asyncio.sleep(0.2 if kind == "multiplexer" else 0)
+    await asyncio.sleep(0.2)
+    async with raw_client(server) as client:
+        assert await is_answered(client)
 
 
-@virtual
-async def test_a_multiplexer_keeps_no_more_than_a_hundred_replies() -> None:
-    async with simulator() as server:
-        await server.fault_injector.begin(Trouble("multiplexer", 0.1))
-        async with raw_client(server) as client:
-            client.writer.write(b"".join(client.frame(READ) for _ in range(300)))
-            await asyncio.sleep(0.05)
-        await asyncio.sleep(1)
-        async with raw_client(server) as client:
-            assert [(await client.reply())[0] for _ in range(100)] == list(range(201, 301))
-            assert await is_answered(client)
+async def test_a_multiplexer_keeps_no_more_than_a_hundred_replies(server: SimulatorServer) -> None:
+    await server.fault_injector.begin(Trouble("multiplexer", 0.1))
+    async with raw_client(server) as client:
+        client.writer.write(b"".join(client.frame(READ) for _ in range(300)))
+        await asyncio.sleep(0.05)
+    await asyncio.sleep(1)
+    async with raw_client(server) as client:
+        assert [(await client.reply())[0] for _ in range(100)] == list(range(201, 301))
+        assert await is_answered(client)
 
 
-@virtual
 @pytest.mark.parametrize("kind", ["refuse", "power-cut"])
-async def test_ending_it_does_not_start_a_server_that_was_stopped(kind: str) -> None:
-    async with simulator() as server:
-        begun = await server.fault_injector.begin(Trouble(kind))
-        await server.stop()
-        await server.fault_injector.end(begun)
-        assert not server.is_running
-        assert server.gripper.is_powered
-        assert not await is_let_in(server)
+async def test_ending_it_does_not_start_a_server_that_was_stopped(server: SimulatorServer, kind: str) -> None:
+    begun = await server.fault_injector.begin(Trouble(kind))
+    await server.stop()
+    await server.fault_injector.end(begun)
+    assert not server.is_running
+    assert server.gripper.is_powered
+    assert not await is_let_in(server)
 
 
 # Troubles that overlap.
 
 
-@virtual
 @pytest.mark.parametrize(
     ("kind", "request_"),
     [
@@ -335,25 +317,23 @@ async def test_ending_it_does_not_start_a_server_that_was_stopped(kind: str) -> 
         ("wrong-echo", "10 0000 0009 12" + "00" * 18),
     ],
 )
-async def test_a_refusal_is_not_corrupted(kind: str, request_: str) -> None:
-    async with simulator() as server, raw_client(server) as client:
-        begun = await server.fault_injector.begin(Trouble(kind))
-        assert (await client.ask(bytes.fromhex(request_)))[0] & 0x80
-        assert begun.hits == 0
+async def test_a_refusal_is_not_corrupted(
+    server: SimulatorServer, client: RawClient, kind: str, request_: str
+) -> None:
+    begun = await server.fault_injector.begin(Trouble(kind))
+    assert (await client.ask(bytes.fromhex(request_)))[0] & 0x80
+    assert begun.hits == 0
 
 
-@virtual
-async def test_two_slow_devices_are_both_undone() -> None:
-    async with simulator() as server:
-        one = await server.fault_injector.begin(Trouble("slow-device", 0.2))
-        other = await server.fault_injector.begin(Trouble("slow-device", 0.5))
-        await server.fault_injector.end(one)
-        assert server.gripper.device_cycle == 0.5, "the other one lasts"
-        await server.fault_injector.end(other)
-        assert server.gripper.device_cycle == 0.005
+async def test_two_slow_devices_are_both_undone(server: SimulatorServer) -> None:
+    one = await server.fault_injector.begin(Trouble("slow-device", 0.2))
+    other = await server.fault_injector.begin(Trouble("slow-device", 0.5))
+    await server.fault_injector.end(one)
+    assert server.gripper.device_cycle == 0.5, "the other one lasts"
+    await server.fault_injector.end(other)
+    assert server.gripper.device_cycle == 0.005
 
 
-@virtual
 @pytest.mark.parametrize(
     ("first", "second", "left"),
     [
@@ -362,59 +342,41 @@ async def test_two_slow_devices_are_both_undone() -> None:
         ("fault 9", "fault 14", 9),
     ],
 )
-async def test_a_fault_outlasts_another(first: str, second: str, left: int) -> None:
-    async with simulator() as server:
-        (lasting,), (ending,) = plan_of(first), plan_of(second)
-        async with server.fault_injector.making(lasting):
-            async with server.fault_injector.making(ending):
-                pass
-            assert status(server).fault is Fault(left)
+async def test_a_fault_outlasts_another(server: SimulatorServer, first: str, second: str, left: int) -> None:
+    (lasting,), (ending,) = plan_of(first), plan_of(second)
+    async with server.fault_injector.making(lasting):
+        async with server.fault_injector.making(ending):
+            pass
+        assert status(server).fault is Fault(left)
 
 
-@virtual
-async def test_a_plan_waits_for_what_happens_once() -> None:
-    async with simulator() as server, raw_client(server) as client:
-        plan = asyncio.create_task(server.fault_injector.run(plan_of("drop")))
-        await asyncio.sleep(100)
-        assert not plan.done()
-        assert not await is_answered(client)
-        await plan
-        assert server.fault_injector.ongoing == ()
-
-
-@pytest.mark.parametrize("turns", range(5))
-async def test_cancelled_while_it_ends_clients_are_let_in_and_the_server_can_stop(turns: int) -> None:
-    server = SimulatorServer()
-    async with server:
-        begun = await server.fault_injector.begin(Trouble("refuse"))
-        ending = asyncio.create_task(server.fault_injector.end(begun))
-        for _ in range(turns):
-            await asyncio.sleep(0)
-        await cancelled(ending)
-        await server.fault_injector.end(begun)
-        assert await is_let_in(server)
-    assert not await is_let_in(server)
+async def test_a_plan_waits_for_what_happens_once(server: SimulatorServer, client: RawClient) -> None:
+    plan = asyncio.create_task(server.fault_injector.run(plan_of("drop")))
+    await asyncio.sleep(100)
+    assert not plan.done()
+    assert not await is_answered(client)
+    await plan
+    assert server.fault_injector.ongoing == ()
 
 
 # The gripper.
 
 
-@virtual
 @pytest.mark.parametrize(("value", "position"), [(None, 128), (0, 0)])
-async def test_another_client_sends_all_axes_somewhere(value: int | None, position: int) -> None:
-    async with simulator() as server:
-        await activate(server)
-        await server.fault_injector.begin(Trouble("foreign", value))
-        assert server.fault_injector.ongoing == ()
-        image = Request.from_registers(server.gripper.request_registers)
-        assert (image.activate, image.go) == (True, True)
-        assert image.axes == tuple(replace(axis, position=position) for axis in AXES_ASKED)
-        await asyncio.sleep(60)
-        reached = [server.gripper.position(axis) for axis in THREE_FINGER.axes]
-        assert reached == [max(position, 6)] * 3 + [max(position, 15)]
+async def test_another_client_sends_all_axes_somewhere(
+    server: SimulatorServer, value: int | None, position: int
+) -> None:
+    await activate(server)
+    await server.fault_injector.begin(Trouble("foreign", value))
+    assert server.fault_injector.ongoing == ()
+    image = Request.from_registers(server.gripper.request_registers)
+    assert (image.activate, image.go) == (True, True)
+    assert image.axes == tuple(replace(axis, position=position) for axis in AXES_ASKED)
+    await asyncio.sleep(60)
+    reached = [server.gripper.position(axis) for axis in THREE_FINGER.axes]
+    assert reached == [max(position, 6)] * 3 + [max(position, 15)]
 
 
-@virtual
 @pytest.mark.parametrize(("value", "seconds"), [(None, 0.2), (1.5, 1.5)])
 async def test_requests_to_a_slow_device_take_effect_later(value: float | None, seconds: float) -> None:
     async with simulator(speedup=5, device_cycle=0.02) as server:
@@ -427,101 +389,92 @@ async def test_requests_to_a_slow_device_take_effect_later(value: float | None, 
         assert server.gripper.device_cycle == 0.02
 
 
-@virtual
 @pytest.mark.parametrize(
     ("words", "at_once", "in_a_minute"),
     [("fault", 9, 9), ("fault 15", 15, 15), ("interference", 10, 14), ("release", 11, 15)],
 )
-async def test_a_fault_is_reported(words: str, at_once: int, in_a_minute: int) -> None:
-    async with simulator() as server:
-        await activate(server)
-        (trouble,) = plan_of(words)
-        async with server.fault_injector.making(trouble):
-            assert status(server).fault == Fault(at_once)
-            await asyncio.sleep(60)
-            assert status(server).fault == Fault(in_a_minute)
-        if words != "release":  # an event, which nothing undoes
-            assert status(server).fault is Fault.NONE
-        assert server.fault_injector.ongoing == ()
+async def test_a_fault_is_reported(
+    server: SimulatorServer, words: str, at_once: int, in_a_minute: int
+) -> None:
+    await activate(server)
+    (trouble,) = plan_of(words)
+    async with server.fault_injector.making(trouble):
+        assert status(server).fault == Fault(at_once)
+        await asyncio.sleep(60)
+        assert status(server).fault == Fault(in_a_minute)
+    if words != "release":  # an event, which nothing undoes
+        assert status(server).fault is Fault.NONE
+    assert server.fault_injector.ongoing == ()
 
 
-@virtual
-async def test_an_idle_gripper_loses_its_activation() -> None:
-    async with simulator() as server, raw_client(server) as client:
-        await activate(server)
-        async with server.fault_injector.making(Trouble("idle-reset", 2)):
+async def test_an_idle_gripper_loses_its_activation(server: SimulatorServer, client: RawClient) -> None:
+    await activate(server)
+    async with server.fault_injector.making(Trouble("idle-reset", 2)):
+        await asyncio.sleep(1.9)
+        for _ in range(5):
+            assert await is_answered(client), "a request, whatever it asks"
             await asyncio.sleep(1.9)
-            for _ in range(5):
-                assert await is_answered(client), "a request, whatever it asks"
-                await asyncio.sleep(1.9)
-                assert status(server).is_activated
-            await asyncio.sleep(0.2)
-            assert status(server).is_reset
-            assert server.gripper.request_registers == (0,) * 8
-            assert await is_answered(client), "the connection stays"
-        await activate(server)
-        await asyncio.sleep(100)
-        assert status(server).is_activated, "it is over"
+            assert status(server).is_activated
+        await asyncio.sleep(0.2)
+        assert status(server).is_reset
+        assert server.gripper.request_registers == (0,) * 8
+        assert await is_answered(client), "the connection stays"
+    await activate(server)
+    await asyncio.sleep(100)
+    assert status(server).is_activated, "it is over"
 
 
-@virtual
 @pytest.mark.parametrize(
     ("silent", "is_reset"), [(Trouble("silence"), True), (Trouble("drop", lasts=9), False)]
 )
-async def test_what_is_not_heard_is_no_request(silent: Trouble, is_reset: bool) -> None:
-    async with simulator() as server, raw_client(server) as client:
-        await activate(server)
-        async with (
-            server.fault_injector.making(Trouble("idle-reset", 2)),
-            server.fault_injector.making(silent),
-        ):
-            for _ in range(5):
-                assert not await is_answered(client)
-            assert status(server).is_reset is is_reset
+async def test_what_is_not_heard_is_no_request(
+    server: SimulatorServer, client: RawClient, silent: Trouble, is_reset: bool
+) -> None:
+    await activate(server)
+    async with (
+        server.fault_injector.making(Trouble("idle-reset", 2)),
+        server.fault_injector.making(silent),
+    ):
+        for _ in range(5):
+            assert not await is_answered(client)
+        assert status(server).is_reset is is_reset
 
 
-@virtual
-async def test_an_idle_gripper_without_power_stays_without() -> None:
-    async with simulator() as server, server.fault_injector.making(Trouble("power-cut")):
+async def test_an_idle_gripper_without_power_stays_without(server: SimulatorServer) -> None:
+    async with server.fault_injector.making(Trouble("power-cut")):
         async with server.fault_injector.making(Trouble("idle-reset", 1)):
             await asyncio.sleep(5)
         assert not server.gripper.is_powered
 
 
-@virtual
-async def test_the_least_patient_of_two_counts() -> None:
-    async with simulator() as server:
-        await activate(server)
-        async with server.fault_injector.making(Trouble("idle-reset", 9)):
-            async with server.fault_injector.making(Trouble("idle-reset", 2)):
-                await asyncio.sleep(1)
-            await asyncio.sleep(8)
-            assert status(server).is_activated
-            await asyncio.sleep(2)
-            assert status(server).is_reset
+async def test_the_least_patient_of_two_counts(server: SimulatorServer) -> None:
+    await activate(server)
+    async with server.fault_injector.making(Trouble("idle-reset", 9)):
+        async with server.fault_injector.making(Trouble("idle-reset", 2)):
+            await asyncio.sleep(1)
+        await asyncio.sleep(8)
+        assert status(server).is_activated
+        await asyncio.sleep(2)
+        assert status(server).is_reset
 
 
 # Beginning and ending.
 
 
-@virtual
-async def test_what_is_over_stays_over() -> None:
-    async with simulator() as server:
-        begun = await server.fault_injector.begin(Trouble("fault", 9))
-        await server.fault_injector.end(begun)
-        server.gripper.inject_fault(14)
-        await server.fault_injector.end(begun)
-        assert status(server).fault is Fault.SCISSOR_BLOCKED
+async def test_what_is_over_stays_over(server: SimulatorServer) -> None:
+    begun = await server.fault_injector.begin(Trouble("fault", 9))
+    await server.fault_injector.end(begun)
+    server.gripper.inject_fault(14)
+    await server.fault_injector.end(begun)
+    assert status(server).fault is Fault.SCISSOR_BLOCKED
 
 
-@virtual
-async def test_a_block_that_fails_ends_its_trouble() -> None:
-    async with simulator() as server:
-        with pytest.raises(ZeroDivisionError):
-            async with server.fault_injector.making(Trouble("refuse")):
-                raise ZeroDivisionError
-        assert server.fault_injector.ongoing == ()
-        assert await is_let_in(server)
+async def test_a_block_that_fails_ends_its_trouble(server: SimulatorServer) -> None:
+    with pytest.raises(ZeroDivisionError):
+        async with server.fault_injector.making(Trouble("refuse")):
+            raise ZeroDivisionError
+    assert server.fault_injector.ongoing == ()
+    assert await is_let_in(server)
 
 
 @pytest.mark.parametrize(
@@ -541,12 +494,13 @@ async def test_what_cannot_begin_changes_nothing(kind: str, error: type[Exceptio
 
 
 def test_what_fits_which_link() -> None:
-    servers = SimulatorServer(), SerialSimulatorServer("/dev/ttyFAR")
+    servers = SimulatorServer(), SerialSimulatorServer("/dev/ttyFAR"), RtuOverTcpSimulatorServer()
     for kind, server in itertools.product(KINDS, servers):
-        if ONLY_ON.get(kind, server.link) == server.link:
+        if kind not in MISFITS[server.link]:
             server.fault_injector.check([Trouble(kind)])
         else:
-            with pytest.raises(ValueError, match=f"^{kind} does not fit a simulator on {server.link}$"):
+            message = f"{kind} does not fit a simulator on {server.link}"
+            with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
                 server.fault_injector.check([Trouble("silence"), Trouble(kind)])
 
 
@@ -563,82 +517,74 @@ async def test_of_a_plan_that_does_not_fit_nothing_begins() -> None:
 # Plans.
 
 
-@virtual
-async def test_each_at_its_time_and_for_as_long_as_it_says() -> None:
-    async with simulator() as server, raw_client(server) as client:
-        loop = asyncio.get_running_loop()
-        began = loop.time()
-        told: list[tuple[float, Trouble]] = []
-        plan = plan_of("silence at 5 for 2; fault at 6 for 9; drop for 1")
-        carrying_out = asyncio.create_task(
-            server.fault_injector.run(plan, lambda trouble: told.append((loop.time() - began, trouble)))
-        )
-        seen = []
-        for _ in range(17):
-            seen.append((await is_answered(client), status(server).fault))
-            await asyncio.sleep(began + len(seen) - loop.time())
-        none, fault = Fault.NONE, Fault.COMMUNICATION_NOT_READY
-        # A second each: the drop, four quiet ones, two of silence, and the fault.
-        expected = [(False, none)] + [(True, none)] * 4 + [(False, none), (False, fault)]
-        assert seen == expected + [(True, fault)] * 8 + [(True, none)] * 2
-        assert told == [(0, plan[2]), (5, plan[0]), (6, plan[1])]
-        assert server.fault_injector.ongoing == ()
-        await carrying_out
+async def test_each_at_its_time_and_for_as_long_as_it_says(
+    server: SimulatorServer, client: RawClient
+) -> None:
+    began = now()
+    told: list[tuple[float, Trouble]] = []
+    plan = plan_of("silence at 5 for 2; fault at 6 for 9; drop for 1")
+    carrying_out = asyncio.create_task(
+        server.fault_injector.run(plan, lambda trouble: told.append((now() - began, trouble)))
+    )
+    seen = []
+    for _ in range(17):
+        seen.append((await is_answered(client), status(server).fault))
+        await asyncio.sleep(began + len(seen) - now())
+    none, fault = Fault.NONE, Fault.COMMUNICATION_NOT_READY
+    # A second each: the drop, four quiet ones, two of silence, and the fault.
+    expected = [(False, none)] + [(True, none)] * 4 + [(False, none), (False, fault)]
+    assert seen == expected + [(True, fault)] * 8 + [(True, none)] * 2
+    assert told == [(0, plan[2]), (5, plan[0]), (6, plan[1])]
+    assert server.fault_injector.ongoing == ()
+    await carrying_out
 
 
-@virtual
 @pytest.mark.parametrize(("words", "seconds"), [("fault at 1 for 6; close at 4", 7), ("", 0)])
-async def test_a_plan_is_over_when_its_last_trouble_is(words: str, seconds: float) -> None:
-    async with simulator() as server:
-        loop = asyncio.get_running_loop()
-        began = loop.time()
-        await server.fault_injector.run(plan_of(words))
-        assert loop.time() - began == pytest.approx(seconds)
-        assert server.fault_injector.ongoing == ()
+async def test_a_plan_is_over_when_its_last_trouble_is(
+    server: SimulatorServer, words: str, seconds: float
+) -> None:
+    began = now()
+    await server.fault_injector.run(plan_of(words))
+    assert now() - began == pytest.approx(seconds)
+    assert server.fault_injector.ongoing == ()
 
 
-@virtual
-async def test_again_and_again() -> None:
-    async with simulator() as server:
-        loop = asyncio.get_running_loop()
-        began = loop.time()
-        told: list[float] = []
-        carrying_out = asyncio.create_task(
-            server.fault_injector.run(
-                plan_of("power-cut at 1 for 2 every 10"), lambda _: told.append(loop.time() - began)
-            )
+async def test_again_and_again(server: SimulatorServer) -> None:
+    began = now()
+    told: list[float] = []
+    carrying_out = asyncio.create_task(
+        server.fault_injector.run(
+            plan_of("power-cut at 1 for 2 every 10"), lambda _: told.append(now() - began)
         )
-        powered = []
-        for second in range(35):
-            await asyncio.sleep(began + second + 0.5 - loop.time())
-            powered.append(server.gripper.is_powered)
-        assert [second for second, is_on in enumerate(powered) if not is_on] == [1, 2, 11, 12, 21, 22, 31, 32]
-        assert told == pytest.approx([1, 11, 21, 31])
-        await cancelled(carrying_out)
+    )
+    powered = []
+    for second in range(35):
+        await asyncio.sleep(began + second + 0.5 - now())
+        powered.append(server.gripper.is_powered)
+    assert [second for second, is_on in enumerate(powered) if not is_on] == [1, 2, 11, 12, 21, 22, 31, 32]
+    assert told == pytest.approx([1, 11, 21, 31])
+    await cancelled(carrying_out)
 
 
-@virtual
-async def test_once_and_again_and_what_has_met_nothing_does_not_pile_up() -> None:
-    async with simulator() as server, raw_client(server) as client:
-        told: list[str] = []
-        async with carried_out(server, "drop every 10", told):
-            answered = []
-            for pause in (5, 10, 95):
-                await asyncio.sleep(pause)
-                answered += [await is_answered(client) for _ in range(3)]
-        assert answered == [False, True, True] * 3
-        assert told == ["drop every 10"] * 12
+async def test_once_and_again_and_what_has_met_nothing_does_not_pile_up(
+    server: SimulatorServer, client: RawClient
+) -> None:
+    told: list[str] = []
+    async with carried_out(server, "drop every 10", told):
+        answered = []
+        for pause in (5, 10, 95):
+            await asyncio.sleep(pause)
+            answered += [await is_answered(client) for _ in range(3)]
+    assert answered == [False, True, True] * 3
+    assert told == ["drop every 10"] * 12
 
 
-@virtual
-async def test_it_is_told_before_it_begins() -> None:
-    async with simulator() as server:
-        seen = []
-        await server.fault_injector.run(plan_of("fault 9 for 1"), lambda _: seen.append(status(server).fault))
-        assert seen == [Fault.NONE]
+async def test_it_is_told_before_it_begins(server: SimulatorServer) -> None:
+    seen = []
+    await server.fault_injector.run(plan_of("fault 9 for 1"), lambda _: seen.append(status(server).fault))
+    assert seen == [Fault.NONE]
 
 
-@virtual
 @pytest.mark.parametrize(
     "words",
     [
@@ -659,39 +605,34 @@ async def test_a_plan_that_is_cancelled_ends_its_troubles(words: str) -> None:
         assert await is_let_in(server)
 
 
-@virtual
 @pytest.mark.parametrize("words", ["refuse at 60", "refuse for 1 every 60", "refuse for 1 at 1 every 60"])
-async def test_what_has_not_begun_when_the_plan_is_cancelled_never_begins(words: str) -> None:
-    async with simulator() as server:
-        told: list[str] = []
-        async with carried_out(server, words, told):
-            await asyncio.sleep(30)
-        begun = len(told)
-        await asyncio.sleep(100)
-        assert len(told) == begun
-        assert await is_let_in(server)
+async def test_what_has_not_begun_when_the_plan_is_cancelled_never_begins(
+    server: SimulatorServer, words: str
+) -> None:
+    told: list[str] = []
+    async with carried_out(server, words, told):
+        await asyncio.sleep(30)
+    begun = len(told)
+    await asyncio.sleep(100)
+    assert len(told) == begun
+    assert await is_let_in(server)
 
 
-@virtual
-async def test_a_port_that_somebody_took_meanwhile() -> None:
-    async with simulator() as server:
-        plan = asyncio.create_task(
-            server.fault_injector.run(plan_of("refuse for 10; fault 9; slow-device 3"))
-        )
-        await asyncio.sleep(5)
-        other = await asyncio.get_running_loop().create_server(asyncio.Protocol, "127.0.0.1", server.port)
-        with pytest.raises(OSError, match="address in use"):
-            await plan
-        other.close()
-        assert server.fault_injector.ongoing == ()
-        assert status(server).fault is Fault.NONE
-        assert server.gripper.device_cycle == 0.005
+async def test_a_port_that_somebody_took_meanwhile(server: SimulatorServer) -> None:
+    plan = asyncio.create_task(server.fault_injector.run(plan_of("refuse for 10; fault 9; slow-device 3")))
+    await asyncio.sleep(5)
+    other = await asyncio.get_running_loop().create_server(asyncio.Protocol, "127.0.0.1", server.port)
+    with pytest.raises(OSError, match="address in use"):
+        await plan
+    other.close()
+    assert server.fault_injector.ongoing == ()
+    assert status(server).fault is Fault.NONE
+    assert server.gripper.device_cycle == 0.005
 
 
 # On a serial line.
 
 
-@virtual
 @pytest.mark.parametrize("kind", ["silence", "power-cut", "drop"])
 async def test_no_answer_on_a_serial_line(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     async with line(monkeypatch) as (server, client):
@@ -700,7 +641,6 @@ async def test_no_answer_on_a_serial_line(kind: str, monkeypatch: pytest.MonkeyP
         assert await client.ask(READ_SERIAL) == RESET_READING
 
 
-@virtual
 async def test_a_wrong_checksum_on_a_serial_line(monkeypatch: pytest.MonkeyPatch) -> None:
     async with line(monkeypatch) as (server, client):
         await server.fault_injector.begin(Trouble("wrong-checksum"))

@@ -224,7 +224,7 @@ def test_a_reset_ends_a_release_and_the_gripper_can_be_activated_again(
     assert not releasing.gripper.is_moving
     assert releasing.fault is Fault.NONE
     releasing.activate()
-    releasing.close(100)
+    releasing.reach(100)
     assert releasing.positions[0] == 100
 
 
@@ -241,8 +241,7 @@ def test_release_out_of_a_major_fault(active: Bench) -> None:
 def test_release_ends_at_an_obstacle_too(active: Bench) -> None:
     active.close()
     active.gripper.place_object(Finger.A, 100, opening=True)
-    active.write(release=True)
-    active.settle()
+    active.write_and_settle(release=True)
     assert active.fault is Fault.AUTOMATIC_RELEASE_DONE
     assert active.positions == (100, 6, 6, 15)
     active.gripper.remove_object()

@@ -168,8 +168,7 @@ def test_writes_at_their_distance_are_kept(active: Bench) -> None:
 def test_a_limit_is_echoed_in_place_of_the_request(individual: Bench) -> None:
     individual.gripper.habits = Habits(echoes_limits=True)
     for asked, shown in ((255, 232), (100, 100), (0, 15)):
-        individual.go({Finger.SCISSOR: asked})
-        individual.settle()
+        individual.reach({Finger.SCISSOR: asked})
         assert individual.status.requested_position(Finger.SCISSOR) == shown
         assert individual.status.position(Finger.SCISSOR) == shown
         assert individual.outcomes[3] is ARRIVED
@@ -264,25 +263,16 @@ def test_the_image_that_wakes_it_moves_nothing(individual: Bench) -> None:
     assert individual.status.requested_position(Finger.A) == 200, "it is echoed"
     assert individual.gripper.position(Finger.A) == 6
     assert not individual.gripper.is_asleep
-    individual.write()
-    individual.settle()
+    individual.write_and_settle()
     assert individual.gripper.position(Finger.A) == 200, "the same image once more"
 
 
-def test_the_same_image_wakes_it_too(individual: Bench) -> None:
+@pytest.mark.parametrize("changes", [{}, {"go": False}], ids=["the same", "no rGTO"])
+def test_any_image_with_ract_wakes_it(individual: Bench, changes: dict[str, bool]) -> None:
     individual.gripper.is_asleep = True
-    individual.write()
+    individual.write(**changes)
     assert not individual.gripper.is_asleep
-    individual.go({Finger.A: 200})
-    individual.settle()
-    assert individual.gripper.position(Finger.A) == 200
-
-
-def test_one_register_with_ract_wakes_it(individual: Bench) -> None:
-    individual.gripper.is_asleep = True
-    individual.write(go=False)
-    individual.go({Finger.A: 200})
-    individual.settle()
+    individual.reach({Finger.A: 200})
     assert individual.gripper.position(Finger.A) == 200
 
 
@@ -313,12 +303,10 @@ def test_an_activation_and_a_reset_are_not_ignored(bench: Bench) -> None:
 
 def test_with_no_go_there_may_be_no_object_status(individual: Bench) -> None:
     individual.gripper.place_object(Finger.A, 100)
-    individual.go({Finger.A: 200})
-    individual.settle()
+    individual.reach({Finger.A: 200})
     individual.write(go=False)
     assert individual.words == (0x71, 0xFE)
-    individual.write(go=True)
-    individual.settle()
+    individual.write_and_settle(go=True)
     individual.gripper.habits = Habits(keeps_status_on_halt=False)
     individual.write(go=False)
     assert individual.words == (0x31, 0x00)
@@ -329,8 +317,7 @@ def test_clearing_rics_may_open_the_fingers_or_not(individual: Bench, go: bool) 
     individual.close()
     travelled = individual.gripper.travel(Finger.A)
     individual.gripper.habits = Habits(opens_without_rics=False)
-    individual.write(individual_scissor=False, mode=Mode.BASIC, go=go)
-    individual.settle()
+    individual.write_and_settle(individual_scissor=False, mode=Mode.BASIC, go=go)
     assert individual.gripper.travel(Finger.A) == travelled
     assert individual.positions == (241, 241, 241, 137 if go else 232)
     individual.write(individual_scissor=True)
@@ -364,8 +351,7 @@ def test_a_grip_that_stays_ends_with_the_power_and_with_a_new_request(individual
     individual.close()
     individual.write(go=False)
     assert individual.gripper.holds == Finger.ABC
-    individual.write(go=True, axes=(AxisRequest(150, 255, 0),) * 4)
-    individual.settle()
+    individual.write_and_settle(go=True, axes=(AxisRequest(150, 255, 0),) * 4)
     assert not individual.gripper.holds
     individual.close()
     individual.write(go=False)
@@ -376,20 +362,21 @@ def test_a_grip_that_stays_ends_with_the_power_and_with_a_new_request(individual
 # Values.
 
 
-@pytest.mark.parametrize("name", ["activation_time", "status_lag", "silence_fault", "write_spacing"])
-@pytest.mark.parametrize(("value", "error"), [(-1, ValueError), (math.nan, ValueError), ("1", TypeError)])
-def test_times_that_are_none(name: str, value: Any, error: type[Exception]) -> None:
-    with pytest.raises(error, match=name):
-        Habits(**{name: value})
-
-
 @pytest.mark.parametrize(
-    "name", ["echoes_limits", "lets_go_on_halt", "keeps_status_on_halt", "opens_without_rics"]
+    ("name", "value", "error"),
+    [
+        *(
+            (name, value, error)
+            for name in ("activation_time", "status_lag", "silence_fault", "write_spacing")
+            for value, error in ((-1, ValueError), (math.nan, ValueError), ("1", TypeError))
+        ),
+        *((name, 1, TypeError) for name in ("echoes_limits", "lets_go_on_halt", "keeps_status_on_halt")),
+        ("opens_without_rics", 1, TypeError),
+    ],
 )
-def test_what_is_neither_so_nor_so(name: str) -> None:
-    arguments: dict[str, Any] = {name: 1}
-    with pytest.raises(TypeError, match=f"{name} must be True or False, got 1"):
-        Habits(**arguments)
+def test_values_that_are_none(name: str, value: Any, error: type[Exception]) -> None:
+    with pytest.raises(error, match=f"{name} must be"):
+        Habits(**{name: value})
 
 
 @pytest.mark.parametrize("resets", [0, 10])

@@ -13,10 +13,10 @@ from robotiq_async.simulator.physics.habits import REAL_ACTIVATION
 from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values.enums import Fault, Finger, Initialization
 from robotiq_async.values.request import AxisRequest, Request
+from tests.serial_line import with_crc
 from tests.simulator.test_fault_injector import activate, is_answered, simulator, status
 from tests.simulator.test_serial_frames import READ as READ_SERIAL
 from tests.simulator.test_serial_frames import RESET_READING, line
-from tests.simulator.test_serial_server import with_crc
 from tests.simulator.test_server import RawClient, raw_client
 from tests.virtual import virtual
 

@@ -65,9 +65,8 @@ def test_closing_time_between_the_measured_values() -> None:
     ],
 )
 def test_readings(individual: Bench, axis: Finger, asked: int, reading: int) -> None:
-    individual.close(100 if asked < 100 else 50)
-    individual.go({axis: asked})
-    individual.settle()
+    individual.reach(100 if asked < 100 else 50)
+    individual.reach({axis: asked})
     status = individual.status
     assert status.position(axis) == reading
     assert status.requested_position(axis) == asked
@@ -77,8 +76,7 @@ def test_readings(individual: Bench, axis: Finger, asked: int, reading: int) -> 
 def test_a_limit_replaces_the_request_and_the_echo_keeps_it(make_bench: Callable[..., Bench]) -> None:
     bench = make_bench(scissor_limit=(100, 150))
     bench.activate_individually()
-    bench.go({Finger.SCISSOR: 220})
-    bench.settle()
+    bench.reach({Finger.SCISSOR: 220})
     assert bench.gripper.target(Finger.SCISSOR) == 150
     assert bench.status.position(Finger.SCISSOR) == 150
     assert bench.status.requested_position(Finger.SCISSOR) == 220
@@ -89,8 +87,7 @@ def test_a_new_target_on_the_way_turns_the_finger_round(individual: Bench) -> No
     individual.go({Finger.A: 255})
     individual.wait(1)
     turned_at = individual.gripper.position(Finger.A)
-    individual.go({Finger.A: 6})
-    individual.settle()
+    individual.reach({Finger.A: 6})
     assert individual.gripper.position(Finger.A) == 6
     assert individual.gripper.travel(Finger.A) > 2 * (turned_at - 6)
 
@@ -100,8 +97,7 @@ def test_a_new_speed_on_the_way_counts_from_there(individual: Bench) -> None:
     individual.go({Finger.A: 241}, speed=0)
     individual.wait(2)
     way_left = 241 - individual.gripper.position(Finger.A)
-    individual.go({Finger.A: 241}, speed=255)
-    individual.settle()
+    individual.reach({Finger.A: 241}, speed=255)
     expected = 2 + way_left / THREE_FINGER.stroke.counts * closing_time(255)
     assert individual.now - began == pytest.approx(expected, abs=0.1)
 
@@ -116,8 +112,7 @@ def test_halt_stops_where_the_finger_is_and_going_again_resumes(active: Bench) -
     assert active.positions == stopped_at
     assert not active.gripper.is_moving
     assert not active.status.is_moving
-    active.write(go=True)
-    active.settle()
+    active.write_and_settle(go=True)
     assert active.positions[:3] == (241, 241, 241)
 
 
@@ -135,8 +130,7 @@ def test_retargeting_to_the_reading_moves_nothing(individual: Bench) -> None:
 
 def test_only_the_commanded_axis_moves(individual: Bench) -> None:
     before = {axis: individual.gripper.travel(axis) for axis in THREE_FINGER.axes}
-    individual.go({Finger.B: 100})
-    individual.settle()
+    individual.reach({Finger.B: 100})
     moved = {axis for axis in THREE_FINGER.axes if individual.gripper.travel(axis) != before[axis]}
     assert moved == {Finger.B}
     assert individual.gripper.travel(Finger.B) == before[Finger.B] + 94
@@ -154,8 +148,7 @@ def test_target_and_position_are_inspected_while_moving(individual: Bench) -> No
 
 def test_speedup(make_bench: Callable[..., Bench]) -> None:
     bench = make_bench(speedup=10.0, device_cycle=0)
-    bench.write(activate=True)
-    bench.settle()
+    bench.write_and_settle(activate=True)
     began = bench.now
     bench.go(255, speed=128)
     while bench.gripper.is_moving:

@@ -12,7 +12,7 @@ import serial
 
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
 from robotiq_async.simulator.server.framing import Frame
-from tests.simulator.test_serial_server import with_crc
+from tests.serial_line import with_crc
 from tests.virtual import virtual
 from tests.virtual_line import VirtualLine
 
@@ -115,6 +115,39 @@ async def test_requests_that_came_while_the_loop_was_held_up_are_all_answered(
             await client.say(READ)
             loop.hold_up(0.05)  # type: ignore[attr-defined]
         assert await client.hear() == 3 * RESET_READING
+
+
+# What is refused.
+
+
+@virtual
+@pytest.mark.parametrize(
+    "frame",
+    [
+        *(
+            with_crc(b"\x09" + bytes.fromhex(pdu))
+            for pdu in (
+                *("05 0000 ff00", "03 07d0 0009", "06 07d0 0001", "03 07d0 0000"),
+                *("17 07d0 0000 03e9 0001 02 1234", "17 07d0 007e 03e9 0001 02 1234"),
+                *("17 07d0 0009 03e9 0001 02 1234", "17 07d8 0001 03e9 0001 02 1234"),
+                *("17 07d0 0001 03e9 0000 00", "17 07d0 0001 03e9 0001 04 12345678"),
+                *("17 07d0 0001 03e9 0002 02 1234", "17 07d0 0001 03e9 0001 01 12"),
+                *("17 07d0 0001 07d0 0001 02 1234", "17 07d0 0001 03ef 0002 04 12345678"),
+            )
+        ),
+        bytes.fromhex("ff ff ff"),
+        bytes.fromhex("09 03 07d0 0008 0000"),
+        bytes.fromhex("09 03 07d0 0008 0000 09 03"),  # a wrong checksum takes along what follows
+    ],
+    ids=bytes.hex,
+)
+async def test_a_bad_request_gets_no_answer_and_changes_nothing(
+    frame: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with line(monkeypatch) as (server, client):
+        assert await client.ask(frame) == b""
+        assert await client.ask(READ) == RESET_READING
+        assert server.gripper.writes == ()
 
 
 # Who is meant.

@@ -392,3 +392,44 @@ async def test_half_a_request_from_before_a_power_cut_is_forgotten(
     connection.data_received(request[5:])
     server.gripper.power_on()
     assert (await client.read_status()).is_reset
+
+
+@pytest.mark.parametrize("kind", ["reset", "close", "accept-silence", "refuse", "power-cut"])
+async def test_connections_are_cut_and_new_ones_welcome_afterwards(
+    server: SimulatorServer, client: RawClient, kind: str
+) -> None:
+    port = server.port
+    async with raw_client(server) as other:
+        await client.read_status()
+        await other.read_status()
+        async with server.fault_injector.making(Trouble(kind)), asyncio.timeout(5):
+            for each in (client, other):
+                if kind == "close":
+                    assert await each.reader.read() == b"", "closed in order"
+                else:
+                    with pytest.raises(ConnectionResetError):
+                        await each.reader.read()
+            if kind in ("refuse", "power-cut"):
+                with pytest.raises(ConnectionRefusedError):
+                    await asyncio.open_connection("127.0.0.1", port)
+    assert server.port == port
+    async with raw_client(server) as again:
+        assert (await again.read_status()).is_reset
+
+
+@pytest.mark.parametrize("turns", range(5))
+async def test_cancelled_while_a_trouble_ends_clients_are_let_in_and_the_server_can_stop(
+    server: SimulatorServer, turns: int
+) -> None:
+    begun = await server.fault_injector.begin(Trouble("refuse"))
+    ending = asyncio.create_task(server.fault_injector.end(begun))
+    for _ in range(turns):
+        await asyncio.sleep(0)
+    ending.cancel()
+    await asyncio.wait({ending})
+    await server.fault_injector.end(begun)
+    async with raw_client(server) as client:
+        assert (await client.read_status()).is_reset
+    await server.stop()
+    with pytest.raises(ConnectionRefusedError):
+        await asyncio.open_connection("127.0.0.1", server.port)

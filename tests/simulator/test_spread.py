@@ -56,8 +56,7 @@ def test_who_waits_for_the_position_that_was_asked_for_may_wait_for_ever(real: B
     beside = set()
     for position in (111, 208, 60, *range(100, 200, 10), *range(105, 45, -10)):
         way = 1 if position > real.gripper.position(axis) else -1
-        real.go({axis: position})
-        real.settle()
+        real.reach({axis: position})
         assert real.status.finger_status(axis) is ObjectStatus.AT_POSITION
         beside.add(way * (real.gripper.position(axis) - position))
     assert beside == {0, 1, 2}
@@ -69,7 +68,7 @@ def test_what_is_done_again_ends_in_the_same_way(make_bench: Callable[..., Bench
         bench = one_of(make_bench, seed)
         bench.gripper.place_object(Finger.B, 90)
         for position in (120, 0, 120):
-            bench.close(position)
+            bench.reach(position)
             ends.append(bench.positions)
     assert ends[0] == ends[2] == ends[3] == ends[5]
     assert ends[:3] == ends[3:6] != ends[6:]
@@ -77,7 +76,7 @@ def test_what_is_done_again_ends_in_the_same_way(make_bench: Callable[..., Bench
 
 def test_what_is_asked_to_stay_stays(real: Bench) -> None:
     """A hand tells axes that it does not address to stay at their reading; it must not make them creep."""
-    real.close(111)
+    real.reach(111)
     before = [real.gripper.travel(axis) for axis in THREE_FINGER.axes]
     for _ in range(3):
         real.go({axis: real.gripper.position(axis) for axis in THREE_FINGER.axes})
@@ -89,7 +88,7 @@ def test_what_is_asked_to_stay_stays(real: Bench) -> None:
 
 
 def test_a_finger_follows_requests_that_come_step_by_step(real: Bench) -> None:
-    real.close(20)
+    real.reach(20)
     for step in range(200):
         real.go({Finger.A: 20 + step // 2})
         assert real.gripper.position(Finger.A) == pytest.approx(20 + step / 2, abs=3)
@@ -97,8 +96,7 @@ def test_a_finger_follows_requests_that_come_step_by_step(real: Bench) -> None:
 
 def test_an_object_where_a_finger_stands_is_felt_there(real: Bench) -> None:
     for position in range(40, 200, 10):
-        real.go(position)
-        real.settle()
+        real.reach(position)
         here = real.positions[:3]
         real.gripper.place_object(Finger.ABC, position)
         real.close()
@@ -108,8 +106,8 @@ def test_an_object_where_a_finger_stands_is_felt_there(real: Bench) -> None:
 
 
 def test_near_its_stop_a_finger_still_goes_there(real: Bench) -> None:
-    real.close(8)
-    real.close(0)
+    real.reach(8)
+    real.reach(0)
     assert real.positions[:3] == (7, 6, 6)
 
 

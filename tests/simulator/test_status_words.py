@@ -41,12 +41,11 @@ def test_closing(
 def test_two_fingers_stopped_while_opening(active: Bench) -> None:
     active.close()
     active.gripper.place_object(Finger.A | Finger.C, 100, opening=True)
-    active.close(0)
+    active.reach(0)
     assert active.words == (0x79, 0xDD)
 
 
 def test_the_scissor_is_not_part_of_the_summary(individual: Bench) -> None:
     individual.gripper.place_object(Finger.SCISSOR, 150)
-    individual.go({Finger.SCISSOR: 255})
-    individual.settle()
+    individual.reach({Finger.SCISSOR: 255})
     assert individual.words == (0xF9, 0xBF)

@@ -12,9 +12,10 @@ import serial
 from robotiq_async import Finger, RobotiqHand
 from robotiq_async.simulator import RtuOverTcpSimulatorServer, SerialSimulatorServer, SimulatedGripper
 from robotiq_async.simulator.server.connection import MOST_UNREAD
-from robotiq_async.simulator.server.serial_connection import MOST_UNSENT, WireTime
+from robotiq_async.simulator.server.serial_server import MOST_UNSENT, WireTime
 from tests.grippers import activate_beforehand
-from tests.simulator.test_serial_server import Line, with_crc
+from tests.serial_line import with_crc
+from tests.simulator.test_serial_server import Line
 from tests.virtual import virtual
 from tests.virtual_line import VirtualLine
 

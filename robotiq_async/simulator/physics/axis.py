@@ -154,7 +154,6 @@ class Axis:
 
     @property
     def grips(self) -> bool:
-        """Whether the axis presses against an obstacle."""
         return self._goal is not None and self._is_latched_against(self._goal)
 
     @property
@@ -168,7 +167,6 @@ class Axis:
         return round(self._origin) if self._goal is None else self.within_stops(self._goal.position)
 
     def position(self, time: float) -> float:
-        """Where the axis is."""
         if not self.is_moving:
             return self._origin
         distance = self._path.end - self._origin
@@ -208,7 +206,6 @@ class Axis:
         self._goal = None
 
     def clear(self, time: float) -> None:
-        """Stop and release."""
         self.hold(time, locks=False)
         self.status = ObjectStatus.IN_MOTION
 
@@ -229,7 +226,6 @@ class Axis:
             self._plan(time)
 
     def _plan(self, time: float) -> None:
-        """Begin the motion from here to the goal."""
         assert self._goal is not None, "only a motion with a goal is planned"
         here, before, due = self.position(time), self._path, self.ends_at
         self._path = self._path_to(here, self._goal)
@@ -299,7 +295,6 @@ class Axis:
         return 0.0 if path.end == surface else max(0.0, (position - surface) / (path.end - surface))
 
     def _rest(self, time: float, position: float) -> None:
-        """Come to rest at a position, and add the distance up to it."""
         self._travelled += abs(position - self._origin)
         self._origin = position
         self._since = time

@@ -7,10 +7,12 @@ before doing anything later; all times are simulated seconds.
 from __future__ import annotations
 
 import math
+import struct
 from collections import deque
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
+from robotiq_async.values import registers as reg
 from robotiq_async.values.calibration.scales import SpeedCalibration
 from robotiq_async.values.enums import (
     Fault,
@@ -24,14 +26,23 @@ from robotiq_async.values.request import Request
 from . import control_modes as control
 from .axis import MOTORS, Axis, Motor
 from .faults import EmergencyStop, PresentFaults
-from .inbox import ZEROS
 from .spread import Spread
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from robotiq_async.values.model import Model
 
     from .habits import Habits
 
+ZEROS: Final = (0,) * reg.REGISTER_COUNT
+"""The image of a gripper that was just switched on."""
+_AS_REGISTERS: Final = struct.Struct(">8H")
+_AXIS_BYTES: Final = tuple(
+    (echo.byte, position.byte, current.byte)
+    for echo, position, current in zip(reg.gPR, reg.gPO, reg.gCU, strict=True)
+)
+_MOVING, _SOME_STOPPED, _ALL_STOPPED, _ALL_ARRIVED = range(4)
 
 Statuses = tuple[ObjectStatus, ...]
 
@@ -48,7 +59,6 @@ class StatusTrail:
         self._entries = deque([_Entry(-math.inf, first)])
 
     def note(self, time: float, statuses: Statuses, lag: float) -> None:
-        """Add the present value, and drop values older than the lag."""
         if statuses == self._entries[-1].statuses:
             return
         self._entries.append(_Entry(time, statuses))
@@ -164,7 +174,6 @@ class Controller:
             self._begin(time, Initialization.ACTIVATING, ())
 
     def end_stop(self) -> None:
-        """End an emergency stop."""
         self._stop.end()
 
     @property
@@ -182,10 +191,32 @@ class Controller:
         return *fingers, scissor
 
     def shown_statuses(self, time: float) -> Statuses:
-        """What gDT says of each axis."""
         if self.progress is not Initialization.COMPLETE:
             return self._nothing
         return self._trail.at(time - self.habits.status_lag)
+
+    def status_registers(self, time: float, fault: Fault) -> reg.Registers:
+        """What the gripper reports at a time, with a fault code.
+
+        gDT and gSTA are 0 unless gIMC = 3. Without rGTO an axis in a contact or at its request keeps its gDT,
+        unless the gripper has another habit; one that was stopped on its way reads 0. So gSTA = 0 then does
+        not mean motion.
+        """
+        content = bytearray(2 * reg.REGISTER_COUNT)
+        model, request, statuses = self.model, self.request, self.shown_statuses(time)
+        content[0] = request.activate << reg.gACT.shift | request.go << reg.gGTO.shift
+        content[0] |= self.progress << reg.gIMC.shift
+        if model.has_modes:
+            content[0] |= request.mode << reg.gMOD.shift | _summary(statuses[:3]) << reg.gSTA.shift
+        content[reg.gFLT.byte] = fault
+        for axis, status, shown, echo, (echo_byte, position_byte, current_byte) in zip(
+            self.axes, statuses, model.object_status, self.echoes, _AXIS_BYTES, strict=False
+        ):
+            content[shown.byte] |= status << shown.shift
+            content[echo_byte] = echo
+            content[position_byte] = round(axis.position(time))
+            content[current_byte] = axis.current(time)
+        return _AS_REGISTERS.unpack(content)
 
     @property
     def fault(self) -> Fault:
@@ -308,7 +339,6 @@ class Controller:
         )
 
     def _finish(self, time: float) -> None:
-        """A sequence has come to its end."""
         if self._release is not Fault.NONE:
             self._release = Fault.AUTOMATIC_RELEASE_DONE
         elif self.progress is Initialization.ACTIVATING and self.fail_activation:
@@ -319,7 +349,6 @@ class Controller:
             self._follow_mode(time)
 
     def _note(self, time: float) -> None:
-        """Let the trail know what gDT is from now on."""
         statuses = tuple(axis.status for axis in self.axes)
         if self.progress is not Initialization.COMPLETE or self._is_silent_on_halt:
             statuses = self._nothing
@@ -337,3 +366,13 @@ class Controller:
     def _scissor(self, limit: tuple[int, int], seed: int | None) -> Axis:
         spread = Spread(seed, Finger.SCISSOR)
         return Axis(control.MODE_POSITION[Mode.BASIC], *limit, MOTORS[3], spread, self._speeds)
+
+
+def _summary(fingers: Sequence[ObjectStatus]) -> int:
+    """Return gSTA of the three fingers."""
+    if ObjectStatus.IN_MOTION in fingers:
+        return _MOVING
+    contacts = sum(status.is_contact for status in fingers)
+    if contacts == len(fingers):
+        return _ALL_STOPPED
+    return _SOME_STOPPED if contacts else _ALL_ARRIVED

@@ -27,13 +27,11 @@ class PresentFaults:
             self._escalates_at = time + BLOCKED_AFTER
 
     def clear(self) -> None:
-        """End every fault."""
         self._ends.clear()
         self._escalates_at = math.inf
 
     @property
     def changes_at(self) -> float:
-        """When the next fault ends or escalates."""
         return min(self._escalates_at, min(self._ends.values(), default=math.inf))
 
     def update(self, time: float) -> None:
@@ -53,7 +51,6 @@ class PresentFaults:
 
     @property
     def stops_scissor(self) -> bool:
-        """Whether a minor or major fault keeps the scissor from moving."""
         return any(fault.is_serious for fault in self._ends)
 
     @property
@@ -77,15 +74,12 @@ class EmergencyStop:
 
     @property
     def is_in_force(self) -> bool:
-        """Whether nothing moves because of it."""
         return self._is_pressed or self._resets_needed > 0
 
     def press(self, resets: int) -> None:
-        """Stop; after its end so many resets are needed."""
         self._is_pressed, self._resets_needed = True, resets
 
     def end(self) -> None:
-        """Give the motors their power back."""
         self._is_pressed = False
 
     def reset(self) -> None:

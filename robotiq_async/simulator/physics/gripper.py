@@ -5,21 +5,21 @@ from __future__ import annotations
 import math
 import sys
 import time
+from collections import deque
 from functools import reduce
 from operator import or_
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from robotiq_async.values import registers as reg
 from robotiq_async.values.checks import check_int, check_seconds
 from robotiq_async.values.enums import NO_AXES, Fault, Finger
 from robotiq_async.values.model import Model, model_of
+from robotiq_async.values.request import Request
 
 from .control_modes import SCISSOR_HIGH, SCISSOR_LOW, check_scissor_limit
-from .controller import Controller
+from .controller import ZEROS, Controller
 from .habits import Habits
-from .inbox import Inbox, Write
 from .spread import SEED
-from .status_report import status_registers
 from .surroundings import Surroundings
 
 if TYPE_CHECKING:
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from .axis import Axis
 
 _LONGEST: Final = 1e9
+_HISTORY: Final = 10_000
+_ROUNDING: Final = 1e-9
 
 
 class SimulatedGripper(Surroundings):
@@ -137,7 +139,7 @@ class SimulatedGripper(Surroundings):
         fault = self._controller.fault
         if silence >= self.habits.silence_fault and not fault.is_serious:
             fault = Fault.COMMUNICATION_NOT_READY
-        return status_registers(self._controller, self._time, fault)
+        return self._controller.status_registers(self._time, fault)
 
     # Power.
 
@@ -286,3 +288,63 @@ class SimulatedGripper(Surroundings):
             else:
                 self._controller.apply(*pending.popleft())
         self._time = now
+
+
+class Write(NamedTuple):
+    """One write that was kept.
+
+    Attributes:
+        time: reading of the gripper's clock, in seconds.
+        registers: the full image after the write.
+    """
+
+    time: float
+    registers: reg.Registers
+
+
+class Inbox:
+    """Takes writes; each takes effect a device cycle later. Times are simulated seconds.
+
+    Attributes:
+        image: the registers as written, in effect or not yet.
+        pending: what takes effect, and when, oldest first.
+        writes: the last writes that were kept, oldest first.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        self.image: reg.Registers = ZEROS
+        self.pending: deque[tuple[float, Request]] = deque()
+        self.writes: deque[Write] = deque(maxlen=_HISTORY)
+        self._kept_at: float | None = None
+
+    def checked(self, address_offset: int, registers: Sequence[int]) -> reg.Registers:
+        """The image with some registers replaced.
+
+        Raises:
+            TypeError: the offset or a register is not an int.
+            ValueError: the registers do not lie within the block, or one is outside 0..65535.
+        """
+        offset = check_int("address_offset", address_offset, 0, reg.REGISTER_COUNT - 1)
+        room = reg.REGISTER_COUNT - offset
+        if not 1 <= len(registers) <= room:
+            raise ValueError(f"registers: expected 1..{room} from offset {offset}, got {len(registers)}")
+        image = list(self.image)
+        image[offset : offset + len(registers)] = registers
+        return reg.check_registers(image)
+
+    def keep(self, time: float, write: Write, cycle: float, spacing: float) -> None:
+        """Keep a write, unless it follows the last one too closely: then it is forgotten."""
+        if self._kept_at is not None and time - self._kept_at < spacing - _ROUNDING:
+            return
+        self._kept_at = time
+        self.image = write.registers
+        self.writes.append(write)
+        # Keep their order, even if the device cycle was shortened meanwhile.
+        due = max(time + cycle, self.pending[-1][0] if self.pending else 0.0)
+        self.pending.append((due, Request.from_registers(write.registers, self._model)))
+
+    def clear(self) -> None:
+        self.image = ZEROS
+        self.pending.clear()
+        self._kept_at = None

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from robotiq_async.values.checks import check_seconds
+from robotiq_async.values.checks import check_flag, check_seconds
 
 _LONGEST: Final = 1e9
 
@@ -63,6 +63,4 @@ class Habits:
         if self.silence_fault != math.inf:
             check_seconds("silence_fault", self.silence_fault, 0, _LONGEST)
         for name in ("echoes_limits", "lets_go_on_halt", "keeps_status_on_halt", "opens_without_rics"):
-            value = getattr(self, name)
-            if not isinstance(value, bool):
-                raise TypeError(f"{name} must be True or False, got {value!r}")
+            check_flag(name, getattr(self, name))

@@ -43,11 +43,9 @@ class Connection(asyncio.Protocol):
         """Whether the client is not read from."""
 
     def is_active(self) -> bool:
-        """Whether the client is there."""
         return self.transport is not None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """A client is there."""
         self.transport = transport
         if not self._endpoint.lets_in(self):
             self.hang_up(reset=True)
@@ -56,11 +54,9 @@ class Connection(asyncio.Protocol):
             self.pass_on(part)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  # asyncio's
-        """The client is gone."""
         self._leave()
 
     def data_received(self, data: bytes) -> None:
-        """Take bytes from the client."""
         self._inbox += data
         self._answer_next()
 
@@ -69,12 +65,10 @@ class Connection(asyncio.Protocol):
         self._is_clogged = True
 
     def resume_writing(self) -> None:
-        """The client has read."""
         self._is_clogged = False
         self._answer_next()
 
     def _send(self, reply: bytes) -> None:
-        """Send a reply, or what the policy makes of it."""
         parts = self._endpoint.deliver(reply)
         if parts is None:
             self.hang_up()
@@ -89,7 +83,6 @@ class Connection(asyncio.Protocol):
             self._loop.call_at(self._outbox[-1][0], self._write_next)
 
     def pass_on(self, part: bytes) -> None:
-        """Send bytes now."""
         if not self.is_active():
             self._endpoint.undelivered(part)
         elif part:
@@ -138,7 +131,6 @@ class Connection(asyncio.Protocol):
 
     @property
     def _is_full(self) -> bool:
-        """Whether there are enough replies that the client has not got."""
         return self._is_clogged or len(self._outbox) >= MOST_WAITING
 
     def _regulate(self) -> None:

@@ -86,11 +86,9 @@ def _rtu_size(inbox: bytearray) -> int | None:
 
 
 def tcp_reply(frame: Frame, pdu: bytes) -> bytes:
-    """The frame of a reply to a request over TCP."""
     return struct.pack(">HHHB", frame.transaction, 0, len(pdu) + 1, frame.unit) + pdu
 
 
 def rtu_reply(frame: Frame, pdu: bytes) -> bytes:
-    """The frame of a reply to a request over a serial line."""
     content = bytes((frame.unit,)) + pdu
     return content + FramerRTU.compute_CRC(content).to_bytes(_CRC, "big")

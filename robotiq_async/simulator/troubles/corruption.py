@@ -39,12 +39,10 @@ class Reply:
 
     @property
     def unit(self) -> int:
-        """The unit it comes from."""
         return self.frame[0 if self.serial else 6]
 
     @property
     def pdu(self) -> bytes:
-        """Function code and data."""
         return self.frame[1:-2] if self.serial else self.frame[7:]
 
     @property
