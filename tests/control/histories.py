@@ -1,9 +1,8 @@
-"""A history of writes and a shadow of requests, with images and the statuses that show them, in few words."""
+"""A shadow of requests, with images and the statuses that show them, in few words."""
 
 from __future__ import annotations
 
 from robotiq_async.control.requests.shadow import RequestShadow, Whose
-from robotiq_async.control.requests.writes import WriteHistory
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
@@ -18,27 +17,6 @@ def image(position: int, *, speed: int = 100, force: int = 50, go: bool = True) 
 
 def shows(position: int, at: float, *, go: bool = True) -> RobotiqStatus:
     return status_of(0x31 | go << 3, 0xFF, echo=position, position=position, at=at)
-
-
-class History(WriteHistory):
-    """Of a gripper that shows position 0, and writes that are acknowledged at once."""
-
-    def __init__(self, position: int = 0) -> None:
-        super().__init__()
-        self.restart(image(position), image(position).echo, 0.0)
-
-    def see_at_once(self, status: RobotiqStatus) -> Request | None:
-        """See a status that was answered at once."""
-        return self.see(status, status.timestamp)
-
-    def is_settled(self, now: float) -> bool:
-        """Whether the last image acts."""
-        return self.acts(self.last_number, now)
-
-    def write(self, request: Request, at: float) -> int:
-        number = self.writing(request, at)
-        self.acknowledged(at)
-        return number
 
 
 class Shadow(RequestShadow):

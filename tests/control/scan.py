@@ -143,6 +143,10 @@ class Scan:
     def blink(self, away: float = 0.05) -> None:
         """The link is lost and comes back."""
         self.controller.lost(None)
+        self.come_back(away)
+
+    def come_back(self, away: float) -> None:
+        """The link is back after some seconds, or the hand comes then."""
         self.now += away
         self.connect(activate=False)
 
@@ -195,6 +199,11 @@ class Scan:
         outcome = Outcome()
         self.controller.halt(outcome)
         return outcome
+
+    def halted(self) -> None:
+        """A halt, waited for."""
+        outcome = self.halt()
+        self.until(lambda: outcome.is_told)
 
     def stop(self, *, keep_grip: bool = False) -> None:
         self.controller.stop()

@@ -78,8 +78,7 @@ def test_a_stop_after_a_lost_link_writes_what_the_gripper_has() -> None:
     scan.gripper.write(0, Request(activate=True).registers)
     scan.now += 10
     scan.gripper.write(0, going_to(200))
-    scan.now += 1
-    scan.connect(activate=False)
+    scan.come_back(1)
     scan.run(0.1)
     scan.controller.lost(None)
     scan.now += 1

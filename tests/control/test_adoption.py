@@ -17,14 +17,15 @@ from tests.register_words import status_of
 A, B, C, S = THREE_FINGER.axes
 MOVING, OPENING, CLOSING, THERE = ObjectStatus
 GO, HALTED = 0x39, 0x31
+Four = tuple[int, ...]
 SETTINGS = tuple(AxisRequest(0, 10 * n, 20 * n) for n in range(1, 5))
 
 
 def gripper(
     *what: ObjectStatus,
     byte_0: int = GO,
-    echo: tuple[int, ...] = (0, 0, 0, 0),
-    position: tuple[int, ...] = (0, 0, 0, 0),
+    echo: Four = (0, 0, 0, 0),
+    position: Four = (0, 0, 0, 0),
     at: float = 0.0,
 ) -> RobotiqStatus:
     """A status with what A, B, C and the scissor do."""
@@ -47,65 +48,52 @@ def positions(request: Request) -> list[int]:
 # -- the rules, in their order -----------------------------------------------------------------------------
 
 
-def test_an_echo_that_agrees_is_the_request() -> None:
-    status = gripper(THERE, CLOSING, OPENING, THERE, echo=(100, 220, 30, 255), position=(99, 150, 60, 241))
-    assert positions(adopted(status)) == [100, 220, 30, 255]
+@pytest.mark.parametrize(
+    ("what", "echo", "position", "expected"),
+    [
+        # An echo that agrees with what its axis does is the request.
+        ((THERE, CLOSING, OPENING, THERE), (100, 220, 30, 255), (99, 150, 60, 241), (100, 220, 30, 255)),
+        # B and C echo 0 under simple control, where they follow A; their own echo comes first.
+        ((THERE, THERE, THERE, THERE), (180, 0, 0, 0), (179, 181, 180, 137), (180, 180, 180, 137)),
+        ((CLOSING, CLOSING, CLOSING, THERE), (255, 200, 210, 0), (150, 150, 150, 0), (255, 200, 210, 0)),
+        ((THERE, CLOSING, OPENING, THERE), (100, 0, 255, 0), (100, 150, 60, 6), (100, 255, 0, 0)),
+        # The scissor never follows A.
+        ((THERE, THERE, THERE, THERE), (137, 0, 0, 0), (137, 137, 137, 137), (137, 137, 137, 137)),
+        ((CLOSING, CLOSING, CLOSING, CLOSING), (220, 0, 0, 0), (100, 100, 100, 100), (220, 220, 220, 255)),
+        # A contact without a request that agrees goes on as it is.
+        ((CLOSING, CLOSING, CLOSING, CLOSING), (0, 0, 0, 0), (150, 151, 152, 100), (255, 255, 255, 255)),
+        ((OPENING, OPENING, OPENING, OPENING), (255, 255, 255, 255), (150, 151, 152, 100), (0, 0, 0, 0)),
+        # A software limit is reported as reached, while the echo keeps the request beyond it.
+        ((THERE, THERE, THERE, THERE), (255, 255, 255, 255), (180, 181, 182, 219), (180, 181, 182, 219)),
+    ],
+)
+def test_what_a_gripper_at_rest_was_asked(
+    what: tuple[ObjectStatus, ...], echo: Four, position: Four, expected: Four
+) -> None:
+    assert positions(adopted(gripper(*what, echo=echo, position=position))) == [*expected]
 
 
-@pytest.mark.parametrize("what", [MOVING, CLOSING])
-def test_b_and_c_under_simple_control_have_the_request_of_a(what: ObjectStatus) -> None:
-    """B and C echo 0 while they follow A."""
-    status = gripper(what, what, what, THERE, echo=(220, 0, 0, 0), position=(100, 101, 99, 137))
-    later = gripper(
-        what, what, what, THERE, echo=(220, 0, 0, 0), position=(105, 106, 104, 137), at=DIRECTION_WAIT_S
-    )
-    assert positions(adopted(status, later)) == [220, 220, 220, 137]
-
-
-def test_b_and_c_that_have_arrived_under_simple_control_have_the_request_of_a() -> None:
-    status = gripper(THERE, THERE, THERE, THERE, echo=(180, 0, 0, 0), position=(179, 181, 180, 137))
-    assert positions(adopted(status)) == [180, 180, 180, 137]
-
-
-def test_the_scissor_never_has_the_request_of_a() -> None:
-    status = gripper(THERE, THERE, THERE, THERE, echo=(137, 0, 0, 0), position=(137, 137, 137, 137))
-    assert positions(adopted(status)) == [137, 137, 137, 137]
-    held = gripper(CLOSING, CLOSING, CLOSING, CLOSING, echo=(220, 0, 0, 0), position=(100, 100, 100, 100))
-    assert positions(adopted(held)) == [220, 220, 220, 255]
-
-
-def test_the_own_echo_of_b_comes_before_that_of_a() -> None:
-    status = gripper(CLOSING, CLOSING, CLOSING, THERE, echo=(255, 200, 210, 0), position=(150, 150, 150, 0))
-    assert positions(adopted(status)) == [255, 200, 210, 0]
-
-
-def test_the_echo_of_a_is_not_taken_either_where_it_does_not_agree() -> None:
-    status = gripper(THERE, CLOSING, OPENING, THERE, echo=(100, 0, 255, 0), position=(100, 150, 60, 6))
-    assert positions(adopted(status)) == [100, 255, 0, 0]
-
-
-def test_a_closing_contact_without_a_request_that_agrees_goes_on_closing() -> None:
-    status = gripper(CLOSING, CLOSING, CLOSING, CLOSING, position=(150, 151, 152, 100))
-    assert positions(adopted(status)) == [255] * 4
-
-
-def test_an_opening_contact_without_a_request_that_agrees_goes_on_opening() -> None:
-    status = gripper(
-        OPENING, OPENING, OPENING, OPENING, echo=(255, 255, 255, 255), position=(150, 151, 152, 100)
-    )
-    assert positions(adopted(status)) == [0] * 4
-
-
-def test_an_axis_at_a_software_limit_stays_there() -> None:
-    """The limit is reported as reached, while the echo keeps the request beyond it."""
-    status = gripper(THERE, THERE, THERE, THERE, echo=(255, 255, 255, 255), position=(180, 181, 182, 219))
-    assert positions(adopted(status)) == [180, 181, 182, 219]
-
-
-def test_an_axis_that_moves_against_every_echo_stays_where_it_is() -> None:
-    first = gripper(THERE, MOVING, THERE, THERE, echo=(0, 0, 0, 0), position=(6, 100, 6, 6))
-    later = gripper(THERE, MOVING, THERE, THERE, echo=(0, 0, 0, 0), position=(6, 110, 6, 6), at=0.1)
-    assert positions(adopted(first, later)) == [0, 110, 0, 0]
+@pytest.mark.parametrize(
+    ("what", "echo", "first", "later", "expected"),
+    [
+        *(
+            ((what, what, what, THERE), (220, 0, 0, 0), (100, 101, 99, 137), (105, 106, 104, 137), (220,) * 3)
+            for what in (MOVING, CLOSING)
+        ),
+        # Against every echo: it stays where it is.
+        ((THERE, MOVING, THERE, THERE), (0, 0, 0, 0), (6, 100, 6, 6), (6, 110, 6, 6), (0, 110, 0)),
+        # The direction of B tells its own echo from that of A.
+        *(
+            ((MOVING, MOVING, THERE, THERE), (220, 0, 0, 0), (100, 100, 6, 6), (120, b, 6, 6), (220, to, 0))
+            for b, to in ((101, 220), (120, 220), (99, 0), (80, 0))
+        ),
+    ],
+)
+def test_what_the_fingers_of_a_moving_gripper_were_asked(
+    what: tuple[ObjectStatus, ...], echo: Four, first: Four, later: Four, expected: Four
+) -> None:
+    moved = gripper(*what, echo=echo, position=later, at=DIRECTION_WAIT_S)
+    assert positions(adopted(gripper(*what, echo=echo, position=first), moved))[:3] == [*expected]
 
 
 @pytest.mark.parametrize("what", ObjectStatus)
@@ -119,17 +107,6 @@ def test_a_halted_gripper_has_its_own_positions_as_requests(what: ObjectStatus) 
 
 
 # -- directions --------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("moved", "expected"), [(1, 220), (20, 220), (-1, 0), (-20, 0)], ids=["+1", "+20", "-1", "-20"]
-)
-def test_the_direction_of_b_tells_its_own_echo_from_that_of_a(moved: int, expected: int) -> None:
-    first = gripper(MOVING, MOVING, THERE, THERE, echo=(220, 0, 0, 0), position=(100, 100, 6, 6))
-    later = gripper(
-        MOVING, MOVING, THERE, THERE, echo=(220, 0, 0, 0), position=(120, 100 + moved, 6, 6), at=0.02
-    )
-    assert adopted(first, later).position(B) == expected
 
 
 def test_nothing_is_certain_before_every_moving_axis_has_shown_its_direction() -> None:
@@ -187,22 +164,16 @@ def test_a_gripper_that_was_never_told_to_go_is_certain_at_once() -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 @pytest.mark.parametrize("byte_0", [GO, HALTED, 0x30])
-def test_activation_go_and_mode_are_taken_over(mode: Mode, byte_0: int) -> None:
+def test_activation_go_and_mode_are_taken_over_speed_and_force_come_from_the_settings(
+    mode: Mode, byte_0: int
+) -> None:
     request = adopted(gripper(THERE, THERE, THERE, THERE, byte_0=byte_0 | mode << 1))
     assert request.activate == bool(byte_0 & 0x01)
     assert request.go == bool(byte_0 & 0x08)
     assert request.mode is mode
     assert not request.release
-
-
-def test_every_axis_gets_its_own_registers() -> None:
-    request = adopted(gripper(THERE, THERE, THERE, THERE))
     assert request.individual_fingers
     assert request.individual_scissor
-
-
-def test_speed_and_force_have_no_echo_and_come_from_the_settings() -> None:
-    request = adopted(gripper(THERE, THERE, THERE, THERE))
     assert [(axis.speed, axis.force) for axis in request.axes] == [(10, 20), (20, 40), (30, 60), (40, 80)]
 
 
@@ -215,9 +186,9 @@ WHATS = st.tuples(*[st.sampled_from(ObjectStatus)] * 4)
 @given(WHATS, BYTES4, BYTES4, BYTES4, st.booleans())
 def test_an_adopted_gripper_neither_turns_round_nor_lets_go(
     whats: tuple[ObjectStatus, ...],
-    echo: tuple[int, ...],
-    before: tuple[int, ...],
-    now: tuple[int, ...],
+    echo: Four,
+    before: Four,
+    now: Four,
     go: bool,
 ) -> None:
     byte_0 = GO if go else HALTED
@@ -245,7 +216,7 @@ def test_an_adopted_gripper_neither_turns_round_nor_lets_go(
 
 @given(WHATS, BYTES4, BYTES4)
 def test_a_request_is_an_echo_an_end_or_where_the_axis_is(
-    whats: tuple[ObjectStatus, ...], echo: tuple[int, ...], position: tuple[int, ...]
+    whats: tuple[ObjectStatus, ...], echo: Four, position: Four
 ) -> None:
     request = adopted(gripper(*whats, echo=echo, position=position))
     for number, axis in enumerate(THREE_FINGER.axes):
@@ -256,9 +227,7 @@ def test_a_request_is_an_echo_an_end_or_where_the_axis_is(
 
 
 @given(BYTES4, BYTES4)
-def test_individual_requests_of_a_holding_gripper_are_kept_as_they_are(
-    position: tuple[int, ...], by: tuple[int, ...]
-) -> None:
+def test_individual_requests_of_a_holding_gripper_are_kept_as_they_are(position: Four, by: Four) -> None:
     """Under individual control every echo is worth trusting."""
     echo = tuple(min(255, each + 1 + more) for each, more in zip(position, by, strict=True))
     request = adopted(gripper(CLOSING, CLOSING, CLOSING, CLOSING, echo=echo, position=position))

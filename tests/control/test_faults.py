@@ -8,7 +8,7 @@ from robotiq_async import Fault, Finger, GripperFaultError, NotActivatedError, S
 from robotiq_async.control.passing_fault import LASTS_READS
 from robotiq_async.values.request import Request
 from tests.control.other_client import moved_by_another
-from tests.control.scan import POLL_S, Scan
+from tests.control.scan import POLL_S, Scan, started
 
 UNKNOWN = Fault(0x0C)
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
@@ -44,6 +44,7 @@ def test_a_gripper_found_in_fault_is_left_there() -> None:
     scan.run(0.5)
     assert scan.state is State.FAULT
     assert not scan.written
+    assert scan.controller.foreign_commands == 0
 
 
 def test_nothing_resumes_when_a_minor_fault_clears(scan: Scan) -> None:
@@ -68,8 +69,7 @@ def test_a_motion_nobody_awaits_does_not_resume_either(scan: Scan) -> None:
 
 
 def test_a_command_sent_just_before_the_fault_does_not_begin_to_act_when_it_clears() -> None:
-    scan = Scan(device_cycle=0.2)
-    scan.start()
+    scan = started(0.2)
     scan.command(A, position=149)
     scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
     scan.run(3.0)
@@ -78,8 +78,7 @@ def test_a_command_sent_just_before_the_fault_does_not_begin_to_act_when_it_clea
 
 
 def test_a_write_lost_before_the_fault_does_not_begin_to_act_when_it_clears() -> None:
-    scan = Scan(device_cycle=0.2)
-    scan.start()
+    scan = started(0.2)
     scan.command(A, position=149)
     scan.step(answer=False)
     scan.connect(activate=False)
@@ -95,8 +94,7 @@ def test_nothing_resumes_when_a_fault_clears_that_began_while_the_link_was_down(
     scan.run(0.5)
     scan.controller.lost(None)
     scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 2)
-    scan.now += 0.1
-    scan.connect(activate=False)
+    scan.come_back(0.1)
     assert scan.state is State.FAULT
     with pytest.raises(GripperFaultError):
         scan.command(B, position=3)
@@ -106,8 +104,7 @@ def test_nothing_resumes_when_a_fault_clears_that_began_while_the_link_was_down(
 
 
 def test_an_axis_that_the_fault_keeps_from_starting_is_held() -> None:
-    scan = Scan(device_cycle=0.0)
-    scan.start()
+    scan = started(0.0)
     scan.moved(6)
     scan.command(A, position=107)
     scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
@@ -120,8 +117,7 @@ def test_an_axis_that_the_fault_keeps_from_starting_is_held() -> None:
 def test_an_axis_that_the_fault_keeps_from_its_last_two_counts_is_held(device_cycle: float, by: int) -> None:
     """So close to its request an axis counts as there; one that had not begun yet went on afterwards."""
     for steps in range(8):
-        scan = Scan(device_cycle=device_cycle)
-        scan.start()
+        scan = started(device_cycle)
         scan.moved(112, A)
         scan.move(112 + by, A)
         for _ in range(steps):

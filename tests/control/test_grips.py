@@ -35,8 +35,7 @@ def test_a_grip_is_kept_over_a_minor_fault(scan: Scan) -> None:
 def test_a_halted_grip_survives_a_blink_of_the_link(scan: Scan) -> None:
     scan.gripper.place_object(B, 150)
     scan.moved(255, B)
-    halted = scan.halt()
-    scan.until(lambda: halted.is_told)
+    scan.halted()
     scan.blink()
     scan.run(0.1)
     scan.moved(60, A)
@@ -63,8 +62,7 @@ def test_a_grip_that_is_not_taken_up_again_is_told(caplog: pytest.LogCaptureFixt
 def test_a_grip_that_is_taken_up_again_needs_no_word(scan: Scan, caplog: pytest.LogCaptureFixture) -> None:
     scan.gripper.place_object(B, 60)
     scan.moved(255, B)
-    halted = scan.halt()
-    scan.until(lambda: halted.is_told)
+    scan.halted()
     assert not scan.gripper.grips
     scan.moved(100, A)
     assert scan.gripper.grips == B
@@ -74,8 +72,7 @@ def test_a_grip_that_is_taken_up_again_needs_no_word(scan: Scan, caplog: pytest.
 def test_a_grip_that_is_somewhere_else_by_now_is_none(scan: Scan) -> None:
     scan.gripper.place_object(Finger.ABC, 150)
     scan.moved(255)
-    halted = scan.halt()
-    scan.until(lambda: halted.is_told)
+    scan.halted()
     scan.gripper.remove_object(Finger.ABC)
     scan.gripper.write(0, [0x0000])  # all of this while the loop is held up
     scan.now += 0.05
@@ -94,8 +91,7 @@ def test_a_motion_that_was_halted_does_not_come_back_because_the_axis_had_grippe
     scan.command(A, position=20)
     scan.step()
     scan.gripper.device_cycle = 0  # both writes fall into one tick of the device
-    halted = scan.halt()
-    scan.until(lambda: halted.is_told)
+    scan.halted()
     scan.moved(60, B)
     scan.run(3)
     assert scan.positions()[A] == 150
@@ -106,16 +102,14 @@ def test_after_another_clients_reset_and_activation_no_old_grip_closes_the_finge
         scan = started()
         scan.gripper.place_object(Finger.ABC, 150)
         scan.moved(255)
-        halted = scan.halt()
-        scan.until(lambda: halted.is_told)  # noqa: B023
+        scan.halted()
         scan.gripper.remove_object(Finger.ABC)
         if link_is_down_meanwhile:
             scan.controller.lost(None)
             scan.gripper.write(0, [0x0000])
             scan.now += 0.05
             scan.gripper.write(0, [0x0100])
-            scan.now += 10
-            scan.connect(activate=False)
+            scan.come_back(10)
         else:
             reset_and_activated_by_another(scan)
         scan.moved(100, S)

@@ -7,7 +7,7 @@ import pytest
 from robotiq_async import Fault, Finger, MoveSupersededError, State
 from robotiq_async.values.model import THREE_FINGER
 from tests.control.other_client import image, moved_by_another, used_by_another
-from tests.control.scan import Scan
+from tests.control.scan import Scan, started
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 
@@ -39,8 +39,7 @@ def test_a_command_after_a_halt_moves_only_its_own_axes(scan: Scan) -> None:
 
 
 def test_a_command_after_a_halt_waits_until_a_slow_gripper_has_stopped() -> None:
-    scan = Scan(device_cycle=0.1)
-    scan.start()
+    scan = started(0.1)
     scan.move(255, speed=255)
     scan.run(0.5)
     scan.halt()

@@ -231,8 +231,7 @@ def test_a_hold_that_was_not_acknowledged_before_the_link_was_lost_is_made_good(
     else:
         scan.controller.lost(None)
     assert isinstance(asked.error, ConnectionLostError)
-    scan.now += 0.5
-    scan.connect(activate=False)
+    scan.come_back(0.5)
     scan.run(0.5)
     at = scan.positions()[A]
     scan.run(2.0)

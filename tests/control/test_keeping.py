@@ -134,8 +134,7 @@ def test_where_rgto_is_clear_there_is_nothing_to_keep_and_nothing_to_say(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     scan = holding()
-    halted = scan.halt()
-    scan.until(lambda: halted.is_told)
+    scan.halted()
     writes = len(scan.written)
     stopped(scan)
     assert len(scan.written) == writes

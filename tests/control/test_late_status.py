@@ -123,8 +123,7 @@ def test_a_part_that_is_let_go_of_and_gripped_again_at_once(
     """The part is gone by then: what is shown of the grip before is no grip now."""
     scan = holding(lag, device_cycle)
     scan.move(0)
-    for _ in range(polls):
-        scan.step()
+    scan.run(polls * POLL_S)
     scan.gripper.remove_object(ABC)
     _, again = scan.move(255)
     result = ended(scan, again)
@@ -142,8 +141,7 @@ def test_who_was_sent_away_from_a_part_and_back_is_stopped_by_a_hold(
 ) -> None:
     scan = holding(lag, device_cycle)
     scan.move(0)
-    for _ in range(polls):
-        scan.step()
+    scan.run(polls * POLL_S)
     scan.gripper.remove_object(ABC)
     scan.move(255)
     scan.run(2 * device_cycle + 0.005)
@@ -209,24 +207,20 @@ def test_two_moves_at_once_end_each_in_its_time(lag: int, device_cycle: float) -
 
 @LAGS
 @CYCLES
-def test_more_force_on_a_part_that_is_gone_shows_that_it_is(lag: int, device_cycle: float) -> None:
+@pytest.mark.parametrize("after", ["more force", "a halt"])
+def test_who_tries_again_where_the_part_is_gone_sees_that_it_is(
+    lag: int, device_cycle: float, after: str
+) -> None:
     """It is how a program asks whether a part is still there: the contact of before must not answer."""
     scan = holding(lag, device_cycle)
+    if after == "a halt":
+        scan.halt()
+        scan.run(2 * device_cycle + 0.02)
     scan.gripper.remove_object(ABC)
-    scan.run(0.5)
-    result = ended(scan, scan.move(254, force=200)[1])
-    assert result.contacts == Finger(0)
-
-
-@LAGS
-@CYCLES
-def test_a_grip_that_is_taken_up_after_a_halt_is_seen_anew(lag: int, device_cycle: float) -> None:
-    scan = holding(lag, device_cycle)
-    scan.halt()
-    scan.run(2 * device_cycle + 0.02)
-    scan.gripper.remove_object(ABC)
-    result = ended(scan, scan.move(255)[1])
-    assert result.contacts == Finger(0)
+    if after == "more force":
+        scan.run(0.5)
+    _, told = scan.move(254, force=200) if after == "more force" else scan.move(255)
+    assert ended(scan, told).contacts == Finger(0)
 
 
 # -- what cannot be reached --------------------------------------------------------------------------------
@@ -277,8 +271,7 @@ def test_a_grip_is_kept_and_what_was_just_sent_off_is_held(lag: int, device_cycl
 def test_a_grip_that_is_being_let_go_of_is_not_kept_for_one(lag: int, polls: int) -> None:
     scan = holding(lag)
     scan.command(ABC, position=0)
-    for _ in range(polls):
-        scan.step()
+    scan.run(polls * POLL_S)
     scan.stop(keep_grip=True)
     travels = scan.travels()
     scan.now += 5
@@ -300,8 +293,7 @@ def test_the_first_write_beside_another_clients_leaves_it_what_it_has_just_asked
         scan.now += POLL_S
         scan.status()
     scan.gripper.write(0, image({B: target}))
-    scan.now += 0.01
-    scan.connect(activate=False)
+    scan.come_back(0.01)
     scan.command(S, position=100)
     scan.run(10)
     assert scan.gripper.position(B) == pytest.approx(6 if target == 0 else 150, abs=2)
@@ -333,20 +325,14 @@ class Axis(Standstill):
         return self.after(0, 0)
 
 
-def test_what_is_shown_is_believed_where_nothing_was_asked_lately() -> None:
+def test_what_is_shown_is_known_if_nothing_asked_lately_may_have_shown_it() -> None:
     assert Axis().is_known(THERE, 100)
     assert not Axis().is_known(MOVING, 100)
     assert not Axis().is_doubtful(CLOSING, 100)
-
-
-def test_a_change_that_fits_the_new_request_alone_is_no_old_news() -> None:
-    assert Axis().asked(255, 0).is_known(CLOSING, 9)
+    assert Axis().asked(255, 0).is_known(CLOSING, 9), "it fits the new request alone"
     assert not Axis().asked(0, 255).is_known(CLOSING, 9)
-
-
-def test_what_fitted_before_and_was_contradicted_since_is_not_known() -> None:
     axis = Axis().asked(0, 255).asked(255, 0)
-    assert not axis.is_known(CLOSING, 150)
+    assert not axis.is_known(CLOSING, 150), "it fitted before, and was contradicted since"
     assert axis.is_doubtful(CLOSING, 150)
     # Until the request that contradicts it is old enough: it is from the last one then.
     assert axis.after(LAG_S, LAG_READS).is_known(CLOSING, 150)

@@ -12,7 +12,7 @@ from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.registers import Registers, gPR
 from robotiq_async.values.request import AxisRequest, Request
-from tests.control.scan import Scan
+from tests.control.scan import POLL_S, Scan, started
 from tests.register_words import status_of
 
 A, B, C, S = THREE_FINGER.axes
@@ -133,12 +133,10 @@ def beside(scan: Scan, **positions: int) -> Registers:
 @CYCLES
 @pytest.mark.parametrize("polls", [1, 5, 60])
 def test_a_client_that_writes_after_ours_has_shown_is_one(device_cycle: float, polls: int) -> None:
-    scan = Scan(device_cycle=device_cycle)
-    scan.start()
+    scan = started(device_cycle)
     _, told = scan.move(200, S, speed=0)
     scan.until(lambda: scan.controller.status is not None and scan.latest.requested_position(S) == 200)
-    for _ in range(polls):
-        scan.step()
+    scan.run(polls * POLL_S)
     scan.gripper.write(0, beside(scan, SCISSOR=180))
     scan.until(lambda: told.is_told, 2.0)
     assert isinstance(told.error, MoveSupersededError)
@@ -156,8 +154,7 @@ def test_a_client_that_writes_after_ours_has_shown_is_one(device_cycle: float, p
     ids=str,
 )
 def test_a_client_that_writes_just_after_us_is_one(device_cycle: float, others: dict[str, int]) -> None:
-    scan = Scan(device_cycle=device_cycle)
-    scan.start()
+    scan = started(device_cycle)
     scan.moved(130, S)
     scan.run(1.0)
     _, told = scan.move(200, S, speed=0)
@@ -172,8 +169,7 @@ def test_a_client_that_writes_just_after_us_is_one(device_cycle: float, others: 
 @CYCLES
 def test_a_client_that_takes_the_fingers_just_after_us_is_one(device_cycle: float) -> None:
     """Fingers have a limit only near pinch."""
-    scan = Scan(device_cycle=device_cycle)
-    scan.start()
+    scan = started(device_cycle)
     _, told = scan.move(255)
     scan.step()
     scan.gripper.write(0, beside(scan, A=100, B=100, C=100))
@@ -198,8 +194,7 @@ def test_who_was_seen_lately_is_the_better_explanation() -> None:
 
 def test_a_client_that_is_taken_for_a_limit_is_not_undone() -> None:
     """It wrote within our device cycle, on our axis, on its way: that cannot be told. Nothing moves by it."""
-    scan = Scan(device_cycle=0.03)
-    scan.start()
+    scan = started(0.03)
     scan.moved(130, S)
     scan.run(1.0)
     _, told = scan.move(255, S)

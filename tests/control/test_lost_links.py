@@ -51,8 +51,7 @@ def test_a_motion_goes_on_over_a_lost_link_and_is_adopted(scan: Scan) -> None:
     scan.move(255, A)
     scan.run(0.5)
     scan.controller.lost(None)
-    scan.now += 0.3
-    scan.connect(activate=False)
+    scan.come_back(0.3)
     assert scan.state is State.RUNNING_IDLE
     scan.moved(100, B)
     scan.until(lambda: not scan.controller.is_moving)
@@ -65,8 +64,7 @@ def test_a_gripper_that_lost_its_power_is_not_activated_by_a_reconnect(scan: Sca
     scan.run(0.5)
     scan.controller.lost(None)
     scan.gripper.power_cycle()
-    scan.now += 0.1
-    scan.connect(activate=False)
+    scan.come_back(0.1)
     scan.run(1.0)
     assert scan.state is State.RESET
     assert not scan.gripper.is_moving
@@ -108,8 +106,7 @@ def test_a_lost_command_does_not_come_back_when_the_gripper_was_busy_at_the_reco
     scan.controller.lost(None)
     image = Request.from_registers(scan.gripper.request_registers)
     scan.gripper.write(0, replace(image, individual_scissor=False).registers)  # a mode change: gIMC = 2
-    scan.now += 0.2
-    scan.connect(activate=False)
+    scan.come_back(0.2)
     scan.until(lambda: scan.state is State.RUNNING_IDLE)
     scan.run(1)
     scan.moved(60, B)
@@ -147,8 +144,7 @@ def test_a_hold_survives_a_lost_link() -> None:
             assert scan.controller.decide(scan.now) is not None  # and it is lost
         scan.controller.lost(None)
         at = scan.positions()[A]
-        scan.now += 0.05
-        scan.connect(activate=False)
+        scan.come_back(0.05)
         assert scan.state is State.RUNNING_IDLE, "nothing was asked for"
         scan.run(5)
         # Whether a lost hold arrived is known after a device cycle: a quarter of a second, six counts.
@@ -223,8 +219,7 @@ def test_an_acknowledged_speed_survives_a_blink_of_the_link(moved_before: bool) 
 def test_a_speed_that_was_not_acknowledged_is_not_taken_for_the_axis_s_own(scan: Scan) -> None:
     scan.command(B, speed=77, force=33)
     scan.step(answer=False)
-    scan.now += 0.05
-    scan.connect(activate=False)
+    scan.come_back(0.05)
     scan.run(0.3)
     scan.command(A, position=60)
     scan.run(0.6)
@@ -241,13 +236,11 @@ def test_a_move_cancelled_as_its_link_was_lost_is_held_though_it_had_ended(link_
     scan.controller.lost(None)
     assert isinstance(told.error, ConnectionLostError)
     if link_is_back:
-        scan.now += 0.05
-        scan.connect(activate=False)
+        scan.come_back(0.05)
     scan.controller.abandon(move, unseen=True)
     at = scan.positions()[A]
     if not link_is_back:
-        scan.now += 0.05
-        scan.connect(activate=False)
+        scan.come_back(0.05)
     scan.run(10)
     assert abs(scan.positions()[A] - at) <= 4
 
@@ -257,7 +250,6 @@ def test_a_move_that_was_given_up_after_its_error_was_seen_goes_on(scan: Scan) -
     scan.run(0.5)
     scan.controller.lost(None)
     scan.controller.abandon(move)
-    scan.now += 0.05
-    scan.connect(activate=False)
+    scan.come_back(0.05)
     scan.run(10)
     assert scan.positions()[A] >= 198

@@ -62,8 +62,7 @@ def test_more_force_is_waited_for_also_on_a_slow_device() -> None:
 
 @pytest.mark.parametrize("device_cycle", [0.005, 0.02, 0.2])
 def test_going_there_and_back_quickly_ends_only_when_the_device_has_seen_it(device_cycle: float) -> None:
-    scan = Scan(device_cycle=device_cycle)
-    scan.start()
+    scan = started(device_cycle)
     scan.moved(100, A, speed=255)
     scan.command(A, position=200)
     scan.step()
@@ -181,8 +180,7 @@ def test_a_move_abandoned_before_it_was_sent_keeps_a_grip(scan: Scan) -> None:
 
 @pytest.mark.parametrize("steps", range(1, 8))
 def test_a_move_abandoned_around_the_moment_it_begins_to_act_is_held(steps: int) -> None:
-    scan = Scan(device_cycle=0.02)
-    scan.start()
+    scan = started(0.02)
     move, _ = scan.move(255, A, speed=255)
     for _ in range(steps):
         scan.step()

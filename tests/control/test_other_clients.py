@@ -8,7 +8,7 @@ from robotiq_async import Finger, MoveSupersededError, NotActivatedError, Roboti
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
 from tests.control.other_client import image, used_by_another
-from tests.control.scan import POLL_S, Scan
+from tests.control.scan import POLL_S, Scan, started
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 
@@ -70,8 +70,7 @@ def test_a_halted_gripper_is_adopted_where_it_stands() -> None:
 
 def test_our_own_writes_are_never_taken_for_another_client() -> None:
     for device_cycle in (0.0, 0.005, 0.05, 0.2):
-        scan = Scan(device_cycle=device_cycle)
-        scan.start()
+        scan = started(device_cycle)
         for value in (100, 200, 100, 0, 100, 200, 255, 0):
             scan.command(A, position=value)
             scan.run(0.02)

@@ -33,16 +33,12 @@ def test_before_anything_is_known_every_axis_has_the_settings_of_the_hand() -> N
 def test_what_a_gripper_shows_when_it_is_found_is_not_ours_but_settled(shadow: Shadow) -> None:
     assert shadow.base == image(100, speed=128, force=64)
     assert shadow.ours == NO_AXES
-    assert shadow.doubt is None
-    assert shadow.acts()
     assert not shadow.may_begin_to_move
-
-
-def test_a_gripper_that_was_found_reset_is_settled_too() -> None:
-    shadow = Shadow()
-    shadow.shown(status_of(0x00), 1.0)
-    assert shadow.acts()
-    assert shadow.doubt is None
+    found_reset = Shadow()
+    found_reset.shown(status_of(0x00), 1.0)
+    for each in (shadow, found_reset):
+        assert each.acts()
+        assert each.doubt is None
 
 
 def test_a_moving_gripper_that_is_found_is_not_certain_before_it_has_shown_its_direction() -> None:
@@ -64,14 +60,10 @@ def test_at_rest_nothing_could_be_woken(ours: Shadow) -> None:
 # -- what we write -----------------------------------------------------------------------------------------
 
 
-def test_the_last_image_written_is_what_the_next_is_made_from(shadow: Shadow) -> None:
-    shadow.write(image(200))
+def test_a_write_is_what_the_next_is_made_from_and_acts_once_it_shows(shadow: Shadow) -> None:
+    number = shadow.write(image(200))
     assert shadow.base == image(200)
     assert shadow.ours == Finger.ALL
-
-
-def test_a_write_acts_once_it_shows(shadow: Shadow) -> None:
-    number = shadow.write(image(200))
     assert shadow.follows(shadow.shown(shows(100, 1.01), 1.01))
     assert not shadow.acts(number)
     assert not shadow.acts()
@@ -107,12 +99,9 @@ def test_a_speed_that_does_not_act_yet_sets_nothing_in_motion_while_rgto_is_clea
 # -- another client beside us ------------------------------------------------------------------------------
 
 
-def test_what_we_never_wrote_is_anothers(ours: Shadow) -> None:
-    assert not ours.follows(ours.shown(shows(77, 1.2), 1.2))
-
-
 def test_the_requests_of_another_client_are_what_the_next_image_is_made_from(ours: Shadow) -> None:
     status = ours.shown(shows(77, 1.2), 1.2)
+    assert not ours.follows(status)
     ours.follow(Whose.FOREIGN, status)
     assert ours.base == image(77), "speed and force stay as we last wrote them: they have no echo"
     assert ours.follows(ours.shown(shows(77, 1.3), 1.3))
@@ -151,19 +140,15 @@ def test_who_writes_again_and_again_does_not_make_us_wait_again_and_again(shadow
 # -- a link that comes back --------------------------------------------------------------------------------
 
 
-def test_our_image_that_shows_when_the_link_is_back_is_still_ours(ours: Shadow) -> None:
+@pytest.mark.parametrize(("position", "axes"), [(200, Finger.ALL), (77, NO_AXES)])
+def test_what_shows_when_the_link_is_back_is_ours_if_we_wrote_it(
+    ours: Shadow, position: int, axes: Finger
+) -> None:
     ours.lost()
-    ours.returned(ours.shown(shows(200, 9.0), 9.0))
-    assert ours.base == image(200)
-    assert ours.ours == Finger.ALL
+    ours.returned(ours.shown(shows(position, 9.0), 9.0))
+    assert ours.base == image(position)
+    assert ours.ours == axes
     assert ours.doubt is None
-
-
-def test_what_somebody_asked_while_the_link_was_down_is_theirs(ours: Shadow) -> None:
-    ours.lost()
-    ours.returned(ours.shown(shows(77, 9.0), 9.0))
-    assert ours.base == image(77)
-    assert ours.ours == NO_AXES
 
 
 def test_what_was_adopted_is_not_ours_after_the_link_was_lost(shadow: Shadow) -> None:
@@ -173,48 +158,37 @@ def test_what_was_adopted_is_not_ours_after_the_link_was_lost(shadow: Shadow) ->
     assert shadow.ours == NO_AXES
 
 
-def test_a_write_that_may_have_arrived_is_waited_for(ours: Shadow) -> None:
+@pytest.mark.parametrize("arrived", [True, False])
+def test_a_write_that_may_have_arrived_is_waited_for(ours: Shadow, arrived: bool) -> None:
     ours.write(image(30), answered=False)
     ours.returned(ours.shown(shows(200, 1.2), 1.2))
     assert ours.base == image(200)
     assert ours.doubt is not None
-    assert ours.follows(ours.shown(shows(200, 1.15 + SILENT_S), 1.15 + SILENT_S))
+    position = 30 if arrived else 200
+    at = 1.3 if arrived else 1.15 + SILENT_S
+    assert ours.follows(ours.shown(shows(position, at), at))
+    assert ours.base == image(position)
     assert ours.doubt is None, "what has not shown by now has not arrived"
 
 
-def test_a_write_that_has_arrived_all_the_same_is_gone_on_from(ours: Shadow) -> None:
-    ours.write(image(30), answered=False)
-    ours.returned(ours.shown(shows(200, 1.2), 1.2))
-    assert ours.follows(ours.shown(shows(30, 1.3), 1.3))
-    assert ours.base == image(30)
-    assert ours.doubt is None
-
-
-def test_an_acknowledged_speed_is_kept_over_a_lost_link(ours: Shadow) -> None:
-    ours.write(image(200, speed=7))
+@pytest.mark.parametrize("acknowledged", [True, False])
+def test_a_speed_is_kept_over_a_lost_link_if_it_was_acknowledged(ours: Shadow, acknowledged: bool) -> None:
+    ours.write(image(200, speed=7), answered=acknowledged)
     ours.lost()
     ours.returned(ours.shown(shows(200, 1.2), 1.2))
-    assert ours.base == image(200, speed=7)
-
-
-def test_a_speed_that_may_not_have_arrived_is_not_taken_for_the_axis_s_own(ours: Shadow) -> None:
-    ours.write(image(200, speed=7), answered=False)
-    ours.returned(ours.shown(shows(200, 1.2), 1.2))
-    assert ours.base == image(200)
+    assert ours.base == (image(200, speed=7) if acknowledged else image(200))
 
 
 # -- the end of a sequence ---------------------------------------------------------------------------------
 
 
-def test_after_a_sequence_the_gripper_has_what_was_written_last(ours: Shadow) -> None:
+@pytest.mark.parametrize("shown", [30, 77])
+def test_a_sequence_ends_with_what_was_written_last_or_another_client_has_written(
+    ours: Shadow, shown: int
+) -> None:
     ours.write(image(30))
-    assert ours.restart(ours.shown(shows(30, 1.2), 1.2))
+    assert ours.restart(ours.shown(shows(shown, 1.2), 1.2)) == (shown == 30)
     assert ours.acts()
-
-
-def test_another_client_that_has_written_during_a_sequence_is_noticed(ours: Shadow) -> None:
-    ours.write(image(30))
-    assert not ours.restart(ours.shown(shows(77, 1.2), 1.2))
 
 
 # -- axes that grip, and axes at rest ----------------------------------------------------------------------
@@ -268,13 +242,10 @@ def test_an_axis_has_arrived_when_it_was_seen_at_rest_under_what_it_was_asked_la
     assert ours.axes.resting == C | S
 
 
-def test_no_axis_arrives_under_what_does_not_act_yet(ours: Shadow) -> None:
+def test_no_axis_arrives_under_what_does_not_act_yet_nor_while_rgto_is_clear(ours: Shadow) -> None:
     ours.write(image(30), moved=A)
     ours.axes.see(ours.shown(shows(200, 1.2), 1.2), ours.now)
     assert A not in ours.axes.resting
-
-
-def test_no_axis_arrives_while_rgto_is_clear(ours: Shadow) -> None:
     ours.write(image(200, go=False))
     ours.axes.see(ours.shown(shows(200, 1.2, go=False), 1.2), ours.now)
     assert ours.axes.resting == NO_AXES

@@ -9,7 +9,7 @@ import pytest
 from robotiq_async import Finger, Mode, NotStartedError, State
 from robotiq_async.values.request import Request
 from tests.control.other_client import activated_by_another, asked, image
-from tests.control.scan import LAG, POLL_S, Scan
+from tests.control.scan import LAG, POLL_S, Scan, started
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 
@@ -25,8 +25,7 @@ def test_the_shutdown_stops_the_fingers_and_keeps_the_activation(scan: Scan) -> 
 
 
 def test_the_shutdown_waits_for_the_echo_of_the_complete_last_image() -> None:
-    scan = Scan(device_cycle=0.1)
-    scan.start()
+    scan = started(0.1)
     scan.command(A, position=200)
     scan.step()
     scan.stop()
@@ -67,8 +66,7 @@ def test_stop_leaves_the_activation_of_others_alone() -> None:
     scan = activated_by_another()
     pinch = Request(activate=True, go=True, individual_scissor=False, mode=Mode.PINCH, axes=asked(100))
     scan.gripper.write(0, pinch.registers)
-    scan.now += 0.2
-    scan.connect(activate=False)
+    scan.come_back(0.2)
     scan.run(0.05)
     assert scan.state is State.WF_ACTIVATION, "it changes its mode"
     scan.stop()

@@ -1,48 +1,225 @@
-"""The machine that follows the table: what it tells, the sequence it runs, and whole lives as stories."""
+"""The state machine: each cell of its table, each refusal, the sequence it runs, and what a status shows."""
 
 from __future__ import annotations
 
+import itertools
 import logging
+from collections import deque
 
 import pytest
 
 from robotiq_async.control.sequences import Sequence
-from robotiq_async.control.state_machine import TABLE, StateMachine
+from robotiq_async.control.state_machine import (
+    RUNNING,
+    SEQUENCES,
+    TABLE,
+    StateMachine,
+    Verdict,
+    refusal,
+    states_allowing,
+)
+from robotiq_async.control.triggers import classify
 from robotiq_async.values.enums import Fault, State, Trigger
-from robotiq_async.values.errors import GripperFaultError, InvalidStateError
+from robotiq_async.values.errors import (
+    ConnectionLostError,
+    GripperFaultError,
+    InvalidStateError,
+    NotActivatedError,
+    NotStartedError,
+    RobotiqError,
+)
 from robotiq_async.values.request import Request
 from robotiq_async.values.status import RobotiqStatus
-from tests.control.walks import Change, Recorded
 from tests.register_words import status_of
 
 
-def test_after_a_refusal_the_machine_goes_on_as_if_nothing_had_been_asked() -> None:
-    machine = StateMachine()
-    machine.fire(Trigger.SEEN_READY)
-    with pytest.raises(InvalidStateError):
-        machine.fire(Trigger.ASK_RELEASE)
-    assert machine.fire(Trigger.ASK_COMMAND)
-    assert machine.state is State.RUNNING_CC
+def path_to(target: State) -> list[Trigger]:
+    """The shortest way through the table."""
+    ways: dict[State, list[Trigger]] = {State.DISCONNECTED: []}
+    queue = deque(ways)
+    while target not in ways:
+        state = queue.popleft()
+        for trigger, following in TABLE[state].items():
+            if isinstance(following, State) and following not in ways:
+                ways[following] = [*ways[state], trigger]
+                queue.append(following)
+    return ways[target]
 
 
-def test_the_new_state_is_in_place_when_the_change_is_told() -> None:
+class Recorded:
+    """A machine that has walked to a state, and the changes it has told since."""
+
+    def __init__(self, state: State) -> None:
+        self.changes: list[tuple[State, State, Trigger]] = []
+        self.machine = StateMachine(lambda *change: self.changes.append(change))
+        for trigger in path_to(state):
+            self.machine.fire(trigger)
+        assert self.machine.state is state
+        self.changes.clear()
+
+
+# -- every state and trigger -------------------------------------------------------------------------------
+
+GOES = {
+    Trigger.ASK_START: State.DISCONNECTED,
+    Trigger.ASK_ACTIVATE: State.DO_ACTIVATION,
+    Trigger.ASK_COMMAND: State.RUNNING_CC,
+    Trigger.ASK_HOLD: State.RUNNING_CC,
+    Trigger.ASK_HALT: State.RUNNING_CC,
+    Trigger.ASK_RELEASE: State.DO_ATR,
+    Trigger.ASK_RESET: State.DO_RESET,
+    Trigger.ASK_STOP: State.DO_SHUTDOWN,
+}
+ASKED = """
+                start()  activate()  command  hold()   halt()   atr()    reset()  stop()
+DISCONNECTED  | goes   | lost      | lost   | lost   | lost   | lost   | lost   | goes
+DO_ACTIVATION | not now| nothing   | not now| nothing| resets | not now| goes   | goes
+WF_ACTIVATION | not now| nothing   | not now| nothing| resets | not now| goes   | goes
+RUNNING_IDLE  | not now| nothing   | goes   | goes   | goes   | not now| goes   | goes
+RUNNING_CC    | not now| nothing   | goes   | goes   | goes   | not now| goes   | goes
+FAULT         | not now| fault     | fault  | stays  | stays  | goes   | goes   | goes
+DO_ATR        | not now| not now   | not now| nothing| resets | not now| goes   | goes
+WF_ATR        | not now| not now   | not now| nothing| resets | not now| goes   | goes
+ATR_DONE      | not now| fault     | fault  | nothing| nothing| not now| goes   | goes
+DO_RESET      | not now| not now   | not now| nothing| nothing| not now| nothing| goes
+WF_RESET      | not now| not now   | not now| nothing| resets | not now| goes   | goes
+RESET         | not now| goes      | reset  | nothing| nothing| not now| goes   | goes
+DO_SHUTDOWN   | not now| off       | off    | off    | off    | off    | off    | nothing
+SHUTDOWN      | goes   | off       | off    | off    | off    | off    | off    | nothing
+"""
+"""What becomes of what is asked: where it goes, "nothing" to do, or the error."""
+LEADS = {
+    Trigger.SEEN_READY: State.RUNNING_IDLE,
+    Trigger.SEEN_BUSY: State.WF_ACTIVATION,
+    Trigger.SEEN_RESET: State.RESET,
+    Trigger.SEEN_FAULT: State.FAULT,
+    Trigger.SEEN_RELEASED: State.ATR_DONE,
+}
+HAPPENS = """
+                active   busy     reset    fault    released  acknowledged    link lost      stopped
+DISCONNECTED  | leads  | leads  | leads  | leads  | leads   | not now       | stays        | not now
+DO_ACTIVATION | nothing| nothing| nothing| nothing| nothing | WF_ACTIVATION | DISCONNECTED | not now
+WF_ACTIVATION | leads  | leads  | leads  | leads  | leads   | not now       | DISCONNECTED | not now
+RUNNING_IDLE  | leads  | leads  | leads  | leads  | leads   | not now       | DISCONNECTED | not now
+RUNNING_CC    | stays  | leads  | leads  | leads  | leads   | RUNNING_IDLE  | DISCONNECTED | not now
+FAULT         | leads  | leads  | leads  | leads  | leads   | not now       | DISCONNECTED | not now
+DO_ATR        | nothing| nothing| nothing| nothing| nothing | WF_ATR        | DISCONNECTED | not now
+WF_ATR        | leads  | leads  | leads  | leads  | leads   | not now       | DISCONNECTED | not now
+ATR_DONE      | leads  | leads  | leads  | leads  | leads   | not now       | DISCONNECTED | not now
+DO_RESET      | nothing| nothing| nothing| nothing| nothing | WF_RESET      | DISCONNECTED | not now
+WF_RESET      | nothing| nothing| leads  | nothing| nothing | not now       | DISCONNECTED | not now
+RESET         | leads  | leads  | leads  | leads  | leads   | not now       | DISCONNECTED | not now
+DO_SHUTDOWN   | nothing| nothing| nothing| nothing| nothing | not now       | nothing      | SHUTDOWN
+SHUTDOWN      | nothing| nothing| nothing| nothing| nothing | not now       | nothing      | nothing
+"""
+"""What a status shows never leads to a state that sends something, and nothing before an acknowledgement."""
+HAPPENING = (*LEADS, Trigger.DELIVERED, Trigger.LINK_LOST, Trigger.STOPPED)
+ERRORS: dict[str, type[RobotiqError]] = {
+    "lost": ConnectionLostError,
+    "off": NotStartedError,
+    "reset": NotActivatedError,
+    "fault": GripperFaultError,
+    "not now": InvalidStateError,
+}
+
+
+def contract() -> dict[tuple[State, Trigger], State | str]:
+    """For every state and trigger the next state, "nothing", or a key of the errors."""
+    cells: dict[tuple[State, Trigger], State | str] = {}
+    for table, triggers in ((ASKED, tuple(GOES)), (HAPPENS, HAPPENING)):
+        for line in table.strip().splitlines()[1:]:
+            name, *words = (word.strip() for word in line.split("|"))
+            state = State[name]
+            for trigger, word in zip(triggers, words, strict=True):
+                where = {"stays": state, "resets": State.DO_RESET} | State.__members__
+                target = (GOES | LEADS).get(trigger) if word in ("goes", "leads") else where.get(word)
+                cells[state, trigger] = target or word
+    activates = dict.fromkeys(itertools.product(State, [Trigger.ACTIVATES]), "not now")
+    return cells | activates | {(State.DISCONNECTED, Trigger.ACTIVATES): State.DO_ACTIVATION}
+
+
+ANSWERS = contract()
+PAIRS = list(itertools.product(State, Trigger))
+
+
+def test_the_contract_has_every_state_and_trigger() -> None:
+    assert set(ANSWERS) == set(PAIRS)
+    assert [trigger for trigger in Trigger if trigger.is_seen] == list(LEADS)
+
+
+@pytest.mark.parametrize("state", State)
+def test_every_trigger_leads_on_is_nothing_to_do_or_is_refused_with_the_error_that_says_why(
+    state: State,
+) -> None:
+    status = status_of(0x31, fault=0x0E)
+    for trigger in Trigger:
+        recorded, answer = Recorded(state), ANSWERS[state, trigger]
+        machine = recorded.machine
+        if isinstance(answer, State) or answer == "nothing":
+            assert machine.fire(trigger, status) is (answer != "nothing"), trigger
+        else:
+            with pytest.raises(RobotiqError) as caught:
+                machine.fire(trigger, status)
+            assert type(caught.value) is ERRORS[answer], trigger
+            if isinstance(caught.value, GripperFaultError):
+                assert caught.value.fault is status.fault
+            if isinstance(caught.value, InvalidStateError):
+                assert caught.value.state is state
+                assert caught.value.allowed == states_allowing(trigger), trigger
+        to = answer if isinstance(answer, State) else state
+        assert machine.state is to, trigger
+        assert recorded.changes == ([(state, to, trigger)] if to is not state else []), trigger
+
+
+def test_the_states_that_allow_something_are_those_of_the_contract() -> None:
+    for trigger in Trigger:
+        allowed = {state for state in State if ANSWERS[state, trigger] not in ERRORS}
+        assert states_allowing(trigger) == allowed, trigger
+    assert states_allowing(Trigger.ASK_COMMAND) == RUNNING
+    ended_by_a_reset = {state for state in State if ANSWERS[state, Trigger.ASK_HALT] is State.DO_RESET}
+    assert ended_by_a_reset | {State.DO_RESET} == SEQUENCES
+
+
+def test_a_verdict_is_named_after_the_error_it_means() -> None:
+    for state, trigger in PAIRS:
+        verdict = TABLE[state][trigger]
+        if isinstance(verdict, Verdict) and verdict is not Verdict.IGNORED:
+            assert type(refusal(trigger, state)).__name__ == verdict.value, (state, trigger)
+
+
+def test_a_fault_that_nobody_has_seen_is_refused_all_the_same() -> None:
+    error = refusal(Trigger.ASK_COMMAND, State.FAULT)
+    assert isinstance(error, GripperFaultError)
+    assert error.fault is Fault.NONE
+
+
+def test_a_refusal_names_what_was_asked_the_state_and_the_states_that_would_do() -> None:
+    for trigger in Trigger:
+        if TABLE[State.WF_ATR][trigger] is Verdict.NOT_NOW:
+            message = str(refusal(trigger, State.WF_ATR))
+            assert trigger.value in message
+            assert "WF_ATR" in message
+            assert [state for state in states_allowing(trigger) if state.name not in message] == []
+
+
+# -- the machine -------------------------------------------------------------------------------------------
+
+
+def test_a_machine_begins_disconnected_and_tells_a_change_when_it_has_happened() -> None:
     seen: list[State] = []
     machine = StateMachine(lambda *_: seen.append(machine.state))
+    assert machine.state is State.DISCONNECTED
+    assert machine.sequence is None
     machine.fire(Trigger.SEEN_RESET)
     assert seen == [State.RESET]
 
 
-def test_a_machine_begins_disconnected_and_with_no_sequence() -> None:
-    assert StateMachine().state is State.DISCONNECTED
-    assert StateMachine().sequence is None
-
-
 @pytest.mark.parametrize("state", State)
 def test_what_was_about_to_be_sent_has_been_delivered_and_nothing_else_has(state: State) -> None:
-    recorded = Recorded(state)
-    recorded.machine.delivered()
-    expected = TABLE[state][Trigger.DELIVERED]
-    assert recorded.machine.state is (expected if isinstance(expected, State) else state)
+    machine = Recorded(state).machine
+    machine.delivered()
+    expected = ANSWERS[state, Trigger.DELIVERED]
+    assert machine.state is (expected if isinstance(expected, State) else state)
 
 
 def test_commands_coming_and_going_are_for_the_curious_and_other_changes_for_everybody(
@@ -155,96 +332,46 @@ def test_a_sequence_that_is_dropped_is_over_and_changes_no_state() -> None:
     assert not recorded.changes
 
 
-# -- stories -----------------------------------------------------------------------------------------------
-
-Story = list[tuple[Trigger, State]]
-
-STORIES: dict[str, Story] = {
-    "a whole life": [
-        (Trigger.ASK_START, State.DISCONNECTED),
-        (Trigger.ACTIVATES, State.DO_ACTIVATION),
-        (Trigger.SEEN_RESET, State.DO_ACTIVATION),
-        (Trigger.DELIVERED, State.WF_ACTIVATION),
-        (Trigger.SEEN_BUSY, State.WF_ACTIVATION),
-        (Trigger.SEEN_READY, State.RUNNING_IDLE),
-        (Trigger.ASK_COMMAND, State.RUNNING_CC),
-        (Trigger.SEEN_READY, State.RUNNING_CC),
-        (Trigger.ASK_COMMAND, State.RUNNING_CC),
-        (Trigger.DELIVERED, State.RUNNING_IDLE),
-        (Trigger.ASK_HALT, State.RUNNING_CC),
-        (Trigger.DELIVERED, State.RUNNING_IDLE),
-        (Trigger.SEEN_FAULT, State.FAULT),
-        (Trigger.ASK_RELEASE, State.DO_ATR),
-        (Trigger.SEEN_FAULT, State.DO_ATR),
-        (Trigger.DELIVERED, State.WF_ATR),
-        (Trigger.SEEN_RELEASED, State.ATR_DONE),
-        (Trigger.ASK_RESET, State.DO_RESET),
-        (Trigger.SEEN_RELEASED, State.DO_RESET),
-        (Trigger.DELIVERED, State.WF_RESET),
-        (Trigger.SEEN_RELEASED, State.WF_RESET),
-        (Trigger.SEEN_RESET, State.RESET),
-        (Trigger.ASK_ACTIVATE, State.DO_ACTIVATION),
-        (Trigger.DELIVERED, State.WF_ACTIVATION),
-        (Trigger.SEEN_READY, State.RUNNING_IDLE),
-        (Trigger.ASK_STOP, State.DO_SHUTDOWN),
-        (Trigger.SEEN_READY, State.DO_SHUTDOWN),
-        (Trigger.STOPPED, State.SHUTDOWN),
-        (Trigger.ASK_START, State.DISCONNECTED),
-        (Trigger.SEEN_READY, State.RUNNING_IDLE),
-    ],
-    "an active gripper is adopted and a lost link is opened again": [
-        (Trigger.ASK_START, State.DISCONNECTED),
-        (Trigger.SEEN_READY, State.RUNNING_IDLE),
-        (Trigger.LINK_LOST, State.DISCONNECTED),
-        (Trigger.LINK_LOST, State.DISCONNECTED),
-        (Trigger.SEEN_READY, State.RUNNING_IDLE),
-        (Trigger.LINK_LOST, State.DISCONNECTED),
-        (Trigger.SEEN_RESET, State.RESET),
-    ],
-    "a minor fault clears by itself": [
-        (Trigger.SEEN_READY, State.RUNNING_IDLE),
-        (Trigger.SEEN_FAULT, State.FAULT),
-        (Trigger.SEEN_FAULT, State.FAULT),
-        (Trigger.SEEN_READY, State.RUNNING_IDLE),
-    ],
-    "a failed activation is reset": [
-        (Trigger.SEEN_RESET, State.RESET),
-        (Trigger.ASK_ACTIVATE, State.DO_ACTIVATION),
-        (Trigger.DELIVERED, State.WF_ACTIVATION),
-        (Trigger.SEEN_FAULT, State.FAULT),
-        (Trigger.ASK_RESET, State.DO_RESET),
-        (Trigger.DELIVERED, State.WF_RESET),
-        (Trigger.SEEN_FAULT, State.WF_RESET),
-        (Trigger.SEEN_RESET, State.RESET),
-    ],
-    "the power goes during a release": [
-        (Trigger.SEEN_FAULT, State.FAULT),
-        (Trigger.ASK_RELEASE, State.DO_ATR),
-        (Trigger.DELIVERED, State.WF_ATR),
-        (Trigger.SEEN_RESET, State.RESET),
-    ],
-    "the link goes in the middle of a shutdown": [
-        (Trigger.SEEN_READY, State.RUNNING_IDLE),
-        (Trigger.ASK_STOP, State.DO_SHUTDOWN),
-        (Trigger.LINK_LOST, State.DO_SHUTDOWN),
-        (Trigger.STOPPED, State.SHUTDOWN),
-    ],
-    "a hand that never found its gripper": [
-        (Trigger.ASK_START, State.DISCONNECTED),
-        (Trigger.ASK_STOP, State.DO_SHUTDOWN),
-        (Trigger.STOPPED, State.SHUTDOWN),
-    ],
-}
+# -- what a status shows -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", STORIES)
-def test_a_story_goes_as_it_is_told(name: str) -> None:
-    changes: list[Change] = []
-    machine = StateMachine(lambda *change: changes.append(change))
-    expected = []
-    for trigger, target in STORIES[name]:
-        if target is not machine.state:
-            expected.append((machine.state, target, trigger))
-        machine.fire(trigger)
-        assert machine.state is target
-    assert changes == expected
+@pytest.mark.parametrize(
+    ("byte_0", "byte_1", "fault", "condition"),
+    [
+        (0x00, 0x00, 0x00, Trigger.SEEN_RESET),
+        (0x01, 0x00, 0x00, Trigger.SEEN_BUSY),  # rACT taken over, not begun yet
+        (0x11, 0x00, 0x00, Trigger.SEEN_BUSY),  # activating
+        (0x21, 0x00, 0x00, Trigger.SEEN_BUSY),  # changing mode
+        (0x30, 0x00, 0x00, Trigger.SEEN_BUSY),  # rACT cleared, not reset yet
+        (0x31, 0x00, 0x00, Trigger.SEEN_READY),
+        (0x39, 0xC0, 0x00, Trigger.SEEN_READY),  # closing
+        (0xB9, 0xEA, 0x00, Trigger.SEEN_READY),  # object held
+        (0xF9, 0xFF, 0x00, Trigger.SEEN_READY),  # position reached
+        # Priority codes are no faults.
+        (0x11, 0x00, 0x05, Trigger.SEEN_BUSY),
+        (0x21, 0x00, 0x06, Trigger.SEEN_BUSY),
+        (0x00, 0x00, 0x07, Trigger.SEEN_RESET),
+        (0x31, 0x00, 0x07, Trigger.SEEN_READY),
+        # Minor and major ones are, whatever else the status shows.
+        (0x00, 0x00, 0x09, Trigger.SEEN_FAULT),
+        (0x39, 0x00, 0x0A, Trigger.SEEN_FAULT),
+        (0x11, 0x00, 0x0D, Trigger.SEEN_FAULT),
+        (0x39, 0x00, 0x0E, Trigger.SEEN_FAULT),
+        (0x31, 0x00, 0x0C, Trigger.SEEN_FAULT),  # unassigned
+        # gIMC = 0 with a fault is an automatic release and not a reset.
+        (0x01, 0x00, 0x0B, Trigger.SEEN_FAULT),
+        (0x09, 0x00, 0x0B, Trigger.SEEN_FAULT),
+        (0x00, 0x00, 0x0B, Trigger.SEEN_FAULT),
+        (0x01, 0x00, 0x0F, Trigger.SEEN_RELEASED),
+        (0x00, 0x00, 0x0F, Trigger.SEEN_RELEASED),
+        (0x31, 0x00, 0xF0, Trigger.SEEN_READY),  # the high nibble is no fault code
+    ],
+)
+def test_a_status_shows(byte_0: int, byte_1: int, fault: int, condition: Trigger) -> None:
+    assert classify(status_of(byte_0, byte_1, fault)) is condition
+
+
+@pytest.mark.parametrize("code", range(1, 16))
+def test_no_fault_that_matters_is_taken_for_a_reset(code: int) -> None:
+    status = status_of(0x00, fault=code)
+    assert (classify(status) is Trigger.SEEN_RESET) == (code in (0x05, 0x06, 0x07))
