@@ -1,4 +1,4 @@
-"""What a hand cannot be made with, or started with: refused with its name, value and range."""
+"""What a hand cannot be made with, started with or used with: refused with its name, value and range."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from robotiq_async import ReconnectPolicy, RobotiqHand, State
+from robotiq_async.fleet import RemoteHand
 
 pytestmark = pytest.mark.virtual_time
 
@@ -98,3 +99,28 @@ def test_options_that_are_numbers_of_numpy() -> None:
 def test_addresses(address: Any) -> None:
     with pytest.raises((TypeError, ValueError), match="address"):
         RobotiqHand(address)
+
+
+# -- 'async' forgotten --------------------------------------------------------------------------------------
+
+
+def test_with_names_async_with_and_the_hand_that_blocks() -> None:
+    hand: Any = RobotiqHand()
+    with pytest.raises(TypeError, match=r"'async with'.*robotiq_async\.sync"), hand:
+        pass
+
+
+def test_with_names_async_with_for_a_hand_on_another_host() -> None:
+    hand: Any = RemoteHand("zenoh://lab/cell/left")
+    with pytest.raises(TypeError, match="'async with'"), hand:
+        pass
+
+
+@pytest.mark.parametrize("name", ["statuses", "transitions", "requests", "grip_events"])
+def test_for_names_async_for(name: str) -> None:
+    stream: Any = getattr(RobotiqHand(), name)()
+    with pytest.raises(TypeError, match="'async for'"):
+        for _ in stream:
+            pass
+    with pytest.raises(TypeError, match="'async for'"):
+        list(stream)

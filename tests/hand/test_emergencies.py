@@ -20,7 +20,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
 from tests.conftest import Clock
-from tests.hand.habits import Plain
+from tests.fake_transport import Wire
 from tests.virtual import VirtualLoop
 
 pytestmark = pytest.mark.virtual_time
@@ -182,7 +182,7 @@ async def test_a_recovery_goes_on_when_the_minor_fault_clears(
 # -- a stop goes out before the next read -------------------------------------------------------------------
 
 
-class Wire(Plain):
+class Watched(Wire):
     """Notes what the gripper is asked."""
 
     def __init__(self) -> None:
@@ -208,7 +208,7 @@ class Wire(Plain):
 @pytest.mark.parametrize("stop", ["halt", "reset", "stop"])
 async def test_a_stop_is_written_before_the_next_read(stop: str) -> None:
     """The gripper may hear without being heard: a read that fails first would keep the stop from it."""
-    wire = Wire()
+    wire = Watched()
     async with RobotiqHand(wire) as hand:
         await hand.set_position(255)
         await anext(hand.statuses())
@@ -219,7 +219,7 @@ async def test_a_stop_is_written_before_the_next_read(stop: str) -> None:
 
 
 async def test_a_command_is_written_after_a_read() -> None:
-    wire = Wire()
+    wire = Watched()
     async with RobotiqHand(wire) as hand:
         await anext(hand.statuses())
         wire.asked.clear()
@@ -247,7 +247,7 @@ async def test_a_stop_over_a_new_link_does_not_activate_a_gripper_that_lost_its_
 
 async def test_a_loop_that_is_held_up_is_not_held_up_more_by_reading_again() -> None:
     """With nothing to write an old status does no harm; 96 hands in a loop lost 6 % of their polls."""
-    wire = Wire()
+    wire = Watched()
     async with RobotiqHand(wire, poll_interval=0.1) as hand:
         stream = hand.statuses(buffer=10)
         await anext(stream)

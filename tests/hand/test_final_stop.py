@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
+import anyio
 import pytest
 
 from robotiq_async import Finger, NotStartedError, RobotiqHand, State
@@ -14,8 +15,10 @@ from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, Sim
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
 from tests.contract.bench import until
+from tests.contract.test_loops import called
+from tests.fake_transport import Wire
 from tests.grippers import activate_beforehand
-from tests.session.wire import Wire
+from tests.hand.conftest import REQUESTS
 from tests.virtual_line import VirtualLine
 
 pytestmark = pytest.mark.virtual_time
@@ -27,32 +30,6 @@ TURNS = pytest.mark.parametrize(
     "turn", [0.0, 0.002, 0.004, 0.006, 0.05, 0.16], ids=lambda s: f"{s * 1000:g}ms"
 )
 """When in a cycle the stop comes: before, in and after its read."""
-
-
-async def call(what: Callable[[], Any]) -> None:
-    """A request of the hand, whether it is to be awaited or not."""
-    answer = what()
-    if isinstance(answer, Awaitable):
-        await answer
-
-
-REQUESTS: dict[str, Callable[[RobotiqHand], Any]] = {
-    "command": lambda hand: hand.command(position=255),
-    "command a speed": lambda hand: hand.command(speed=255),
-    "move": lambda hand: hand.move(255),
-    "open": lambda hand: hand.open(),
-    "close": lambda hand: hand.close(),
-    "grasp": lambda hand: hand.grasp(),
-    "set_position": lambda hand: hand.set_position(255),
-    "set_speed": lambda hand: hand.set_speed(255),
-    "set_force": lambda hand: hand.set_force(255),
-    "hold": lambda hand: hand.hold(),
-    "halt": lambda hand: hand.halt(),
-    "activate": lambda hand: hand.activate(),
-    "reset": lambda hand: hand.reset(),
-    "atr": lambda hand: hand.atr(),
-    "recover": lambda hand: hand.recover(),
-}
 
 
 def images_since(gripper: SimulatedGripper, count: int) -> list[Request]:
@@ -80,7 +57,7 @@ async def test_after_the_call_of_stop_every_request_is_refused(
     stopping = asyncio.create_task(hand.stop())
     await asyncio.sleep(0)
     with pytest.raises(NotStartedError):
-        await call(lambda: request_(hand))
+        await called(request_, hand)
     await stopping
     assert not any(image.go or not image.activate for image in images_since(gripper, writes))
 
@@ -292,6 +269,35 @@ async def test_waiting_for_the_end_is_no_request(hand: RobotiqHand) -> None:
     await asyncio.sleep(0)
     assert await hand.wait_for_state(State.SHUTDOWN) is State.SHUTDOWN
     await stopping
+
+
+# -- what ends a hand halfway: a scope of anyio's, and a loop that is torn down ------------------------------
+
+
+async def test_leaving_through_a_cancelled_scope_stops_the_fingers(
+    hand: RobotiqHand, server: SimulatorServer
+) -> None:
+    """Each await inside such a scope is cancelled, those of stop() too."""
+    await hand.stop()
+    with anyio.CancelScope() as scope:
+        async with RobotiqHand(server.address, speed=0) as other:
+            await other.set_position(255)
+            scope.cancel()
+            await asyncio.sleep(1)
+    assert scope.cancelled_caught
+    assert not server.gripper.is_moving
+    assert all(server.gripper.position(axis) < 200 for axis in (1, 2, 4))
+
+
+async def test_the_fingers_are_stopped_when_the_loop_is_torn_down(
+    hand: RobotiqHand, server: SimulatorServer
+) -> None:
+    await hand.set_position(255)
+    (poller,) = [task for task in asyncio.all_tasks() if task.get_name() == "robotiq_async poller"]
+    poller.cancel()
+    await asyncio.wait({poller})
+    assert not server.gripper.is_moving
+    assert hand.state is State.SHUTDOWN
 
 
 # -- what is decided and not on its way ---------------------------------------------------------------------

@@ -21,8 +21,8 @@ from robotiq_async.control.requests.standstill import LAG_S
 from robotiq_async.session.options import ACTIVATION_TIMEOUT_S
 from robotiq_async.session.waiting import STALLED_S, TOLD_EVERY_S
 from robotiq_async.values.errors import MoveIgnoredError
+from tests.fake_transport import Asleep, Late, Silent, Stopped, Wire
 from tests.grippers import activate_beforehand
-from tests.hand.habits import Asleep, Late, Plain, Silent, Stopped
 from tests.virtual import VirtualLoop
 
 pytestmark = pytest.mark.virtual_time
@@ -85,9 +85,9 @@ async def test_a_reconnect_after_a_silence_goes_on() -> None:
     silent = Silent()
     async with RobotiqHand(silent) as hand:
         transitions = hand.transitions()
-        silent.is_pulled = True
+        silent.pull()
         await asyncio.sleep(2)
-        silent.is_pulled = False
+        silent.plug()
         await hand.wait_for_state(State.RUNNING_IDLE)
         assert [each.target for each in transitions.drain()] == [State.DISCONNECTED, State.RUNNING_IDLE]
         assert hand.statistics.passing_faults == 2
@@ -100,7 +100,7 @@ async def test_an_activation_may_take_half_a_minute_and_is_told_on_the_way(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     caplog.set_level(logging.INFO)
-    slow = Plain(speedup=4.2 / 30)  # 4.2 s is the simulator's own
+    slow = Wire(speedup=4.2 / 30)  # 4.2 s is the simulator's own
     began = now()
     async with RobotiqHand(slow) as hand:
         assert hand.state is State.RUNNING_IDLE
@@ -113,7 +113,7 @@ async def test_an_activation_may_take_half_a_minute_and_is_told_on_the_way(
 
 
 async def test_at_the_limit_an_activation_goes_on_and_can_be_waited_for_again() -> None:
-    slow = Plain(speedup=4.2 / 50)
+    slow = Wire(speedup=4.2 / 50)
     hand = RobotiqHand(slow)
     await hand.start(activate=False)
     with pytest.raises(ActivationTimeoutError, match="within 40 s"):
@@ -125,7 +125,7 @@ async def test_at_the_limit_an_activation_goes_on_and_can_be_waited_for_again() 
 
 
 async def test_who_leaves_before_its_end_takes_it_back() -> None:
-    slow = Plain(speedup=4.2 / 50)
+    slow = Wire(speedup=4.2 / 50)
     with pytest.raises(ActivationTimeoutError):
         await RobotiqHand(slow).start()
     assert [request.activate for request in slow.written] == [True, False]
@@ -163,9 +163,9 @@ async def test_after_a_reconnect_it_is_the_same() -> None:
     async with RobotiqHand(asleep) as hand:
         await hand.move(100)
         asleep._images = 1
-        asleep.is_pulled = True
+        asleep.pull()
         await hand.wait_for_state(State.DISCONNECTED)
-        asleep.is_pulled = False
+        asleep.plug()
         await hand.wait_for_state(State.RUNNING_IDLE)
         with pytest.raises(MoveIgnoredError):
             await hand.move(200)
@@ -175,11 +175,11 @@ async def test_after_a_reconnect_it_is_the_same() -> None:
 @pytest.mark.parametrize(("target", "fingers"), [(0, ABC), (255, Finger.SCISSOR), (130, Finger.SCISSOR)])
 async def test_a_first_motion_of_nothing_is_one(target: int, fingers: Finger) -> None:
     """The scissor stands at its software limit, which is reported as reached."""
-    plain = Plain(scissor_limit=(6, 228))  # type: ignore[arg-type]
-    await activate_beforehand(plain.gripper)
-    async with RobotiqHand(plain) as hand:
+    wire = Wire(scissor_limit=(6, 228))
+    await activate_beforehand(wire.gripper)
+    async with RobotiqHand(wire) as hand:
         await hand.move(255 if target == 255 else 130, Finger.SCISSOR)
-    async with RobotiqHand(plain) as hand:
+    async with RobotiqHand(wire) as hand:
         began = now()
         await hand.move(target, fingers)
         assert now() - began < 0.5
@@ -187,9 +187,9 @@ async def test_a_first_motion_of_nothing_is_one(target: int, fingers: Finger) ->
 
 async def test_a_slow_first_motion_is_one() -> None:
     assert IGNORED_S > 2 * LAG_S
-    plain = Plain()
-    await activate_beforehand(plain.gripper)
-    async with RobotiqHand(plain) as hand:
+    wire = Wire()
+    await activate_beforehand(wire.gripper)
+    async with RobotiqHand(wire) as hand:
         assert (await hand.move(12, speed=0)).positions[Finger.A] == 12
 
 
@@ -227,7 +227,7 @@ async def test_one_that_never_comes_back_is_reset_twice_and_left_to_a_person() -
 async def test_an_activation_that_shows_nothing_new_is_not_reset() -> None:
     """Without a priority code it may well go on; here it ends after 20 s."""
 
-    class Quiet(Plain):
+    class Quiet(Wire):
         def shown(self) -> tuple[int, ...]:
             words = super().shown()
             return words if words[0] >> 12 & 0b11 == 0b11 else (words[0], 0, 0, 0, 0, 0, 0, 0)

@@ -19,6 +19,8 @@ from robotiq_async import (
 )
 from robotiq_async.simulator import Trouble
 from tests.adversity.world import world
+from tests.contract.test_loops import called
+from tests.hand.conftest import REQUESTS
 
 pytestmark = pytest.mark.virtual_time
 
@@ -96,10 +98,9 @@ async def test_while_it_waits_it_owns_the_address_and_refuses_commands() -> None
     async with world() as here, here.server.fault_injector.making(Trouble("refuse")):
         starting = asyncio.create_task(here.hand.start(wait=3600))
         await asyncio.sleep(1)
-        with pytest.raises(ConnectionLostError):
-            here.hand.command(position=255)
-        with pytest.raises(ConnectionLostError):
-            await here.hand.halt()
+        for call in REQUESTS.values():
+            with pytest.raises(ConnectionLostError):
+                await called(call, here.hand)
         with pytest.raises(NotStartedError):
             _ = here.hand.status
         with pytest.raises(InvalidStateError):

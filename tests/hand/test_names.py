@@ -32,6 +32,8 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.tools.recording.payloads import reading_fields, state_fields, title
 from robotiq_async.values.request import AxisRequest, Request
 from tests.conftest import Clock, started
+from tests.contract.test_loops import CALLS, called
+from tests.hand.conftest import REQUESTS
 
 pytestmark = pytest.mark.virtual_time
 
@@ -89,32 +91,10 @@ async def test_what_is_told_of_it_has_its_name(named: RobotiqHand) -> None:
 # -- errors ------------------------------------------------------------------------------------------------
 
 
-CALLS: dict[str, Callable[[RobotiqHand], Any]] = {
-    "activate": lambda hand: hand.activate(),
-    "atr": lambda hand: hand.atr(),
-    "close": lambda hand: hand.close(),
-    "command": lambda hand: hand.command(position=3),
-    "halt": lambda hand: hand.halt(),
-    "hold": lambda hand: hand.hold(),
-    "is_activated": lambda hand: hand.is_activated,
-    "is_moving": lambda hand: hand.is_moving,
-    "is_reset": lambda hand: hand.is_reset,
-    "move": lambda hand: hand.move(3),
-    "open": lambda hand: hand.open(),
-    "recover": lambda hand: hand.recover(),
-    "reset": lambda hand: hand.reset(),
-    "set_force": lambda hand: hand.set_force(3),
-    "set_position": lambda hand: hand.set_position(3),
-    "set_speed": lambda hand: hand.set_speed(3),
-    "status": lambda hand: hand.status,
-    "wait_for_state": lambda hand: hand.wait_for_state(State.FAULT),
+PROPERTIES = {
+    name: lambda hand, name=name: getattr(hand, name)
+    for name in ("is_activated", "is_moving", "is_reset", "status")
 }
-
-
-async def called(call: Callable[[RobotiqHand], Any], hand: RobotiqHand) -> None:
-    outcome = call(hand)
-    if asyncio.iscoroutine(outcome):
-        await outcome
 
 
 async def error_of(call: Callable[[RobotiqHand], Any], hand: RobotiqHand) -> RobotiqError:
@@ -131,10 +111,11 @@ def assert_tells(error: BaseException | None, name: str = NAME) -> None:
     assert repr(str(error)) in repr(error)
 
 
-@pytest.mark.parametrize("call", CALLS)
-async def test_a_refusal_tells_the_name_when_there_is_one(call: str) -> None:
-    assert_tells(await error_of(CALLS[call], RobotiqHand(name=NAME)))
-    error = await error_of(CALLS[call], RobotiqHand())
+@pytest.mark.parametrize("name", REQUESTS | PROPERTIES | {"wait_for_state": CALLS["wait_for_state"]})
+async def test_a_refusal_tells_the_name_when_there_is_one(name: str) -> None:
+    call = (CALLS | PROPERTIES)[name]
+    assert_tells(await error_of(call, RobotiqHand(name=NAME)))
+    error = await error_of(call, RobotiqHand())
     assert error.hand == ""
     assert str(error) == error.message == error.args[0]
 
@@ -226,6 +207,9 @@ async def test_a_stream_that_ends_for_good_tells_the_name(server: SimulatorServe
             pass
     assert_tells(caught.value)
     assert_tells(await error_of(lambda hand: hand.set_speed(3), hand))
+    await hand.stop()
+    await hand.start(activate=False)
+    await anext(hand.statuses())
     await hand.stop()
 
 

@@ -19,84 +19,37 @@ from robotiq_async import (
     Transport,
 )
 from robotiq_async.runtime.clock import now
-from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
 from tests.contract.bench import until
+from tests.fake_transport import Wire
 from tests.virtual import VirtualLoop, run
 
 pytestmark = pytest.mark.virtual_time
 
 
-class Wire:
-    """A gripper without a network: the link breaks when told to."""
-
-    def __init__(self) -> None:
-        self.gripper = SimulatedGripper(asyncio.get_running_loop().time, speedup=20)
-        self.is_open = False
-        self.fail_opens = 0
-        self.opened = 0
-        self.broken = False
-
-    async def open(self) -> None:
-        await asyncio.sleep(0)
-        self.opened += 1
-        if self.fail_opens:
-            self.fail_opens -= 1
-            raise ConnectFailedError("wire", "unplugged")
-        self.broken, self.is_open = False, True
-
-    async def read(self) -> Registers:
-        await self._carry()
-        return self.gripper.status_registers()
-
-    async def write(self, registers: Sequence[int]) -> None:
-        await self._carry()
-        self.gripper.write(0, registers)
-
-    async def close(self) -> None:
-        self.is_open = False
-
-    async def _carry(self) -> None:
-        await asyncio.sleep(0)
-        if self.broken:
-            self.is_open = False
-            raise ConnectionLostError("unplugged")
-
-
-async def test_a_transport_object_is_as_good_as_an_address() -> None:
-    wire = Wire()
+async def test_a_transport_object_is_as_good_as_an_address_and_a_start_on_it_can_be_repeated() -> None:
+    wire = Wire(speedup=20)
     assert isinstance(wire, Transport)
-    async with RobotiqHand(wire) as hand:
+    hand = RobotiqHand(wire)
+    wire.pull()
+    with pytest.raises(ConnectFailedError):
+        await hand.start()
+    wire.plug()
+    async with hand:
         result = await hand.move(100, Finger.A)
         assert result.positions[Finger.A] == pytest.approx(100, abs=2)
     assert not wire.is_open
 
 
-async def test_a_start_on_an_unplugged_wire_can_be_repeated() -> None:
-    wire = Wire()
-    wire.fail_opens = 1
-    hand = RobotiqHand(wire)
-    with pytest.raises(ConnectFailedError):
-        await hand.start()
-    await hand.start()
-    await hand.stop()
-
-
 async def test_missed_ticks_are_skipped_and_not_caught_up() -> None:
-    """A poll every 10 ms; ten of them are missed, and only the next ones follow."""
-    wire = Wire()
-    held = asyncio.Event()
-
-    async def hold() -> None:
-        held.set()
-        await asyncio.sleep(0.1)
-
+    """A poll every 10 ms; the answer to one takes as long as ten, and only the next ones follow."""
+    wire = Slow()
     async with RobotiqHand(wire, poll_interval=0.01) as hand:
-        carry, wire._carry = wire._carry, hold  # type: ignore[method-assign]  # the fake's own
-        await held.wait()
-        wire._carry = carry  # type: ignore[method-assign]
         statuses = hand.statuses(buffer=100)
+        wire.answers_after = 0.1
+        await anext(statuses)
+        wire.answers_after = 0.0
         timestamps = [(await anext(statuses)).timestamp for _ in range(6)]
         assert hand.statistics.overruns >= 8
         assert statuses.missed == 0
@@ -109,8 +62,10 @@ async def test_missed_ticks_are_skipped_and_not_caught_up() -> None:
 class Rogue(Wire):
     """Does something that a transport must not do, in the given call."""
 
+    exchange_s = 0.0
+
     def __init__(self, call: str, what: str) -> None:
-        super().__init__()
+        super().__init__(speedup=20)
         self.call, self.what = call, what
         self.is_rogue = False
         self.released = asyncio.Event()
@@ -286,7 +241,7 @@ class HeldUp(Wire):
 
 
 async def test_a_reply_that_waits_while_the_loop_is_held_up_is_in_time() -> None:
-    async with RobotiqHand(HeldUp(), response_timeout=0.05) as hand:
+    async with RobotiqHand(HeldUp(speedup=20), response_timeout=0.05) as hand:
         statuses = hand.statuses()
         for _ in range(10):
             await anext(statuses)
@@ -297,19 +252,16 @@ class Slow(Wire):
     """Its answers come in order, and closing it takes a moment; or all takes for ever."""
 
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__(speedup=20)
         self.answers: asyncio.Queue[Registers] = asyncio.Queue()
-        self.calls: list[str] = []
         self.answers_after = 0.0
         self.hangs = False
 
     async def open(self) -> None:
-        self.calls.append("open")
         self.answers = asyncio.Queue()
         await super().open()
 
     async def read(self) -> Registers:
-        self.calls.append("read")
         if self.hangs:
             await asyncio.Event().wait()
         registers = await super().read()
@@ -324,8 +276,6 @@ class Slow(Wire):
     async def close(self) -> None:
         if self.hangs:
             await asyncio.Event().wait()
-        await asyncio.sleep(0)
-        self.calls.append("close")
         await super().close()
 
 
@@ -334,8 +284,9 @@ async def test_a_read_that_stop_interrupts_leaves_no_answer_to_the_next() -> Non
     hand = RobotiqHand(wire)
     await hand.start()
     await hand.set_position(255)
-    wire.broken = True
+    wire.pull()
     await hand.wait_for_state(State.DISCONNECTED)
+    wire.plug()
     wire.answers_after = 0.05
     wire.calls.clear()
     await until(lambda: "read" in wire.calls)
@@ -370,7 +321,7 @@ class Mute(Wire):
 
     def __init__(self) -> None:
         self.is_mute = self._is_open = False
-        super().__init__()
+        super().__init__(speedup=20)
 
     @property
     def is_open(self) -> bool:
@@ -393,8 +344,8 @@ def test_a_transport_that_cannot_tell_whether_it_is_open_is_opened_again(
         await hand.set_position(255, Finger.A)
         wire.is_mute = True
         await hand.stop()
-        assert not Request.from_registers(wire.gripper.writes[-1].registers).go
-        assert wire.opened == 2
+        assert not wire.written[-1].go
+        assert wire.calls.count("open") == 2
 
     run(main)
     assert "is_open of the transport raised" in caplog.text
@@ -407,7 +358,7 @@ async def test_the_fingers_are_stopped_over_a_transport_object_when_the_loop_is_
     backwards: bool, turns: int
 ) -> None:
     """asyncio.run() cancels every task at once, in any order and wherever it is."""
-    wire = Wire()
+    wire = Wire(speedup=20)
     hand = RobotiqHand(wire)
     await hand.start()
     await hand.set_position(255, Finger.A)
@@ -421,6 +372,5 @@ async def test_the_fingers_are_stopped_over_a_transport_object_when_the_loop_is_
     began = now()
     await asyncio.wait(tasks)
     assert now() - began < 0.2
-    image = Request.from_registers(wire.gripper.writes[-1].registers)
-    assert (image.activate, image.go) == (True, False)
+    assert (wire.written[-1].activate, wire.written[-1].go) == (True, False)
     assert not wire.is_open

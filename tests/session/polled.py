@@ -15,18 +15,16 @@ from robotiq_async.session.poller import STOP_S, Poller
 from robotiq_async.session.streams import Channel, Channels, Listeners
 from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.enums import State, Trigger
-from robotiq_async.values.errors import ConnectionLostError
 from robotiq_async.values.events import SentRequest
 from robotiq_async.values.statistics import Counters
 from robotiq_async.values.status import RobotiqStatus
+from tests.fake_transport import Wire
 from tests.session.sessions import options
-from tests.session.wire import Wire
 from tests.virtual import VirtualLoop
 
 T = TypeVar("T")
 
 POLL_S = 0.01
-LOST = ConnectionLostError("unplugged")
 
 
 class Published(Channel[T]):

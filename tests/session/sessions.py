@@ -10,10 +10,7 @@ from robotiq_async.session.gripper_link import Gripper, GripperLink
 from robotiq_async.session.options import HandOptions, ReconnectPolicy
 from robotiq_async.session.session import Session
 from robotiq_async.session.streams import Channels
-from robotiq_async.values.errors import ConnectionLostError
-from tests.session.wire import Wire
-
-LOST = ConnectionLostError("unplugged")
+from tests.fake_transport import Wire
 
 
 def options(wire: Wire, policy: ReconnectPolicy | None, key: str = "wire") -> HandOptions:

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 
 import pytest
 
-from robotiq_async import Finger, RobotiqHand, RobotiqStatus, SentRequest, Transition
+from robotiq_async import Finger, RobotiqHand, RobotiqStatus, SentRequest, State, Transition
 from robotiq_async.runtime.clock import clock_of, now
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.request import AxisRequest, Request
@@ -82,7 +82,7 @@ def test_now_is_the_running_loop_s() -> None:
 
 @pytest.mark.parametrize("factory", LOOPS)
 def test_what_a_hand_tells_of_times_belongs_together(
-    factory: Callable[[], asyncio.AbstractEventLoop],
+    factory: Callable[[], asyncio.AbstractEventLoop], caplog: pytest.LogCaptureFixture
 ) -> None:
     async def main() -> None:
         async with SimulatorServer(SimulatedGripper(speedup=100)) as server:
@@ -96,57 +96,29 @@ def test_what_a_hand_tells_of_times_belongs_together(
                 short = await hand.move(60, Finger.A)
                 assert 0 <= short.duration < 1
                 assert 0 <= now() - hand.status.timestamp < 1
-            told: list[RobotiqStatus | Transition | SentRequest] = [
-                *statuses.drain(),
-                *transitions.drain(),
-                *requests.drain(),
-            ]
+                # Another client and a loop that is held up are warned of at any time.
+                image = Request(activate=True, go=True, axes=(AxisRequest(50, 255, 100),) * 4)
+                server.gripper.write(0, image.registers)
+                time.sleep(0.1)  # noqa: ASYNC251  # holds up the loop
+                while not hand.statistics.foreign_commands:
+                    await anext(statuses)
+                await hand.reset()
+            seen = list(statuses.drain())
+            changes = list(transitions.drain())
+            told: list[RobotiqStatus | Transition | SentRequest] = [*seen, *changes, *requests.drain()]
             after = now()
         assert all(before <= each.timestamp <= after for each in told)
+        times = [each.timestamp for each in changes]
+        assert times == sorted(times)
+        asked, was_reset = (
+            each.timestamp for each in changes if each.target in (State.DO_RESET, State.RESET)
+        )
+        cause = next(each for each in seen if each.is_reset and each.timestamp > asked)
+        assert cause.timestamp <= was_reset, "a transition comes after the status that it was seen in"
         figures = hand.statistics
         assert 0 < figures.round_trip_p50 < 1
         assert 0 < figures.period_p50 < 1
         assert 0 <= figures.longest_stall < 1
-
-    with asyncio.Runner(loop_factory=factory) as runner:
-        runner.run(main())
-
-
-@pytest.mark.parametrize("factory", LOOPS)
-def test_a_transition_comes_after_the_status_that_it_was_seen_in(
-    factory: Callable[[], asyncio.AbstractEventLoop],
-) -> None:
-    async def main() -> None:
-        async with SimulatorServer(SimulatedGripper(speedup=100)) as server:
-            hand = RobotiqHand(server.address)
-            async with hand:
-                statuses, transitions = hand.statuses(1000), hand.transitions()
-                await hand.reset()
-                seen = list(transitions.drain())
-                cause = next(each for each in statuses.drain() if each.is_reset and not each.activation_echo)
-        times = [each.timestamp for each in seen]
-        assert times == sorted(times)
-        assert cause.timestamp <= times[-1]
-
-    with asyncio.Runner(loop_factory=factory) as runner:
-        runner.run(main())
-
-
-@pytest.mark.parametrize("factory", LOOPS)
-def test_another_client_and_a_loop_that_is_held_up_are_warned_of_at_any_time(
-    factory: Callable[[], asyncio.AbstractEventLoop], caplog: pytest.LogCaptureFixture
-) -> None:
-    async def main() -> None:
-        async with (
-            SimulatorServer(SimulatedGripper(speedup=100)) as server,
-            RobotiqHand(server.address) as hand,
-        ):
-            image = Request(activate=True, go=True, axes=(AxisRequest(50, 255, 100),) * 4)
-            server.gripper.write(0, image.registers)
-            time.sleep(0.1)  # noqa: ASYNC251  # holds up the loop
-            statuses = hand.statuses()
-            while not hand.statistics.foreign_commands:
-                await anext(statuses)
 
     with asyncio.Runner(loop_factory=factory) as runner, caplog.at_level(logging.WARNING, "robotiq_async"):
         runner.run(main())

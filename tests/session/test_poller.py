@@ -10,7 +10,7 @@ import pytest
 from robotiq_async.control.requests.pending import Command
 from robotiq_async.session.options import ReconnectPolicy
 from robotiq_async.session.poller import READS, STOP_S
-from robotiq_async.values.enums import Finger, State, Trigger
+from robotiq_async.values.enums import Finger, State
 from robotiq_async.values.errors import (
     ConnectFailedError,
     ConnectionLostError,
@@ -19,143 +19,134 @@ from robotiq_async.values.errors import (
     RobotiqConnectionError,
 )
 from robotiq_async.values.request import Request
-from tests.session.polled import LOST, POLL_S, Polled, polled
-from tests.virtual import virtual
+from tests.fake_transport import LOST
+from tests.session.polled import POLL_S, Polled, polled
+
+pytestmark = pytest.mark.virtual_time
 
 # -- read, decide, write -----------------------------------------------------------------------------------
 
 
-@virtual
-async def test_while_nothing_is_asked_it_reads_at_its_interval_and_writes_nothing() -> None:
-    async with polled() as here:
-        await here.polls(50)
-        assert here.wire.calls == ["open", *["read"] * 51]
-        asked = [status.timestamp for status in here.statuses[1:]]
-        assert all(later - earlier == pytest.approx(POLL_S) for earlier, later in pairwise(asked))
-        assert [status.sequence for status in here.statuses] == list(range(7, 58))
-        assert here.counters.polls == 51
-        assert not here.requests
+async def test_while_nothing_is_asked_it_reads_at_its_interval_and_writes_nothing(here: Polled) -> None:
+    await here.polls(50)
+    assert here.wire.calls == ["open", *["read"] * 51]
+    asked = [status.timestamp for status in here.statuses[1:]]
+    assert all(later - earlier == pytest.approx(POLL_S) for earlier, later in pairwise(asked))
+    assert [status.sequence for status in here.statuses] == list(range(7, 58))
+    assert here.counters.polls == 51
+    assert not here.requests
 
 
-@virtual
-async def test_a_status_is_read_before_anything_is_written_and_the_write_follows_at_once() -> None:
-    async with polled() as here:
-        await here.polls(3)
-        here.controller.command(Command(Finger.A, 100))
-        del here.wire.calls[:]
-        await here.polls(2)
-        assert here.wire.calls[:3] == ["read", "write", "read"]
-        (sent,) = here.requests
-        assert sent.acknowledged
-        assert sent.request.position(Finger.A) == 100
-        assert sent.timestamp == here.statuses[-2].timestamp, "decided on what was read just now"
-        assert here.counters.writes == 1
+async def test_a_status_is_read_before_anything_is_written_and_the_write_follows_at_once(
+    here: Polled,
+) -> None:
+    await here.polls(3)
+    here.controller.command(Command(Finger.A, 100))
+    del here.wire.calls[:]
+    await here.polls(2)
+    assert here.wire.calls[:3] == ["read", "write", "read"]
+    (sent,) = here.requests
+    assert sent.acknowledged
+    assert sent.request.position(Finger.A) == 100
+    assert sent.timestamp == here.statuses[-2].timestamp, "decided on what was read just now"
+    assert here.counters.writes == 1
 
 
-@virtual
-async def test_a_halt_does_not_wait_for_the_tick_and_shifts_none() -> None:
-    async with polled() as here:
-        await here.polls(3)
-        here.controller.command(Command(Finger.A, 200))
-        await here.polls(3)
-        await asyncio.sleep(POLL_S / 4)
-        del here.wire.calls[:]
-        before, asked = here.statuses[-1].timestamp, here.loop.time()
-        here.controller.halt(asyncio.get_running_loop().create_future())
-        here.poller.hurry()
-        here.poller.hurry()
-        await here.polls()
-        assert here.wire.calls == ["write", "read"]
-        assert here.statuses[-1].timestamp - asked < POLL_S / 2
-        await here.polls(2)
-        later = [status.timestamp for status in here.statuses[-2:]]
-        assert later == [pytest.approx(before + POLL_S), pytest.approx(before + 2 * POLL_S)]
-        assert not here.counters.overruns
-        whole = list(here.counters.periods)[1:]  # the first is from the first contact to the first tick
-        assert len(whole) == 6, "those around a hurried cycle do not count"
-        assert all(period == pytest.approx(POLL_S) for period in whole)
+async def test_a_halt_does_not_wait_for_the_tick_and_shifts_none(here: Polled) -> None:
+    await here.polls(3)
+    here.controller.command(Command(Finger.A, 200))
+    await here.polls(3)
+    await asyncio.sleep(POLL_S / 4)
+    del here.wire.calls[:]
+    before, asked = here.statuses[-1].timestamp, here.loop.time()
+    here.controller.halt(asyncio.get_running_loop().create_future())
+    here.poller.hurry()
+    here.poller.hurry()
+    await here.polls()
+    assert here.wire.calls == ["write", "read"]
+    assert here.statuses[-1].timestamp - asked < POLL_S / 2
+    await here.polls(2)
+    later = [status.timestamp for status in here.statuses[-2:]]
+    assert later == [pytest.approx(before + POLL_S), pytest.approx(before + 2 * POLL_S)]
+    assert not here.counters.overruns
+    whole = list(here.counters.periods)[1:]  # the first is from the first contact to the first tick
+    assert len(whole) == 6, "those around a hurried cycle do not count"
+    assert all(period == pytest.approx(POLL_S) for period in whole)
 
 
-@virtual
-async def test_what_is_no_stop_waits_for_the_tick() -> None:
-    async with polled() as here:
-        await here.polls(3)
-        before = here.statuses[-1].timestamp
-        here.controller.command(Command(Finger.A, 200))
-        here.poller.hurry()
-        await here.polls()
-        assert here.statuses[-1].timestamp == pytest.approx(before + POLL_S)
+async def test_what_is_no_stop_waits_for_the_tick(here: Polled) -> None:
+    await here.polls(3)
+    before = here.statuses[-1].timestamp
+    here.controller.command(Command(Finger.A, 200))
+    here.poller.hurry()
+    await here.polls()
+    assert here.statuses[-1].timestamp == pytest.approx(before + POLL_S)
 
 
-@virtual
-async def test_what_is_decided_is_decided_on_what_the_gripper_has_just_shown() -> None:
+async def test_what_is_decided_is_decided_on_what_the_gripper_has_just_shown(here: Polled) -> None:
     """Another client resets it between two polls: a command that was waiting would activate it again."""
-    async with polled() as here:
-        await here.polls(3)
-        here.controller.command(Command(Finger.A, 100))
-        here.wire.gripper.write(0, Request().registers)
-        await here.polls(3)
-        assert here.machine.state is State.RESET
-        assert not here.requests
+    await here.polls(3)
+    here.controller.command(Command(Finger.A, 100))
+    here.wire.gripper.write(0, Request().registers)
+    await here.polls(3)
+    assert here.machine.state is State.RESET
+    assert not here.requests
 
 
-@virtual
-async def test_a_write_that_was_not_acknowledged_is_published_as_such_and_never_repeated() -> None:
-    async with polled() as here:
-        await here.polls(3)
-        here.wire.failing["write"] = LOST
-        here.controller.command(Command(Finger.A, 100))
-        await here.polls(1)
-        await asyncio.sleep(0.005)
-        assert here.machine.state is State.DISCONNECTED
-        here.wire.failing.clear()
-        await here.polls(20)
-        assert here.machine.state is State.RUNNING_IDLE
-        assert [sent.acknowledged for sent in here.requests] == [False]
-        assert here.counters.writes == 0
-        assert here.counters.reconnects == 1
+async def test_a_write_that_was_not_acknowledged_is_published_as_such_and_never_repeated(
+    here: Polled,
+) -> None:
+    await here.polls(3)
+    here.wire.failing["write"] = LOST
+    here.controller.command(Command(Finger.A, 100))
+    await here.polls(1)
+    await asyncio.sleep(0.005)
+    assert here.machine.state is State.DISCONNECTED
+    here.wire.failing.clear()
+    await here.polls(20)
+    assert here.machine.state is State.RUNNING_IDLE
+    assert [sent.acknowledged for sent in here.requests] == [False]
+    assert here.counters.writes == 0
+    assert here.counters.reconnects == 1
 
 
-@virtual
-async def test_when_the_loop_was_held_up_the_gripper_is_read_again_before_anything_is_written() -> None:
+async def test_when_the_loop_was_held_up_the_gripper_is_read_again_before_anything_is_written(
+    here: Polled,
+) -> None:
     """What another client has done, or where an axis is by now, must be seen before the next write."""
-    async with polled() as here:
-        await here.polls(3)
-        here.controller.command(Command(Finger.A, 100))
+    await here.polls(3)
+    here.controller.command(Command(Finger.A, 100))
 
-        def hold_up() -> None:
-            here.wire.gripper.write(0, Request().registers)
-            here.loop.hold_up(0.5)
+    def hold_up() -> None:
+        here.wire.gripper.write(0, Request().registers)
+        here.loop.hold_up(0.5)
 
-        del here.wire.calls[:]
+    del here.wire.calls[:]
+    here.at_next_status = hold_up
+    await here.polls(3)
+    assert here.wire.calls[:3] == ["read", "read", "read"]
+    assert here.machine.state is State.RESET
+    assert not here.requests
+
+
+async def test_in_a_loop_that_is_always_held_up_something_is_written_in_the_end(here: Polled) -> None:
+    await here.polls(3)
+    here.controller.command(Command(Finger.A, 100))
+
+    def hold_up() -> None:
+        here.loop.hold_up(0.1)
         here.at_next_status = hold_up
-        await here.polls(3)
-        assert here.wire.calls[:3] == ["read", "read", "read"]
-        assert here.machine.state is State.RESET
-        assert not here.requests
 
-
-@virtual
-async def test_in_a_loop_that_is_always_held_up_something_is_written_in_the_end() -> None:
-    async with polled() as here:
-        await here.polls(3)
-        here.controller.command(Command(Finger.A, 100))
-
-        def hold_up() -> None:
-            here.loop.hold_up(0.1)
-            here.at_next_status = hold_up
-
-        del here.wire.calls[:]
-        here.at_next_status = hold_up
-        await here.polls(READS + 1)
-        assert here.wire.calls[: READS + 1] == [*["read"] * READS, "write"]
-        here.at_next_status = None
+    del here.wire.calls[:]
+    here.at_next_status = hold_up
+    await here.polls(READS + 1)
+    assert here.wire.calls[: READS + 1] == [*["read"] * READS, "write"]
+    here.at_next_status = None
 
 
 # -- the first contact -------------------------------------------------------------------------------------
 
 
-@virtual
 @pytest.mark.parametrize(
     ("failing", "error", "told"),
     [
@@ -180,58 +171,37 @@ async def test_a_first_contact_that_fails_is_told_and_ends_the_task(
     assert here.poller.failure is None, "the hand has not given up: it has never begun"
 
 
-@virtual
-async def test_the_start_may_activate_and_nothing_else_does_unasked() -> None:
-    async with polled(activate=True, active=False) as here:
-        assert here.changes[0] == (State.DISCONNECTED, State.DO_ACTIVATION, Trigger.ACTIVATES)
+@pytest.mark.parametrize(
+    ("activate", "policy", "active", "at_first", "after_a_power_cut"),
+    [
+        (True, ReconnectPolicy(), False, State.RUNNING_IDLE, State.RESET),
+        # The start might have activated it, had it been reset then.
+        (True, ReconnectPolicy(), True, State.RUNNING_IDLE, State.RESET),
+        (False, ReconnectPolicy(), True, State.RUNNING_IDLE, State.RESET),
+        (False, ReconnectPolicy(activate=True), True, State.RUNNING_IDLE, State.RUNNING_IDLE),
+        (False, ReconnectPolicy(activate=True), False, State.RESET, State.RUNNING_IDLE),
+    ],
+)
+async def test_the_start_and_the_policy_may_activate_and_nothing_else_does_unasked(
+    activate: bool, policy: ReconnectPolicy, active: bool, at_first: State, after_a_power_cut: State
+) -> None:
+    async with polled(policy, activate=activate, active=active) as here:
         await asyncio.sleep(10)
-        assert here.machine.state is State.RUNNING_IDLE
-        here.wire.failing["read"] = LOST
-        here.wire.gripper.power_cycle()
-        await asyncio.sleep(0.1)
-        here.wire.failing.clear()
+        assert here.machine.state is at_first
         written = len(here.requests)
-        await asyncio.sleep(10)
-        assert here.machine.state is State.RESET
-        assert len(here.requests) == written
-
-
-@virtual
-async def test_a_gripper_that_was_adopted_is_not_activated_when_it_comes_back_reset() -> None:
-    """The start might have activated it, had it been reset then."""
-    async with polled(activate=True) as here:
+        assert written == (activate and not active)
         here.wire.failing["read"] = LOST
         here.wire.gripper.power_cycle()
         await asyncio.sleep(0.1)
         here.wire.failing.clear()
         await asyncio.sleep(10)
-        assert here.machine.state is State.RESET
-        assert not here.requests
-
-
-@virtual
-async def test_the_policy_may_activate_a_gripper_that_comes_back_without_its_activation() -> None:
-    async with polled(ReconnectPolicy(activate=True)) as here:
-        here.wire.failing["read"] = LOST
-        here.wire.gripper.power_cycle()
-        await asyncio.sleep(0.1)
-        here.wire.failing.clear()
-        await asyncio.sleep(10)
-        assert here.machine.state is State.RUNNING_IDLE
-
-
-@virtual
-async def test_a_policy_that_may_activate_leaves_the_first_start_alone() -> None:
-    async with polled(ReconnectPolicy(activate=True), active=False) as here:
-        await asyncio.sleep(10)
-        assert here.machine.state is State.RESET
-        assert not here.requests
+        assert here.machine.state is after_a_power_cut
+        assert len(here.requests) == written + (after_a_power_cut is State.RUNNING_IDLE)
 
 
 # -- a link that is lost -----------------------------------------------------------------------------------
 
 
-@virtual
 async def test_without_a_policy_a_lost_link_is_the_end() -> None:
     async with polled(None) as here:
         await here.polls(3)
@@ -240,7 +210,6 @@ async def test_without_a_policy_a_lost_link_is_the_end() -> None:
         assert here.poller.failure is LOST
 
 
-@virtual
 async def test_the_delays_between_tries_double_up_to_their_limit() -> None:
     async with polled(ReconnectPolicy(first_delay=0.1, max_delay=0.5)) as here:
         await here.polls(3)
@@ -258,7 +227,6 @@ async def test_the_delays_between_tries_double_up_to_their_limit() -> None:
         assert here.counters.reconnects == 1
 
 
-@virtual
 async def test_the_policy_may_give_up_and_says_why() -> None:
     async with polled(ReconnectPolicy(give_up_after=0.3)) as here:
         await here.polls(3)

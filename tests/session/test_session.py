@@ -18,28 +18,27 @@ from robotiq_async.values.errors import (
     InvalidStateError,
     NotStartedError,
 )
-from tests.session.sessions import LOST, Run, running
-from tests.session.wire import Wire
-from tests.virtual import VirtualLoop, run, virtual
+from tests.fake_transport import LOST, Wire
+from tests.session.sessions import Run, running
+from tests.virtual import VirtualLoop, run
+
+pytestmark = pytest.mark.virtual_time
 
 # -- who owns the address ----------------------------------------------------------------------------------
 
 
-@virtual
-async def test_an_address_has_one_session_at_a_time() -> None:
-    async with running() as (_, first):
-        with pytest.raises(InvalidStateError, match="another hand runs on wire already"):
-            Run().session()
-        other = Run(key="another wire").session()
-        await other.connected()
-        await other.stop(halt=False)
-        await first.stop(halt=False)
-        again = Run().session()
-        await again.connected()
-        await again.stop(halt=False)
+async def test_an_address_has_one_session_at_a_time(session: Session) -> None:
+    with pytest.raises(InvalidStateError, match="another hand runs on wire already"):
+        Run().session()
+    other = Run(key="another wire").session()
+    await other.connected()
+    await other.stop(halt=False)
+    await session.stop(halt=False)
+    again = Run().session()
+    await again.connected()
+    await again.stop(halt=False)
 
 
-@virtual
 async def test_a_session_that_could_not_begin_leaves_the_address_free() -> None:
     here = Run()
 
@@ -52,7 +51,6 @@ async def test_a_session_that_could_not_begin_leaves_the_address_free() -> None:
     await begins_and_ends(here)
 
 
-@virtual
 async def test_the_numbers_of_statuses_go_on_from_session_to_session() -> None:
     here = Run()
     first = here.session()
@@ -71,33 +69,28 @@ async def test_the_numbers_of_statuses_go_on_from_session_to_session() -> None:
 # -- its end -----------------------------------------------------------------------------------------------
 
 
-@virtual
-async def test_a_session_is_over_when_it_was_stopped_and_may_be_stopped_again() -> None:
-    async with running() as (here, session):
-        assert not session.is_over
+async def test_a_session_is_over_when_it_was_stopped_and_may_be_stopped_again(session: Session) -> None:
+    assert not session.is_over
+    session.check_running()
+    await session.stop(halt=True)
+    assert session.is_over
+    assert session.machine.state is State.SHUTDOWN
+    with pytest.raises(NotStartedError):
         session.check_running()
-        await session.stop(halt=True)
-        assert session.is_over
-        assert here.machine.state is State.SHUTDOWN
-        with pytest.raises(NotStartedError):
-            session.check_running()
 
 
-@virtual
-async def test_a_stop_that_is_cancelled_stops_all_the_same() -> None:
-    async with running() as (here, session):
-        session.controller.command(Command(Finger.ABC, 200, 0))
-        await asyncio.sleep(0.1)
-        stopping = asyncio.create_task(session.stop(halt=True))
-        await asyncio.sleep(0)
-        stopping.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await stopping
-        assert session.is_over
-        assert not here.wire.gripper.is_moving
+async def test_a_stop_that_is_cancelled_stops_all_the_same(session: Session, wire: Wire) -> None:
+    session.controller.command(Command(Finger.ABC, 200, 0))
+    await asyncio.sleep(0.1)
+    stopping = asyncio.create_task(session.stop(halt=True))
+    await asyncio.sleep(0)
+    stopping.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await stopping
+    assert session.is_over
+    assert not wire.gripper.is_moving
 
 
-@virtual
 async def test_a_first_contact_that_fails_is_the_end() -> None:
     here = Run()
     here.wire.failing["open"] = ConnectFailedError("wire", "refused")
@@ -108,39 +101,34 @@ async def test_a_first_contact_that_fails_is_the_end() -> None:
     assert session.is_over
 
 
-@virtual
-async def test_who_waits_when_a_session_ends_is_told_why() -> None:
-    async with running() as (here, session):
-        state = asyncio.create_task(session.reach({State.FAULT}, None, what="never"))
-        position = asyncio.create_task(
-            session.answered(lambda waiter: session.controller.command(Command(Finger.A, 100), waiter))
-        )
-        stream = here.channels.transitions.open(None)
-        await asyncio.sleep(0)
-        await session.stop(halt=False)
-        for task in (state, position):
-            with pytest.raises(NotStartedError, match="the hand was stopped"):
-                await task
-        assert [each.target async for each in stream][-2:] == [State.DO_SHUTDOWN, State.SHUTDOWN]
+async def test_who_waits_when_a_session_ends_is_told_why(session: Session) -> None:
+    state = asyncio.create_task(session.reach({State.FAULT}, None, what="never"))
+    position = asyncio.create_task(
+        session.answered(lambda waiter: session.controller.command(Command(Finger.A, 100), waiter))
+    )
+    stream = session._channels.transitions.open(None)
+    await asyncio.sleep(0)
+    await session.stop(halt=False)
+    for task in (state, position):
+        with pytest.raises(NotStartedError, match="the hand was stopped"):
+            await task
+    assert [each.target async for each in stream][-2:] == [State.DO_SHUTDOWN, State.SHUTDOWN]
 
 
-@virtual
-async def test_who_waits_when_a_hand_gives_up_on_its_link_is_told_why() -> None:
-    async with running() as (here, session):
-        state = asyncio.create_task(session.reach({State.FAULT}, None, what="never"))
-        stream = here.channels.statuses.open(1)
-        here.wire.failing["read"] = here.wire.failing["open"] = LOST
-        with pytest.raises(ConnectionLostError, match="the link is down: unplugged") as caught:
-            await state
-        assert caught.value.__cause__ is LOST
-        with pytest.raises(ConnectionLostError, match="unplugged"):
-            async for _ in stream:
-                pass
-        with pytest.raises(ConnectionLostError, match="unplugged"):
-            session.check_running()
+async def test_who_waits_when_a_hand_gives_up_on_its_link_is_told_why(session: Session, wire: Wire) -> None:
+    state = asyncio.create_task(session.reach({State.FAULT}, None, what="never"))
+    stream = session._channels.statuses.open(1)
+    wire.failing["read"] = wire.failing["open"] = LOST
+    with pytest.raises(ConnectionLostError, match="the link is down: unplugged") as caught:
+        await state
+    assert caught.value.__cause__ is LOST
+    with pytest.raises(ConnectionLostError, match="unplugged"):
+        async for _ in stream:
+            pass
+    with pytest.raises(ConnectionLostError, match="unplugged"):
+        session.check_running()
 
 
-@virtual
 async def test_who_waits_when_the_task_fails_is_told_too(caplog: pytest.LogCaptureFixture) -> None:
     """A bug must not leave anybody waiting for ever."""
     async with running() as (_, session):

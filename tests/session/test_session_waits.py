@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Awaitable
 
 import pytest
 
 from robotiq_async.control.requests.pending import Command
 from robotiq_async.session.options import ReconnectPolicy
+from robotiq_async.session.session import Session
 from robotiq_async.values.enums import Fault, Finger, State
 from robotiq_async.values.errors import (
     ActivationTimeoutError,
@@ -17,34 +19,33 @@ from robotiq_async.values.errors import (
     NotStartedError,
     StateTimeoutError,
 )
-from tests.session.sessions import LOST, running
-from tests.virtual import virtual
+from tests.fake_transport import LOST, Wire
+from tests.session.sessions import running
+
+pytestmark = pytest.mark.virtual_time
 
 # -- an acknowledgement ------------------------------------------------------------------------------------
 
 
-@virtual
-async def test_who_asks_is_answered_when_the_gripper_has_acknowledged() -> None:
+def asking(session: Session) -> Awaitable[None]:
+    return session.answered(lambda waiter: session.controller.command(Command(Finger.A, 100), waiter))
+
+
+async def test_who_asks_is_answered_when_the_gripper_has_acknowledged_or_refused_at_once() -> None:
     async with running() as (here, session):
-        asked = here.wire.calls.count("write")
-        await session.answered(lambda waiter: session.controller.command(Command(Finger.A, 100), waiter))
-        assert here.wire.calls.count("write") == asked + 1
-
-
-@virtual
-async def test_what_is_refused_is_told_at_once() -> None:
+        await asking(session)
+        assert here.wire.calls.count("write") == 1
     async with running(active=False) as (here, session):
         with pytest.raises(NotActivatedError):
-            await session.answered(lambda waiter: session.controller.command(Command(Finger.A, 100), waiter))
+            await asking(session)
         assert "write" not in here.wire.calls
 
 
-@virtual
 async def test_who_asks_is_told_that_the_link_went_down_before_the_acknowledgement() -> None:
     async with running(policy=ReconnectPolicy()) as (here, session):
         here.wire.failing["write"] = LOST
         with pytest.raises(ConnectionLostError, match="before this was done: unplugged") as caught:
-            await session.answered(lambda waiter: session.controller.command(Command(Finger.A, 100), waiter))
+            await asking(session)
         assert caught.value.__cause__ is LOST
         here.wire.failing.clear()
 
@@ -52,58 +53,48 @@ async def test_who_asks_is_told_that_the_link_went_down_before_the_acknowledgeme
 # -- a state -----------------------------------------------------------------------------------------------
 
 
-@virtual
-async def test_a_state_that_is_reached_is_returned_also_when_it_lasts_no_time() -> None:
-    async with running() as (_, session):
-        reached = await session.reach(
-            {State.RUNNING_CC},
-            1.0,
-            what="never",
-            ask=lambda: session.controller.command(Command(Finger.A, 100)),
+async def test_a_state_that_is_reached_is_returned_also_when_it_lasts_no_time(session: Session) -> None:
+    reached = await session.reach(
+        {State.RUNNING_CC},
+        1.0,
+        what="never",
+        ask=lambda: session.controller.command(Command(Finger.A, 100)),
+    )
+    assert reached is State.RUNNING_CC
+
+
+async def test_a_state_that_is_not_reached_in_time_is_said_with_the_one_that_is(session: Session) -> None:
+    with pytest.raises(StateTimeoutError, match=r"no fault came within 0\.5 s \(now RUNNING_IDLE\)"):
+        await session.reach({State.FAULT}, 0.5, what="no fault came")
+
+
+async def test_a_state_that_means_it_will_not_come_is_an_error(session: Session, wire: Wire) -> None:
+    reaching = asyncio.create_task(
+        session.reach(
+            {State.ATR_DONE}, 9.0, what="", failing={State.FAULT: lambda: GripperFaultError(Fault(0x0E))}
         )
-        assert reached is State.RUNNING_CC
+    )
+    await asyncio.sleep(0.1)
+    wire.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    with pytest.raises(GripperFaultError):
+        await reaching
 
 
-@virtual
-async def test_a_state_that_is_not_reached_in_time_is_said_with_the_one_that_is() -> None:
-    async with running() as (_, session):
-        with pytest.raises(StateTimeoutError, match=r"no fault came within 0\.5 s \(now RUNNING_IDLE\)"):
-            await session.reach({State.FAULT}, 0.5, what="no fault came")
+async def test_nobody_waits_for_what_was_refused(session: Session) -> None:
+    with pytest.raises(NotActivatedError):
+        await session.reach({State.WF_ATR}, 1.0, what="", ask=refuse)
+    assert not session._waiters._waiters
 
 
-@virtual
-async def test_a_state_that_means_it_will_not_come_is_an_error() -> None:
-    async with running() as (here, session):
-        reaching = asyncio.create_task(
-            session.reach(
-                {State.ATR_DONE}, 9.0, what="", failing={State.FAULT: lambda: GripperFaultError(Fault(0x0E))}
-            )
-        )
-        await asyncio.sleep(0.1)
-        here.wire.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
-        with pytest.raises(GripperFaultError):
-            await reaching
-
-
-@virtual
-async def test_nobody_waits_for_what_was_refused() -> None:
-    async with running() as (_, session):
-        with pytest.raises(NotActivatedError):
-            await session.reach({State.WF_ATR}, 1.0, what="", ask=refuse)
-        assert not session._waiters._waiters
-
-
-@virtual
-async def test_nobody_is_left_who_waits_after_a_cancellation() -> None:
-    async with running() as (_, session):
-        reaching = asyncio.create_task(session.reach({State.ATR_DONE}, 9.0, what=""))
-        activating = asyncio.create_task(session.activated(session.controller.activate))
-        await asyncio.sleep(0.1)
-        assert session._waiters._waiters
-        for task in (reaching, activating):
-            task.cancel()
-        await asyncio.gather(reaching, activating, return_exceptions=True)
-        assert not session._waiters._waiters
+async def test_nobody_is_left_who_waits_after_a_cancellation(session: Session) -> None:
+    reaching = asyncio.create_task(session.reach({State.ATR_DONE}, 9.0, what=""))
+    activating = asyncio.create_task(session.activated(session.controller.activate))
+    await asyncio.sleep(0.1)
+    assert session._waiters._waiters
+    for task in (reaching, activating):
+        task.cancel()
+    await asyncio.gather(reaching, activating, return_exceptions=True)
+    assert not session._waiters._waiters
 
 
 def refuse() -> None:
@@ -113,21 +104,14 @@ def refuse() -> None:
 # -- an activation -----------------------------------------------------------------------------------------
 
 
-@virtual
-async def test_an_activation_is_waited_for_until_the_gripper_is_active() -> None:
+async def test_an_activation_is_waited_for_and_nothing_where_none_is_under_way() -> None:
     async with running(active=False) as (here, session):
+        await session.activated()
+        assert here.machine.state is State.RESET
         await session.activated(session.controller.activate)
         assert here.machine.state is State.RUNNING_IDLE
 
 
-@virtual
-async def test_where_nothing_is_under_way_nothing_is_waited_for() -> None:
-    async with running(active=False) as (here, session):
-        await session.activated()
-        assert here.machine.state is State.RESET
-
-
-@virtual
 async def test_an_activation_of_ours_must_not_end_in_a_fault() -> None:
     async with running(active=False) as (here, session):
         here.wire.gripper.fail_activation = True
@@ -136,7 +120,6 @@ async def test_an_activation_of_ours_must_not_end_in_a_fault() -> None:
         assert caught.value.fault is Fault.ACTIVATION_FAULT
 
 
-@virtual
 async def test_an_activation_of_others_that_ends_in_a_fault_is_over_too() -> None:
     """The hand is left there, so that it can be recovered."""
     async with running(active=False) as (here, session):
@@ -148,14 +131,12 @@ async def test_an_activation_of_others_that_ends_in_a_fault_is_over_too() -> Non
         assert here.machine.state is State.FAULT
 
 
-@virtual
 async def test_an_activation_that_takes_too_long_says_so() -> None:
     async with running(active=False, speedup=0.1) as (_, session):
         with pytest.raises(ActivationTimeoutError, match="the activation was not finished within 20 s"):
             await session.activated(session.controller.activate)
 
 
-@virtual
 @pytest.mark.parametrize("how", ["reset", "power", "link"])
 async def test_an_activation_that_comes_to_nothing_says_why(how: str) -> None:
     async with running(active=False, policy=ReconnectPolicy()) as (here, session):
@@ -178,15 +159,17 @@ async def test_an_activation_that_comes_to_nothing_says_why(how: str) -> None:
 # -- the next status ---------------------------------------------------------------------------------------
 
 
-@virtual
-async def test_the_next_status_is_one_that_was_not_there_before() -> None:
-    async with running() as (_, session):
-        before = session.controller.status
-        await session.next_status()
-        assert session.controller.status is not before
+async def test_the_next_status_is_one_that_was_not_there_before(session: Session) -> None:
+    before = session.controller.status
+    await session.next_status()
+    assert session.controller.status is not before
+    waiting = asyncio.create_task(session.next_status())
+    await asyncio.sleep(0)
+    await session.stop(halt=False)
+    with pytest.raises(NotStartedError):
+        await waiting
 
 
-@virtual
 async def test_who_waits_for_the_next_status_is_told_of_a_lost_link() -> None:
     """A stream of statuses waits out a lost link; who wants to know what the gripper does now does not."""
     async with running(policy=ReconnectPolicy()) as (here, session):
@@ -196,25 +179,13 @@ async def test_who_waits_for_the_next_status_is_told_of_a_lost_link() -> None:
         here.wire.failing.clear()
 
 
-@virtual
-async def test_who_waits_for_the_next_status_is_told_of_the_end() -> None:
-    async with running() as (_, session):
-        waiting = asyncio.create_task(session.next_status())
-        await asyncio.sleep(0)
-        await session.stop(halt=False)
-        with pytest.raises(NotStartedError):
-            await waiting
-
-
 # -- what is reported of it --------------------------------------------------------------------------------
 
 
-@virtual
-async def test_changes_of_state_are_told_and_faults_are_counted() -> None:
-    async with running() as (here, session):
-        stream = here.channels.transitions.open(None)
-        for _ in range(2):
-            here.wire.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.1)
-            await asyncio.sleep(0.3)
-        assert [each.target for each in stream.drain()] == [State.FAULT, State.RUNNING_IDLE] * 2
-        assert session.counters.faults == 2
+async def test_changes_of_state_are_told_and_faults_are_counted(session: Session, wire: Wire) -> None:
+    stream = session._channels.transitions.open(None)
+    for _ in range(2):
+        wire.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.1)
+        await asyncio.sleep(0.3)
+    assert [each.target for each in stream.drain()] == [State.FAULT, State.RUNNING_IDLE] * 2
+    assert session.counters.faults == 2

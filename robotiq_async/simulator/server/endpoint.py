@@ -141,15 +141,18 @@ class SimulatorEndpoint(ABC):
     # What connections ask.
 
     def lets_in(self, client: Connection) -> bool:
+        """Take note of a client that has come; whether it may stay."""
         self.connections.append(client)
         return self.fault_injector.lets_in(len(self.connections) - 1)
 
     def forget(self, client: Connection) -> None:
+        """Take note that a client has gone."""
         if client in self.connections:
             self.connections.remove(client)
 
     @property
     def answers_nobody(self) -> bool:
+        """Whether the gripper is without power."""
         return not self.gripper.is_powered
 
     @abstractmethod
@@ -157,15 +160,18 @@ class SimulatorEndpoint(ABC):
         """Cut the next request out of what has arrived."""
 
     def hears(self, frame: Frame) -> bool:
+        """Whether a request is heard, and meant for this gripper."""
         return self._is_meant(frame.unit) and self.fault_injector.hears()
 
     def answer(self, frame: Frame) -> bytes:
+        """Carry out a request; the frame of the reply."""
         served: Collection[int] = self.functions
         if self.fault_injector.reads_only_with_function_3:
             served = set(served) - {READ_INPUT}
         return self._reply(frame, self._bank.answer(frame.pdu, served))
 
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
+        """What to send for a reply."""
         return self.fault_injector.deliver(reply)
 
     def undelivered(self, part: bytes) -> None:

@@ -49,6 +49,7 @@ class _RtuEndpoint(SimulatorEndpoint):
     functions = RTU_FUNCTIONS
 
     def take(self, inbox: bytearray) -> Frame | None:
+        """Cut the next request out of what has arrived."""
         return take_rtu(inbox)
 
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:

@@ -120,6 +120,7 @@ class SimulatorServer(SimulatorEndpoint):
             await asyncio.sleep(seconds / self.gripper.speedup)
 
     def take(self, inbox: bytearray) -> Frame | None:
+        """Cut the next request out of what has arrived."""
         return take_tcp(inbox)
 
     def _is_meant(self, unit: int) -> bool:

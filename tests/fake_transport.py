@@ -1,66 +1,124 @@
-"""Transports on which a gripper behaves as some real ones are said to do."""
+"""Transports without a network, on which a simulated gripper behaves as some real ones are said to do."""
 
 from __future__ import annotations
 
 import asyncio
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.enums import Fault
-from robotiq_async.values.errors import ConnectFailedError, ConnectionLostError
+from robotiq_async.values.errors import (
+    ConnectFailedError,
+    ConnectionLostError,
+    ResponseTimeoutError,
+    RobotiqConnectionError,
+)
 from robotiq_async.values.registers import Registers, gPR
 from robotiq_async.values.request import Request
 from tests.register_words import with_object_status
 
+EXCHANGE_S = 0.001
+SILENCE_S = 0.4
+"""How long a transport waits for an answer."""
 DEVICE_CYCLE_S = 0.005
 """So long a simulated gripper takes to see a write."""
+LOST = ConnectionLostError("unplugged")
 
 
-class Plain:
-    """A gripper in the time of the loop, and no network."""
+class Wire:
+    """A gripper in the time of the loop; the transport fails when told to.
 
-    def __init__(self, **options: float) -> None:
-        self.gripper = SimulatedGripper(asyncio.get_running_loop().time, spread=False, **options)  # type: ignore[arg-type]
+    Attributes:
+        calls: what was asked of it, in order.
+        written: the images that have reached the gripper.
+        failing: the calls that fail, and with what; until taken out.
+        silent: the calls that are not answered.
+        exchange_s: how long each exchange takes.
+        closing_s: how long it takes to close.
+    """
+
+    exchange_s = EXCHANGE_S
+
+    def __init__(self, speedup: float = 1.0, **options: Any) -> None:
+        time = asyncio.get_running_loop().time
+        self.gripper = SimulatedGripper(time, spread=False, speedup=speedup, **options)
         self.is_open = False
-        self.is_pulled = False
-        """Whether the cable is."""
+        self.calls: list[str] = []
         self.written: list[Request] = []
+        self.failing: dict[str, RobotiqConnectionError] = {}
+        self.silent: set[str] = set()
+        self.closing_s = 0.0
 
     async def open(self) -> None:
-        await asyncio.sleep(0.0005)
-        if self.is_pulled:
-            raise ConnectFailedError("plain", "pulled")
+        await self._carry("open")
         self.is_open = True
 
     async def read(self) -> Registers:
-        await asyncio.sleep(0.0005)
-        if self.is_pulled:
-            self.is_open = False
-            raise ConnectionLostError("pulled")
+        await self._carry("read")
         return self.shown()
 
+    async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
+        """What a link does beyond a transport object."""
+        registers = decide()
+        if registers is None:
+            return False
+        await self.write(registers)
+        return True
+
     async def write(self, registers: Sequence[int]) -> None:
-        await asyncio.sleep(0.0005)
+        await self._carry("write")
         self.written.append(Request.from_registers(registers))
         self.take(tuple(registers))
 
     async def close(self) -> None:
+        self.calls.append("close")
         self.is_open = False
+        if self.closing_s:
+            await asyncio.sleep(self.closing_s)
+
+    async def _carry(self, what: str) -> None:
+        self.calls.append(what)
+        if what in self.silent:
+            await asyncio.sleep(SILENCE_S)
+            self.is_open = False
+            raise ResponseTimeoutError("no answer")
+        await asyncio.sleep(self.exchange_s)
+        if what in self.failing:
+            self.is_open = False
+            raise self.failing[what]
 
     def shown(self) -> Registers:
+        """What the gripper shows."""
         return self.gripper.status_registers()
 
     def take(self, registers: Registers) -> None:
+        """The gripper gets an image."""
         self.gripper.write(0, registers)
+
+    def pull(self) -> None:
+        """Pull the cable out."""
+        self.failing = {"open": ConnectFailedError("wire", "unplugged"), "read": LOST, "write": LOST}
+
+    def plug(self) -> None:
+        self.failing.clear()
+
+    async def activate(self) -> None:
+        """Leave the gripper active, as another client would."""
+        self.gripper.write(0, Request(activate=True).registers)
+        await asyncio.sleep(10)
 
     @property
     def now(self) -> float:
         return asyncio.get_running_loop().time()
 
 
-class Late(Plain):
+# -- habits ------------------------------------------------------------------------------------------------
+
+
+class Late(Wire):
     """gDT and gSTA come some reads late."""
 
     def __init__(self, reads: int) -> None:
@@ -72,7 +130,7 @@ class Late(Plain):
         return with_object_status(self._late[-1], self._late[0])
 
 
-class Silent(Plain):
+class Silent(Wire):
     """0x09 in the first read after a second without a message."""
 
     _last = -10.0
@@ -91,7 +149,7 @@ class Silent(Plain):
         super().take(registers)
 
 
-class Asleep(Plain):
+class Asleep(Wire):
     """The first images on a new connection are echoed, and move nothing.
 
     ``shows`` is the gDT of an axis that does not follow; None for the one it had.
@@ -133,7 +191,7 @@ class Asleep(Plain):
         return tuple(words)
 
 
-class Stopped(Plain):
+class Stopped(Wire):
     """After an emergency stop: 0x05 and gIMC = 1 until it has been reset so many times."""
 
     def __init__(self, resets: float, *, is_raised: bool = True) -> None:
