@@ -249,7 +249,7 @@ def test_the_lines_to_paste_are_taken(tmp_path: Path, model: Model) -> None:
     for name in EVERY.keys() - given:
         assert name not in PARAMETERS
         assert name in told["ROS 2"]
-    assert f"Looked at as a {model}, link tcp." in page(report)
+    assert f"Checked as a {model}, link tcp." in page(report)
 
 
 @pytest.mark.parametrize("why", ENDINGS)
@@ -273,7 +273,7 @@ def test_checks_that_were_not_reached_are_said_to_be_so() -> None:
     report = Report("tcp", entered=[0, 1])
     report.complete()
     assert report.checks.keys() == {name for name, each in CATALOGUE.items() if each.stage <= 1}
-    assert {check.verdict for check in report.checks.values()} == {Verdict.UNTOLD}
+    assert {check.verdict for check in report.checks.values()} == {Verdict.INCONCLUSIVE}
 
 
 # -- the page that describes them --------------------------------------------------------------------------

@@ -30,7 +30,7 @@ async def test_a_habit_is_found_and_nothing_else(trouble: str, check: str, optio
     assert differing(report) == ({} if check == "-" else {check: options(option)})
     assert report.options == options(option)
     if ending == "done":
-        assert not report.untold
+        assert not report.inconclusive
         assert report.checks.keys() == CATALOGUE.keys()
     assert not helper.alarms
 
@@ -40,7 +40,7 @@ async def test_a_gripper_like_hardware_has_its_three_habits() -> None:
         report = await verified(server)
     assert report.why == "done", report.words
     assert differing(report).keys() == {"read.silence", "write.spacing", "axis.lag"}
-    assert not report.untold
+    assert not report.inconclusive
 
 
 @pytest.mark.parametrize("first", range(10))

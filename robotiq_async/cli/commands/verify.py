@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 HARMLESS = 2
 NOTE = (
-    "Nothing of this has run on real hardware: yours may be the first. It is no safety function: have an "
+    "None of this has run on real hardware: yours may be the first. It is no safety function: have an "
     "emergency stop in reach that cuts the gripper's power. While a stage runs ANY KEY stops the fingers."
 )
 
@@ -43,7 +43,7 @@ async def verify(
     label: Annotated[str, Parameter(metavar="TEXT", show_default=False)] = "",
     model: Literal["3f", "2f85", "2f140", "hand-e"] | None = None,
 ) -> None:
-    """Check a real gripper against all that this library assumes. FROM STAGE 3 ON THE FINGERS MOVE.
+    """Check a real gripper against what this library assumes. FROM STAGE 3 ON THE FINGERS MOVE.
 
     Ten stages: this computer; reading only; writing with rGTO = 0; activation; one
     axis at a time, slowly; stopping; full strokes; something soft; loss of client,
@@ -52,7 +52,7 @@ async def verify(
 
     Stages 0 to 2 move nothing, take four minutes, and make a report that is worth sending.
     While a stage runs any key and Ctrl-C write rGTO = 0 first. No stage beyond 2 runs
-    without a terminal, and none after a fault or after a check about safety that failed.
+    without a terminal, and none after a fault or after a safety check that differs.
     A gripper that another client commands, or that holds something, is not written to.
 
     The folder of the report gets report.json, report.md and recording.mcap with every
@@ -67,20 +67,20 @@ async def verify(
 
     Args:
         up_to: The last stage, 0..9; 9 unless given.
-        from_: The stage to begin with. The gripper is identified all the same.
+        from_: The stage to begin with. The gripper is identified first in any case.
         report: Folder for the report; it must not contain one yet.
         yes_to: Do not ask for the stages up to this one, at most 2.
         label: Title of the report; it appears there as you write it.
         model: Which gripper it is (default: that of the address, or 3f).
     """
     if is_remote(address):
-        raise UsageError("verify the gripper on the host that its line leads to: it uses no agent")
+        raise UsageError("verify does not use an agent: run it on the host that has the gripper's line")
     last = 9 if up_to is None else up_to
     agreed = -1 if yes_to is None else yes_to
     has_person = has_terminal()
     if not has_person and not (last <= HARMLESS and agreed >= last):
         raise UsageError(
-            "without a terminal to ask at, and to stop at, this needs --up-to and --yes-to, both at most 2"
+            "without a terminal to ask and to stop it, verify needs --up-to and --yes-to, both at most 2"
         )
     with usage():
         parsed = parse_address(address)

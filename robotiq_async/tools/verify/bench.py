@@ -1,4 +1,4 @@
-"""What a stage has at hand: the gripper, the person, and where results go."""
+"""What a stage works with: the gripper, the person, and the results."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from .catalogue import CATALOGUE, NO_OPTIONS, Check, EndError, Figure, Options, 
 from .recorded_link import Frame, RecordedLink
 from .watch import Person, Watch
 
-CONNECT_S: Final = 2.0  # for a connection: with this a stop over a link that was lost is tried soon again
-SPACING_S: Final = 0.02  # twice what the manual wants between two writes
+CONNECT_S: Final = 2.0  # for a connection; short, so that a stop over a lost link is soon tried again
+SPACING_S: Final = 0.02  # twice the time between two writes that the manual asks for
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,14 +39,14 @@ class Bench:
 
     address: Address  # where it is; tcp, rtu or rtu+tcp
     person: Person  # beside it
-    keep: Callable[[Frame], None]  # is given every frame
+    keep: Callable[[Frame], None]  # takes every frame
     lengths: Lengths = field(default_factory=Lengths)  # of the long checks
     checks: dict[str, Check] = field(default_factory=dict)  # the results so far, by name
     link: RecordedLink = field(init=False)  # to the gripper, once it has been found
-    registers: RegisterMap | None = None  # how it is asked, once it has been found
+    registers: RegisterMap | None = None  # where its registers are, once it has been found
     found: RobotiqStatus | None = None  # the first status
     spacing: float = SPACING_S  # seconds from one write to the next; stage 2 may raise it
-    is_active: bool = False  # whether it was active when a stage last came to its end
+    is_active: bool = False  # whether it was active at the end of the last stage
 
     @property
     def model(self) -> Model:
@@ -58,7 +58,7 @@ class Bench:
 
     @property
     def first(self) -> str:
-        """What moves in stages that move one finger, for a sentence."""
+        """The name, for messages, of what moves in stages that move one finger."""
         return "finger A" if len(self.fingers) > 1 else "the jaw"
 
     @property
@@ -69,7 +69,7 @@ class Bench:
     def another_link(
         self, registers: RegisterMap, keep: Callable[[Frame], None] | None = None
     ) -> RecordedLink:
-        """One more link, not opened; its frames are kept with the others unless told otherwise."""
+        """Another link, not opened; its frames are kept with the others unless ``keep`` is given."""
         transport = ModbusTransport(
             self.address, registers, connect_timeout=CONNECT_S, response_timeout=RESPONSE_TIMEOUT_S
         )
@@ -91,7 +91,7 @@ class Bench:
         /,
         **figures: Figure,
     ) -> None:
-        """Note what was found: as assumed if it holds, else what follows for the user.
+        """Add the result of a check: as assumed if it holds, else what follows for the user.
 
         Raises:
             EndError: it does not hold, and is about safety.
@@ -111,8 +111,8 @@ class Bench:
     ) -> None:
         self.judge(name, False, found, follows, options, **figures)
 
-    def untold(self, name: str, why: str, **figures: Figure) -> None:
-        self._add(Check(name, Verdict.UNTOLD, why, figures=figures))
+    def inconclusive(self, name: str, why: str, **figures: Figure) -> None:
+        self._add(Check(name, Verdict.INCONCLUSIVE, why, figures=figures))
 
     def _add(self, check: Check) -> None:
         assert check.name in CATALOGUE

@@ -1,4 +1,4 @@
-"""What is checked and how a check ends, and how a run ends."""
+"""What is checked, and how checks and runs end."""
 
 from __future__ import annotations
 
@@ -12,58 +12,58 @@ from ...values.model import Model
 
 
 class Assumption(NamedTuple):
-    """One thing that the library takes for granted of every gripper."""
+    """One thing that the library assumes of every gripper."""
 
     stage: int  # the stage that checks it
     assumed: str  # what is assumed, in a sentence
-    is_safety: bool = False  # whether nothing further is done when it does not hold
-    of_several: bool = False  # whether it is about a gripper with several axes: a jaw has none of it
+    is_safety: bool = False  # whether the run ends when it does not hold
+    of_several: bool = False  # whether it is about several axes, and so not about a jaw
 
 
 CATALOGUE: Final[dict[str, Assumption]] = {
     "host.timer": Assumption(0, "This computer's timers are at most 1 ms late."),
     "host.adapter": Assumption(0, "A USB adapter passes on what it hears within 2 ms."),
-    "read.registers": Assumption(1, "Unit id, function and registers are the usual ones of the link."),
+    "read.registers": Assumption(1, "Unit id, function and registers are the defaults of the link."),
     "read.others": Assumption(1, "There are registers at the addresses of the manual, and nowhere else."),
     "read.counts": Assumption(1, "One to eight registers can be read at once."),
     "read.round_trip": Assumption(1, "A status is read within the usual poll interval."),
     "read.silence": Assumption(1, "The first read after a silence shows no fault."),
-    "read.idle": Assumption(1, "It answers after a minute of silence, and has kept its activation."),
-    "read.connections": Assumption(1, "A second and a third client are let in while the first reads."),
-    "write.same": Assumption(2, "The image that is in force already changes nothing when written.", True),
+    "read.idle": Assumption(1, "It answers after a minute of silence, and is still activated."),
+    "read.connections": Assumption(1, "A second and a third client can connect while the first reads."),
+    "write.same": Assumption(2, "Writing the image that is already in force changes nothing.", True),
     "write.still": Assumption(2, "With rGTO = 0 no position request moves anything.", True),
     "write.echo": Assumption(2, "A write is echoed within 20 ms of its acknowledgement."),
-    "write.spacing": Assumption(2, "Of two writes the second acts, however soon it comes."),
+    "write.spacing": Assumption(2, "The second of two writes acts, however soon it follows."),
     "activation.time": Assumption(3, "An activation takes at most 20 s."),
-    "activation.words": Assumption(3, "After it no go is echoed, and every gDT is 0."),
+    "activation.words": Assumption(3, "After an activation gGTO is 0, and every gDT is 0."),
     "axis.finger": Assumption(
         4, "A is the finger that stands alone, or the jaw; B, C and the scissor are as named.", True
     ),
-    "axis.alone": Assumption(4, "An axis that is asked alone moves alone.", True, of_several=True),
+    "axis.alone": Assumption(4, "An axis that is commanded alone moves alone.", True, of_several=True),
     "axis.lag": Assumption(4, "gDT shows a motion as soon as its request is echoed."),
     "axis.end": Assumption(4, "An axis stops within 2 counts of its request."),
     "stop.halt": Assumption(5, "rGTO = 0 stops a motion within 10 counts.", True),
-    "stop.resume": Assumption(5, "Setting rGTO again goes on to the same request."),
+    "stop.resume": Assumption(5, "Setting rGTO again continues to the same target."),
     "stop.target": Assumption(5, "A new request in the middle of a motion is followed at once."),
     "stop.hold": Assumption(5, "Requesting the present position stops within 10 counts.", True),
     "stroke.time": Assumption(
-        6, "A full stroke takes what the thesis measured, or a sibling's manual says, within a fifth."
+        6, "A full stroke takes the time of the thesis, or of a sibling's manual, within 20 %."
     ),
-    "stroke.readings": Assumption(6, "Open and closed fingers read what those of the model read."),
+    "stroke.readings": Assumption(6, "Open and closed fingers show the usual positions of the model."),
     "stroke.scissor": Assumption(
-        6, "The scissor echoes what it is asked, also beyond its limits.", of_several=True
+        6, "The scissor echoes each request, even beyond its limits.", of_several=True
     ),
     "soft.contact": Assumption(7, "A contact while closing is gDT = 2."),
     "soft.current": Assumption(7, "A finger at rest draws no current."),
     "soft.halt": Assumption(7, "rGTO = 0 leaves the part held."),
-    "loss.client": Assumption(8, "A gripper that has lost its client goes on to its request."),
-    "loss.wake": Assumption(8, "The first motion on a new connection is followed."),
-    "loss.idle": Assumption(8, "The activation is kept while there is no client."),
-    "loss.cable": Assumption(8, "The activation outlives a cable that was out for 5 s."),
+    "loss.client": Assumption(8, "A gripper that loses its client continues to its target."),
+    "loss.wake": Assumption(8, "The gripper follows the first motion on a new connection."),
+    "loss.idle": Assumption(8, "The gripper stays activated without a client."),
+    "loss.cable": Assumption(8, "The gripper stays activated when the cable is out for 5 s."),
     "loss.estop": Assumption(8, "After an emergency stop at most two resets are needed."),
-    "loss.power": Assumption(8, "A gripper that comes back from a loss of power is reset."),
+    "loss.power": Assumption(8, "After a loss of power the gripper is reset."),
     "soak.reads": Assumption(9, "Fewer than one read in 10,000 fails."),
-    "soak.commands": Assumption(9, "Commands at 10 to 100 Hz are followed to the last one."),
+    "soak.commands": Assumption(9, "The last of many commands at 10 to 100 Hz is followed."),
 }
 """By name, in the order in which they are checked."""
 
@@ -90,7 +90,7 @@ class Verdict(Enum):
 
     AS_ASSUMED = "as assumed"
     DIFFERS = "differs"
-    UNTOLD = "could not be told"
+    INCONCLUSIVE = "inconclusive"
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,18 +116,18 @@ class Check:
 
 
 ENDINGS: Final = {
-    "done": "every stage that was asked for has run",
+    "done": "all requested stages have run",
     "declined": "the answer was not Enter",
     "stopped": "a key was pressed, or the terminal closed",
     "interrupted": "Ctrl-C, or a signal",
-    "refused": "nothing was written: the gripper is not in a state for it",
+    "refused": "nothing was written: the state of the gripper forbids it",
     "link": "the link failed",
     "fault": "the gripper reports a fault",
-    "envelope": "an axis left the range of its stage",
-    "time": "the time of a stage was over",
-    "foreign": "the gripper echoes what this program has not written",
-    "inactive": "the gripper is not active, and the stage needs it",
-    "deviation": "a check about safety differs",
+    "envelope": "an axis left the range that its stage allows",
+    "time": "a stage took too long",
+    "foreign": "the gripper echoes a request that this program did not write",
+    "inactive": "the stage needs an active gripper",
+    "deviation": "a safety check differs",
     "disk": "the report cannot be written",
 }
 """By the word in the report."""

@@ -62,7 +62,7 @@ class Recording:
 
     def flush(self) -> None: ...
 
-    # What a run tells.
+    # What a run adds.
 
     def keep(self, frame: Frame) -> None:
         """Take a frame. Never blocks and never fails."""

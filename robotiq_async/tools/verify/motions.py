@@ -13,15 +13,15 @@ from ...values.request import AxisRequest, Request
 from ...values.status import RobotiqStatus
 from .catalogue import EndError
 from .recorded_link import RecordedLink
-from .watch import ANYWHERE, Watch, words_of
+from .watch import ANYWHERE, Watch, describe
 
-MARGIN: Final = 4  # counts beside its way that an axis may reach: it may stop 2 beside its request (manual)
-ASIDE: Final = 3  # counts by which an axis that is not asked may waver
-ACTIVATION_S: Final = 60.0  # an activation that takes longer is taken back: drivers wait for 25 to 30 s
+MARGIN: Final = 4  # counts that an axis may leave its path: it may stop 2 off its request (manual)
+ASIDE: Final = 3  # counts by which the position of a resting axis may change
+ACTIVATION_S: Final = 60.0  # a longer activation is taken back: drivers wait for 25 to 30 s
 
 
-def standing(status: RobotiqStatus, *, speed: int = 0, force: int = 0, go: bool = False) -> Request:
-    """The image that asks every axis to be where it is."""
+def in_place(status: RobotiqStatus, *, speed: int = 0, force: int = 0, go: bool = False) -> Request:
+    """The image that requests the present position of every axis."""
     axes = tuple(AxisRequest(status.position(axis), speed, force) for axis in status.model.axes)
     return Request(activate=True, go=go, mode=status.mode, axes=axes, model=status.model)
 
@@ -32,7 +32,7 @@ def as_found(status: RobotiqStatus) -> Request:
     return Request(activate=status.activation_echo, mode=status.mode, axes=axes, model=status.model)
 
 
-def way(status: RobotiqStatus, targets: Mapping[Finger, int]) -> dict[Finger, tuple[int, int]]:
+def motion_envelope(status: RobotiqStatus, targets: Mapping[Finger, int]) -> dict[Finger, tuple[int, int]]:
     """The envelope of a motion from a status to targets; the other axes stay."""
     envelope = {}
     for axis in status.model.axes:
@@ -43,7 +43,7 @@ def way(status: RobotiqStatus, targets: Mapping[Finger, int]) -> dict[Finger, tu
     return envelope
 
 
-def aside(status: RobotiqStatus, moving: Sequence[Finger]) -> dict[Finger, tuple[int, int]]:
+def resting_envelope(status: RobotiqStatus, moving: Sequence[Finger]) -> dict[Finger, tuple[int, int]]:
     """The envelope of the axes that are not in ``moving``: they stay."""
     return {
         axis: (status.position(axis) - ASIDE, status.position(axis) + ASIDE)
@@ -62,7 +62,7 @@ async def reset(watch: Watch) -> None:
     watch.needs_active = False
     await watch.write(Request(model=watch.model))
     if await watch.until(lambda status: not status.activation_echo and status.is_reset, 2.0) is None:
-        raise EndError("inactive", "rACT = 0 was acknowledged, and the gripper does not show it")
+        raise EndError("inactive", "rACT = 0 was acknowledged, but the gripper does not show it")
 
 
 async def activate(watch: Watch) -> float:
@@ -71,8 +71,8 @@ async def activate(watch: Watch) -> float:
     await reset(watch)
     began = await watch.write(Request(activate=True, model=watch.model))
     if await watch.until(lambda status: status.is_activated, ACTIVATION_S, 0.02) is None:
-        shown = f": it reads {words_of(watch.last)}" if watch.last else ""
-        raise EndError("time", f"the activation was not over within {ACTIVATION_S:g} s{shown}")
+        shown = f": the gripper is {describe(watch.last)}" if watch.last else ""
+        raise EndError("time", f"the activation did not finish within {ACTIVATION_S:g} s{shown}")
     watch.needs_active = True
     return asyncio.get_running_loop().time() - began
 
@@ -82,7 +82,7 @@ async def go(
 ) -> RobotiqStatus | None:
     """Send axes to targets and wait until they rest there; None if they do not in time."""
     assert watch.last is not None
-    watch.envelope = way(watch.last, targets)
+    watch.envelope = motion_envelope(watch.last, targets)
     await watch.write(replace(image, go=True).with_positions(targets))
     return await watch.until(lambda status: are_near(status, targets, MARGIN), seconds) and (
         await watch.until_still(2.0)
@@ -90,8 +90,8 @@ async def go(
 
 
 APART_S: Final = (0.02, 0.05, 0.1, 0.25, 0.5)
-"""From one try to the next: first twice what the manual wants between writes, for one that was forgotten; at
-last more than the slowest device in reach takes to follow."""
+"""Seconds between tries: at first twice what the manual asks for between writes, in case one was forgotten;
+at last more than the slowest known device takes to follow."""
 UNREACHED: Final = "THE FINGERS MAY STILL MOVE: {}. Press the emergency stop, or cut the power."
 
 

@@ -1,4 +1,4 @@
-"""The link to the gripper under test: every exchange is kept with its time, and none is cut off."""
+"""The link to the gripper under test: keeps every exchange with its time, and cuts none off."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ...values.status import RobotiqStatus
 T = TypeVar("T")
 
 RECENT_S: Final = 2.0
-"""For so long an image may still be on its way into effect: ten times what a slow gripper takes."""
+"""How long an image may take to act: ten times what a slow gripper takes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +105,7 @@ class RecordedLink:
         return [echo for _, echo in self._echoes]
 
     async def _whole(self, work: Coroutine[Any, Any, T]) -> T:
-        """Carry something out to its end; a cancellation is raised after it."""
+        """Finish the work; a cancellation is raised after it."""
         task = asyncio.ensure_future(work)
         try:
             await wait_shielded(task)

@@ -34,18 +34,18 @@ class Report:
     label: str = ""  # what the user wants it to be called
 
     def complete(self) -> None:
-        """Say of the checks of stages that have begun and were not reached that they could not be told."""
+        """Note as inconclusive the checks that a stage has not reached."""
         for name, assumption in checks_of(self.model).items():
             if assumption.stage in self.entered and name not in self.checks:
-                self.checks[name] = Check(name, Verdict.UNTOLD, "not reached")
+                self.checks[name] = Check(name, Verdict.INCONCLUSIVE, "not reached")
 
     @property
     def differing(self) -> list[Check]:
         return self._in_order(Verdict.DIFFERS)
 
     @property
-    def untold(self) -> list[Check]:
-        return self._in_order(Verdict.UNTOLD)
+    def inconclusive(self) -> list[Check]:
+        return self._in_order(Verdict.INCONCLUSIVE)
 
     @property
     def options(self) -> dict[str, int | float]:
@@ -106,24 +106,24 @@ def sentences(report: Report) -> tuple[str, str, str]:
 def _usable(report: Report) -> str:
     words = report.words.rstrip(".")
     if report.why in UNUSABLE:
-        return f"Do not use this gripper with robotiq_async before this is understood: {words}."
+        return f"Do not use this gripper with robotiq_async until the cause is known: {words}."
     if report.why in NOT_JUDGED and 2 not in report.stages:
         return f"Whether this gripper can be used could not be judged: {words}."
     if not any(report.stages):
-        return "Nothing is known of the gripper yet: only this computer was looked at."
-    how_far = "" if LAST in report.stages else f", as far as stage {max(report.stages, default=0)} can tell"
+        return "Nothing is known about the gripper yet: only this computer was checked."
+    how_far = "" if LAST in report.stages else f", checked up to stage {max(report.stages, default=0)}"
     if report.options:
         options = ", ".join(f"{name}={value:g}" for name, value in report.options.items())
         return f"This gripper can be used with {options}{how_far}."
     if report.differing:
-        return f"This gripper can be used as it is{how_far}: what differs needs no option."
-    return f"This gripper can be used as it is{how_far}: nothing that was checked differs."
+        return f"This gripper can be used as it is{how_far}: the differences need no option."
+    return f"This gripper can be used as it is{how_far}: no check differs."
 
 
 def _known(report: Report) -> str:
-    total, differing, untold = len(report.checks), len(report.differing), len(report.untold)
-    as_assumed = total - differing - untold
-    words = f"{total} checks: {as_assumed} as assumed, {differing} otherwise, {untold} undecided"
+    total, differing, inconclusive = len(report.checks), len(report.differing), len(report.inconclusive)
+    as_assumed = total - differing - inconclusive
+    words = f"{total} checks: {as_assumed} as assumed, {differing} different, {inconclusive} inconclusive"
     missing = [number for number in range(LAST + 1) if number not in report.stages]
     rest = f"; not finished: stage {', '.join(map(str, missing))}" if missing else ""
     return f"{words}{rest}."
@@ -137,7 +137,7 @@ def _to_report(report: Report) -> str:
         return f"Please send the folder with an issue: {found}."
     if not any(report.stages):
         return "There is nothing to send yet."
-    return "Please send the folder with an issue: a gripper that is as assumed is worth knowing, too."
+    return "Please send the folder with an issue: a gripper without differences is worth knowing, too."
 
 
 def lines(report: Report) -> dict[str, str]:
@@ -159,24 +159,17 @@ def lines(report: Report) -> dict[str, str]:
     }
 
 
-MARKS: Final = {
-    Verdict.AS_ASSUMED: "as assumed",
-    Verdict.DIFFERS: "**DIFFERS**",
-    Verdict.UNTOLD: "could not be told",
-}
-
-
 def page(report: Report, pictures: tuple[str, ...] = (), why_none: str = "") -> str:
     """The text of the page."""
     fields = report.as_dict()
     head = [
-        f"# A gripper, looked at by robotiq_async {fields['library']}",
+        f"# A gripper, checked by robotiq_async {fields['library']}",
         "",
         *([f"**{report.label}**", ""] if report.label else []),
         *sentences(report),
         "",
-        f"It ended because {ENDINGS.get(report.why, 'it was killed')}: {report.words.rstrip('.') or '-'}.",
-        f"Looked at as a {report.model}, link {report.link}.",
+        f"The run ended: {ENDINGS.get(report.why, 'it was killed')}: {report.words.rstrip('.') or '-'}.",
+        f"Checked as a {report.model}, link {report.link}.",
         f"Python {fields['python']} on {fields['system']}, {fields['machine']}.",
         "",
         "## Lines to paste",
@@ -196,5 +189,6 @@ def page(report: Report, pictures: tuple[str, ...] = (), why_none: str = "") -> 
 def _row(check: Check) -> str:
     assumption = CATALOGUE[check.name]
     found = f"{check.found}. {check.follows}" if check.follows else check.found
-    cells = (str(assumption.stage), f"`{check.name}`", assumption.assumed, MARKS[check.verdict], found)
+    mark = "**DIFFERS**" if check.verdict is Verdict.DIFFERS else check.verdict.value
+    cells = (str(assumption.stage), f"`{check.name}`", assumption.assumed, mark, found)
     return f"| {' | '.join(cell.replace('|', '/').replace(chr(10), ' ') for cell in cells)} |"

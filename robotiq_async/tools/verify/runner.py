@@ -15,16 +15,17 @@ from ...values.model import model_of
 from ...values.request import Request
 from .bench import Bench, Lengths
 from .catalogue import HARMLESS, LAST, EndError
-from .looking import find, see_that_it_may_be_written_to
+from .identification import check_before_writing, find
 from .motions import as_found, stop_fingers
 from .recorded_link import Frame
 from .report import Report
 from .stages import STAGES, Stage
 from .stages.loss import report_lost_activation
-from .watch import Person, words_of
+from .watch import Person, describe
 
 LEFT_SET: Final = (
-    "A program has left rGTO set. Going on writes rGTO = 0 first: it stops every axis, and starts none."
+    "A program has left rGTO set. If you go on, rGTO = 0 is written first: it stops every axis, and starts "
+    "none."
 )
 
 
@@ -54,7 +55,9 @@ class Plan:
         if not 0 <= self.first <= self.last <= LAST:
             raise ValueError(f"--from and --up-to must be 0 <= from <= up-to <= {LAST}")
         if not -1 <= self.agreed <= HARMLESS:
-            raise ValueError(f"--yes-to must be in 0..{HARMLESS}: what moves is asked for, got {self.agreed}")
+            raise ValueError(
+                f"--yes-to must be in 0..{HARMLESS}: stages that move always ask, got {self.agreed}"
+            )
         if self.address.kind == "sim":
             raise ValueError("a simulated gripper is verified through its server")
 
@@ -135,34 +138,34 @@ class Runner:
     # -- before a stage --------------------------------------------------------------------------------------
 
     async def _look_first(self, stage: Stage) -> Request:
-        """See that the stage may begin; returns the image that would stop everything now."""
+        """Check that the stage may begin; returns the image that stops everything now."""
         if stage.number < HARMLESS:
             return Request(model=self._bench.model)
         if not self._is_found:
             await self._find()
-        status = await see_that_it_may_be_written_to(self._bench)
-        self._person.tell(f"The gripper is {words_of(status)}.")
+        status = await check_before_writing(self._bench)
+        self._person.tell(f"The gripper is {describe(status)}.")
         if status.go_echo:
             await self._ask_to_clear_go(stage)
         if stage.needs_active and not status.is_activated:
             if self._bench.is_active:
-                report_lost_activation(self._bench, "while it was left alone between two stages")
+                report_lost_activation(self._bench, "without a client between two stages")
             raise EndError("inactive", f"stage {stage.number} needs an active gripper: begin with --from 3")
         return as_found(status)
 
     async def _ask_to_clear_go(self, stage: Stage) -> None:
         if stage.number <= self._plan.agreed:
             raise EndError(
-                "refused", "rGTO is set: a program has left it so, or commands it. Run without --yes-to."
+                "refused", "rGTO is set: a program left it so, or commands the gripper. Run without --yes-to."
             )
         if not await self._person.consents(LEFT_SET):
-            raise EndError("declined", "rGTO is set, and was left so")
+            raise EndError("declined", "rGTO is set, and stays set")
 
     async def _ask(self, stage: Stage) -> None:
         if stage.number <= self._plan.agreed:
             self._person.tell(stage.as_text(self._bench.model))
         elif not await self._person.consents(stage.as_text(self._bench.model)):
-            raise EndError("declined", f"stage {stage.number} was not agreed to")
+            raise EndError("declined", f"stage {stage.number} was not confirmed")
 
     async def _find(self) -> None:
         try:

@@ -26,13 +26,13 @@ class Person(Protocol):
         """Whether a key was pressed since the last answer, or the terminal has closed."""
 
     def tell(self, words: str) -> None:
-        """Say something. While fingers move nothing is said: a terminal may keep who writes waiting."""
+        """Say something; never while fingers move, because a terminal may block."""
 
     def alarm(self, words: str) -> None:
-        """Say at once what must not wait, while fingers may move; never blocks."""
+        """Warn at once, even while fingers move; never blocks."""
 
     async def consents(self, words: str) -> bool:
-        """Ask; only Enter agrees. What was typed before the question counts for nothing."""
+        """Ask; only Enter agrees. Keys pressed before the question do not count."""
 
     async def chooses(self, question: str, answers: Mapping[str, str]) -> str | None:
         """Ask for one of the keys of ``answers``, which say what they mean; None ends the run."""
@@ -42,24 +42,24 @@ Envelope = Mapping[Finger, tuple[int, int]]  # the lowest and the highest positi
 
 ANYWHERE: Final[Envelope] = dict.fromkeys(Finger.ALL, (0, 255))
 LASTING: Final = 3
-"""Reads in which 0x09 must be seen to be a fault: siblings show it once after a second of silence."""
-SLICE_S: Final = 0.05  # while nothing may be sent the person is looked at so often
+"""Reads in a row that make 0x09 a fault: siblings show it once after a second of silence."""
+SLICE_S: Final = 0.05  # how often the person is checked while nothing is sent
 STILL_S: Final = 0.15
-"""An axis that has not moved for so long is at rest: the slowest takes 43 ms for a count (thesis, A1.1)."""
+"""An axis rests once it has not moved for this long: the slowest takes 43 ms for a count (thesis, A1.1)."""
 LIMITS: Final = 20, 225
 """A request beyond may be echoed as a software limit (drivers keep the scissor within 15..232)."""
 
 
 class Watch:
-    """Looks after one stage."""
+    """Reads and writes for one stage, and ends it when something is wrong."""
 
     def __init__(
         self, link: RecordedLink, person: Person, *, seconds: float, interval: float, spacing: float
     ) -> None:
-        """Begin: so many seconds for the whole stage, between two reads, and from one write to the next."""
+        """Begin. The times are the seconds of the whole stage, between two reads, and between two writes."""
         self.envelope = ANYWHERE  # where each axis may be; changed by the stage before each motion
         self.needs_active = True  # whether the gripper must be active
-        self.bears_faults = False  # whether faults are what the stage is about
+        self.allows_faults = False  # whether the stage expects faults
         self.last: RobotiqStatus | None = None  # the newest status
         self.model = link.model  # of the gripper
         self._link = link
@@ -72,25 +72,25 @@ class Watch:
         self._not_ready = 0
 
     async def look(self) -> RobotiqStatus:
-        """Read, and see that all is well."""
-        self.heed()
+        """Read a status, and end the stage if anything is wrong."""
+        self.check_stop()
         status = self.last = await self._link.read()
-        self.heed()
+        self.check_stop()
         self._check(status)
         return status
 
     async def write(self, request: Request, *, spaced: bool = True) -> float:
         """Write an image unless the person has stopped; returns when it was acknowledged."""
-        self.heed()
+        self.check_stop()
         due = self._link.wrote + self._spacing if spaced else 0.0
         if (left := due - self._loop.time()) > 0:
-            await self.rest(left)
+            await self.pause(left)
         return await self._link.write(request)
 
     async def until(
         self, is_so: Callable[[RobotiqStatus], bool], seconds: float, interval: float | None = None
     ) -> RobotiqStatus | None:
-        """Look again and again until something is so; None if it is not within some seconds."""
+        """Read until a status fulfils a condition; None if none does within some seconds."""
         end = self._loop.time() + seconds
         while True:
             began = self._loop.time()
@@ -101,14 +101,14 @@ class Watch:
                 return None
             await asyncio.sleep(max(0.0, began + (interval or self._interval) - self._loop.time()))
 
-    async def pass_by(self, seconds: float) -> RobotiqStatus:
-        """Look for some seconds; returns the last status."""
+    async def watch_for(self, seconds: float) -> RobotiqStatus:
+        """Read for some seconds; returns the last status."""
         await self.until(lambda _: False, seconds)
         assert self.last is not None
         return self.last
 
     async def until_still(self, seconds: float) -> RobotiqStatus | None:
-        """Look until no axis has moved for a while; None if one moves all the time."""
+        """Read until no axis has moved for a while; None if one still moves after some seconds."""
         positions: list[int] = []
         since = self._loop.time()
 
@@ -121,32 +121,32 @@ class Watch:
 
         return await self.until(is_at_rest, seconds)
 
-    async def rest(self, seconds: float) -> None:
-        """Ask nothing of the gripper for some seconds; the person still stops it."""
+    async def pause(self, seconds: float) -> None:
+        """Send nothing for some seconds; the person can still stop the stage."""
         end = self._loop.time() + seconds
         while (left := end - self._loop.time()) > 0:
-            self.heed()
+            self.check_stop()
             await asyncio.sleep(min(SLICE_S, left))
-        self.heed()
+        self.check_stop()
 
-    def heed(self) -> None:
-        """See whether the person has stopped, or the time is over."""
+    def check_stop(self) -> None:
+        """End the stage if the person has stopped it, or its time is over."""
         if self._person.has_stopped:
             raise EndError("stopped", "a key was pressed, or the terminal was closed")
         if self._loop.time() > self._until:
-            raise EndError("time", f"the stage was not over within {self._seconds:g} s")
+            raise EndError("time", f"the stage did not finish within {self._seconds:g} s")
 
-    # -- what a status tells ---------------------------------------------------------------------------------
+    # -- what a status shows ---------------------------------------------------------------------------------
 
     def _check(self, status: RobotiqStatus) -> None:
-        if not self.bears_faults:
+        if not self.allows_faults:
             self._check_fault(status)
         if self.needs_active and not status.is_activated:
-            raise EndError("inactive", f"the gripper is no longer active: it reads {words_of(status)}")
+            raise EndError("inactive", f"the gripper is no longer active: it is {describe(status)}")
         for axis in self.model.axes:
             low, high = self.envelope.get(axis, (0, 255))
             if not low <= status.position(axis) <= high:
-                where = f"{axis.name} is at {status.position(axis)}, and may be in {low}..{high} only"
+                where = f"{axis.name} is at {status.position(axis)}, outside {low}..{high}"
                 raise EndError("envelope", where)
         self._check_echo(status)
 
@@ -163,9 +163,9 @@ class Watch:
         size = len(status.echo) if status.is_activated else 2
         if expected and not any(_may_echo(each[:size], status.echo[:size]) for each in expected):
             found = (
-                f"rACT, rGTO and positions {show_echo(status.echo)}, and this wrote {show_echo(expected[-1])}"
+                f"rACT, rGTO and positions {show_echo(status.echo)}; written was {show_echo(expected[-1])}"
             )
-            why = "another client commands the gripper, or it has forgotten a write"
+            why = "another client commands the gripper, or the gripper forgot a write"
             raise EndError("foreign", f"{why}: it echoes {found}")
 
 
@@ -181,8 +181,8 @@ def show_echo(echo: tuple[int, ...]) -> str:
     return ", ".join(str(int(each)) for each in echo)
 
 
-def words_of(status: RobotiqStatus) -> str:
-    """What a status says, for a person."""
+def describe(status: RobotiqStatus) -> str:
+    """A status in words."""
     if status.is_activated:
         words = "active"
     else:

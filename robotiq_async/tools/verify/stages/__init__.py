@@ -40,14 +40,14 @@ class Stage(NamedTuple):
 
 _NOTHING: Final = ("nothing", "", "", "")
 _WAY: Final = "the fingers' whole way, and the way of what they could push; no hand, no cable"
-_SLOWEST: Final = "the slowest there is (20 to 30 mm/s by the manuals), the weakest force"
+_SLOWEST: Final = "the slowest speed (20 to 30 mm/s by the manuals), the weakest force"
 
 STAGES: Final = (
     Stage(0, "this computer", reading.host, *_NOTHING, "1 s", is_moving=False, needs_active=False),
     Stage(1, "reading only", reading.reading, *_NOTHING, "3 minutes", is_moving=False, needs_active=False),
     Stage(
         *(2, "writing with rGTO = 0", writing.writing),
-        "nothing should; stay clear all the same, for that is what is checked",
+        "nothing should; stay clear: this is what the stage checks",
         *("", "", "", "20 s"),
         is_moving=False,
         needs_active=False,
@@ -64,10 +64,10 @@ STAGES: Final = (
     ),
     Stage(
         *(4, "one axis at a time", first_motions.single_axis),
-        "A, then B, then C, then the scissor, each there and back; you say which it was",
+        "A, then B, then C, then the scissor, each there and back; you say which one moved",
         "30 counts of 255, about an eighth of the way",
         *(_SLOWEST, _WAY, "1 minute"),
-        jaw_moves="the jaw, there and back; you say what it was",
+        jaw_moves="the jaw, there and back; you say what moved",
     ),
     Stage(
         *(5, "stopping", stopping.stopping),
@@ -81,7 +81,7 @@ STAGES: Final = (
         *(6, "full strokes", full_strokes.full_strokes),
         "the scissor to both ends, then A, B and C closed and open three times",
         "the whole way",
-        "slowest, speed 64, and at last the FASTEST there is (2 s, a jaw under 1 s), the weakest force",
+        "slowest, speed 64, and last the FASTEST (2 s, a jaw under 1 s), the weakest force",
         *("everything; nothing may be between the fingers", "1 minute"),
         jaw_moves="the jaw, closed and open three times",
     ),
@@ -93,7 +93,7 @@ STAGES: Final = (
         jaw_moves="the jaw closes on a block of foam that you put there, and opens again",
     ),
     Stage(
-        *(8, "losing client, cable, emergency stop, power", loss.loss),
+        *(8, "loss of client, cable and power; emergency stop", loss.loss),
         "finger A there and back, and ALL FINGERS in activations that are asked for",
         "60 counts of 255; the activations to the stops",
         *(_SLOWEST, _WAY, "10 minutes, with your hands on cable and switches"),

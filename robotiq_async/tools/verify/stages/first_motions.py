@@ -12,38 +12,38 @@ from ....values.request import Request
 from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError
-from ..motions import ACTIVATION_S, activate, are_near, standing, way
+from ..motions import ACTIVATION_S, activate, are_near, in_place, motion_envelope
 from ..watch import Watch
 
 SECONDS: Final = ACTIVATION_S + 20
 USUAL_S: Final = 20.0
-ROOM: Final = 1.5  # an activation_timeout is so many times what an activation took
+ROOM: Final = 1.5  # activation_timeout is this many times the duration of the activation
 
 
 async def activation(bench: Bench) -> None:
     """Reset and activate, and look at what is shown after it."""
     watch = bench.watch(SECONDS)
     took = await activate(watch)
-    status = await watch.pass_by(1.0)
+    status = await watch.watch_for(1.0)
     found = f"{took:.1f} s"
     wanted = round(ROOM * took)
     options = {"activation_timeout": wanted} if wanted > ACTIVATION_TIMEOUT_S else {}
     waits = options.get("activation_timeout", ACTIVATION_TIMEOUT_S)
-    follows = f"A hand waits {waits:g} s; others may wait less."
+    follows = f"A hand waits {waits:g} s; other clients may wait less."
     bench.judge("activation.time", took <= USUAL_S, found, follows, options, seconds=took)
     words = f"registers {status.registers[0]:04X} {status.registers[1]:04X}"
     zeros = all(status.finger_status(axis) is ObjectStatus.IN_MOTION for axis in status.model.axes)
-    follows = "Nothing is to be set: a hand believes no gDT before it has asked for a position. Report this."
+    follows = "No option is needed: a hand ignores gDT until it has commanded a position. Report this."
     bench.judge("activation.words", zeros and not status.go_echo, words, follows)
     bench.is_active = True
 
 
 STEP: Final = 30
 STEP_S: Final = 6.0
-"""For one way: 1.3 s at the slowest speed (thesis, table A1.1), and what a gripper may take to begin."""
+"""For one way: 1.3 s at the slowest speed (thesis, table A1.1), and the time before a gripper begins."""
 LAG_WINDOW_S: Final = 0.5
 LAG_READ_S: Final = 0.002
-LAG_S: Final = 0.25  # so long a hand does not believe an object status that nothing else speaks for
+LAG_S: Final = 0.25  # how long a hand ignores an object status that nothing else confirms
 END_COUNTS: Final = 2
 
 QUESTION: Final = "Which finger has moved, there and back?"
@@ -76,20 +76,20 @@ async def single_axis(bench: Bench) -> None:
         await _there_and_back(bench, axis, found)
         answer = await bench.person.chooses(question, answers)
         if answer is None:
-            raise EndError("declined", "what moved was not named")
+            raise EndError("declined", "the question was not answered")
         if answer != RIGHT[axis]:
             seen = f"the register of {axis.name} moves: {answers[answer]}"
-            bench.differs("axis.finger", seen, "Do not use this gripper with names of fingers; report this.")
-    bench.as_assumed("axis.finger", "each as named by the person")
+            bench.differs("axis.finger", seen, "Address no finger of this gripper by name; report this.")
+    bench.as_assumed("axis.finger", "each moved as named")
     if has_several:
-        bench.as_assumed("axis.alone", "the other axes stood still each time")
+        bench.as_assumed("axis.alone", "the other axes did not move")
     _judge(bench, found)
 
 
 async def _there_and_back(bench: Bench, axis: Finger, found: _Found) -> None:
     watch = bench.watch(4 * STEP_S)
     start = await watch.look()
-    image = standing(start)
+    image = in_place(start)
     await watch.write(image)
     position = start.position(axis)
     target = position - STEP if position > 127 else position + STEP
@@ -98,15 +98,15 @@ async def _there_and_back(bench: Bench, axis: Finger, found: _Found) -> None:
             await _one_way(watch, image, axis, goal, found)
     except EndError as end:
         if end.why == "envelope" and len(bench.model.axes) > 1:
-            bench.differs("axis.alone", end.words, "Do not use this gripper before that is understood.")
+            bench.differs("axis.alone", end.words, "Do not use this gripper until the cause is known.")
         raise
-    await watch.write(standing(await watch.look()))
+    await watch.write(in_place(await watch.look()))
     await watch.until(lambda status: not status.go_echo, 1.0)
 
 
 async def _one_way(watch: Watch, image: Request, axis: Finger, goal: int, found: _Found) -> None:
     start = await watch.look()
-    watch.envelope = way(start, {axis: goal})
+    watch.envelope = motion_envelope(start, {axis: goal})
     await watch.write(replace(image, go=True).with_positions({axis: goal}))
     if start.go_echo and start.finger_status(axis) is ObjectStatus.AT_POSITION:
         lag = await _lag(watch, axis, goal)
@@ -146,15 +146,15 @@ def _judge(bench: Bench, found: _Found) -> None:
     if found.lags:
         worst = max(found.lags)
         words = f"at most {1000 * worst:.0f} ms after the echo"
-        follows = "Nothing is to be set: a hand does not believe an object status for 250 ms."
+        follows = "No option is needed: a hand ignores the object status for 250 ms."
         if worst > LAG_S:
-            follows = "That is longer than a hand waits: its moves may end before they begin. Please report."
+            follows = "That is longer than a hand waits: a move may end before it begins. Please report this."
         bench.judge("axis.lag", worst <= max(0.01, bench.interval), words, follows, worst_ms=1000 * worst)
         if worst > LAG_S:
             raise EndError("deviation", f"axis.lag: {words}, longer than a hand waits")
     else:
-        bench.untold("axis.lag", "gDT showed no motion that began at a known status")
+        bench.inconclusive("axis.lag", "no motion began from a known gDT")
     worst_error = max(found.errors)
     words = f"at most {worst_error} counts beside the request"
-    follows = "Do not compare positions with requests; a hand goes by gDT."
+    follows = "Do not compare positions with requests; a hand uses gDT."
     bench.judge("axis.end", worst_error <= END_COUNTS, words, follows, counts=worst_error)

@@ -12,7 +12,7 @@ from ....values.request import Request
 from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError, Figure
-from ..motions import aside, standing
+from ..motions import in_place, resting_envelope
 from ..watch import Watch
 
 SECONDS: Final = 180.0
@@ -28,7 +28,7 @@ async def full_strokes(bench: Bench) -> None:
     """The scissor with open fingers, then the fingers, slow ones first."""
     watch = bench.watch(SECONDS)
     start = await watch.look()
-    await watch.write(standing(start))
+    await watch.write(in_place(start))
     await _fingers_to(bench, watch, start, OPEN, 64)
     if Finger.SCISSOR in bench.model.all_axes:
         await _scissor(bench, watch, start.position(Finger.SCISSOR))
@@ -48,8 +48,8 @@ async def _fingers_to(
     bench: Bench, watch: Watch, start: RobotiqStatus, goal: int, speed: int
 ) -> tuple[RobotiqStatus, float]:
     """Where they end, and for how many seconds a finger was seen to move."""
-    watch.envelope = aside(start, bench.fingers)
-    image = replace(standing(start, speed=speed), go=True).with_positions(dict.fromkeys(bench.fingers, goal))
+    watch.envelope = resting_envelope(start, bench.fingers)
+    image = replace(in_place(start, speed=speed), go=True).with_positions(dict.fromkeys(bench.fingers, goal))
     return await _stroke(watch, image, bench.fingers)
 
 
@@ -69,7 +69,7 @@ async def _stroke(watch: Watch, image: Request, axes: tuple[Finger, ...]) -> tup
     # Where limits are echoed, the scissor's echo does not show the end: two seconds of rest do.
     status = await watch.until(lambda now: is_at_rest(now) or loop.time() - moved >= 2.0, STROKE_S)
     if status is None:
-        raise EndError("time", f"a stroke was not over within {STROKE_S:g} s")
+        raise EndError("time", f"a stroke did not finish within {STROKE_S:g} s")
     return status, moved - began
 
 
@@ -78,14 +78,14 @@ async def _scissor(bench: Bench, watch: Watch, home: int) -> None:
     readings: list[Figure] = []
     for goal in (0, 255, home):
         start = await watch.look()
-        watch.envelope = aside(start, (Finger.SCISSOR,))
-        image = replace(standing(start, speed=SCISSOR_SPEED), go=True).with_positions({Finger.SCISSOR: goal})
+        watch.envelope = resting_envelope(start, (Finger.SCISSOR,))
+        image = replace(in_place(start, speed=SCISSOR_SPEED), go=True).with_positions({Finger.SCISSOR: goal})
         status, _ = await _stroke(watch, image, (Finger.SCISSOR,))
         if goal != home:
             echoes.append(status.requested_position(Finger.SCISSOR))
             readings.append(status.position(Finger.SCISSOR))
     words = f"0 and 255 are echoed as {echoes[0]} and {echoes[1]}, and read {readings[0]} and {readings[1]}"
-    follows = "Nothing is to be set: a hand learns the limits, and its moves end there."
+    follows = "No option is needed: a hand learns the limits, and its moves end there."
     bench.judge("stroke.scissor", echoes == [0, 255], words, follows, echoes=echoes, readings=readings)
 
 
@@ -95,7 +95,7 @@ def _judge_times(bench: Bench, times: dict[int, float]) -> None:
     share = max(abs(took / usual(speed) - 1) for speed, took in times.items())
     words = ", ".join(f"{took:.2f} s at speed {speed}" for speed, took in times.items())
     if share > SHARE:
-        words += f"; up to {100 * share:.0f} % beside what is assumed"
+        words += f"; up to {100 * share:.0f} % from what is assumed"
     follows = "Run robotiq-async measure speed, and give its table to the hand as calibration."
     bench.judge("stroke.time", share <= SHARE, words, follows, **figures)
 
@@ -111,7 +111,7 @@ def _judge_readings(bench: Bench, readings: list[list[int]]) -> None:
     if is_usual:
         bench.as_assumed("stroke.readings", words, **figures)
     elif closed[0] - opened[-1] < PART_OF_STROKE * model.stroke.counts:
-        bench.untold("stroke.readings", f"{words}: something was in the way", **figures)
+        bench.inconclusive("stroke.readings", f"{words}: something was in the way", **figures)
     else:
-        follows = "Nothing is to be set: a hand goes by gDT and not by readings. Please report."
+        follows = "No option is needed: a hand uses gDT, not positions. Please report this."
         bench.differs("stroke.readings", words, follows, **figures)

@@ -1,4 +1,4 @@
-"""Stage 8: what is left after the client, the cable, the power or the emergency stop was gone."""
+"""Stage 8: what remains after a loss of the client, the cable or the power, and after an emergency stop."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from ....values.request import Request
 from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError, Figure
-from ..motions import MARGIN, activate, are_near, standing, way
+from ..motions import MARGIN, activate, are_near, in_place, motion_envelope
 from ..watch import ENTER, Watch
 
 SECONDS: Final = 900.0
 STEP: Final = 60
 GONE_S: Final = 4.0  # longer than the motion takes
 BEGINS_S: Final = 1.0
-BACK_S: Final = 60.0  # A gripper may boot for so long
+BACK_S: Final = 60.0  # a gripper may take this long to boot
 RETRY_S: Final = 0.5
 AFTER_S: Final = 3.0
 RESETS: Final = 2
@@ -33,13 +33,13 @@ ESTOP: Final = "Nothing moves now. Press the emergency stop, wait three seconds,
 POWER: Final = (
     "Nothing moves now. Switch the gripper's power off, wait five seconds, switch it on, and press Enter."
 )
-ANEW: Final = (
-    "ALL FINGERS MOVE: the gripper is reset and activated anew, as in stage 3. Hands away? Enter begins."
+AGAIN: Final = (
+    "ALL FINGERS MOVE: the gripper is reset and activated again, as in stage 3. Hands away? Enter begins."
 )
 
 
 async def loss(bench: Bench) -> None:
-    """One after the other; what needs hands is asked for, and may be skipped."""
+    """One after the other; the person may skip what has to be done by hand."""
     await _client(bench)
     await _alone(bench)
     for words, name, part in (
@@ -49,34 +49,34 @@ async def loss(bench: Bench) -> None:
     ):
         answer = await bench.person.chooses(words, GO_OR_SKIP)
         if answer == "s":
-            bench.untold(name, "skipped")
+            bench.inconclusive(name, "skipped")
         elif answer == ENTER:
             await part(bench)
         else:
-            raise EndError("declined", f"{name} was neither done nor skipped")
+            raise EndError("declined", f"the question about {name} was not answered")
 
 
 async def _client(bench: Bench) -> None:
     """Finger A, slowly; the client goes away half way, and comes back."""
     watch = bench.watch(60.0)
     start = await watch.look()
-    image, home = standing(start), {Finger.A: start.position(Finger.A)}
+    image, home = in_place(start), {Finger.A: start.position(Finger.A)}
     far = {Finger.A: home[Finger.A] + (STEP if home[Finger.A] < 128 else -STEP)}
     await watch.write(image)
-    watch.envelope = way(start, far)
+    watch.envelope = motion_envelope(start, far)
     away = replace(image, go=True).with_positions(far)
     await watch.write(away)
     if await watch.until(lambda status: not are_near(status, home, MARGIN), 3.0) is None:
         raise EndError("time", f"{bench.first} did not begin to move within 3 s")
     await bench.link.close()
-    await watch.rest(GONE_S)
+    await watch.pause(GONE_S)
     await bench.link.open()
     status = await watch.look()
     where = status.position(Finger.A)
     if are_near(status, far, MARGIN):
-        bench.as_assumed("loss.client", f"{bench.first} went on to {where}")
+        bench.as_assumed("loss.client", f"{bench.first} continued to {where}")
     else:
-        follows = "It stops by itself when it loses its client; that is safer than assumed."
+        follows = "It stops when it loses its client, which is safer than assumed."
         bench.differs("loss.client", f"{bench.first} stopped at {where}, asked {far[Finger.A]}", follows)
     await _wake(bench, watch, image, home)
 
@@ -85,7 +85,7 @@ async def _wake(bench: Bench, watch: Watch, image: Request, home: dict[Finger, i
     """The first image on the new connection is a motion."""
     assert watch.last is not None
     here = {Finger.A: watch.last.position(Finger.A)}
-    watch.envelope = way(watch.last, home)
+    watch.envelope = motion_envelope(watch.last, home)
     back = replace(image, go=True).with_positions(home)
     for number in range(2):
         # Another position, or a gripper that has taken it for its own does not see a change.
@@ -93,17 +93,17 @@ async def _wake(bench: Bench, watch: Watch, image: Request, home: dict[Finger, i
         if await watch.until(lambda status: not are_near(status, here, MARGIN), BEGINS_S) is not None:
             break
     else:
-        raise EndError("time", "two motions on a new connection were not followed")
+        raise EndError("time", "the gripper did not follow two motions on a new connection")
     follows = "The first move after a connection raises MoveIgnoredError: call it again."
-    found = "the first motion on the new connection was followed"
+    found = "the gripper followed the first motion on the new connection"
     if number:
-        found = "the first motion was echoed and not followed; the second was"
+        found = "the gripper echoed the first motion without moving, and followed the second"
     bench.judge("loss.wake", number == 0, found, follows)
     if await watch.until(lambda status: are_near(status, home, MARGIN), 6.0) is None:
         raise EndError("time", f"{bench.first} did not come back within 6 s")
     await watch.until_still(2.0)
     assert watch.last is not None
-    await watch.write(standing(watch.last))
+    await watch.write(in_place(watch.last))
     await watch.until(lambda status: not status.go_echo, 1.0)
 
 
@@ -113,7 +113,7 @@ async def _alone(bench: Bench) -> None:
     watch = bench.watch(SECONDS)
     for seconds in bench.lengths.alone:
         await bench.link.close()
-        await watch.rest(seconds)
+        await watch.pause(seconds)
         await bench.link.open()
         statuses = [await bench.link.read() for _ in range(3)]
         status, alone = statuses[-1], seconds
@@ -124,8 +124,8 @@ async def _alone(bench: Bench) -> None:
 
 
 def report_lost_activation(bench: Bench, when: str) -> None:
-    """It was not reset, and is no longer active."""
-    follows = "Keep one program polling. A start after a pause activates: it MOVES, and lets go."
+    """Note that the gripper is no longer active although it was not reset."""
+    follows = "Keep one program polling. A start after a pause activates the gripper: it MOVES and lets go."
     bench.differs("loss.idle", f"the activation was lost {when}", follows)
 
 
@@ -143,12 +143,12 @@ async def _back(bench: Bench) -> tuple[list[RobotiqStatus], float]:
         except RobotiqConnectionError as error:
             await bench.link.close()
             if loop.time() - began > BACK_S:
-                raise EndError("link", f"it has not answered again within {BACK_S:g} s: {error}") from error
-            await watch.rest(RETRY_S)
+                raise EndError("link", f"the gripper did not answer within {BACK_S:g} s: {error}") from error
+            await watch.pause(RETRY_S)
     answered = loop.time() - began
     while loop.time() - began - answered < AFTER_S:
         statuses.append(await bench.link.read())
-        await watch.rest(bench.interval)
+        await watch.pause(bench.interval)
     bench.link.expect(statuses[-1].echo)
     return statuses, answered
 
@@ -168,7 +168,7 @@ async def _cable(bench: Bench) -> None:
         words = f"answered after {answered:.1f} s, still active"
         bench.as_assumed("loss.cable", words, seconds=answered, faults=faults)
     else:
-        follows = "After a break of the link the next start activates: it MOVES, and lets go."
+        follows = "After a break of the link the next start activates the gripper: it MOVES and lets go."
         bench.differs("loss.cable", "the activation was lost", follows, seconds=answered, faults=faults)
         raise EndError("inactive", "the activation was lost while the cable was out")
 
@@ -180,16 +180,16 @@ async def _estop(bench: Bench) -> None:
     last = statuses[-1]
     if last.is_activated and last.fault is Fault.NONE:
         bench.as_assumed(
-            "loss.estop", "still active, without a fault: it does not reach the gripper", **figures
+            "loss.estop", "still active, no fault: the emergency stop does not reach the gripper", **figures
         )
         return
     for number in range(1, RESETS + 1):
-        if await _activated_anew(bench):
+        if await _activated_again(bench):
             words = f"showed {', '.join(map(str, _faults(statuses)))}; {number} reset and activation helped"
             bench.as_assumed("loss.estop", words, resets=number, **figures)
             return
-    follows = "recover() tries twice, and gives up: switch the gripper's power off and on."
-    bench.differs("loss.estop", f"{RESETS} resets and activations have not helped", follows, **figures)
+    follows = "recover() gives up after two tries: switch the gripper's power off and on."
+    bench.differs("loss.estop", f"{RESETS} resets and activations did not help", follows, **figures)
     raise EndError("fault", f"the gripper is not active after {RESETS} resets")
 
 
@@ -197,27 +197,27 @@ async def _power(bench: Bench) -> None:
     statuses, answered = await _back(bench)
     figures: dict[str, Figure] = {"seconds": answered, "faults": _faults(statuses)}
     if statuses[-1].activation_echo or statuses[-1].go_echo:
-        follows = "Look at what the hand adopts when it starts; please report."
+        follows = "Check what a hand adopts when it starts. Please report this."
         found = "rACT or rGTO is still set after the loss of power"
         bench.differs("loss.power", found, follows, **figures)
     else:
         words = f"answered {answered:.1f} s later, reset; showed {', '.join(map(str, _faults(statuses)))}"
         bench.as_assumed("loss.power", words, **figures)
-    if not statuses[-1].is_activated and not await _activated_anew(bench):
+    if not statuses[-1].is_activated and not await _activated_again(bench):
         raise EndError("inactive", "the gripper could not be activated after the loss of power")
 
 
-async def _activated_anew(bench: Bench) -> bool:
-    """Ask, reset and activate; whether that came to its end."""
-    if not await bench.person.consents(ANEW):
-        raise EndError("declined", "the gripper was not activated anew")
+async def _activated_again(bench: Bench) -> bool:
+    """Ask, reset and activate; whether it is active then."""
+    if not await bench.person.consents(AGAIN):
+        raise EndError("declined", "the new activation was not confirmed")
     watch = bench.watch(SECONDS)
-    watch.bears_faults = True
+    watch.allows_faults = True
     try:
         await activate(watch)
     except EndError as end:
         if end.why in ("time", "inactive"):
             return False
         raise
-    status = await watch.pass_by(0.5)
+    status = await watch.watch_for(0.5)
     return status.is_activated and not status.fault.is_serious

@@ -40,31 +40,31 @@ async def host(bench: Bench) -> None:
         "p99_ms": 1000 * p99,
         "worst_ms": 1000 * late[-1],
     }
-    follows = "The times below are partly this computer's: let nothing else run on it."
+    follows = "This computer adds to the times below: stop other programs on it."
     bench.judge("host.timer", p99 < LATE_S, found, follows, **figures)
     _adapter(bench)
 
 
 def _adapter(bench: Bench) -> None:
     if bench.address.kind != "rtu":
-        bench.as_assumed("host.adapter", "there is none: the gripper is reached through a socket")
+        bench.as_assumed("host.adapter", "no adapter: the link is a socket")
         return
     kept = latency_timer(bench.address.host)
     if kept is None:
-        why = "the system does not say; only FTDI adapters on Linux have a timer to read"
-        bench.untold("host.adapter", why)
+        why = "unknown: only FTDI adapters on Linux have a timer that can be read"
+        bench.inconclusive("host.adapter", why)
         return
-    found = f"passes on what it hears after {kept} ms"
+    found = f"passes on what it receives after {kept} ms"
     file = latency_file("PORT")
-    follows = f"Every read waits for that: echo 1 | sudo tee {file}, with PORT as ttyUSB0 or what yours is."
+    follows = f"Every read waits that long: echo 1 | sudo tee {file}, with your port (ttyUSB0) for PORT."
     bench.judge("host.adapter", kept <= KEPT_MS, found, follows, latency_ms=kept)
 
 
 UNITS: Final = (0, 1, 2, 9, 255)
 NOWHERE: Final = 3000  # no source has registers of a 3-Finger there
 PERIODS_S: Final = (0.02, 0.01)  # between reads, beside the usual interval
-LET_GO_S: Final = 0.5  # for a gateway that serves one client to see that one has gone
-GONE_S: Final = 0.05  # for a gripper to see that a connection has been closed
+LET_GO_S: Final = 0.5  # for a gateway that serves one client to notice that it has gone
+GONE_S: Final = 0.05  # for a gripper to notice a closed connection
 LONGEST_INTERVAL_S: Final = 0.1
 OTHERS: Final = 2
 
@@ -80,7 +80,7 @@ async def reading(bench: Bench) -> None:
 
 
 async def _unchanged(bench: Bench) -> None:
-    """Nothing was written, so what is requested is what it was."""
+    """Nothing was written, so the requests must be unchanged."""
     assert bench.found is not None
     statuses = [await bench.link.read() for _ in range(LASTING)]
     if statuses[-1].echo != bench.found.echo:
@@ -105,7 +105,7 @@ def _registers(bench: Bench) -> None:
         f"unit {found.device_id}, function {found.read_function}, "
         f"requests at {found.request}, status at {found.status}"
     )
-    follows = "Give the hand the options below. See that what is read is the status, and not the requests."
+    follows = "Give the hand the options below. Check that they hold the status, not the requests."
     bench.judge("read.registers", not options, words, follows, options)
 
 
@@ -129,16 +129,16 @@ async def _others(bench: Bench) -> None:
     await bench.link.open()
     words = f"answers as unit {', '.join(map(str, answering))}; {', '.join(map(str, places))}"
     if nowhere:
-        follows = "Another register map may be in it: please report the firmware's version."
+        follows = "It may have another register map: please report the firmware version."
         bench.differs(
-            "read.others", f"registers are read at {NOWHERE}, too", follows, units=answering, places=places
+            "read.others", f"there are registers at {NOWHERE}, too", follows, units=answering, places=places
         )
     else:
         bench.as_assumed("read.others", f"{words}; nothing at {NOWHERE}", units=answering, places=places)
 
 
 async def _answers(bench: Bench, registers: RegisterMap) -> bool:
-    """Whether something is read there; what it is need not be the status."""
+    """Whether something can be read there, even if it is no status."""
     loop = asyncio.get_running_loop()
     link, began = bench.another_link(registers, lambda _: None), loop.time()
     block: Registers = ()
@@ -157,7 +157,7 @@ async def _answers(bench: Bench, registers: RegisterMap) -> bool:
 
 
 async def _counts(bench: Bench) -> None:
-    """Opening reads one to seven registers, another count each time."""
+    """Opening reads one to seven registers, a different number each time."""
     refused: list[Figure] = []
     for count in range(1, 8):
         try:
@@ -169,12 +169,12 @@ async def _counts(bench: Bench) -> None:
         await bench.link.open()
         bench.differs(
             "read.counts",
-            f"{len(refused)} of 7 openings failed, each of which reads another count",
-            "A hand reads so after each connection: connecting will fail at times. Please report.",
+            f"{len(refused)} of 7 connections failed; each reads another number of registers",
+            "A hand does the same, so connecting may fail at times. Please report this.",
             refused=refused,
         )
     else:
-        bench.as_assumed("read.counts", "1 to 8 registers can be read; 7 connections one after the other")
+        bench.as_assumed("read.counts", "1 to 8 registers can be read, over 7 successive connections")
 
 
 async def _round_trip(bench: Bench) -> None:
@@ -188,15 +188,13 @@ async def _round_trip(bench: Bench) -> None:
         worst = max(worst, p99)
     found = f"99 of 100 reads take at most {1000 * worst:.1f} ms"
     interval = min(LONGEST_INTERVAL_S, math.ceil(1000 * worst * 1.2) / 1000)
-    follows = (
-        f"Fingers are watched every {1000 * interval:g} ms at best; use a wired network if this is none."
-    )
+    follows = f"A hand reads the status every {1000 * interval:g} ms at best; use a wired network."
     options = {"poll_interval": interval}
     bench.judge("read.round_trip", worst < bench.interval, found, follows, options, **figures)
 
 
 def _histogram(seconds: list[float]) -> list[Figure]:
-    """How many took so many milliseconds, in steps of a tenth: [milliseconds, count] each."""
+    """[milliseconds, count] for each tenth of a millisecond that occurs."""
     counts = Counter(round(1000 * each, 1) for each in seconds)
     return [[tenth, counts[tenth]] for tenth in sorted(counts)]
 
@@ -231,12 +229,12 @@ async def _connections(bench: Bench) -> None:
             await each.close()
     let_in = len(others) if why else 1 + len(others)
     if not why:
-        bench.as_assumed("read.connections", f"{let_in} at once, each answered", connections=let_in)
+        bench.as_assumed("read.connections", f"{let_in} at once, and each was answered", connections=let_in)
         return
     if not bench.link.is_open:
         await asyncio.sleep(LET_GO_S)
         await bench.link.open()
-    follows = "One program at a time: stop it before you start another; an agent of a fleet can share it."
+    follows = "Run one program at a time, or an agent: it shares the gripper between several."
     bench.differs("read.connections", f"{let_in} at once: {why}", follows, connections=let_in)
 
 
@@ -247,7 +245,7 @@ async def _silence(bench: Bench) -> None:
     lasting, lost = "", ""
     watch = bench.watch(sum(bench.lengths.idle) + 60)
     for seconds in bench.lengths.idle:
-        await watch.rest(seconds)
+        await watch.pause(seconds)
         statuses = [await link.read(), await link.read()]
         codes = [int(status.fault) for status in statuses]
         shown.append([seconds, *codes])
@@ -257,7 +255,7 @@ async def _silence(bench: Bench) -> None:
             lost = f"after {seconds:g} s"
             break
     if lost:
-        follows = "A program that polls keeps it; after a pause the next start activates: it MOVES."
+        follows = "Keep a program polling: after a pause the next start activates the gripper, and it MOVES."
         bench.differs("read.idle", f"the activation was lost {lost} of silence", follows)
     else:
         bench.as_assumed(
@@ -265,11 +263,11 @@ async def _silence(bench: Bench) -> None:
         )
     passing = [each for each in shown if isinstance(each, list) and each[1] == Fault.COMMUNICATION_NOT_READY]
     if lasting:
-        follows = "A hand takes that for a fault: poll all the time, and report this, please."
+        follows = "A hand takes that for a fault: poll without pauses, and please report this."
         bench.differs("read.silence", lasting, follows, faults=shown)
     elif passing:
-        found = f"after {passing[0][0]} s of silence the first read shows fault 0x09, and the next does not"
-        follows = "Nothing is to be set: a hand waits for a third read before it believes 0x09."
+        found = f"after {passing[0][0]} s of silence the first read shows fault 0x09, the next one does not"
+        follows = "No option is needed: a hand believes 0x09 only after a third read."
         bench.differs("read.silence", found, follows, faults=shown)
     else:
         bench.as_assumed("read.silence", "no fault in the first read after any silence", faults=shown)

@@ -13,14 +13,14 @@ from ....values.request import Request
 from ....values.statistics import percentile
 from ..bench import Bench
 from ..catalogue import EndError, Figure
-from ..motions import MARGIN, are_near, aside, go, standing
+from ..motions import MARGIN, are_near, go, in_place, resting_envelope
 from ..watch import Watch
 
 RATES: Final = (10, 20, 50, 100)
 SPEED: Final = 64
 SWING: Final = 15
 FAILED: Final = 1e-4
-LEAST_READS: Final = 10_000  # with fewer a single failure would be too many
+LEAST_READS: Final = 10_000  # with fewer, a single failure would be too many
 MOST_FAILURES: Final = 20
 
 
@@ -60,7 +60,7 @@ async def _read(bench: Bench) -> None:
         "failures": failures,
     }
     words = f"{failed} of {len(times) + len(failures)} reads failed"
-    follows = "Look at cable, shield and switch: each lost connection ends the moves that are awaited."
+    follows = "Check cable, shield and switch: each lost connection ends the moves that a program awaits."
     bench.judge("soak.reads", failed <= FAILED * max(len(times), LEAST_READS), words, follows, **figures)
 
 
@@ -72,12 +72,12 @@ async def _command(bench: Bench) -> None:
     """Finger A back and forth a little; at each rate the last command must be followed."""
     watch = bench.watch(len(RATES) * (bench.lengths.commands + 20))
     start = await watch.look()
-    image = standing(start, speed=SPEED)
+    image = in_place(start, speed=SPEED)
     await watch.write(image)
     home = start.position(Finger.A)
     step = 1 if home < 128 else -1
     reached = [home - MARGIN, home + MARGIN, home + step * (SWING + MARGIN)]
-    watch.envelope = aside(start, (Finger.A,)) | {Finger.A: (min(reached), max(reached))}
+    watch.envelope = resting_envelope(start, (Finger.A,)) | {Finger.A: (min(reached), max(reached))}
     envelope = watch.envelope
     achieved: list[Figure] = []
     for rate in RATES:

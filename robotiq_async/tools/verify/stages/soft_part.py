@@ -9,7 +9,7 @@ from ....values.enums import CLOSED, ObjectStatus
 from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError
-from ..motions import MARGIN, are_near, aside, standing
+from ..motions import MARGIN, are_near, in_place, resting_envelope
 from ..watch import Watch
 
 SECONDS: Final = 60.0
@@ -29,22 +29,22 @@ async def soft_part(bench: Bench) -> None:
     """Close on it, stop with it held, and open."""
     person = bench.person
     if not await person.consents(PLACE):
-        raise EndError("declined", "nothing was closed on")
+        raise EndError("declined", "the foam was not confirmed")
     watch = bench.watch(SECONDS)
     start = await watch.look()
     home = {finger: start.position(finger) for finger in bench.fingers}
-    watch.envelope = aside(start, bench.fingers)
+    watch.envelope = resting_envelope(start, bench.fingers)
     held = await _close(bench, watch, start)
     _judge_contact(bench, held)
-    await watch.write(replace(standing(held)).with_positions(dict.fromkeys(bench.fingers, CLOSED)))
-    left = await watch.pass_by(LEFT_S)
+    await watch.write(replace(in_place(held)).with_positions(dict.fromkeys(bench.fingers, CLOSED)))
+    left = await watch.watch_for(LEFT_S)
     answer = await person.chooses(STAYS, ANSWERS) if held.contacts else "?"
     if answer is None or not await person.consents(RELEASE):
         raise EndError("declined", "the fingers were not opened: they are still closed, with rGTO = 0")
     _judge_halt(bench, answer, held, left)
     watch = bench.watch(SECONDS)
     now = await watch.look()
-    await watch.write(replace(standing(now), go=True).with_positions(home))
+    await watch.write(replace(in_place(now), go=True).with_positions(home))
     if await watch.until(lambda status: are_near(status, home, MARGIN), CLOSE_S) is None:
         raise EndError("time", f"the fingers did not open within {CLOSE_S:g} s")
     await watch.until_still(2.0)
@@ -52,44 +52,42 @@ async def soft_part(bench: Bench) -> None:
 
 async def _close(bench: Bench, watch: Watch, start: RobotiqStatus) -> RobotiqStatus:
     """Close, and wait until every finger rests; the status in which all of them have for a while."""
-    await watch.write(standing(start))
-    await watch.write(replace(standing(start), go=True).with_positions(dict.fromkeys(bench.fingers, CLOSED)))
+    await watch.write(in_place(start))
+    await watch.write(replace(in_place(start), go=True).with_positions(dict.fromkeys(bench.fingers, CLOSED)))
     # What gDT shows just after a write may be from before it.
-    await watch.pass_by(0.3)
+    await watch.watch_for(0.3)
 
     def rest(status: RobotiqStatus) -> bool:
         return all(status.finger_status(finger) is not ObjectStatus.IN_MOTION for finger in bench.fingers)
 
     if await watch.until(rest, CLOSE_S) is None:
         raise EndError("time", f"the fingers did not come to rest within {CLOSE_S:g} s")
-    return await watch.pass_by(0.5)
+    return await watch.watch_for(0.5)
 
 
 def _judge_contact(bench: Bench, held: RobotiqStatus) -> None:
     shown = {finger: held.finger_status(finger) for finger in bench.fingers}
     words = ", ".join(f"{finger.name} {what.name}" for finger, what in shown.items())
     if ObjectStatus.CONTACT_OPENING in shown.values():
-        follows = (
-            "The codes of gDT are the other way round than assumed: outcomes of moves are wrong. Report this."
-        )
+        follows = "The codes of gDT are swapped: outcomes of moves would be wrong. Report this."
         bench.differs("soft.contact", words, follows)
     elif ObjectStatus.CONTACT_CLOSING in shown.values():
         bench.as_assumed("soft.contact", words)
     else:
-        bench.untold("soft.contact", f"no finger has touched anything: {words}")
+        bench.inconclusive("soft.contact", f"no finger touched anything: {words}")
     drawn = max(held.current_ma(finger) for finger in bench.fingers)
     if not held.contacts:
-        bench.untold("soft.current", "nothing was held")
+        bench.inconclusive("soft.current", "nothing was held")
     else:
         words = f"up to {drawn} mA while it is held" if drawn else "0 mA while it is held"
-        follows = "Nothing is to be set: a hand takes no current for a sign of a grip."
+        follows = "No option is needed: a hand does not judge a grip by currents."
         bench.judge("soft.current", drawn == 0, words, follows, milliampere=drawn)
 
 
 def _judge_halt(bench: Bench, answer: str, held: RobotiqStatus, left: RobotiqStatus) -> None:
     moved = max(abs(left.position(finger) - held.position(finger)) for finger in bench.fingers)
     if answer not in ANSWERS:
-        bench.untold("soft.halt", "nothing was held")
+        bench.inconclusive("soft.halt", "nothing was held")
         return
     what = f"held for {LEFT_S:g} s" if answer == "y" else "the part came loose"
     follows = "A stop, and the end of a program without keep_grip, lets go of the part."

@@ -12,7 +12,7 @@ from ....values.request import Request
 from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError
-from ..motions import MARGIN, are_near, go, standing, way
+from ..motions import MARGIN, are_near, go, in_place, motion_envelope
 from ..watch import Watch
 
 SECONDS: Final = 90.0
@@ -29,24 +29,24 @@ async def stopping(bench: Bench) -> None:
     if any(start.position(finger) > 100 for finger in bench.fingers):
         raise EndError("refused", "the fingers are not open; begin with --from 3")
     home = {finger: start.position(finger) for finger in bench.fingers}
-    image = standing(start, speed=SPEED)
+    image = in_place(start, speed=SPEED)
     await watch.write(image)
     far = {finger: home[finger] + STROKE for finger in bench.fingers}
-    watch.envelope = way(start, far)
+    watch.envelope = motion_envelope(start, far)
     away = replace(image, go=True).with_positions(far)
     await _halt(bench, watch, away, home)
     await _resume(bench, watch, away, far)
     await _new_target(bench, watch, image, home)
     await _hold(bench, watch, image, home)
-    watch.envelope = way(start, far)
+    watch.envelope = motion_envelope(start, far)
     if await go(watch, image, home, LEG_S) is None:
-        raise EndError("time", "the fingers did not come back to where they began")
+        raise EndError("time", "the fingers did not return to where they began")
 
 
 async def _until_past(watch: Watch, is_past: Callable[[RobotiqStatus], bool]) -> RobotiqStatus:
     status = await watch.until(is_past, LEG_S)
     if status is None:
-        raise EndError("time", f"the fingers did not come half way within {LEG_S:g} s")
+        raise EndError("time", f"the fingers did not get half way within {LEG_S:g} s")
     return status
 
 
@@ -57,7 +57,7 @@ async def _halt(bench: Bench, watch: Watch, away: Request, home: dict[Finger, in
     )
     counts, seconds = await _stop(bench, watch, replace(away, go=False), status)
     words = f"{counts} counts and {1000 * seconds:.0f} ms at speed {SPEED}"
-    follows = "Do not rely on a stop by software; report this."
+    follows = "Do not rely on a software stop; report this."
     bench.judge("stop.halt", counts <= COUNTS, words, follows, counts=counts, seconds=seconds)
 
 
@@ -84,10 +84,10 @@ async def _resume(bench: Bench, watch: Watch, away: Request, far: dict[Finger, i
     await watch.write(away)
     if await watch.until(lambda status: are_near(status, far, MARGIN), LEG_S) is None:
         where = [watch.last.position(finger) for finger in bench.fingers] if watch.last else []
-        follows = "Nothing is to be set: a hand writes fresh requests after a stop. Please report."
-        bench.differs("stop.resume", f"stays at {where} although rGTO is set again", follows)
+        follows = "No option is needed: a hand writes new requests after a stop. Please report this."
+        bench.differs("stop.resume", f"stays at {where} with rGTO set again", follows)
     else:
-        bench.as_assumed("stop.resume", "goes on to its request")
+        bench.as_assumed("stop.resume", "continues to its target")
     await watch.until_still(2.0)
 
 
@@ -107,7 +107,7 @@ async def _new_target(bench: Bench, watch: Watch, image: Request, home: dict[Fin
     turned = {finger: home[finger] + STROKE - 10 for finger in bench.fingers}
     await watch.write(replace(image, go=True).with_positions(turned))
     turns = await watch.until(lambda status: are_near(status, turned, MARGIN), LEG_S) is not None
-    found = "fingers turn round, and stop at the new request" if turns else "the new request is not followed"
+    found = "the fingers turn, and stop at the new target" if turns else "the new request is ignored"
     bench.judge("stop.target", turns, found, "A motion cannot be replaced: report this.")
     await watch.until_still(2.0)
 
@@ -121,5 +121,5 @@ async def _hold(bench: Bench, watch: Watch, image: Request, home: dict[Finger, i
         bench.as_assumed("stop.hold", words, counts=counts, seconds=seconds)
     else:
         bench.differs(
-            "stop.hold", words, "hold() does not stop soon enough: use halt(). Please report.", counts=counts
+            "stop.hold", words, "hold() stops too late: use halt(). Please report this.", counts=counts
         )

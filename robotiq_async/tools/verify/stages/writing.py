@@ -13,20 +13,20 @@ from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import Figure
 from ..motions import as_found
-from ..watch import Watch, words_of
+from ..watch import Watch, describe
 
 SECONDS: Final = 60.0
 STILL_S: Final = 1.0
 PROBES: Final = 20
 ECHO_S: Final = 0.02
 LONGEST_ECHO_S: Final = 1.0
-APART_S: Final = 0.1  # between two probes: what is forgotten within that is another matter
+APART_S: Final = 0.1  # between two probes, so that none is forgotten
 GAPS_S: Final = (0.002, 0.005, 0.011, 0.021)
-"""From one write to the next; 1 ms above what is of interest where a timer that is early would decide."""
+"""Between two writes; 1 ms more than the time in question where an early timer would decide."""
 PAIRS: Final = 5
-MOST_PAIRS: Final = 25  # tried at a distance until so many count
+MOST_PAIRS: Final = 25  # tried at one distance until PAIRS of them count
 LATE: Final = 1.5
-LATE_S: Final = 0.0005  # A first image that took so many times the usual, and so much more, was late
+LATE_S: Final = 0.0005  # a first image was late if it took LATE times the usual, and this much more
 
 
 async def writing(bench: Bench) -> None:
@@ -43,9 +43,9 @@ async def writing(bench: Bench) -> None:
     if await _echoed(watch, marked) is not None:
         await _spacing(bench, watch, image, usual=await _echo(bench, watch, image))
     else:
-        why = "it echoes no positions while it is not active; run this stage again after stage 3"
-        bench.untold("write.echo", why)
-        bench.untold("write.spacing", why)
+        why = "the gripper echoes no positions while it is inactive; repeat this stage after stage 3"
+        bench.inconclusive("write.echo", why)
+        bench.inconclusive("write.spacing", why)
     await watch.write(image)
     await _echoed(watch, image)
 
@@ -53,14 +53,14 @@ async def writing(bench: Bench) -> None:
 async def _same(bench: Bench, watch: Watch, image: Request) -> None:
     """The image as found, twice; the first clears rGTO if it was left set."""
     await watch.write(image)
-    before = await watch.pass_by(0.2)
+    before = await watch.watch_for(0.2)
     await watch.write(image)
-    after = await watch.pass_by(0.5)
+    after = await watch.watch_for(0.5)
     if _lasting(before) == _lasting(after):
-        bench.as_assumed("write.same", f"still {words_of(after)}")
+        bench.as_assumed("write.same", f"still {describe(after)}")
     else:
-        found = f"from {words_of(before)} to {words_of(after)}"
-        bench.differs("write.same", found, "Writing has side effects: command nothing, and report this.")
+        found = f"from {describe(before)} to {describe(after)}"
+        bench.differs("write.same", found, "Writing has side effects: send no commands, and report this.")
 
 
 def _lasting(status: RobotiqStatus) -> tuple[object, ...]:
@@ -82,10 +82,10 @@ async def _still(bench: Bench, watch: Watch, image: Request) -> None:
         return bool(moved)
 
     if await watch.until(moves, STILL_S) is None:
-        bench.as_assumed("write.still", f"nothing has moved within {STILL_S:g} s")
+        bench.as_assumed("write.still", f"nothing moved within {STILL_S:g} s")
     else:
         await watch.write(image)
-        follows = "Keep away from the fingers, and report this: a stop may be none."
+        follows = "Keep away from the fingers, and report this: a stop may not stop them."
         bench.differs("write.still", f"with rGTO = 0 {', '.join(moved)}", follows)
 
 
@@ -106,7 +106,7 @@ async def _echo(bench: Bench, watch: Watch, image: Request) -> float:
         else:
             times.append(bench.link.asked - acknowledged)
     if not times:
-        bench.untold("write.echo", f"none of {PROBES} images was echoed within {LONGEST_ECHO_S:g} s")
+        bench.inconclusive("write.echo", f"none of {PROBES} images was echoed within {LONGEST_ECHO_S:g} s")
         return percentile(sorted(writes), 0.5)
     times.sort()
     p50, worst = percentile(times, 0.5), times[-1]
@@ -118,7 +118,7 @@ async def _echo(bench: Bench, watch: Watch, image: Request) -> float:
     }
     found = f"after {1000 * p50:.0f} ms, at most {1000 * worst:.0f} ms"
     found += f"; {lost} of {PROBES} never" if lost else ""
-    follows = "Nothing is to be set: a hand goes by the echo. Commands and stops begin so much later."
+    follows = "No option is needed: a hand waits for the echo. Commands and stops act that much later."
     bench.judge("write.echo", not lost and p50 <= ECHO_S, found, follows, **figures)
     return percentile(sorted(writes), 0.5)
 
@@ -144,9 +144,9 @@ async def _spacing(bench: Bench, watch: Watch, image: Request, usual: float) -> 
                 break
         kept.append([1000 * gap, counted, acted])
         if counted < PAIRS:
-            bench.untold(
+            bench.inconclusive(
                 "write.spacing",
-                "writes are held up on their way: is this computer busy?",
+                "writes left late: is this computer busy?",
                 gap_pairs_acted=kept,
             )
             return
@@ -158,7 +158,7 @@ async def _spacing(bench: Bench, watch: Watch, image: Request, usual: float) -> 
 async def _pair(bench: Bench, watch: Watch, image: Request, gap: float, number: int) -> tuple[float, bool]:
     """Two writes so far apart; seconds until the first was acknowledged, and whether the second acts."""
     loop = asyncio.get_running_loop()
-    await watch.rest(APART_S)
+    await watch.pause(APART_S)
     acknowledged = await watch.write(_marked(image, 2 * number))
     began = bench.link.wrote
     await asyncio.sleep(max(0.0, began + gap - loop.time()))
@@ -173,10 +173,10 @@ def _judge_spacing(bench: Bench, kept: list[Figure], enough: list[float]) -> Non
         bench.as_assumed("write.spacing", f"all {PAIRS} pairs at each distance", gap_pairs_acted=kept)
         return
     forgotten = max(set(GAPS_S) - set(enough))
-    found = f"writes that follow within {1000 * forgotten:.0f} ms are acknowledged and forgotten"
+    found = f"a write within {1000 * forgotten:.0f} ms of another is acknowledged and forgotten"
     if forgotten < WRITE_SPACING_S:
         spacing = WRITE_SPACING_S
-        follows = "The usual write_spacing is enough; other programs that write faster lose commands."
+        follows = "The default write_spacing is enough; programs that write faster lose commands."
     else:
         spacing = min(LONGEST_SPACING_S, 2 * forgotten)
         follows = "Leave more time between writes."

@@ -1,4 +1,4 @@
-"""Who answers, and whether anything may be written there. Only reads."""
+"""Finds the gripper, and decides whether the run may write to it. Only reads."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ..doctor.answer import find_gripper
 from ..doctor.findings import Finding, GiveUpError
 from .bench import Bench
 from .catalogue import EndError
-from .watch import LASTING, words_of
+from .watch import LASTING, describe
 
-WATCH_S: Final = 2.0  # for so long the gripper is watched for another client, and for motion
+WATCH_S: Final = 2.0  # how long to watch for another client, and for motion
 STILL_COUNTS: Final = 1
 
 
@@ -37,23 +37,23 @@ async def find(bench: Bench) -> None:
     bench.found = statuses[-1]
     strange = [why for status in statuses if (why := why_no_gripper(status))]
     if strange:
-        raise EndError("refused", f"what answers cannot be told from another device: {strange[0]}")
+        raise EndError("refused", f"what answers may be another device: {strange[0]}")
 
 
 def why_no_gripper(status: RobotiqStatus) -> str:
-    """What a status shows that none of the model does; empty if there is nothing."""
+    """What in a status shows that this is no gripper of the model; empty if nothing does."""
     words = " ".join(f"{word:04X}" for word in status.registers)
     if not any(status.registers):
-        return "all registers read 0; the gripper may be without power behind its fieldbus"
+        return "all registers read 0; the gripper behind the fieldbus may have no power"
     if shown := status.model.contradiction(status.registers):
         how = names_that_fit(status.registers)
         return f"this is no {status.model.title}: its registers show {shown}; {how}"
     # The old controller of the siblings has faults of its own in byte 2 (kFLT).
     reserved = STATUS_RESERVED if status.model is THREE_FINGER else STATUS_RESERVED[1:]
     if any(field.read(status.registers) for field in reserved):
-        return f"bits are set that are 0 in a gripper: {words}"
+        return f"bits are set that are always 0 in a gripper: {words}"
     if status.fault.name.startswith("UNKNOWN"):
-        return f"a fault code that the manual does not assign: {words}"
+        return f"a fault code that is not in the manual: {words}"
     if not status.activation_echo and not status.is_reset:
         return f"gIMC says active or activating while gACT is 0: {words}"
     axes = status.model.axes
@@ -63,21 +63,21 @@ def why_no_gripper(status: RobotiqStatus) -> str:
     return ""
 
 
-async def see_that_it_may_be_written_to(bench: Bench) -> RobotiqStatus:
-    """Watch it for a while; returns the newest status."""
+async def check_before_writing(bench: Bench) -> RobotiqStatus:
+    """End the run unless the gripper may be written to; returns the newest status."""
     loop, first = asyncio.get_running_loop(), await bench.link.read()
     until, not_ready, last = loop.time() + WATCH_S, 0, first
     while loop.time() < until:
         await asyncio.sleep(2 * bench.interval)
         last = await bench.link.read()
         if why := why_no_gripper(last):
-            raise EndError("refused", f"what answers cannot be told from another device: {why}")
+            raise EndError("refused", f"what answers may be another device: {why}")
         if last.echo != first.echo:
             raise EndError(
-                "refused", "another client commands the gripper: its requests change. Stop that one."
+                "refused", "another client commands the gripper: its requests change. Stop that client."
             )
         if any(abs(last.position(axis) - first.position(axis)) > STILL_COUNTS for axis in last.model.axes):
-            raise EndError("refused", "the fingers move: wait until they rest, and find out who moves them")
+            raise EndError("refused", "the fingers move: wait until they rest, and find out what moves them")
         not_ready = not_ready + 1 if last.fault is Fault.COMMUNICATION_NOT_READY else 0
     bench.link.expect(last.echo)
     _check_rest(last, not_ready)
@@ -93,6 +93,6 @@ def _check_rest(status: RobotiqStatus, not_ready: int) -> None:
         held = f"{status.contacts} reads a contact: the gripper holds something"
         raise EndError("refused", f"{held}. Take it out with your usual program, and open the fingers.")
     if status.is_moving:
-        raise EndError("refused", f"an axis is under way: it reads {words_of(status)}")
+        raise EndError("refused", f"an axis is moving: the gripper is {describe(status)}")
     if status.activation_echo and not status.is_activated and fault is Fault.NONE:
-        raise EndError("refused", "an activation or a change of mode is under way: wait for its end")
+        raise EndError("refused", "an activation or a change of mode is under way: wait until it ends")
