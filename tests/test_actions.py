@@ -226,7 +226,7 @@ async def test_fingers_that_a_halt_has_stopped_stand_still(active: Operator, pau
     with pytest.raises(MoveSupersededError):
         await moving
     await asyncio.sleep(pause)
-    assert await active.leave() == "The fingers were stopped: they had been moved from here."
+    assert await active.leave() == "The fingers were stopped, because a command from here moved them."
 
 
 async def test_an_old_halt_is_no_stop(

@@ -197,7 +197,7 @@ async def test_registers_elsewhere(where: bytes, options: dict[str, int]) -> Non
         await helps(f"tcp://{address}", **options)
     assert found.level is Level.DOUBT
     words = ", ".join(f"{name}={value}" for name, value in options.items())
-    assert found.advice.startswith(f"Pass {words}, or the options so called.")
+    assert found.advice.startswith(f"Pass {words}, or the options of these names.")
     assert ("may be the requests" in found.advice) is ("read_function" in options)
 
 
@@ -384,7 +384,7 @@ async def test_replies_that_take_a_longer_timeout() -> None:
 def test_an_extra_that_is_missing_is_no_question_of_cables() -> None:
     assert _advice_for_opening(
         parse_address("rtu:///dev/x"), "pip install 'pyserial>=3.5' (the extra serial)"
-    ) == ("Install that, and look again.")
+    ) == ("Install it, and run doctor again.")
 
 
 async def test_a_slow_gripper() -> None:

@@ -138,10 +138,10 @@ class Operator:
         began = now()
         await self.hand.stop(halt=has_moved)
         if not has_moved:
-            return "The fingers were left as they are: nothing here has moved them."
+            return "The fingers were left as they are: no command from here moved them."
         if rests or self._stands_still(began):
-            return "The fingers were stopped: they had been moved from here."
-        return "The fingers had been moved from here and may STILL MOVE: the gripper was not seen to stop."
+            return "The fingers were stopped, because a command from here moved them."
+        return "A command from here moved the fingers. They may STILL MOVE: no status confirmed the stop."
 
     async def set_speed(self, value: int) -> str:
         """Set the speed of all axes, also of a motion under way; returns it as text.

@@ -75,7 +75,7 @@ def test_the_thesis_tables_are_there() -> None:
         (f"{HEADER}\n0,1,-2\n", ", line 2: run_2_ms must be an integer"),
         (f"{HEADER}\n0,1,600001\n", ", line 2: run_2_ms must be an integer in 0..600000, got '600001'"),
         (f"{HEADER}\n256,1,2\n", ", line 2: speed_value must be an integer in 0..255, got '256'"),
-        (f"{HEADER}\n0,1,2\n\n0,3,4\n", ", line 4: speed_value 0 is there twice"),
+        (f"{HEADER}\n0,1,2\n\n0,3,4\n", ", line 4: speed_value 0 appears twice"),
         (f'{HEADER}\n0,"1,2\n', ": cannot be read"),
     ],
 )

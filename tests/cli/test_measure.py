@@ -135,7 +135,7 @@ def test_fingers_that_meet_something_or_an_input_that_has_ended(call: Call, tmp_
     with served(gripper) as server:
         for what, options, words in (
             ("speed", ("--yes", "--no-plot"), "the fingers met something"),
-            ("force", IN_THE_WAY, "no answer: the input has ended"),
+            ("force", IN_THE_WAY, "no answer: the input ended"),
         ):
             outcome = call("measure", what, server.address, "--output", str(tmp_path / "t.csv"), *options)
             assert outcome.code == 1

@@ -335,7 +335,7 @@ def test_a_recording_with_other_names_is_one_line_that_says_so(
     lacks = {"axis_state": "requested_position", "fault_code": "fault"}[lacks] if command == "plot" else lacks
     outcome = call(command, str(foreign(message, topic=topic)))
     assert outcome.out == ""
-    why = f"is not one of ours, or of another version of robotiq_async: it has no '{lacks}'"
+    why = f"was not made by this version of robotiq_async: it has no '{lacks}'"
     outcome.assert_failed(1, f"{foreign()}: a message on '{topic}' {why}\n")
 
 

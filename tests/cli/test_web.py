@@ -59,7 +59,7 @@ async def test_it_prints_where_to_look_and_leaves_the_fingers_alone(
         process.send_signal(signal.SIGINT)
         outcome = await shell.finish(process)
         assert (outcome.code, outcome.out) == (0, "")
-        assert "The fingers were left as they are: nothing here has moved them." in outcome.err
+        assert "The fingers were left as they are: no command from here moved them." in outcome.err
         assert gripper.request_registers == before
 
 

@@ -168,7 +168,7 @@ async def test_a_command_is_answered_whenever_its_page_is_gone() -> None:
     pages = Pages(FakeHand())
     pages.do("close")
     pages.commands.gone("one")
-    assert (await pages.answer())["words"] == "the page was gone: the axes are held"
+    assert (await pages.answer())["words"] == "the page is gone: the axes are held"
     assert not pages.commands.under_way
 
 

@@ -73,7 +73,7 @@ def force(
     if scale is not None and scale.resolve() == path.resolve():
         raise UsageError("--scale must be another file than --output")
     if (model := named_model(address)) is not THREE_FINGER:
-        raise UsageError(f"forces are measured with three fingers, and {address} names a {model}")
+        raise UsageError(f"forces are measured with three fingers; {address} names a {model}")
     factor = check(address, path, speedup, runs, step, not no_plot)
     from ...tools.measure.campaigns import force_campaign
     from ...values.calibration.csv_tables import FORCE, read_table
@@ -206,7 +206,7 @@ async def _prompt(question: str) -> str:
     threading.Thread(target=read, daemon=True).start()
     line = await answer
     if not line:
-        raise CommandError("no answer: the input has ended")
+        raise CommandError("no answer: the input ended")
     return line.strip()
 
 

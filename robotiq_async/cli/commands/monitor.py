@@ -66,7 +66,7 @@ async def monitor(
         as_json: Print every poll and event as a line of JSON; take no commands.
     """
     if watch and as_json:
-        raise UsageError("--watch and --json exclude each other")
+        raise UsageError("--watch and --json cannot be combined")
     try:
         if watch or as_json or not _is_terminal():
             await _look(address, link, as_json=not watch)
@@ -93,7 +93,7 @@ async def _look(address: str, link: Link, *, as_json: bool) -> None:
         if as_json:
             tell(gripper_words(address))
         await (print_objects if as_json else watch)(hand)
-    raise CommandError("the hand has ended; the reason is above")
+    raise CommandError("the hand has failed; the reason is above")
 
 
 async def _screen(address: str, link: Link, speed: int, force: int) -> None:

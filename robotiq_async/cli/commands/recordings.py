@@ -59,7 +59,7 @@ def replay(
         print(line)
         is_empty = False
     if is_empty:
-        raise CommandError(f"{file}: it contains nothing that this command shows")
+        raise CommandError(f"{file}: it contains nothing for this command")
 
 
 def _in_order(file: Path) -> Iterator[Entry]:
@@ -203,7 +203,7 @@ def recover(file: Path, target: Path | None = None, /) -> None:
     print(f"{found.messages} messages in {whole}")
 
 
-WHOLE = "robotiq-async recover makes a whole file of it"
+WHOLE = "robotiq-async recover makes a complete file of it"
 
 
 async def record(
@@ -273,10 +273,10 @@ def _tell_figures(recorder: Recorder, hand: Hand) -> None:
     if not recorder.has_failed:
         words = f"{polls} polls, {recorder.missed} lost, {overruns}, {recorder.size} bytes"
     elif recorder.saved:
-        words = f"The recording ended early: {recorder.saved} of {polls} polls at least are in the file"
+        words = f"The recording ended early: at least {recorder.saved} of {polls} polls are in the file"
         words += f"; {WHOLE}" * (recorder.path.suffix != ".csv")
     else:
-        words = f"The recording is lost: of its {polls} polls none is in the file for certain"
+        words = f"The recording is lost: none of its {polls} polls is in the file for certain"
     print(f"\n{words}", flush=True)
 
 

@@ -107,7 +107,7 @@ async def simulate(
         )
         _place(gripper, object_, fixed=fixed)
         if serial is not None and rtu_over_tcp:
-            raise ValueError("--serial and --rtu-over-tcp contradict each other")
+            raise ValueError("--serial and --rtu-over-tcp cannot be combined")
         if unpaced and serial is None and not rtu_over_tcp:
             raise ValueError("--unpaced is for a serial line: --serial or --rtu-over-tcp")
         server: SimulatorServer | SerialSimulatorServer
@@ -158,6 +158,6 @@ def _list_troubles() -> None:
 
     for name, kind in KINDS.items():
         usual = "" if kind.value is None else f" (VALUE: {kind.value:g} unless given)"
-        lasts = "" if kind.lasts == 0 else "; lasts for ever unless a duration is given"
+        lasts = "" if kind.lasts == 0 else "; without end unless a duration is given"
         link = "" if kind.link is None else f"; {kind.link} only"
         print(f"{name:19} {kind.meaning}{usual}{lasts}{link}")

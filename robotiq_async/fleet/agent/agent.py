@@ -151,7 +151,7 @@ class Agent:
         if name.gripper in self.hands:
             return f"another agent serves {name} already"
         return (
-            f"another agent has this host name, and serves {name}: each needs a host of its own in its file"
+            f"another agent with this host name serves {name}: give each agent a host of its own in its file"
         )
 
     async def _others(self) -> list[tuple[int, GripperName]]:
@@ -244,6 +244,8 @@ class Questions:
                 return True
             self._dropped += 1
             if now >= self._report_due:
-                log.warning("%d questions were dropped: a client asks too many", self._dropped)
+                log.warning(
+                    "%d requests for information were dropped: a client sends too many", self._dropped
+                )
                 self._dropped, self._report_due = 0, now + EVERY_S
             return False

@@ -101,7 +101,7 @@ class _Reader:
             listen = check_endpoints("listen", wanted, has_keys=keys is not None, insecure=insecure)
             if listen and connect:
                 why = "clients connect there, or through a router"
-                raise ValueError(f"listen must be left out where there is connect: {why}, got {wanted!r}")
+                raise ValueError(f"listen and connect cannot be combined: {why}, got {wanted!r}")
         return AgentSettings(
             site, self._grippers(table[_GRIPPERS]), host, listen, connect, keys, insecure, window
         )

@@ -58,7 +58,7 @@ def check_endpoints(
         ValueError: an endpoint is malformed or unprotected.
     """
     if has_keys and insecure:
-        raise ValueError("keys and insecure exclude each other: with keys everything is encrypted")
+        raise ValueError("keys and insecure cannot be combined: with keys everything is encrypted")
     checked = [parse_endpoint(what, endpoint) for endpoint in endpoints]
     for endpoint in checked:
         _check_protected(what, endpoint, has_keys=has_keys, insecure=insecure)

@@ -92,7 +92,7 @@ def unpack(data: bytes) -> StatusMessage:
     if not (isfinite(stamp) and isfinite(age)):
         # The client returns the newest stamp with every request and ignores older ones: an infinite stamp
         # would block all that follow.
-        raise ProtocolError(f"a status at no time: {stamp}, {age} s old")
+        raise ProtocolError(f"a status with an impossible time: {stamp}, {age} s old")
     return StatusMessage(
         mark=mark,
         epoch=epoch,

@@ -70,7 +70,7 @@ class _Asker:
             key, call.pack(), timeout=ANSWER_S, urgency=Urgency.COMMAND, decides=of_its_run(call)
         )
         if reply is None and now() - asked < ANSWER_S / 2:
-            raise NotAllowedError("the agent is there, and does not answer to info: access denied")
+            raise NotAllowedError("the agent is running, but does not answer info: access denied")
         if reply is None:
             raise NoAnswerError(f"no answer to info within {ANSWER_S:g} s")
         answer = unpack_answer(reply.payload)
@@ -123,7 +123,7 @@ async def _describe(asker: _Asker, report: Report) -> Fields:
     elif isinstance(why, NotAllowedError):
         advice = "Is this client in the agent's access.toml, and was the agent started since?"
     else:
-        advice = "Its liveliness token is there, so it ran a second ago. Is its host or the network busy?"
+        advice = "Its liveliness token exists, so it ran a second ago. Is its host or the network busy?"
     report(Finding(Level.BAD, "access", str(why), advice))
     raise GiveUpError
 
@@ -171,7 +171,7 @@ def _report_statuses(listener: _Listener, seconds: float, info: Fields, report: 
         advice = "Does another program publish under these keys? Otherwise update the older side."
         report(Finding(Level.DOUBT, "statuses", listener.unreadable, advice))
     if not listener.statuses:
-        advice = "Answers come and statuses do not: is the client in the agent's access list, in one role?"
+        advice = "Answers arrive, statuses do not: is the client in the agent's access list, in one role?"
         report(Finding(Level.BAD, "statuses", f"none within {seconds:.1f} s", advice))
         return
     sequences = {each.sequence for each in listener.statuses if each.registers is not None}
@@ -184,16 +184,14 @@ def _report_statuses(listener: _Listener, seconds: float, info: Fields, report: 
     if lost < LOST:
         report(Finding(Level.GOOD, "statuses", found))
     else:
-        advice = (
-            "The newest one counts, so commands are safe; streams and recordings have gaps. A wired network?"
-        )
+        advice = "Commands are safe, but streams and recordings have gaps. Use a wired network."
         report(Finding(Level.DOUBT, "statuses", found, advice))
 
 
 def _report_gripper(listener: _Listener, info: Fields, report: Report) -> None:
     problem, state = info["problem"], str(info["state"])
     if problem or state == "disconnected":
-        found = f"its agent does not reach it: {problem or 'the link is down'}"
+        found = f"its agent cannot reach it: {problem or 'the link is down'}"
         advice = f"On that host: robotiq-async doctor {info['address']}, while the agent is stopped."
         report(Finding(Level.BAD, "gripper", found, advice))
         return

@@ -158,7 +158,7 @@ def _report_no_connection(
     if isinstance(cause, ConnectionRefusedError):
         advice = "The host is up, but nothing listens on this port: is it the right address and port?"
     elif isinstance(cause, OSError) and not isinstance(cause, TimeoutError):
-        advice = "There is no way to it: check cable, IP address and subnet mask of this computer."
+        advice = "It cannot be reached: check the cable, and the IP address and subnet mask of this computer."
     else:
         advice = "Is it switched on, on this network, in this subnet? A firewall may drop the packets."
     report(Finding(Level.BAD, "port", f"{address.port}: {error.args[0]}", advice))
@@ -166,12 +166,10 @@ def _report_no_connection(
 
 def _advice_for_opening(address: Address, why: str) -> str:
     if "pip install" in why:
-        return "Install that, and look again."
+        return "Install it, and run doctor again."
     if address.kind == "rtu":
-        return (
-            "ls -l /dev/ttyUSB* /dev/ttyACM* shows the ports and whose they are, dmesg what was plugged in."
-        )
-    return f"It took a connection before and refuses now. {ALONE}: stop the other."
+        return "ls -l /dev/ttyUSB* /dev/ttyACM* shows the ports and their owners, dmesg what was plugged in."
+    return f"It accepted a connection before and refuses one now. {ALONE}: stop the other."
 
 
 # -- no answer, or a late one ------------------------------------------------------------------------------
@@ -184,10 +182,10 @@ def _answers(failure: RobotiqConnectionError | None, tries: int, seconds: float)
     if failure is None:
         return Finding(Level.GOOD, "Modbus", "answers")
     if isinstance(failure, ConnectionLostError):
-        advice = f"It hung up first. {ALONE} and was busy with another: is another program connected?"
+        advice = f"It closed the connection without an answer. {ALONE}: is another program connected?"
     else:
         advice = (
-            "Replies get lost or damaged: look at cable and switch, and for another client. "
+            "Replies get lost or damaged: check cable and switch, and look for another client. "
             f"{ALONE}, and was busy with another."
         )
     return Finding(Level.DOUBT, "Modbus", f"answers when asked {tries} times", advice)
@@ -200,8 +198,8 @@ def _advice_for_silence(error: RobotiqConnectionError) -> str:
             "serves one client at a time and has another."
         )
     if isinstance(error, ProtocolError):
-        return "What answers is not this gripper: it has its registers elsewhere, or does not speak Modbus."
-    return f"It hangs up when asked. {ALONE}, or not speak Modbus."
+        return "What answers is not this gripper: its registers are elsewhere, or it does not speak Modbus."
+    return f"It closes the connection when asked. {ALONE}, or not speak Modbus."
 
 
 # -- the device that answers -------------------------------------------------------------------------------
@@ -211,7 +209,7 @@ def _report_place(usual: RegisterMap, found: RegisterMap, report: Report) -> Non
     unit = Finding(Level.GOOD, "unit id", str(found.device_id))
     if found.device_id != usual.device_id:
         advice = f"Pass device_id={found.device_id}, or --device-id {found.device_id}."
-        unit = Finding(Level.DOUBT, "unit id", f"{found.device_id}, and not {usual.device_id}", advice)
+        unit = Finding(Level.DOUBT, "unit id", f"{found.device_id}, not {usual.device_id}", advice)
     report(unit)
     at = f"status at {found.status}, requests at {found.request}, function {found.read_function}"
     options = {
@@ -222,19 +220,17 @@ def _report_place(usual: RegisterMap, found: RegisterMap, report: Report) -> Non
     given = [f"{name}={value}" for name, (value, as_usual) in options.items() if value != as_usual]
     where = Finding(Level.GOOD, "registers", at)
     if given:
-        advice = f"Pass {', '.join(given)}, or the options so called."
+        advice = f"Pass {', '.join(given)}, or the options of these names."
         if found.read_function != usual.read_function:
-            advice += (
-                " What this function reads may be the requests: see that status shows what the gripper does."
-            )
+            advice += " This function may read the requests: check that status shows what the gripper does."
         where = Finding(Level.DOUBT, "registers", f"{at}: unusual on this kind of link", advice)
     report(where)
 
 
 def _report_silence(status: RobotiqStatus, report: Report) -> None:
     if not any(status.registers):
-        found = "all registers read 0, which those of a gripper never do"
-        advice = "The gripper behind the fieldbus may be without power, or this is another device."
+        found = "all registers read 0, which never happens with a gripper"
+        advice = "The gripper behind the fieldbus may have no power, or this is another device."
         report(Finding(Level.DOUBT, "gripper", found, advice))
 
 
@@ -247,5 +243,5 @@ def _report_stranger(status: RobotiqStatus, report: Report) -> None:
     report(Finding(Level.GOOD, "Modbus", "answers"))
     words = " ".join(f"{word:04X}" for word in status.registers)
     found = f"another device answers: its registers {words} have bits set that are 0 in a gripper"
-    advice = "Command nothing there: another machine may move. Are address, unit id and registers right?"
+    advice = "Send it no commands: another machine may move. Are address, unit id and registers right?"
     report(Finding(Level.BAD, "gripper", found, advice))

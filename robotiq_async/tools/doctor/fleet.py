@@ -64,7 +64,7 @@ async def _examine_way_and_agent(name: GripperName, route: Route, report: Report
     try:
         bus = await open_bus(configuration, str(name))
     except ConnectFailedError as error:
-        report(Finding(Level.BAD, "session", str(error), "Are the files in the folder of keys whole?"))
+        report(Finding(Level.BAD, "session", str(error), "Are the files in the folder of keys complete?"))
         raise GiveUpError from error
     try:
         await _examine(name, bus, report)
@@ -98,13 +98,13 @@ async def _find(name: GripperName, bus: Bus, report: Report) -> None:
             advice = "Check the three names in the address."
         else:
             advice = (
-                "Does robotiq-async agent run there? Is what listens there one? With keys: is this client in "
+                "Does robotiq-async agent run there, and does it listen there? With keys: is this client in "
                 "the agent's access.toml, and was the agent started since?"
             )
         report(Finding(Level.BAD, "agent", found, advice))
         raise GiveUpError
     if len(own) > 1:
-        advice = "Two agents command one gripper against each other: stop one."
+        advice = "Two agents command one gripper: stop one."
         report(Finding(Level.BAD, "agent", f"{len(own)} serve this gripper", advice))
     else:
         report(Finding(Level.GOOD, "agent", "one serves this gripper"))
@@ -144,7 +144,7 @@ def examine_keys(folder: Path, report: Report, *, now: datetime) -> None:
 def _report_dates(begins: datetime, ends: datetime, now: datetime, report: Report) -> None:
     if now < begins:
         found = f"holds from {begins:%Y-%m-%d} on, and here it is {now:%Y-%m-%d}"
-        report(Finding(Level.BAD, "certificate", found, "Set the clock of this machine."))
+        report(Finding(Level.BAD, "certificate", found, "Set the clock of this computer."))
         raise GiveUpError
     if now > ends:
         report(Finding(Level.BAD, "certificate", f"ended on {ends:%Y-%m-%d}", _NEW))
@@ -158,7 +158,9 @@ def _report_dates(begins: datetime, ends: datetime, now: datetime, report: Repor
 def _report_mode(key: Path, report: Report) -> None:
     if stat.S_IMODE(key.stat().st_mode) & (stat.S_IRWXG | stat.S_IRWXO) and stat.S_ISREG(key.stat().st_mode):
         advice = f"chmod 600 {key}"
-        report(Finding(Level.DOUBT, "private key", "others on this machine may read or write it", advice))
+        report(
+            Finding(Level.DOUBT, "private key", "other users of this computer may read or write it", advice)
+        )
 
 
 def _report_role(common_name: str, role: Role | None, report: Report) -> None:
@@ -167,10 +169,12 @@ def _report_role(common_name: str, role: Role | None, report: Report) -> None:
         report(Finding(Level.GOOD, "role", f"{common_name}: {_MAY[role]}, if the agent's list has it"))
     elif role is Role.AGENT:
         advice = "Name the folder of a client: read-, halt- or operate-NAME."
-        report(Finding(Level.BAD, "role", f"{common_name}: an agent's, who is no client", advice))
+        report(
+            Finding(Level.BAD, "role", f"{common_name}: the certificate of an agent, not of a client", advice)
+        )
     else:
         found = f"{common_name!r}: it names no role, so the agent's own rules decide what it may do"
-        advice = "Is it of an authority of your own? The command fleet keys writes ROLE:NAME."
+        advice = "Is it from your own authority? The command fleet keys writes ROLE:NAME."
         report(Finding(Level.DOUBT, "role", found, advice))
 
 
@@ -197,7 +201,7 @@ async def _examine_endpoint(endpoint: Endpoint, route: Route, report: Report) ->
         return await _shake_hands(endpoint, route.keys, report)
     if not endpoint.is_loopback:
         found = f"{endpoint.text}: everyone on that network can read and command"
-        advice = "Make keys (robotiq-async fleet keys), unless no one else can be on it."
+        advice = "Make keys (robotiq-async fleet keys), unless the network is yours alone."
         report(Finding(Level.DOUBT, "encryption", found, advice))
     return True
 
@@ -228,19 +232,19 @@ async def _shake_hands(endpoint: Endpoint, keys: Path, report: Report) -> bool:
     except ssl.SSLCertVerificationError as error:
         found = f"{endpoint.text}: its certificate is not trusted: {error.verify_message}"
         advice = (
-            "It must be of the same authority, not past its end, and name what you connect to "
+            "It must be from the same authority, still valid, and name what you connect to "
             "(fleet keys --agent NAME=HOST,...)."
         )
         report(Finding(Level.BAD, "certificates", found, advice))
         return False
     except OSError as error:
         found = f"{endpoint.text}: no encrypted connection: {str(error) or 'no answer'}"
-        advice = "Is it the port of an agent with keys? One without listens at tcp/."
+        advice = "Is it the port of an agent with keys? One without keys listens at tcp/."
         report(Finding(Level.BAD, "certificates", found, advice))
         return False
     if not stays:
         found = f"{endpoint.text}: the agent does not trust this certificate"
-        advice = "Is it of the same authority? Look at the clock of the agent's host, too."
+        advice = "Is it from the same authority? Check the clock of the agent's host, too."
         report(Finding(Level.BAD, "certificates", found, advice))
         return False
     report(Finding(Level.GOOD, "certificates", f"{endpoint.text}: both sides trust each other"))
@@ -254,8 +258,8 @@ async def _try_without(endpoint: Endpoint, keys: Path, report: Report) -> None:
     except OSError:
         stays = False
     if stays:
-        found = f"{endpoint.text}: clients without a certificate are let in, too"
-        advice = "What listens there is no agent of this kind, or a router without mutual TLS. Stop it."
+        found = f"{endpoint.text}: clients without a certificate are accepted, too"
+        advice = "What listens there is no agent with keys, or a router without mutual TLS. Stop it."
         report(Finding(Level.BAD, "no certificate", found, advice))
     else:
         report(Finding(Level.GOOD, "no certificate", "refused, as it must be"))

@@ -63,9 +63,9 @@ async def examine(address: Address, report: Report, *, device_id: int | None = N
     except GiveUpError:
         pass
     except RobotiqConnectionError as error:
-        advice = "Look at cable, switch and power; something between here and the gripper drops packets."
+        advice = "Check cable, switch and power: something on the way to the gripper drops packets."
         if isinstance(error, ConnectionLostError):
-            advice = "It hung up: it may serve one client at a time, and another has come. Or it lost power."
+            advice = "It closed the connection: it serves one client and another came, or it lost power."
         report(Finding(Level.BAD, "link", f"lost during the examination: {error}", advice))
 
 
@@ -135,7 +135,11 @@ def report_state(status: RobotiqStatus, report: Report) -> None:
     if status.is_activated:
         report(Finding(Level.GOOD, "activation", "active"))
     elif status.activation_echo:
-        report(Finding(Level.DOUBT, "activation", "under way, or ended in a fault", "Wait, and look again."))
+        report(
+            Finding(
+                Level.DOUBT, "activation", "under way, or ended in a fault", "Wait, and run doctor again."
+            )
+        )
     else:
         advice = "activate() or start() activates it; the fingers MOVE then."
         report(Finding(Level.GOOD, "activation", "not active", advice))
@@ -145,7 +149,7 @@ def report_state(status: RobotiqStatus, report: Report) -> None:
         case Severity.NONE:
             report(Finding(Level.GOOD, "fault", "none"))
         case Severity.PRIORITY:
-            report(Finding(Level.GOOD, "fault", found, "This is a hint and not a failure."))
+            report(Finding(Level.GOOD, "fault", found, "This is a hint, not a failure."))
         case Severity.MINOR:
             report(Finding(Level.DOUBT, "fault", found, "It may clear on its own; recover() waits for that."))
         case Severity.MAJOR:
@@ -160,7 +164,9 @@ async def _others(link: Link, report: Report) -> None:
         seen.add(RobotiqStatus.from_registers(await link.read()).echo)
         await asyncio.sleep(0.01)
     if len(seen) == 1:
-        found = f"no request changed within {WATCH_S:g} s: none seen to write, unless always the same"
+        found = (
+            f"no request changed within {WATCH_S:g} s: no other client seen, unless it repeats one request"
+        )
         report(Finding(Level.GOOD, "other clients", found))
     else:
         found = f"the requests changed within {WATCH_S:g} s, to {len(seen) - 1} others"
@@ -188,7 +194,7 @@ def report_adapter(address: Address, report: Report, folder: Path = USB_SERIAL) 
     else:
         file = latency_file(address.host, folder)
         advice = (
-            f"This program may not change that: echo 1 | sudo tee {file}, or permanently a udev rule: "
+            f"To change it: echo 1 | sudo tee {file}, or permanently a udev rule: "
             'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1".'
         )
         report(Finding(Level.DOUBT, "adapter", f"{found}, which delays every read", advice))
@@ -199,5 +205,5 @@ def report_damage(link: Link, reads: int, report: Report) -> None:
     repeats = link.repeats if isinstance(link, ModbusTransport) else 0
     if repeats:
         found = f"{repeats} of {reads} reads had to be repeated: answers get lost or damaged"
-        advice = "Look at cable, shield, ground and termination; a few are usual with USB adapters."
+        advice = "Check cable, shield, ground and termination; a few are usual with USB adapters."
         report(Finding(Level.DOUBT, "line", found, advice))

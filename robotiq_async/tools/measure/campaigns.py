@@ -101,7 +101,9 @@ async def time_closing(hand: Hand, speed: int, fingers: Finger, speedup: float =
         missed = max(0, after.overruns - before.overruns - 2)
         if missed * after.period_p50 <= TOLERATED * closed.duration:
             return closed.duration * speedup
-    raise MeasuringError(f"the event loop was blocked in each of {ATTEMPTS} runs: too busy to measure")
+    raise MeasuringError(
+        f"the event loop was blocked in each of {ATTEMPTS} runs: the computer is too busy to measure"
+    )
 
 
 def expected_seconds(speed: int) -> float:
@@ -129,7 +131,7 @@ async def grasp(hand: Hand, force: int, speed: int, speedup: float = 1.0) -> lis
     """
     opened = await hand.open(speed=255)
     if opened.object_detected:
-        raise MeasuringError(f"something is in the way of opening ({opened.contacts!r})")
+        raise MeasuringError(f"something blocks the opening ({opened.contacts!r})")
     await asyncio.sleep(REST_S / speedup)
     samples: list[Sample] = []
     began = now()
@@ -148,7 +150,7 @@ def _sampling(
     statuses = hand.statuses(buffer=10_000)
 
     if hand.model is not THREE_FINGER:
-        raise MeasuringError(f"this measures three fingers, and a {hand.model.title} has one axis")
+        raise MeasuringError(f"this measures three fingers; a {hand.model.title} has one axis")
 
     async def watch() -> None:
         async for status in statuses:

@@ -166,7 +166,7 @@ class Feed:
         for ended in await asyncio.gather(*self._tasks, return_exceptions=True):
             if isinstance(ended, Exception):
                 Log(self._hand.name).critical(
-                    "a feed failed: what happens to the hand is no longer published", exc_info=ended
+                    "a feed failed: the hand is no longer published", exc_info=ended
                 )
         for source in self._sources:
             source.drain()

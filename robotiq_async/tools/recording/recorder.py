@@ -229,4 +229,4 @@ class Recorder:
         write_all(self._file.fileno(), data)
         os.fsync(self._file.fileno())
         if os.fstat(self._file.fileno()).st_nlink == 0:
-            raise FileNotFoundError(errno.ENOENT, "the file has been deleted")
+            raise FileNotFoundError(errno.ENOENT, "the file was deleted")

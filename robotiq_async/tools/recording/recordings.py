@@ -139,7 +139,7 @@ class Entry:
         try:
             return what(fields)
         except KeyError as error:
-            why = f"is not one of ours, or of another version of robotiq_async: it has no {error!s:.80}"
+            why = f"was not made by this version of robotiq_async: it has no {error!s:.80}"
             raise self._refused(why) from error
         except NOT_OURS as error:
             raise self._refused("is not one of ours") from error
@@ -295,7 +295,9 @@ def _unpacked(path: Path | str, record: McapRecord) -> list[McapRecord]:
         return [record]
     size = record.uncompressed_size
     if size > LARGEST:
-        raise RecordingError(f"{path}: a chunk of {size} bytes, more than {LARGEST}: not one of ours")
+        raise RecordingError(
+            f"{path}: a chunk of {size} bytes, more than {LARGEST}: not written by robotiq_async"
+        )
     match record.compression:
         case "":
             data = record.data
@@ -306,9 +308,13 @@ def _unpacked(path: Path | str, record: McapRecord) -> list[McapRecord]:
         case "lz4":
             data = LZ4FrameDecompressor().decompress(record.data, max_length=size + 1)
         case other:
-            raise RecordingError(f"{path}: a chunk is compressed as {reprlib.repr(other)}: unknown here")
+            raise RecordingError(
+                f"{path}: a chunk is compressed as {reprlib.repr(other)}, which is not supported"
+            )
     if len(data) > size:
-        raise RecordingError(f"{path}: a chunk has more than the {size} bytes that it says: not one of ours")
+        raise RecordingError(
+            f"{path}: a chunk has more than the {size} bytes that it claims: not written by robotiq_async"
+        )
     if len(data) < size:
         raise ValueError(f"{len(data)} bytes of {size}")
     return breakup_chunk(replace(record, compression="", data=data), validate_crc=True)

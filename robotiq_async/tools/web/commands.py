@@ -210,13 +210,13 @@ class PageCommands:
 
     async def _carry_out(self, request: Fields, page: str, name: str) -> str:
         if not self._operators:
-            raise ValueError("this page only looks; to command from a page: robotiq-async web --control")
+            raise ValueError("this page only watches; to command from a page: robotiq-async web --control")
         if name != HALT and self.is_ending:
-            raise ValueError("the page is ending: nothing is moved from here now")
+            raise ValueError("the page is closing: it takes no more commands")
         if name != HALT and not 0 <= monotonic() - request["at"] <= FRESH_S:
-            raise ValueError("this came too late to be carried out: the connection was held up")
+            raise ValueError("this arrived too late and was not carried out: the connection was delayed")
         if name != HALT and len(self._tasks.get(page, ())) > MAX_COMMANDS:
-            raise ValueError(f"{MAX_COMMANDS} commands of this page are under way already")
+            raise ValueError(f"{MAX_COMMANDS} commands of this page are already under way")
         service = SERVICES.get(f"/gripper/{name}")
         if service is None or not 0 <= request["hand"] < len(self._operators):
             raise ValueError(f"there is no {name} of hand {request['hand']}")
@@ -228,7 +228,7 @@ def _outcome(task: asyncio.Task[str]) -> tuple[bool, str]:
     try:
         return True, task.result()
     except asyncio.CancelledError:
-        return False, "the page was gone: the axes are held"
+        return False, "the page is gone: the axes are held"
     except RobotiqError as error:
         return False, refusal_words(error, BUTTONS)
     except (ValueError, TypeError) as error:

@@ -82,7 +82,7 @@ def read_table(path: Path | str, layout: Layout) -> Table:
             raise TableError(path, line, f"expected {columns} columns, got {len(cells)}")
         value = integer(path, line, layout.value, cells[0], 255)
         if value in table:
-            raise TableError(path, line, f"{layout.value} {value} is there twice")
+            raise TableError(path, line, f"{layout.value} {value} appears twice")
         names = layout.header(columns - 1)[1:]
         table[value] = tuple(
             integer(path, line, name, cell, layout.high) for name, cell in zip(names, cells[1:], strict=True)

@@ -32,7 +32,7 @@ class Verdict(Enum):
     LET_IN = "it gets the cookie, and is sent on"
     ASK = "it is asked for the password"
     WRONG_HOST = "this is not the address that robotiq-async printed"
-    WRONG_ORIGIN = "a page of another site has no business here"
+    WRONG_ORIGIN = "pages of other sites have no access"
     NO_TOKEN = "open the address that robotiq-async printed: it holds the token"
 
 

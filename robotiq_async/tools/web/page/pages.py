@@ -172,7 +172,7 @@ def _hand_page(mirror: Mirror, hand: HandMirror, client: Client, sessions: PageS
         _halt_button("halt", "stops every axis", controls.halt)
     else:
         with place:
-            hint = ui.label("This page only looks. To command from a page: robotiq-async web --control")
+            hint = ui.label("This page only watches. To command from a page: robotiq-async web --control")
             hint.classes("text-sm opacity-70").props("data-testid=read-only")
     ui.timer(REFRESH_S, lambda: [show() for show in shown])
 
