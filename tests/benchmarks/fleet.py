@@ -177,6 +177,7 @@ class Benchmarks:
                 client.begin()
                 time.sleep(self.seconds)
                 rounds.append(client.end())
+                assert rounds[-1]["members"] == OVERVIEW, "the client could not read every summary"
         self.results["overview"] = rounds
         yield {
             "grippers heard of": f"{median(it['members'] for it in rounds):.0f}",
