@@ -93,7 +93,7 @@ async def test_a_healthy_connection() -> None:
     assert list(found) == [*HEALTHY, "other clients"]
     assert {finding.level for finding in found.values()} == {Level.GOOD}
     assert found["activation"].found == "not active"
-    assert "none seen" in found["other clients"].found
+    assert "no other client seen" in found["other clients"].found
 
 
 @pytest.mark.parametrize(
@@ -198,7 +198,7 @@ async def test_registers_elsewhere(where: bytes, options: dict[str, int]) -> Non
     assert found.level is Level.DOUBT
     words = ", ".join(f"{name}={value}" for name, value in options.items())
     assert found.advice.startswith(f"Pass {words}, or the options of these names.")
-    assert ("may be the requests" in found.advice) is ("read_function" in options)
+    assert ("may read the requests" in found.advice) is ("read_function" in options)
 
 
 async def test_a_gateway_that_is_slower_than_was_waited_for() -> None:
@@ -287,7 +287,7 @@ async def test_the_memory_of_another_device_is_no_gripper(seed: int, changes: bo
     assert list(found) == ["name", "port", "Modbus", "gripper"], "of a state or a fault it knows nothing"
     assert found["gripper"].level is Level.BAD
     assert "that are 0 in a gripper" in found["gripper"].found
-    assert "Command nothing" in found["gripper"].advice
+    assert "Send it no commands" in found["gripper"].advice
 
 
 async def test_a_gripper_beside_other_memory_is_found() -> None:
@@ -355,7 +355,7 @@ async def test_a_gateway_for_one_client_is_no_bad_cable_unless_another_client_ha
         found = await findings(address)
     assert found["Modbus"].level is Level.DOUBT
     assert "one client at a time" in found["Modbus"].advice
-    assert ("It hung up first" in found["Modbus"].advice) is not waits
+    assert ("It closed the connection without an answer" in found["Modbus"].advice) is not waits
 
 
 async def test_slow_replies_are_no_lost_ones() -> None:

@@ -317,7 +317,7 @@ class Summaries:
             stamp, age, fault = float(fields["stamp"]), fields["age"], fields["fault"]
             seen = stamp if age is None else stamp - float(age)
             if not math.isfinite(seen):
-                raise ValueError(f"no time: {stamp}, {age}")
+                raise ValueError(f"not a time: {stamp}, {age}")
             what = {
                 "state": State[fields["state"]],
                 "fault": None if fault is None else model_of(fields.get("model")).fault(fault),

@@ -52,14 +52,14 @@ def test_stages_that_move_nothing_run_without_a_person(call: Call, tmp_path: Pat
     """Against the gripper of sim://."""
     outcome = call("verify", "sim://", "--up-to", "0", "--yes-to", "0", "--report", str(tmp_path / "report"))
     outcome.assert_succeeded()
-    assert "Nothing is known of the gripper yet" in outcome.out
+    assert "Nothing is known about the gripper yet" in outcome.out
 
 
 def test_it_takes_the_model_as_an_option(call: Call, tmp_path: Path) -> None:
     where = tmp_path / "report"
     arguments = ("--model", "2f85", "--up-to", "0", "--yes-to", "0", "--report", str(where))
     call("verify", "sim://", *arguments).assert_succeeded()
-    assert "Looked at as a 2F-85" in (where / "report.md").read_text()
+    assert "Checked as a 2F-85" in (where / "report.md").read_text()
     assert 'model="2f85"' in (where / "report.md").read_text()
 
 

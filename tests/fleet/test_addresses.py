@@ -224,7 +224,7 @@ def test_encryption_takes_keys(endpoint: str) -> None:
 def test_with_keys_everything_is_encrypted(endpoint: str) -> None:
     with pytest.raises(ValueError, match="must begin with tls/"):
         check([endpoint], has_keys=True)
-    with pytest.raises(ValueError, match="exclude each other"):
+    with pytest.raises(ValueError, match="cannot be combined"):
         check([endpoint], has_keys=True, insecure=True)
 
 

@@ -84,7 +84,7 @@ async def test_an_opening_that_is_blocked_is_no_full_closing() -> None:
         gripper.place_object(Finger.ABC, 150, opening=True)
         with pytest.raises(MeasuringError, match="met something"):
             await time_closing(hand, 255, Finger.ABC)
-        with pytest.raises(MeasuringError, match="in the way of opening"):
+        with pytest.raises(MeasuringError, match="blocks the opening"):
             await grasp(hand, 200, 255)
 
 

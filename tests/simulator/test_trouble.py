@@ -158,7 +158,7 @@ def test_on_means_nothing_where_no_reply_is_meant() -> None:
 
 def test_a_condition_is_not_for_once() -> None:
     for kind, words in itertools.product(CONDITIONS, ["once", "for 0"]):
-        with pytest.raises(ValueError, match=f"^{kind} is a condition: say for how long"):
+        with pytest.raises(ValueError, match=f"^{kind} is a condition: give a duration"):
             parse_troubles(f"{kind} {words}")
 
 

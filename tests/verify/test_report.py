@@ -265,7 +265,7 @@ def test_three_sentences_for_every_ending(why: str) -> None:
     if why in ("refused", "link"):
         assert "could not be judged" in sentences(report)[0]
     usable, _, wanted = sentences(Report("tcp", stages=[0], entered=[0], why="done"))
-    assert usable.startswith("Nothing is known of the gripper")
+    assert usable.startswith("Nothing is known about the gripper")
     assert wanted == "There is nothing to send yet."
 
 

@@ -108,7 +108,7 @@ async def test_without_operators_nothing_is_carried_out() -> None:
     pages = Pages()
     for name in ("close", "halt"):
         pages.do(name)
-        assert "only looks" in (await pages.answer())["words"]
+        assert "only watches" in (await pages.answer())["words"]
 
 
 MOVING: tuple[tuple[str, dict[str, Any]], ...] = (
@@ -123,14 +123,14 @@ async def test_what_was_asked_for_too_long_ago_moves_nothing_but_a_halt_is_never
     hand: RobotiqHand, ago: float
 ) -> None:
     """Whether it waited in the browser, on the network, or for this loop, which something had held up."""
-    await assert_only_a_halt(Pages(hand), hand, "came too late", ago=ago)
+    await assert_only_a_halt(Pages(hand), hand, "arrived too late", ago=ago)
 
 
 async def test_a_page_that_is_ending_takes_nothing_but_a_halt(hand: RobotiqHand) -> None:
     """With several hands the others were still commanded while the first one stopped."""
     pages = Pages(hand)
     pages.commands.refuse()
-    await assert_only_a_halt(pages, hand, "the page is ending")
+    await assert_only_a_halt(pages, hand, "the page is closing")
 
 
 async def assert_only_a_halt(pages: Pages, hand: RobotiqHand, words: str, ago: float = 0.0) -> None:
@@ -179,7 +179,7 @@ async def test_a_halt_finds_its_way_through_a_crowd() -> None:
         pages = Pages(hand)
         for _ in range(MAX_COMMANDS + 1):
             pages.do("recover", confirm=True)
-        assert "under way already" in (await pages.answer())["words"]
+        assert "already under way" in (await pages.answer())["words"]
         pages.do("halt")
         words = [(await pages.answer())["words"] for _ in range(MAX_COMMANDS + 1)]
         assert "every axis has stopped" in words

@@ -37,7 +37,7 @@ def demo(
 
     Args:
         yes: Do not ask.
-        show: Show the hand on a page in the browser while it moves; it only looks.
+        show: Show the hand on a page in the browser while it moves; it only watches.
     """
     program = _program()
     if show:

@@ -218,7 +218,7 @@ async def record(
 ) -> None:
     """Record every poll, command, transition and fault in a file, until Ctrl-C.
 
-    It only looks: nothing moves and nothing is written to the gripper. The file is
+    It only watches: nothing moves and nothing is written to the gripper. The file is
     MCAP, for viewers (Foxglove, PlotJuggler), and for replay, plot and export. Tools of
     ROS 2 open only one made with --ros2. A file named .csv is a table with a row for each
     poll, for spreadsheets and pandas; it needs no extra but cli. Commands are recorded only

@@ -45,7 +45,7 @@ async def web(
     """Show grippers on a page in the browser, the hand in three dimensions, until Ctrl-C.
 
     It prints the address to open; the token in the address lets its users in. The page
-    only looks, unless --control is given: then it has buttons, and a halt that is also on
+    only watches, unless --control is given: then it has buttons, and a halt that is also on
     the space bar. Nothing moves until one is pressed. With several addresses there is a
     tile for each.
 

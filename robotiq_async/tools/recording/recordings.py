@@ -142,7 +142,7 @@ class Entry:
             why = f"was not made by this version of robotiq_async: it has no {error!s:.80}"
             raise self._refused(why) from error
         except NOT_OURS as error:
-            raise self._refused("is not one of ours") from error
+            raise self._refused("was not written by robotiq_async") from error
 
     def _refused(self, why: str) -> RecordingError:
         return RecordingError(f"{self.path}: a message on {reprlib.repr(self.topic)} {why}")

@@ -135,7 +135,7 @@ class PageServer:
         Args:
             hands: started before or while they are shown.
             settings: how the page is served.
-            operators: carry out the commands, one for each hand; without them the page only looks.
+            operators: carry out the commands, one for each hand; without them the page only watches.
 
         Raises:
             ValueError: the operators do not match the hands or the settings.

@@ -79,7 +79,7 @@ async def single_axis(bench: Bench) -> None:
             raise EndError("declined", "the question was not answered")
         if answer != RIGHT[axis]:
             seen = f"the register of {axis.name} moves: {answers[answer]}"
-            bench.differs("axis.finger", seen, "Address no finger of this gripper by name; report this.")
+            bench.differs("axis.finger", seen, "Do not use names of fingers with this gripper; report this.")
     bench.as_assumed("axis.finger", "each moved as named")
     if has_several:
         bench.as_assumed("axis.alone", "the other axes did not move")
