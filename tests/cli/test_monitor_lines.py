@@ -125,9 +125,13 @@ async def test_a_reader_that_stops_reading_does_not_hold_up_the_polling(
     assert len(objects) < 500
 
 
-async def test_a_signal_ends_it_although_nobody_reads(shell: Shell, server: SimulatorServer) -> None:
-    """Its writer is stuck in a full pipe: the end does not wait for it."""
+async def test_a_signal_ends_it_although_nobody_reads(
+    server: SimulatorServer, gripper: SimulatedGripper
+) -> None:
+    """Its writer is stuck in a full pipe: the end does not wait for it. Nor does it stop the fingers."""
     async with RobotiqHand(server.address) as hand:
+        await hand.move(50)
+        before = gripper.request_registers
         reading, writing = os.pipe()
         arguments = ("-m", "robotiq_async", "monitor", "--json", server.address)
         environment = os.environ | {"PYTHONPATH": str(ROOT)}
@@ -142,4 +146,5 @@ async def test_a_signal_ends_it_although_nobody_reads(shell: Shell, server: Simu
         process.send_signal(signal.SIGTERM)
         async with asyncio.timeout(10):
             assert await process.wait() == 0
+        assert gripper.request_registers == before
         os.close(reading)

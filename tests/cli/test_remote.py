@@ -220,7 +220,7 @@ def test_a_file_is_checked(call: Call, tmp_path: Path) -> None:
     call("agent", "--check", str(file)).assert_failed(2, "adress", "address", "line 3")
 
 
-@pytest.mark.parametrize("command", [("fleet", "halt"), ("status", ADDRESS)])
+@pytest.mark.parametrize("command", [("fleet", "halt"), ("fleet",), ("status", ADDRESS)])
 def test_a_route_that_cannot_be_meant_is_one_line(
     call: Call, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
 ) -> None:

@@ -66,6 +66,7 @@ async def test_what_is_dangerous_has_to_be_confirmed(operator: Operator, name: s
     ("name", "payload", "words"),
     [
         ("open", b"{", "takes a JSON object"),
+        ("open", b"[]", "takes a JSON object"),
         ("open", b"\xff\xfe", "takes a JSON object"),
         ("open", b"[" * 2000, "takes a JSON object"),
         ("move", b'{"position": ' + b"[" * 2000 + b"]" * 2000 + b"}", "takes a JSON object"),

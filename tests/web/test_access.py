@@ -76,8 +76,9 @@ def test_cookies_of_other_servers_of_this_machine_do_no_harm(others: str) -> Non
     ("host", "fine"),
     [
         (HERE, True),
-        (f"localhost:{PORT}", True),
+        (f"LOCALHOST:{PORT}", True),
         (f"[::1]:{PORT}", True),
+        ("127.0.0.1", False),
         ("127.0.0.1:80", False),
         (f"evil.example:{PORT}", False),
         (f"127.0.0.1.evil.example:{PORT}", False),
