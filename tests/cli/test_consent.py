@@ -103,6 +103,17 @@ async def test_at_a_terminal_nothing_happens_without_a_yes(
     assert list(file.parent.iterdir()) == []
 
 
+@pytest.mark.parametrize(("model", "axes"), [("3f", b"ABC"), ("hand-e", b"A")])
+async def test_the_question_names_the_axes_of_the_model(
+    server: SimulatorServer, model: str, axes: bytes
+) -> None:
+    terminal = Terminal(*COMMAND_LINE, "move", "30", f"{server.address}?model={model}")
+    await terminal.shows(b"Continue? [y/N]")
+    terminal.press("n\n")
+    assert await terminal.end() == 1
+    assert b"this MOVES %b to 30." % axes in terminal.out
+
+
 @pytest.mark.parametrize("answer", ["y", " YES "])
 async def test_after_a_yes_it_moves(server: SimulatorServer, answer: str) -> None:
     terminal = Terminal(*COMMAND_LINE, "move", "30", server.address)

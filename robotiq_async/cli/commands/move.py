@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from ...values.checks import check_timeout
 from ...values.enums import Finger
-from ..addresses import gripper_words
+from ..addresses import gripper_words, named_model
 from ..arguments import USUAL, Address, Byte, Fingers, Flag, Link, Position, Yes
 from ..consent import consent
 from ..failures import usage
@@ -66,8 +66,9 @@ def move(
     """
     with usage():
         check_timeout("timeout", timeout)
+        axes = named_model(address).mask(fingers)
     # Asked here and not in the coroutine: a question would block the event loop.
-    consent(address, WARNING.format(fingers=fingers.name, position=position), yes=yes)
+    consent(address, WARNING.format(fingers=axes.name, position=position), yes=yes)
     return _move(position, address, fingers, speed, force, timeout, keep, link)
 
 
