@@ -86,7 +86,8 @@ def test_behind_a_router_it_does_not_listen(tmp_path: Path) -> None:
     assert agent_configuration("lab", "cell", settings.listen, settings.connect)["mode"] == "client"
     assert agent_configuration("lab", "cell")["mode"] == "peer"
     both = 'connect = ["tcp/127.0.0.1:7447"]\nlisten = ["tcp/127.0.0.1:7448"]\n'
-    with pytest.raises(AgentFileError, match=r"line 2: listen and connect cannot be combined.*through a router.*7448"):
+    words = r"line 2: listen and connect cannot be combined.*through a router.*7448"
+    with pytest.raises(AgentFileError, match=words):
         read(tmp_path, both + GOOD)
 
 
