@@ -1,15 +1,13 @@
-"""Transports without a network, on which a simulated gripper behaves as some real ones are said to do."""
+"""Transports without a network: a simulated gripper that hears, and one that does not follow at first."""
 
 from __future__ import annotations
 
 import asyncio
 import math
-from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.values.enums import Fault
 from robotiq_async.values.errors import (
     ConnectFailedError,
     ConnectionLostError,
@@ -18,7 +16,6 @@ from robotiq_async.values.errors import (
 )
 from robotiq_async.values.registers import Registers, gPR
 from robotiq_async.values.request import Request
-from tests.register_words import with_object_status
 
 EXCHANGE_S = 0.001
 SILENCE_S = 0.4
@@ -115,40 +112,6 @@ class Wire:
         return asyncio.get_running_loop().time()
 
 
-# -- habits ------------------------------------------------------------------------------------------------
-
-
-class Late(Wire):
-    """gDT and gSTA come some reads late."""
-
-    def __init__(self, reads: int) -> None:
-        super().__init__()
-        self._late: deque[Registers] = deque(maxlen=reads + 1)
-
-    def shown(self) -> Registers:
-        self._late.append(super().shown())
-        return with_object_status(self._late[-1], self._late[0])
-
-
-class Silent(Wire):
-    """0x09 in the first read after a second without a message."""
-
-    _last = -10.0
-    seen = 0
-
-    def shown(self) -> Registers:
-        was_silent, self._last = self.now - self._last > 1.0, self.now
-        words = super().shown()
-        if was_silent:
-            self.seen += 1
-            words = (words[0], words[1] & 0x00FF | Fault.COMMUNICATION_NOT_READY << 8, *words[2:])
-        return words
-
-    def take(self, registers: Registers) -> None:
-        self._last = self.now
-        super().take(registers)
-
-
 class Asleep(Wire):
     """The first images on a new connection are echoed, and move nothing.
 
@@ -189,30 +152,3 @@ class Asleep(Wire):
         if self._shows is not None:
             words[0] = words[0] & 0x3F00 | self._shows * 0x55
         return tuple(words)
-
-
-class Stopped(Wire):
-    """After an emergency stop: 0x05 and gIMC = 1 until it has been reset so many times."""
-
-    def __init__(self, resets: float, *, is_raised: bool = True) -> None:
-        super().__init__()
-        self.resets_left = resets
-        self.resets = 0
-        self._is_raised = is_raised
-        """Whether rACT is set: not after a power cut."""
-
-    def take(self, registers: Registers) -> None:
-        raised = Request.from_registers(registers).activate
-        if self._is_raised and not raised:
-            self.resets += 1
-            self.resets_left -= 1
-        self._is_raised = raised
-        if self.resets_left <= 0:
-            super().take(registers)
-
-    def shown(self) -> Registers:
-        if self.resets_left <= 0:
-            return super().shown()
-        if not self._is_raised:
-            return (0x0000, 0x0000, *super().shown()[2:])
-        return (0x1100, Fault.ACTIVATION_PENDING << 8, *super().shown()[2:])

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Callable
+from typing import Any
 
 from robotiq_async import Finger, MoveResult, RobotiqStatus, State
 from robotiq_async.control.controller import Controller
@@ -64,24 +65,25 @@ class Scan:
         self,
         *,
         device_cycle: float = 0.005,
-        gripper: SimulatedGripper | None = None,
         speed: int = 128,
         after: Scan | None = None,
         lag: int = LAG,
         model: Model = THREE_FINGER,
+        **options: Any,
     ) -> None:
         """``after`` is the program before this one: the gripper is its, and so is the time.
 
-        ``lag`` is by how many reads gDT and gSTA come late.
+        ``lag`` is by how many reads gDT and gSTA come late; the options are the gripper's.
         """
         self._late: deque[Registers] = deque(maxlen=lag + 1)
         self._time: list[float] = [100.0] if after is None else after._time
         self.gripper: SimulatedGripper
         if after is not None:
-            gripper = after.gripper
-        self.gripper = gripper or SimulatedGripper(
-            lambda: self.now, device_cycle=device_cycle, spread=False, model=model
-        )
+            self.gripper = after.gripper
+        else:
+            self.gripper = SimulatedGripper(
+                lambda: self.now, device_cycle=device_cycle, spread=False, model=model, **options
+            )
         self.transitions: list[tuple[State, State, Trigger]] = []
         self.machine = StateMachine(lambda *change: self.transitions.append(change))
         self.controller = Controller(

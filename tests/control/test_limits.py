@@ -6,11 +6,11 @@ import logging
 
 import pytest
 
-from robotiq_async import Finger, MoveSupersededError, ObjectStatus, RobotiqStatus
+from robotiq_async import Finger, MoveSupersededError, ObjectStatus
 from robotiq_async.control.requests.limits import ALONE_S, Limits
-from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.simulator import Habits
 from robotiq_async.values.model import THREE_FINGER
-from robotiq_async.values.registers import Registers, gPR
+from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import AxisRequest, Request
 from tests.control.scan import POLL_S, Scan, started
 from tests.register_words import status_of
@@ -22,24 +22,14 @@ CYCLES = pytest.mark.parametrize("device_cycle", [0.0, 0.005, 0.03, 0.2])
 LAGS = pytest.mark.parametrize("lag", [0, 2, 8])
 
 
-class Echoing(Scan):
+def echoing(device_cycle: float = 0.005, lag: int = 0) -> Scan:
     """Of a gripper whose scissor goes to 20..220, and that shows that in place of requests beyond."""
-
-    def __init__(self, device_cycle: float = 0.005, lag: int = 0) -> None:
-        super().__init__(lag=lag)
-        self.gripper = SimulatedGripper(
-            lambda: self.now, device_cycle=device_cycle, spread=False, scissor_limit=(LOW, HIGH)
-        )
-        self.start()
-        self.moved(130, S)
-        self.run(1.0)
-
-    def status(self) -> RobotiqStatus:
-        status = super().status()
-        words = list(status.registers)
-        if status.go_echo:
-            gPR[3].write(words, min(max(gPR[3].read(words), LOW), HIGH))
-        return RobotiqStatus(tuple(words), status.timestamp, status.sequence)
+    habits = Habits(echoes_limits=True)
+    scan = Scan(device_cycle=device_cycle, lag=lag, scissor_limit=(LOW, HIGH), habits=habits)
+    scan.start()
+    scan.moved(130, S)
+    scan.run(1.0)
+    return scan
 
 
 # -- limits ------------------------------------------------------------------------------------------------
@@ -51,7 +41,7 @@ class Echoing(Scan):
 def test_a_move_beyond_a_limit_ends_with_what_it_reached(
     device_cycle: float, lag: int, request_: int, limit: int
 ) -> None:
-    scan = Echoing(device_cycle, lag)
+    scan = echoing(device_cycle, lag)
     for _ in range(2):
         result = scan.moved(request_, S)
         assert result.outcomes == {S: ObjectStatus.AT_POSITION}
@@ -62,14 +52,14 @@ def test_a_move_beyond_a_limit_ends_with_what_it_reached(
 
 def test_it_is_learned_and_told_once(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO)
-    scan = Echoing()
+    scan = echoing()
     for request in (255, 130, 250, 130, 255):
         scan.moved(request, S)
     assert caplog.text.count(f"its limit {HIGH}") == 1
 
 
 def test_an_axis_at_its_limit_rests_and_is_left_alone() -> None:
-    scan = Echoing()
+    scan = echoing()
     scan.moved(255, S)
     written = len(scan.written)
     scan.hold()
@@ -82,14 +72,14 @@ def test_an_axis_at_its_limit_rests_and_is_left_alone() -> None:
 
 
 def test_an_axis_that_a_part_keeps_from_its_limit_is_in_contact() -> None:
-    scan = Echoing()
+    scan = echoing()
     scan.gripper.place_object(S, 180)
     assert scan.moved(255, S).contacts == S
 
 
 @CYCLES
 def test_a_control_loop_beyond_a_limit_commands_alone(device_cycle: float) -> None:
-    scan = Echoing(device_cycle)
+    scan = echoing(device_cycle)
     for position in range(140, 256, 2):
         scan.command(S, position=position)
         scan.step()
@@ -103,7 +93,7 @@ def test_a_control_loop_beyond_a_limit_commands_alone(device_cycle: float) -> No
 
 
 def test_two_moves_at_once_one_of_them_beyond_a_limit() -> None:
-    scan = Echoing()
+    scan = echoing()
     _, finger = scan.move(150, A)
     _, scissor = scan.move(255, S)
     scan.until(lambda: finger.is_told and scissor.is_told)
@@ -112,7 +102,7 @@ def test_two_moves_at_once_one_of_them_beyond_a_limit() -> None:
 
 
 def test_after_a_reconnect_it_goes_on() -> None:
-    scan = Echoing()
+    scan = echoing()
     scan.moved(255, S)
     scan.blink()
     assert scan.moved(100, A).positions == {A: 100}
@@ -179,7 +169,7 @@ def test_a_client_that_takes_the_fingers_just_after_us_is_one(device_cycle: floa
 
 
 def test_who_was_seen_lately_is_the_better_explanation() -> None:
-    scan = Echoing()
+    scan = echoing()
     scan.gripper.write(0, beside(scan, A=90))
     scan.run(2.0)
     assert scan.controller.foreign_commands == 1

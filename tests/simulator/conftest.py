@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.enums import Fault, Finger, Initialization, Mode, ObjectStatus
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
+from tests.simulator.test_server import RawClient, raw_client
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -133,3 +137,26 @@ def individual() -> Bench:
     bench = Bench()
     bench.activate_individually()
     return bench
+
+
+# -- behind Modbus TCP -------------------------------------------------------------------------------------
+
+
+@asynccontextmanager
+async def simulator(**options: Any) -> AsyncIterator[SimulatorServer]:
+    """A simulator whose gripper goes by the clock of the loop, and stops exactly where it is asked to."""
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, spread=False, **options)
+    async with SimulatorServer(gripper) as server:
+        yield server
+
+
+@pytest.fixture
+async def server() -> AsyncIterator[SimulatorServer]:
+    async with simulator() as server:
+        yield server
+
+
+@pytest.fixture
+async def client(server: SimulatorServer) -> AsyncIterator[RawClient]:
+    async with raw_client(server) as client:
+        yield client

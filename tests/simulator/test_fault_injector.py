@@ -9,7 +9,6 @@ import struct
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
@@ -17,7 +16,6 @@ from robotiq_async.runtime.clock import now
 from robotiq_async.simulator import (
     RtuOverTcpSimulatorServer,
     SerialSimulatorServer,
-    SimulatedGripper,
     SimulatorServer,
     Trouble,
 )
@@ -28,6 +26,7 @@ from robotiq_async.values.enums import Fault
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
+from tests.simulator.conftest import simulator
 from tests.simulator.test_serial_frames import READ as READ_SERIAL
 from tests.simulator.test_serial_frames import RESET_READING, line
 from tests.simulator.test_server import RawClient, raw_client
@@ -46,26 +45,6 @@ MISFITS = {
     "rtu+tcp": {"wrong-transaction", "wrong-protocol", "exception"},
 }
 """What cannot happen on a kind of link."""
-
-
-@asynccontextmanager
-async def simulator(**options: Any) -> AsyncIterator[SimulatorServer]:
-    """A simulator whose gripper goes by the clock of the loop, and stops exactly where it is asked to."""
-    gripper = SimulatedGripper(asyncio.get_running_loop().time, spread=False, **options)
-    async with SimulatorServer(gripper) as server:
-        yield server
-
-
-@pytest.fixture
-async def server() -> AsyncIterator[SimulatorServer]:
-    async with simulator() as server:
-        yield server
-
-
-@pytest.fixture
-async def client(server: SimulatorServer) -> AsyncIterator[RawClient]:
-    async with raw_client(server) as client:
-        yield client
 
 
 @asynccontextmanager

@@ -16,7 +16,7 @@ from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, Sim
 from robotiq_async.simulator.server.connection import MOST_UNREAD, MOST_WAITING
 from robotiq_async.simulator.server.serial_server import MOST_UNSENT
 from tests.serial_line import with_crc
-from tests.simulator.test_fault_injector import simulator
+from tests.simulator.conftest import simulator
 from tests.simulator.test_serial_server import Line
 from tests.simulator.test_server import RawClient, raw_client
 from tests.virtual import virtual

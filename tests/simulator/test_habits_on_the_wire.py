@@ -14,11 +14,13 @@ from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values.enums import Fault, Finger, Initialization
 from robotiq_async.values.request import AxisRequest, Request
 from tests.serial_line import with_crc
-from tests.simulator.test_fault_injector import activate, is_answered, simulator, status
+from tests.simulator.conftest import simulator
+from tests.simulator.test_fault_injector import activate, is_answered, status
 from tests.simulator.test_serial_frames import READ as READ_SERIAL
 from tests.simulator.test_serial_frames import RESET_READING, line
 from tests.simulator.test_server import RawClient, raw_client
-from tests.virtual import virtual
+
+pytestmark = pytest.mark.virtual_time
 
 READ_3 = bytes.fromhex("03 0000 0001")
 READ_4 = bytes.fromhex("04 0000 0001")
@@ -37,34 +39,29 @@ async def begin(server: SimulatorServer) -> None:
     await asyncio.sleep(10)
 
 
-@virtual
-async def test_each_habit_is_the_grippers_own_again_when_its_trouble_ends() -> None:
-    async with simulator() as server:
-        own = server.gripper.habits
-        for name, kind in KINDS.items():
-            if kind.habit is None:
-                continue
-            async with server.fault_injector.making(Trouble(name)):
-                expected = True if kind.value is None else kind.value
-                assert getattr(server.gripper.habits, kind.habit) == expected
-            assert server.gripper.habits == own
-
-
-@virtual
-async def test_habits_overlap_and_the_newest_counts() -> None:
-    async with simulator() as server:
-        own = server.gripper.habits
-        begun = [await server.fault_injector.begin(each) for each in plan_of("status-lag 0.1; echoed-limits")]
-        async with server.fault_injector.making(Trouble("status-lag", 0.3)):
-            assert server.gripper.habits.status_lag == 0.3
-            await server.fault_injector.end(begun[1])
-            assert server.gripper.habits == Habits(status_lag=0.3)
-        assert server.gripper.habits == Habits(status_lag=0.1)
-        await server.fault_injector.end(begun[0])
+async def test_each_habit_is_the_grippers_own_again_when_its_trouble_ends(server: SimulatorServer) -> None:
+    own = server.gripper.habits
+    for name, kind in KINDS.items():
+        if kind.habit is None:
+            continue
+        async with server.fault_injector.making(Trouble(name)):
+            expected = True if kind.value is None else kind.value
+            assert getattr(server.gripper.habits, kind.habit) == expected
         assert server.gripper.habits == own
 
 
-@virtual
+async def test_habits_overlap_and_the_newest_counts(server: SimulatorServer) -> None:
+    own = server.gripper.habits
+    begun = [await server.fault_injector.begin(each) for each in plan_of("status-lag 0.1; echoed-limits")]
+    async with server.fault_injector.making(Trouble("status-lag", 0.3)):
+        assert server.gripper.habits.status_lag == 0.3
+        await server.fault_injector.end(begun[1])
+        assert server.gripper.habits == Habits(status_lag=0.3)
+    assert server.gripper.habits == Habits(status_lag=0.1)
+    await server.fault_injector.end(begun[0])
+    assert server.gripper.habits == own
+
+
 async def test_the_times_of_troubles_are_real_ones() -> None:
     slow = Trouble("slow-activation", 12)
     async with simulator(speedup=20) as server, server.fault_injector.making(slow):
@@ -79,57 +76,52 @@ def test_a_server_that_is_given_no_gripper_activates_as_slowly_as_a_real_one() -
     assert SimulatorServer().gripper.habits == Habits(activation_time=REAL_ACTIVATION)
 
 
-@virtual
-async def test_writes_that_are_acknowledged_and_forgotten() -> None:
-    async with simulator() as server, raw_client(server) as client:
-        async with server.fault_injector.making(Trouble("write-spacing")):
-            for position in (10, 20, 30):
-                assert await client.write(image(position)) == struct.pack(">BHH", 16, 0, 8)
-            await asyncio.sleep(0.01)
-            assert await client.write(image(40)) == struct.pack(">BHH", 16, 0, 8)
-        kept = [Request.from_registers(write.registers).axes[0].position for write in server.gripper.writes]
-        assert kept == [10, 40]
+async def test_writes_that_are_acknowledged_and_forgotten(server: SimulatorServer, client: RawClient) -> None:
+    async with server.fault_injector.making(Trouble("write-spacing")):
+        for position in (10, 20, 30):
+            assert await client.write(image(position)) == struct.pack(">BHH", 16, 0, 8)
+        await asyncio.sleep(0.01)
+        assert await client.write(image(40)) == struct.pack(">BHH", 16, 0, 8)
+    kept = [Request.from_registers(write.registers).axes[0].position for write in server.gripper.writes]
+    assert kept == [10, 40]
 
 
-@virtual
-async def test_the_first_motion_on_a_new_connection_is_forgotten() -> None:
-    async with simulator() as server, raw_client(server) as before:
-        await begin(server)
-        async with server.fault_injector.making(Trouble("wake-needed")):
-            await before.write(image(50))
-            await asyncio.sleep(5)
-            assert server.gripper.position(Finger.A) == 50, "an old connection is awake"
-            async with raw_client(server) as client:
-                await client.read_status()
-                await client.write(image(200))
-                await asyncio.sleep(5)
-                seen = await client.read_status()
-                assert (seen.requested_position(Finger.A), seen.position(Finger.A)) == (200, 50)
-                await client.write(image(200))
-                await asyncio.sleep(5)
-                assert server.gripper.position(Finger.A) == 200
-            async with raw_client(server) as client:
-                await client.read_status()
-        await before.write(image(100))
+async def test_the_first_motion_on_a_new_connection_is_forgotten(
+    server: SimulatorServer, client: RawClient
+) -> None:
+    await begin(server)
+    async with server.fault_injector.making(Trouble("wake-needed")):
+        await client.write(image(50))
         await asyncio.sleep(5)
-        assert server.gripper.position(Finger.A) == 100, "it is over"
+        assert server.gripper.position(Finger.A) == 50, "an old connection is awake"
+        async with raw_client(server) as newer:
+            await newer.read_status()
+            await newer.write(image(200))
+            await asyncio.sleep(5)
+            seen = await newer.read_status()
+            assert (seen.requested_position(Finger.A), seen.position(Finger.A)) == (200, 50)
+            await newer.write(image(200))
+            await asyncio.sleep(5)
+            assert server.gripper.position(Finger.A) == 200
+        async with raw_client(server) as newer:
+            await newer.read_status()
+    await client.write(image(100))
+    await asyncio.sleep(5)
+    assert server.gripper.position(Finger.A) == 100, "it is over"
 
 
-@virtual
-async def test_function_3_serves_where_4_would() -> None:
-    async with simulator() as server, raw_client(server) as client:
-        await activate(server)
-        async with server.fault_injector.making(Trouble("function-3-only")):
-            assert await client.ask(READ_4) == REFUSED
-            assert await client.ask(READ_3) == b"\x03\x02\x31\x00"
-            assert await client.write(image(50)) == struct.pack(">BHH", 16, 0, 8)
-            await asyncio.sleep(0.1)
-            assert (await client.ask(bytes.fromhex("03 07d0 0001"))) == b"\x03\x02\x39\x00"
-        assert await client.ask(READ_4) == b"\x04\x02\x39\x00"
-        assert await client.ask(READ_3) == struct.pack(">BBH", 3, 2, image(50)[0])
+async def test_function_3_serves_where_4_would(server: SimulatorServer, client: RawClient) -> None:
+    await activate(server)
+    async with server.fault_injector.making(Trouble("function-3-only")):
+        assert await client.ask(READ_4) == REFUSED
+        assert await client.ask(READ_3) == b"\x03\x02\x31\x00"
+        assert await client.write(image(50)) == struct.pack(">BHH", 16, 0, 8)
+        await asyncio.sleep(0.1)
+        assert (await client.ask(bytes.fromhex("03 07d0 0001"))) == b"\x03\x02\x39\x00"
+    assert await client.ask(READ_4) == b"\x04\x02\x39\x00"
+    assert await client.ask(READ_3) == struct.pack(">BBH", 3, 2, image(50)[0])
 
 
-@virtual
 async def test_function_3_on_a_serial_line(monkeypatch: pytest.MonkeyPatch) -> None:
     read_with_4 = with_crc(bytes.fromhex("09 04 07d0 0001"))
     async with line(monkeypatch) as (server, client):
@@ -139,20 +131,18 @@ async def test_function_3_on_a_serial_line(monkeypatch: pytest.MonkeyPatch) -> N
         assert await client.ask(read_with_4) != b""
 
 
-@virtual
-async def test_one_connection_at_a_time() -> None:
-    async with simulator() as server:
-        async with server.fault_injector.making(Trouble("one-connection-only")):
-            async with raw_client(server) as first:
-                assert await is_answered(first)
-                assert await is_reset(server)
-                assert await is_answered(first), "the first one goes on"
-            await asyncio.sleep(0.1)
-            async with raw_client(server) as second:
-                assert await is_answered(second)
-            await asyncio.sleep(0.1)
-        async with raw_client(server) as one, raw_client(server) as other:
-            assert [await is_answered(each) for each in (one, other)] == [True, True]
+async def test_one_connection_at_a_time(server: SimulatorServer) -> None:
+    async with server.fault_injector.making(Trouble("one-connection-only")):
+        async with raw_client(server) as first:
+            assert await is_answered(first)
+            assert await is_reset(server)
+            assert await is_answered(first), "the first one goes on"
+        await asyncio.sleep(0.1)
+        async with raw_client(server) as second:
+            assert await is_answered(second)
+        await asyncio.sleep(0.1)
+    async with raw_client(server) as one, raw_client(server) as other:
+        assert [await is_answered(each) for each in (one, other)] == [True, True]
 
 
 async def is_reset(server: SimulatorServer) -> bool:
@@ -165,18 +155,16 @@ async def is_reset(server: SimulatorServer) -> bool:
     return False
 
 
-@virtual
-async def test_an_emergency_stop_for_a_while() -> None:
-    async with simulator() as server:
-        await begin(server)
-        async with server.fault_injector.making(Trouble("e-stop", 2)):
-            async with server.fault_injector.making(Trouble("e-stop", 1)):
-                assert status(server).fault is Fault.ACTIVATION_PENDING
-            server.gripper.write(0, (0,) * 8)
-            await asyncio.sleep(1)
-        for expected in (False, True):
-            server.gripper.write(0, Request(activate=True).registers)
-            await asyncio.sleep(30)
-            assert status(server).is_activated is expected
-            server.gripper.write(0, (0,) * 8)
-            await asyncio.sleep(1)
+async def test_an_emergency_stop_for_a_while(server: SimulatorServer) -> None:
+    await begin(server)
+    async with server.fault_injector.making(Trouble("e-stop", 2)):
+        async with server.fault_injector.making(Trouble("e-stop", 1)):
+            assert status(server).fault is Fault.ACTIVATION_PENDING
+        server.gripper.write(0, (0,) * 8)
+        await asyncio.sleep(1)
+    for expected in (False, True):
+        server.gripper.write(0, Request(activate=True).registers)
+        await asyncio.sleep(30)
+        assert status(server).is_activated is expected
+        server.gripper.write(0, (0,) * 8)
+        await asyncio.sleep(1)

@@ -13,8 +13,9 @@ import serial
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
 from robotiq_async.simulator.server.framing import Frame
 from tests.serial_line import with_crc
-from tests.virtual import virtual
 from tests.virtual_line import VirtualLine
+
+pytestmark = pytest.mark.virtual_time
 
 READ = with_crc(bytes.fromhex("09 03 07d0 0001"))
 RESET_READING = with_crc(bytes.fromhex("09 03 02 0000"))
@@ -57,70 +58,72 @@ async def line(
             port.close()
 
 
+Ends = tuple[SerialSimulatorServer, Client]
+
+
+@pytest.fixture
+async def ends(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Ends]:
+    async with line(monkeypatch) as ends:
+        yield ends
+
+
+@pytest.fixture
+def server(ends: Ends) -> SerialSimulatorServer:
+    return ends[0]
+
+
+@pytest.fixture
+def client(ends: Ends) -> Client:
+    return ends[1]
+
+
 # Where a frame ends.
 
 
-@virtual
 @pytest.mark.parametrize("silence", [0.002, 0.005, 0.05, 1.0])
 @pytest.mark.parametrize(
     "cut_off",
     [CUT_OFF, CUT_OFF[:1], CUT_OFF[:2], READ[:-1], READ[:-1] + b"\0", bytes.fromhex("09 2b 0e 01"), bytes(3)],
 )
-async def test_silence_ends_what_was_cut_off(
-    silence: float, cut_off: bytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    async with line(monkeypatch) as (_, client):
-        await client.say(cut_off, silence)
-        assert await client.ask(READ) == RESET_READING
-        assert await client.ask(READ) == RESET_READING
+async def test_silence_ends_what_was_cut_off(client: Client, silence: float, cut_off: bytes) -> None:
+    await client.say(cut_off, silence)
+    assert await client.ask(READ) == RESET_READING
+    assert await client.ask(READ) == RESET_READING
 
 
-@virtual
-async def test_the_request_after_one_without_silence_is_heard(monkeypatch: pytest.MonkeyPatch) -> None:
-    async with line(monkeypatch) as (_, client):
-        await client.say(CUT_OFF + READ, 0.03)
-        assert await client.hear() == b""
-        assert await client.ask(READ) == RESET_READING
+async def test_the_request_after_one_without_silence_is_heard(client: Client) -> None:
+    await client.say(CUT_OFF + READ, 0.03)
+    assert await client.hear() == b""
+    assert await client.ask(READ) == RESET_READING
 
 
-@virtual
 @pytest.mark.parametrize("pause", [0.0005, 0.002, 0.016])
 @pytest.mark.parametrize("at", range(1, len(READ)))
 async def test_a_request_in_two_parts_as_an_adapter_delivers_it(
-    pause: float, at: int, monkeypatch: pytest.MonkeyPatch
+    client: Client, pause: float, at: int
 ) -> None:
-    async with line(monkeypatch) as (_, client):
-        await client.say(READ[:at], pause)
-        assert await client.ask(READ[at:]) == RESET_READING
+    await client.say(READ[:at], pause)
+    assert await client.ask(READ[at:]) == RESET_READING
 
 
-@virtual
 @pytest.mark.parametrize("silence", [0.002, 0.005])
-async def test_after_silence_a_request_may_come_in_parts_too(
-    silence: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    async with line(monkeypatch) as (_, client):
-        await client.say(CUT_OFF, 0.03)
-        await client.say(READ[:3], silence)
-        assert await client.ask(READ[3:]) == RESET_READING
+async def test_after_silence_a_request_may_come_in_parts_too(client: Client, silence: float) -> None:
+    await client.say(CUT_OFF, 0.03)
+    await client.say(READ[:3], silence)
+    assert await client.ask(READ[3:]) == RESET_READING
 
 
-@virtual
-async def test_requests_that_came_while_the_loop_was_held_up_are_all_answered(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    async with line(monkeypatch) as (_, client):
-        loop = asyncio.get_running_loop()
-        for _ in range(3):
-            await client.say(READ)
-            loop.hold_up(0.05)  # type: ignore[attr-defined]
-        assert await client.hear() == 3 * RESET_READING
+async def test_requests_that_came_while_the_loop_was_held_up_are_all_answered(client: Client) -> None:
+    loop = asyncio.get_running_loop()
+    for _ in range(3):
+        await client.say(READ)
+        loop.hold_up(0.05)  # type: ignore[attr-defined]
+    assert await client.hear() == 3 * RESET_READING
 
 
 # What is refused.
 
 
-@virtual
 @pytest.mark.parametrize(
     "frame",
     [
@@ -142,43 +145,39 @@ async def test_requests_that_came_while_the_loop_was_held_up_are_all_answered(
     ids=bytes.hex,
 )
 async def test_a_bad_request_gets_no_answer_and_changes_nothing(
-    frame: bytes, monkeypatch: pytest.MonkeyPatch
+    server: SerialSimulatorServer, client: Client, frame: bytes
 ) -> None:
-    async with line(monkeypatch) as (server, client):
-        assert await client.ask(frame) == b""
-        assert await client.ask(READ) == RESET_READING
-        assert server.gripper.writes == ()
+    assert await client.ask(frame) == b""
+    assert await client.ask(READ) == RESET_READING
+    assert server.gripper.writes == ()
 
 
 # Who is meant.
 
 
-@virtual
 @pytest.mark.parametrize("unit", [1, 8, 10, 247])
-async def test_other_units_are_left_to_themselves(unit: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    async with line(monkeypatch) as (server, client):
-        assert await client.ask(with_crc(bytes([unit]) + READ[1:-2])) == b""
-        assert await client.ask(with_crc(bytes([unit]) + bytes.fromhex("06 03e9 1234"))) == b""
-        assert server.gripper.writes == ()
+async def test_other_units_are_left_to_themselves(
+    server: SerialSimulatorServer, client: Client, unit: int
+) -> None:
+    assert await client.ask(with_crc(bytes([unit]) + READ[1:-2])) == b""
+    assert await client.ask(with_crc(bytes([unit]) + bytes.fromhex("06 03e9 1234"))) == b""
+    assert server.gripper.writes == ()
 
 
-@virtual
 async def test_the_unit_id_can_be_another(monkeypatch: pytest.MonkeyPatch) -> None:
     async with line(monkeypatch, device_id=12) as (_, client):
         assert await client.ask(READ) == b""
         assert await client.ask(with_crc(b"\x0c" + READ[1:-2])) == with_crc(b"\x0c" + RESET_READING[1:-2])
 
 
-@virtual
 @pytest.mark.parametrize("write", ["00 06 03e9 1234", "00 10 03e9 0001 02 1234"])
 async def test_a_broadcast_is_carried_out_and_not_answered(
-    write: str, monkeypatch: pytest.MonkeyPatch
+    server: SerialSimulatorServer, client: Client, write: str
 ) -> None:
-    async with line(monkeypatch) as (server, client):
-        assert await client.ask(with_crc(bytes.fromhex(write))) == b""
-        assert server.gripper.request_registers[1] == 0x1234
-        assert await client.ask(with_crc(b"\0" + READ[1:-2])) == b"", "nor is a broadcast that reads"
-        assert await client.ask(READ) == RESET_READING
+    assert await client.ask(with_crc(bytes.fromhex(write))) == b""
+    assert server.gripper.request_registers[1] == 0x1234
+    assert await client.ask(with_crc(b"\0" + READ[1:-2])) == b"", "nor is a broadcast that reads"
+    assert await client.ask(READ) == RESET_READING
 
 
 @pytest.mark.parametrize("unit", [-1, 0, 248, 255])
@@ -190,20 +189,18 @@ def test_a_unit_id_that_no_unit_can_have(unit: int) -> None:
 # Without power.
 
 
-@virtual
 async def test_a_request_that_waits_for_its_turn_at_a_power_cut_is_not_answered(
-    monkeypatch: pytest.MonkeyPatch,
+    server: SerialSimulatorServer, client: Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    async with line(monkeypatch) as (server, client):
-        asked = asyncio.Event()
-        take = server.take
+    asked = asyncio.Event()
+    take = server.take
 
-        def taken(inbox: bytearray) -> Frame | None:
-            asked.set()
-            return take(inbox)
+    def taken(inbox: bytearray) -> Frame | None:
+        asked.set()
+        return take(inbox)
 
-        monkeypatch.setattr(server, "take", taken)
-        await client.say(READ + READ)
-        await asked.wait()
-        server.gripper.power_off()
-        assert len(await client.hear()) == 3 + 2 + 2, "the first alone"
+    monkeypatch.setattr(server, "take", taken)
+    await client.say(READ + READ)
+    await asked.wait()
+    server.gripper.power_off()
+    assert len(await client.hear()) == 3 + 2 + 2, "the first alone"
