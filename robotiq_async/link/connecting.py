@@ -30,10 +30,8 @@ async def connected_client(
 ) -> Client:
     """A client that is connected to the first reachable address of the host.
 
-    Args:
-        address: a tcp, rtu or rtu+tcp address.
-        on_data: called with the bytes that arrive, from the first one on.
-        on_connection: called with True when the connection is made and with False when it is lost.
+    ``on_data`` gets the bytes that arrive, from the first one on; ``on_connection`` gets True when the
+    connection is made and False when it is lost.
 
     Raises:
         ConnectFailedError: refused, unreachable, no such port, or no pyserial.

@@ -99,15 +99,7 @@ class ModbusTransport:
         response_timeout: float,
         log: Log = log,
     ) -> None:
-        """Keep the settings; opens nothing.
-
-        Args:
-            address: a tcp, rtu or rtu+tcp address.
-            registers: where the blocks lie, and the device id.
-            connect_timeout: seconds for connecting.
-            response_timeout: seconds for one answer; on a serial line a read may be repeated after that.
-            log: of the hand.
-        """
+        """Keep the settings, in seconds; opens nothing. A tcp, rtu or rtu+tcp address."""
         self.repeats = 0
         self._log = log
         self._address = address

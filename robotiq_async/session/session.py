@@ -212,22 +212,16 @@ class Session:
         ask: Callable[[], None] | None = None,
         failing: Failing | None = None,
     ) -> State:
-        """Make a request and wait for one of some states.
+        """Make a request and wait for one of some states, so many seconds or (None) as long as the hand runs.
 
-        Args:
-            states: what to wait for.
-            timeout: seconds; None for as long as the hand runs.
-            what: the message of a timeout.
-            ask: makes the request.
-            failing: states in which the wait is in vain, besides a lost link and a stop. None waits those
-                out, too.
+        ``failing`` are states in which the wait is in vain, besides a lost link and a stop; None waits those
+        out, too. ``what`` is the message of a timeout.
 
         Raises:
             StateTimeoutError: not in time.
             RobotiqError: refused, or in vain.
         """
-        ends: Failing = {State.DISCONNECTED: self.link_lost, State.DO_SHUTDOWN: self._stopped}
-        ends = {} if failing is None else {**ends, **failing}
+        ends = {} if failing is None else {**self._ends, **failing}
         with self._waiters.watching(states, ends) as reached:
             if ask is not None:
                 self.ask(ask)
@@ -277,9 +271,7 @@ class Session:
             raise ActivationTimeoutError(f"{error}{why}") from None
 
     async def next_status(self) -> None:
-        """Wait for the next status."""
-        ends: Failing = {State.DISCONNECTED: self.link_lost, State.DO_SHUTDOWN: self._stopped}
-        with self._waiters.watching((), ends) as seen:
+        with self._waiters.watching((), self._ends) as seen:
 
             def see(item: object) -> None:
                 if isinstance(item, RobotiqStatus) and not seen.done():
@@ -290,6 +282,10 @@ class Session:
                 await seen
             finally:
                 remove()
+
+    @property
+    def _ends(self) -> Failing:
+        return {State.DISCONNECTED: self.link_lost, State.DO_SHUTDOWN: self._stopped}
 
     @staticmethod
     def _stopped() -> NotStartedError:

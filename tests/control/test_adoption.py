@@ -14,7 +14,6 @@ from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 from tests.register_words import status_of
 
-A, B, C, S = THREE_FINGER.axes
 MOVING, OPENING, CLOSING, THERE = ObjectStatus
 GO, HALTED = 0x39, 0x31
 Four = tuple[int, ...]

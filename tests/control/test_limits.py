@@ -16,7 +16,6 @@ from tests.control.scan import POLL_S, Scan, started
 from tests.register_words import status_of
 
 A, B, C, S = THREE_FINGER.axes
-ABC = Finger.ABC
 LOW, HIGH = 20, 220
 CYCLES = pytest.mark.parametrize("device_cycle", [0.0, 0.005, 0.03, 0.2])
 LAGS = pytest.mark.parametrize("lag", [0, 2, 8])

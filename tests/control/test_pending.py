@@ -15,7 +15,7 @@ from robotiq_async.values.model import THREE_FINGER
 from tests.control.scan import Outcome
 
 A, B, C, S = THREE_FINGER.axes
-ABC, ALL = Finger.ABC, Finger.ALL
+ABC = Finger.ABC
 SUPERSEDED = MoveSupersededError("halt")
 LOST = ConnectionLostError("gone")
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
 from contextlib import AsyncExitStack
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import anyio
 import pytest
 
-from robotiq_async import ConnectionLostError, Finger, MoveSupersededError, RobotiqError, RobotiqHand, State
+from robotiq_async import ConnectionLostError, RobotiqError, RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
@@ -19,7 +18,6 @@ from tests.conftest import Clock
 
 pytestmark = pytest.mark.virtual_time
 
-A, B, C, S = THREE_FINGER.axes
 
 Work = Callable[[], Coroutine[Any, Any, Any]]
 
@@ -137,30 +135,3 @@ async def test_a_halt_of_all_reaches_those_that_can_be_reached(cell: Cell) -> No
         assert ended[0] is None
         assert isinstance(ended[1], ConnectionLostError)
         assert not cell.servers[0].gripper.is_moving
-
-
-async def test_many_hands_readers_and_movers_side_by_side() -> None:
-    async with (
-        SimulatorServer(SimulatedGripper(speedup=20)) as one,
-        SimulatorServer(SimulatedGripper(speedup=20)) as two,
-        RobotiqHand(one.address) as left,
-        RobotiqHand(two.address) as right,
-        asyncio.TaskGroup() as group,
-    ):
-
-        async def read(hand: RobotiqHand) -> None:
-            seen = 0
-            async for _ in hand.statuses():
-                seen += 1
-                if seen == 50:
-                    return
-
-        async def mover(hand: RobotiqHand, finger: Finger, position: int) -> None:
-            with contextlib.suppress(MoveSupersededError):
-                await hand.move(position, finger)
-
-        for hand in (left, right):
-            for _ in range(5):
-                group.create_task(read(hand))
-            for index in range(10):
-                group.create_task(mover(hand, (A, B, C, S)[index % 4], 40 + index))

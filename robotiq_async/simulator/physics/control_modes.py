@@ -46,12 +46,7 @@ _RELEASE_SPEED: Final = SPEED_MIN
 
 
 def check_scissor_limit(limit: tuple[int, int]) -> tuple[int, int]:
-    """The range that a software limit leaves the scissor, checked.
-
-    Raises:
-        TypeError: an end of it is not an int.
-        ValueError: it is not a range within 6..232.
-    """
+    """The range that a software limit leaves the scissor: it must lie within 6..232."""
     low = check_int("scissor_limit", limit[0], THREE_FINGER.stroke.open_reading, SCISSOR_HIGH)
     return low, check_int("scissor_limit", limit[1], low, SCISSOR_HIGH)
 
@@ -84,12 +79,9 @@ def requested(request: Request, readings: Sequence[int]) -> Goals:
 
 
 def activation(mode: Mode | None, seconds: float, speeds: SpeedCalibration) -> tuple[Goals, ...]:
-    """Fingers close, then open, each in half the time; the scissor goes to its mode meanwhile.
+    """Fingers close, then open, each in half the seconds; the scissor goes to the mode's (None: basic).
 
-    Args:
-        mode: the mode; None for none, which is as basic.
-        seconds: how long it is to take; it is never faster than the gripper.
-        speeds: of the gripper.
+    It is never faster than the gripper.
     """
     stroke_time = max(seconds / 2, speeds.closing_time(_SEQUENCE_SPEED))
     close, open_, scissor = (

@@ -319,12 +319,7 @@ class Inbox:
         self._kept_at: float | None = None
 
     def checked(self, address_offset: int, registers: Sequence[int]) -> reg.Registers:
-        """The image with some registers replaced.
-
-        Raises:
-            TypeError: the offset or a register is not an int.
-            ValueError: the registers do not lie within the block, or one is outside 0..65535.
-        """
+        """The image with some registers replaced; raises what :meth:`SimulatedGripper.write` does."""
         offset = check_int("address_offset", address_offset, 0, reg.REGISTER_COUNT - 1)
         room = reg.REGISTER_COUNT - offset
         if not 1 <= len(registers) <= room:

@@ -53,15 +53,7 @@ class RegisterBank:
         self._troubles = troubles
 
     def answer(self, pdu: bytes, functions: Collection[int]) -> bytes:
-        """Carry out a request, all of it or nothing.
-
-        Args:
-            pdu: function code and data.
-            functions: the Modbus functions that are served.
-
-        Returns:
-            The reply, or the exception that refuses the request.
-        """
+        """Carry out a request, all of it or nothing; return the reply, or the exception that refuses it."""
         try:
             if pdu[0] not in functions:
                 raise _RefusedError(_ILLEGAL_FUNCTION)

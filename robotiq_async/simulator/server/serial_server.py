@@ -215,11 +215,7 @@ class WireTime:
         return (self._sent_until - now) / BYTE_S
 
     def hears(self, now: float, size: int) -> tuple[float, float]:
-        """Bytes set out for the gripper.
-
-        Returns:
-            When they have come and the silence has passed; and the pause before them on the line.
-        """
+        """When bytes for the gripper have come and the silence has passed; and the pause before them."""
         pause = max(0.0, now - self._heard_until)
         self._heard_until = max(now, self._heard_until) + size * BYTE_S
         return self._heard_until + SILENCE_S, pause
@@ -238,14 +234,8 @@ class SerialConnection(Connection):
     """The other end of a serial line, which has no connections, no packets and no flow control."""
 
     def __init__(self, endpoint: SimulatorEndpoint, *, paced: bool) -> None:
-        """The end of a line.
-
-        Args:
-            endpoint: the simulator it belongs to.
-            paced: whether bytes take the time that they take at the baud rate.
-        """
         super().__init__(endpoint)
-        self._wire = WireTime() if paced else None
+        self._wire = WireTime() if paced else None  # the time that bytes take at the baud rate
         self._heard_at = 0.0
         self._unsent = 0
         """Bytes sent since the line had taken all of them."""
