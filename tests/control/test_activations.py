@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from robotiq_async import Fault, Finger, InvalidStateError, MoveSupersededError, NotActivatedError, State
+from robotiq_async import Fault, Finger, MoveSupersededError, NotActivatedError, State
 from robotiq_async.values.enums import Trigger
 from robotiq_async.values.request import Request
 from tests.control.other_client import going_to, reset_and_activated_by_another
@@ -20,23 +20,6 @@ def test_activation_from_reset_goes_through_its_states_and_never_shows_reset(sca
         State.RUNNING_IDLE,
     ]
     assert scan.last_image.go is False
-
-
-def test_an_activation_that_fails_ends_in_fault() -> None:
-    scan = Scan()
-    scan.gripper.fail_activation = True
-    scan.connect()
-    scan.until(lambda: scan.state is State.FAULT)
-    assert scan.latest.fault is Fault.ACTIVATION_FAULT
-
-
-def test_a_power_cycle_in_mid_activation_ends_in_reset() -> None:
-    scan = Scan()
-    scan.connect()
-    scan.run(1.0)
-    scan.gripper.power_cycle()
-    scan.run(0.1)
-    assert scan.state is State.RESET
 
 
 def test_an_activation_is_called_off_when_others_have_activated_meanwhile() -> None:
@@ -112,15 +95,6 @@ def test_another_client_that_writes_during_our_activation_is_noticed_at_its_end(
 # -- resets and releases ---------------------------------------------------------------------------------
 
 
-def test_a_reset_ends_moves(scan: Scan) -> None:
-    _, outcome = scan.move(255)
-    scan.run(0.3)
-    scan.controller.reset()
-    assert isinstance(outcome.error, MoveSupersededError)
-    scan.until(lambda: scan.state is State.RESET)
-    assert not scan.gripper.is_moving
-
-
 @pytest.mark.parametrize("what", ["reset", "release"])
 def test_a_sequence_begun_while_a_write_is_on_the_line(scan: Scan, what: str) -> None:
     if what == "release":
@@ -139,29 +113,6 @@ def test_a_sequence_begun_while_a_write_is_on_the_line(scan: Scan, what: str) ->
     assert scan.state in (State.DO_RESET, State.DO_ATR), "its own request has not been sent yet"
     scan.controller.see(scan.status())
     scan.until(lambda: scan.state in (State.RESET, State.ATR_DONE))
-
-
-def test_release_reset_and_activation_bring_the_hand_back(scan: Scan) -> None:
-    scan.moved(200)
-    scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
-    scan.step()
-    scan.controller.release()
-    scan.step()
-    assert scan.state is State.WF_ATR
-    scan.until(lambda: scan.state is State.ATR_DONE, 60)
-    assert scan.gripper.position(A) <= 7
-    scan.controller.reset()
-    scan.until(lambda: scan.state is State.RESET)
-    scan.controller.activate()
-    scan.until(lambda: scan.state is State.RUNNING_IDLE)
-    scan.moved(100, A)
-
-
-def test_the_release_is_for_faults_only(scan: Scan) -> None:
-    with pytest.raises(InvalidStateError) as caught:
-        scan.controller.release()
-    assert caught.value.state is State.RUNNING_IDLE
-    assert caught.value.allowed == {State.FAULT}
 
 
 def test_a_release_must_not_activate_a_gripper_that_is_reset() -> None:

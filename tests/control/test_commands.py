@@ -13,12 +13,6 @@ from tests.control.scan import Outcome, Scan
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 
 
-def test_the_first_command_after_an_activation_moves_only_what_it_addresses(scan: Scan) -> None:
-    before = {axis: scan.gripper.travel(axis) for axis in (B, C, S)}
-    scan.moved(200, A)
-    assert {axis: scan.gripper.travel(axis) for axis in (B, C, S)} == before
-
-
 def test_what_is_set_between_two_polls_is_one_write_and_the_last_value_wins(scan: Scan) -> None:
     writes = len(scan.written)
     told = [scan.command(A, position=value) for value in (10, 20, 30)]
@@ -29,13 +23,6 @@ def test_what_is_set_between_two_polls_is_one_write_and_the_last_value_wins(scan
     image = scan.last_image
     assert (image.position(A), image.axes[1].speed, image.axes[2].force) == (30, 7, 9)
     assert [outcome.told for outcome in told] == [[None]] * 5
-
-
-def test_speed_and_force_never_start_a_motion(scan: Scan) -> None:
-    travel = {axis: scan.gripper.travel(axis) for axis in (A, B, C, S)}
-    scan.command(Finger.ALL, speed=255, force=255)
-    scan.run(1.0)
-    assert {axis: scan.gripper.travel(axis) for axis in (A, B, C, S)} == travel
 
 
 def test_is_moving_from_the_command_until_the_end(scan: Scan) -> None:

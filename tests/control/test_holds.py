@@ -12,7 +12,6 @@ from robotiq_async import (
     Finger,
     MoveSupersededError,
     NotActivatedError,
-    NotStartedError,
     ObjectStatus,
     State,
 )
@@ -169,13 +168,6 @@ def test_in_an_activation_a_hold_does_nothing(steps: int) -> None:
     assert len(scan.written) == max(written, 1)
 
 
-def test_in_reset_a_hold_does_nothing() -> None:
-    scan = begun(lambda _: None)
-    assert scan.hold().told == [None]
-    scan.run(0.1)
-    assert not scan.written
-
-
 def test_in_a_release_a_hold_does_nothing(scan: Scan) -> None:
     scan.moved(200)
     scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
@@ -204,16 +196,6 @@ def test_a_hold_is_told_in_a_fault(scan: Scan, when: str) -> None:
     at = scan.positions()[A]
     scan.run(3.0)
     assert scan.positions()[A] <= at + 2
-
-
-def test_a_hold_is_refused_while_the_link_is_down_and_after_the_end(scan: Scan) -> None:
-    scan.controller.lost(None)
-    with pytest.raises(ConnectionLostError):
-        scan.hold()
-    scan.connect()
-    scan.controller.stop()
-    with pytest.raises(NotStartedError):
-        scan.hold()
 
 
 # -- how it may fail ---------------------------------------------------------------------------------------

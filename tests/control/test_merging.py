@@ -80,19 +80,6 @@ def test_a_speed_and_a_force_change_their_axes_and_start_nothing() -> None:
     assert image == replace(HALTED, axes=(*HALTED.axes[:1], AxisRequest(20, 200, 100), *HALTED.axes[2:]))
 
 
-# -- waking ------------------------------------------------------------------------------------------------
-
-
-def test_raising_rgto_asks_every_other_axis_to_stay_where_it_is() -> None:
-    """It wakes them all: each would go where it was asked to before the halt."""
-    assert positions(after(HALTED, command(A, 200), RESTING)) == (200, 102, 103, 104)
-
-
-def test_an_axis_that_gripped_keeps_its_request_when_rgto_is_raised() -> None:
-    """Asked to be where it is it would touch the object and not hold it."""
-    assert positions(after(HALTED, command(A, 200), RESTING, gripping=B)) == (200, 20, 103, 104)
-
-
 # -- rACT and rATR are for the sequences -------------------------------------------------------------------
 
 
@@ -115,30 +102,38 @@ def test_a_halt_goes_alone() -> None:
     assert after(GOING, pending) == HALTED
 
 
-# -- holding -----------------------------------------------------------------------------------------------
+# -- waking and holding ------------------------------------------------------------------------------------
+
+AT_REST = status_of(0x39, 0xFF, position=(9, 22, 103, 40))
 
 
-def test_an_axis_that_drifts_is_asked_to_stay_where_it_is() -> None:
-    assert positions(after(GOING, hold(A | B))) == (101, 102, 30, 40)
-
-
-def test_axes_that_stand_where_they_were_asked_to_keep_their_requests() -> None:
-    at_rest = status_of(0x39, 0xFF, position=(9, 22, 103, 40))
-    assert positions(after(GOING, hold(Finger.ALL), at_rest)) == (10, 20, 103, 40)
-
-
-def test_an_axis_that_has_not_arrived_is_held_however_close_it_stands() -> None:
-    at_rest = status_of(0x39, 0xFF, position=(9, 22, 30, 40))
-    assert positions(after(GOING, hold(Finger.ALL), at_rest, arrived=B)) == (9, 20, 30, 40)
-
-
-def test_an_axis_in_contact_keeps_its_grip_while_another_is_held() -> None:
-    gripping = status_of(0x39, 0b00_00_00_10, position=(5, 102, 103, 104))
-    assert positions(after(GOING, hold(A | B), gripping)) == (10, 102, 30, 40)
-
-
-def test_a_hold_never_sets_rgto() -> None:
-    assert after(HALTED, hold(Finger.ALL), RESTING) == HALTED
+@pytest.mark.parametrize(
+    ("base", "pending", "status", "options", "expected"),
+    [
+        # Raising rGTO would wake every axis, each to go where it was asked to before the halt. One that
+        # gripped keeps its request: asked to be where it is it would touch the object and not hold it.
+        (HALTED, command(A, 200), RESTING, {}, (200, 102, 103, 104)),
+        (HALTED, command(A, 200), RESTING, {"gripping": B}, (200, 20, 103, 104)),
+        # An axis that drifts stays where it is; those that are where they were asked to be stay so.
+        (GOING, hold(A | B), MOVING, {}, (101, 102, 30, 40)),
+        (GOING, hold(Finger.ALL), AT_REST, {}, (10, 20, 103, 40)),
+        # One that has not arrived is held however close it stands.
+        (GOING, hold(Finger.ALL), AT_REST, {"arrived": B}, (9, 20, 103, 40)),
+        # One in contact keeps its grip while another is held.
+        (GOING, hold(A | B), status_of(0x39, 0b00_00_00_10, position=(5, *AT[1:])), {}, (10, 102, 30, 40)),
+        (HALTED, hold(Finger.ALL), RESTING, {}, (10, 20, 30, 40)),
+    ],
+)
+def test_what_is_not_addressed_stays_or_keeps_its_request(
+    base: Request,
+    pending: PendingCommand,
+    status: RobotiqStatus,
+    options: dict[str, Finger],
+    expected: tuple[int, ...],
+) -> None:
+    image = after(base, pending, status, **options)
+    assert positions(image) == expected
+    assert image.go == (base.go or bool(pending.positions)), "a hold never sets rGTO"
 
 
 def test_an_axis_may_be_held_while_another_is_sent_somewhere() -> None:

@@ -20,16 +20,6 @@ def test_a_move_ends_when_every_addressed_axis_has_stopped(scan: Scan) -> None:
     assert min(result.peak_current_ma.values()) > 0
 
 
-def test_a_contact_is_a_result(scan: Scan) -> None:
-    scan.gripper.place_object(A | B, 150)
-    result = scan.moved(255)
-    assert result.contacts == A | B
-    assert result.object_detected
-    assert result.outcomes[A] is ObjectStatus.CONTACT_CLOSING
-    assert result.outcomes[C] is ObjectStatus.AT_POSITION
-    assert result.positions[A] == pytest.approx(150, abs=1)
-
-
 def test_repeating_a_request_does_not_return_the_previous_result(scan: Scan) -> None:
     scan.moved(200, A, speed=255)
     scan.moved(100, A, speed=255)
@@ -102,15 +92,6 @@ def test_another_command_supersedes_a_move_whose_other_axes_run_on(scan: Scan) -
     scan.until(lambda: not scan.controller.is_moving)
     assert scan.gripper.position(B) >= 240
     assert scan.gripper.position(A) <= 7
-
-
-def test_moves_of_other_axes_go_on_side_by_side(scan: Scan) -> None:
-    _, first = scan.move(255, A)
-    scan.run(0.3)
-    _, second = scan.move(100, B)
-    scan.until(lambda: first.is_told and second.is_told)
-    assert first.result.positions[A] >= 240
-    assert second.result.positions[B] == pytest.approx(100, abs=2)
 
 
 # -- abandoned: cancelled, timed out ---------------------------------------------------------------------

@@ -13,14 +13,6 @@ from tests.control.scan import POLL_S, Scan, started
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 
 
-def test_adopting_writes_nothing() -> None:
-    scan = used_by_another()
-    scan.connect()
-    assert scan.state is State.RUNNING_IDLE
-    scan.run(1.0)
-    assert not scan.written
-
-
 @pytest.mark.parametrize("individual", [True, False])
 @pytest.mark.parametrize("into_motion", [0.0, 0.3, 5.0])
 @pytest.mark.parametrize("speed", [0, 255])
@@ -155,17 +147,6 @@ def test_a_pending_hold_does_not_stop_who_has_taken_over(scan: Scan) -> None:
     assert scan.controller.foreign_commands == 1
     scan.run(10)
     assert scan.positions()[A] == 90
-
-
-def test_a_reset_by_another_client_is_a_lost_activation(scan: Scan) -> None:
-    _, outcome = scan.move(255)
-    scan.run(0.3)
-    scan.gripper.write(0, Request().registers)
-    scan.run(0.1)
-    assert scan.state is State.RESET
-    assert isinstance(outcome.error, NotActivatedError)
-    with pytest.raises(NotActivatedError):
-        scan.command(A, position=0)
 
 
 def test_a_power_cycle_leaves_the_hand_in_reset_and_writes_nothing(scan: Scan) -> None:

@@ -15,7 +15,7 @@ from robotiq_async.values.model import THREE_FINGER
 from tests.control.scan import Outcome
 
 A, B, C, S = THREE_FINGER.axes
-ABC = Finger.ABC
+ABC, NONE = Finger.ABC, Finger(0)
 SUPERSEDED = MoveSupersededError("halt")
 LOST = ConnectionLostError("gone")
 
@@ -47,35 +47,46 @@ def test_any_commands_leave_the_last_value_of_each_axis_and_field(
     assert pending.is_empty == (not any(value is not None for _, *values in commands for value in values))
 
 
-# -- holding -----------------------------------------------------------------------------------------------
+# -- holding and halting -----------------------------------------------------------------------------------
+
+Step = Callable[[PendingCommand], None]
 
 
-def test_holding_an_axis_drops_its_unsent_position_and_no_other() -> None:
-    pending = PendingCommand()
-    pending.merge(Command(ABC, 100, 50, 60))
-    pending.merge_hold(A | B, SUPERSEDED)
-    assert pending.positions == {C: 100}
-    assert pending.speeds == {A: 50, B: 50, C: 50}
-    assert pending.forces == {A: 60, B: 60, C: 60}
-    assert pending.hold == A | B
+def command(axes: Finger, position: int | None = None, setting: int | None = None) -> Step:
+    """With the same setting for speed and force."""
+    return lambda pending: pending.merge(Command(axes, position, setting, setting))
 
 
-def test_a_new_speed_does_not_lift_a_hold() -> None:
-    pending = PendingCommand()
-    pending.merge_hold(A, SUPERSEDED)
-    pending.merge(Command(A, None, 50, 60))
-    assert pending.hold == A
+def hold(axes: Finger) -> Step:
+    return lambda pending: pending.merge_hold(axes, SUPERSEDED)
 
 
-def test_a_hold_that_a_position_or_a_halt_goes_before_is_remembered() -> None:
-    """If that is lost with the link, the hold is not: it was a stop."""
-    pending = PendingCommand()
-    pending.merge_hold(A, SUPERSEDED)
-    pending.merge_hold(B, SUPERSEDED)
-    pending.merge(Command(A, 100))
-    assert (pending.hold, pending.positions) == (A | B, {A: 100})
+def halt(pending: PendingCommand) -> None:
     pending.merge_halt(Outcome(), SUPERSEDED)
-    assert pending.hold == A | B
+
+
+@pytest.mark.parametrize(
+    ("steps", "positions", "settings", "held", "moved"),
+    [
+        # A hold drops the unsent positions of its axes, a halt all of them; both keep speeds and forces.
+        ([command(ABC, 100, 50), hold(A | B)], {C: 100}, {A: 50, B: 50, C: 50}, A | B, C),
+        ([command(ABC, 100, 50), halt], {}, {A: 50, B: 50, C: 50}, NONE, NONE),
+        # A new speed does not lift a hold, and only a position moves an axis.
+        ([hold(A), command(A, None, 50)], {}, {A: 50}, A, NONE),
+        ([command(A | S, 100), command(B, None, 50), hold(C)], {A: 100, S: 100}, {B: 50}, C, A | S),
+        # A hold that a position or a halt goes before is remembered: if that is lost, the stop is not.
+        ([hold(A), hold(B), command(A, 100)], {A: 100}, {}, A | B, A),
+        ([hold(A), hold(B), command(A, 100), halt], {}, {}, A | B, NONE),
+    ],
+)
+def test_holds_and_halts_drop_positions_and_nothing_else(
+    steps: list[Step], positions: dict[Finger, int], settings: dict[Finger, int], held: Finger, moved: Finger
+) -> None:
+    pending = PendingCommand()
+    for step in steps:
+        step(pending)
+    assert (pending.positions, pending.hold, pending.moved) == (positions, held, moved)
+    assert pending.speeds == pending.forces == settings
 
 
 def test_who_waits_for_an_axis_that_is_held_is_told_and_nobody_else() -> None:
@@ -89,28 +100,20 @@ def test_who_waits_for_an_axis_that_is_held_is_told_and_nobody_else() -> None:
     assert not setting.told
 
 
-def test_only_a_new_position_moves_an_axis() -> None:
-    pending = PendingCommand()
-    pending.merge(Command(A | S, 100))
-    pending.merge(Command(B, None, 50, 60))
-    pending.merge_hold(C, SUPERSEDED)
-    assert pending.moved == A | S
-
-
 @pytest.mark.parametrize(
     ("fill", "empty", "holds_at_most"),
     [
         (lambda _: None, True, True),
-        (lambda pending: pending.merge_hold(A, SUPERSEDED), False, True),
-        (lambda pending: pending.merge(Command(A, 1)), False, False),
+        (hold(A), False, True),
+        (command(A, 1), False, False),
         (lambda pending: pending.merge(Command(A, None, 1)), False, False),
         (lambda pending: pending.merge(Command(A, None, None, 1)), False, False),
-        (lambda pending: pending.merge_halt(Outcome(), SUPERSEDED), False, False),
+        (halt, False, False),
     ],
     ids=["nothing", "hold", "position", "speed", "force", "halt"],
 )
 def test_a_pending_command_knows_whether_there_is_something_to_write(
-    fill: Callable[[PendingCommand], None], empty: bool, holds_at_most: bool
+    fill: Step, empty: bool, holds_at_most: bool
 ) -> None:
     pending = PendingCommand()
     fill(pending)
@@ -118,18 +121,7 @@ def test_a_pending_command_knows_whether_there_is_something_to_write(
     assert pending.holds_at_most == holds_at_most
 
 
-# -- halting -----------------------------------------------------------------------------------------------
-
-
-def test_a_halt_drops_unsent_positions_and_keeps_speeds_and_forces() -> None:
-    pending, halter = PendingCommand(), Outcome()
-    pending.merge(Command(ABC, 100, 50, 60))
-    pending.merge_halt(halter, SUPERSEDED)
-    assert not pending.positions
-    assert pending.speeds == {A: 50, B: 50, C: 50}
-    assert pending.forces == {A: 60, B: 60, C: 60}
-    assert pending.halting == [halter]
-    assert not halter.told
+# -- who waits ---------------------------------------------------------------------------------------------
 
 
 def test_who_waits_for_a_speed_goes_on_waiting_though_a_halt_drops_the_position_of_another() -> None:

@@ -14,16 +14,6 @@ from tests.control.scan import LAG, POLL_S, Scan, started
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 
 
-def test_the_shutdown_stops_the_fingers_and_keeps_the_activation(scan: Scan) -> None:
-    _, outcome = scan.move(255)
-    scan.run(0.5)
-    scan.stop()
-    assert isinstance(outcome.error, NotStartedError)
-    assert not scan.gripper.is_moving
-    image = Request.from_registers(scan.written[-1])
-    assert (image.activate, image.go) == (True, False)
-
-
 def test_the_shutdown_waits_for_the_echo_of_the_complete_last_image() -> None:
     scan = started(0.1)
     scan.command(A, position=200)

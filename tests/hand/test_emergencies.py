@@ -66,31 +66,11 @@ async def test_an_emergency_ends_every_sequence(
     await hand.stop()
 
 
-async def test_three_resets_at_once_are_one(hand: RobotiqHand, server: SimulatorServer) -> None:
-    """Two of them were refused."""
-    writes = len(server.gripper.writes)
-    await asyncio.gather(hand.reset(), hand.reset(), hand.reset())
-    assert hand.state is State.RESET
-    assert len(server.gripper.writes) == writes + 1
-
-
 async def test_halts_and_resets_at_once_all_end(hand: RobotiqHand, gripper: SimulatedGripper) -> None:
     await hand.set_position(255)
     await asyncio.gather(hand.reset(), hand.halt(), hand.reset(), hand.halt())
     assert hand.state is State.RESET
     assert not gripper.is_moving
-
-
-async def test_after_a_release_a_halt_has_nothing_to_do(
-    hand: RobotiqHand, gripper: SimulatedGripper, server: SimulatorServer
-) -> None:
-    gripper.inject_fault(Fault.SCISSOR_BLOCKED)
-    await hand.wait_for_state(State.FAULT)
-    await hand.atr()
-    writes = len(server.gripper.writes)
-    await hand.halt()
-    assert hand.state is State.ATR_DONE
-    assert len(server.gripper.writes) == writes
 
 
 async def test_a_release_that_another_client_ends_with_an_activation_is_told_at_once(
@@ -167,18 +147,6 @@ async def test_a_recovery_that_waits_for_a_sequence_ends_with_the_link(
                 await task
 
 
-async def test_a_recovery_goes_on_when_the_minor_fault_clears(
-    hand: RobotiqHand, gripper: SimulatedGripper
-) -> None:
-    gripper.inject_fault(Fault.SCISSOR_INTERFERENCE)
-    await hand.wait_for_state(State.FAULT)
-    recovering = asyncio.create_task(hand.recover())
-    await anext(hand.statuses())
-    gripper.clear_faults()
-    await recovering
-    assert hand.state is State.RUNNING_IDLE
-
-
 # -- a stop goes out before the next read -------------------------------------------------------------------
 
 
@@ -216,15 +184,6 @@ async def test_a_stop_is_written_before_the_next_read(stop: str) -> None:
         await getattr(hand, stop)()
         assert wire.asked[0] == ("reset" if stop == "reset" else "halt")
         assert not wire.gripper.is_moving
-
-
-async def test_a_command_is_written_after_a_read() -> None:
-    wire = Watched()
-    async with RobotiqHand(wire) as hand:
-        await anext(hand.statuses())
-        wire.asked.clear()
-        await hand.set_position(200)
-        assert wire.asked[:2] == ["read", "go"]
 
 
 async def test_a_stop_over_a_new_link_does_not_activate_a_gripper_that_lost_its_power(

@@ -12,7 +12,6 @@ from robotiq_async.session.options import ReconnectPolicy
 from robotiq_async.session.poller import SHUTDOWN_S
 from robotiq_async.values.enums import Finger, State
 from robotiq_async.values.errors import NotStartedError
-from robotiq_async.values.request import Request
 from tests.fake_transport import LOST
 from tests.session.polled import Polled, polled
 
@@ -23,16 +22,6 @@ async def moves(here: Polled, position: int = 200, speed: int = 0, polls: int = 
     """Send the fingers off."""
     here.controller.command(Command(Finger.ABC, position, speed))
     await here.polls(polls)
-
-
-async def test_the_end_stops_the_fingers_and_sees_it_before_it_disconnects(here: Polled) -> None:
-    await moves(here)
-    assert here.wire.gripper.is_moving
-    here.poller.request_stop(halt=True)
-    await here.end()
-    assert not here.wire.gripper.is_moving
-    assert not here.statuses[-1].go_echo
-    assert Request.from_registers(here.wire.gripper.request_registers).activate
 
 
 async def test_a_stronger_stop_while_the_link_closes_opens_it_again(here: Polled) -> None:

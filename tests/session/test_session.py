@@ -51,21 +51,6 @@ async def test_a_session_that_could_not_begin_leaves_the_address_free() -> None:
     await begins_and_ends(here)
 
 
-async def test_the_numbers_of_statuses_go_on_from_session_to_session() -> None:
-    here = Run()
-    first = here.session()
-    await first.connected()
-    await asyncio.sleep(0.1)
-    await first.stop(halt=False)
-    assert first.counters.polls > 5
-    second = here.session()
-    await second.connected()
-    assert second.controller.status is not None
-    assert second.controller.status.sequence == first.counters.polls
-    assert second.counters.polls == 1
-    await second.stop(halt=False)
-
-
 # -- its end -----------------------------------------------------------------------------------------------
 
 
@@ -77,18 +62,6 @@ async def test_a_session_is_over_when_it_was_stopped_and_may_be_stopped_again(se
     assert session.machine.state is State.SHUTDOWN
     with pytest.raises(NotStartedError):
         session.check_running()
-
-
-async def test_a_stop_that_is_cancelled_stops_all_the_same(session: Session, wire: Wire) -> None:
-    session.controller.command(Command(Finger.ABC, 200, 0))
-    await asyncio.sleep(0.1)
-    stopping = asyncio.create_task(session.stop(halt=True))
-    await asyncio.sleep(0)
-    stopping.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await stopping
-    assert session.is_over
-    assert not wire.gripper.is_moving
 
 
 async def test_a_first_contact_that_fails_is_the_end() -> None:

@@ -12,7 +12,6 @@ from robotiq_async.session.options import ReconnectPolicy
 from robotiq_async.session.session import Session
 from robotiq_async.values.enums import Fault, Finger, State
 from robotiq_async.values.errors import (
-    ActivationTimeoutError,
     ConnectionLostError,
     GripperFaultError,
     NotActivatedError,
@@ -51,16 +50,6 @@ async def test_who_asks_is_told_that_the_link_went_down_before_the_acknowledgeme
 
 
 # -- a state -----------------------------------------------------------------------------------------------
-
-
-async def test_a_state_that_is_reached_is_returned_also_when_it_lasts_no_time(session: Session) -> None:
-    reached = await session.reach(
-        {State.RUNNING_CC},
-        1.0,
-        what="never",
-        ask=lambda: session.controller.command(Command(Finger.A, 100)),
-    )
-    assert reached is State.RUNNING_CC
 
 
 async def test_a_state_that_is_not_reached_in_time_is_said_with_the_one_that_is(session: Session) -> None:
@@ -112,14 +101,6 @@ async def test_an_activation_is_waited_for_and_nothing_where_none_is_under_way()
         assert here.machine.state is State.RUNNING_IDLE
 
 
-async def test_an_activation_of_ours_must_not_end_in_a_fault() -> None:
-    async with running(active=False) as (here, session):
-        here.wire.gripper.fail_activation = True
-        with pytest.raises(GripperFaultError) as caught:
-            await session.activated(session.controller.activate)
-        assert caught.value.fault is Fault.ACTIVATION_FAULT
-
-
 async def test_an_activation_of_others_that_ends_in_a_fault_is_over_too() -> None:
     """The hand is left there, so that it can be recovered."""
     async with running(active=False) as (here, session):
@@ -129,12 +110,6 @@ async def test_an_activation_of_others_that_ends_in_a_fault_is_over_too() -> Non
         assert here.machine.state is State.WF_ACTIVATION
         await session.activated()
         assert here.machine.state is State.FAULT
-
-
-async def test_an_activation_that_takes_too_long_says_so() -> None:
-    async with running(active=False, speedup=0.1) as (_, session):
-        with pytest.raises(ActivationTimeoutError, match="the activation was not finished within 20 s"):
-            await session.activated(session.controller.activate)
 
 
 @pytest.mark.parametrize("how", ["reset", "power", "link"])

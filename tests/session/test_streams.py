@@ -81,15 +81,6 @@ async def test_a_buffer_keeps_that_many_of_the_newest_items_in_order(
     assert await rest(stream) == list(range(missed, 10))
 
 
-async def test_a_slow_reader_costs_only_itself(channel: Channel[int]) -> None:
-    slow, patient = channel.open(1), channel.open(None)
-    for item in range(5):
-        channel.push(item)
-        assert await anext(patient) == item
-    assert (patient.missed, slow.missed) == (0, 4)
-    assert await anext(slow) == 4
-
-
 async def test_a_stream_gives_nothing_from_before_it_was_opened(channel: Channel[int]) -> None:
     channel.push(1)
     stream = channel.open(None)

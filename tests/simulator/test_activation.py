@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.values.enums import Fault, Finger, Initialization, Mode
+from robotiq_async.values.enums import Fault, Finger, Initialization
 from robotiq_async.values.request import Request
 
 if TYPE_CHECKING:
@@ -28,13 +28,6 @@ def test_activation_closes_and_opens_the_fingers(bench: Bench) -> None:
     assert bench.gripper.travel(Finger.A) == 2 * 235
     assert bench.positions == (6, 6, 6, 137)
     assert 2 < bench.now - began < 20
-
-
-@pytest.mark.parametrize(("mode", "scissor"), [(0, 137), (1, 219), (2, 24), (3, 15)])
-def test_activation_takes_the_scissor_to_the_mode(bench: Bench, mode: int, scissor: int) -> None:
-    bench.activate(mode=Mode(mode))
-    assert bench.gripper.position(Finger.SCISSOR) == scissor
-    assert bench.status.mode == mode
 
 
 def test_failed_activation(bench: Bench) -> None:

@@ -70,6 +70,7 @@ def test_an_axis_grips_while_it_is_driven_against_what_it_touches(individual: Be
     assert individual.gripper.grips == individual.gripper.holds == Finger.A | Finger.B
     individual.go({Finger.A: 150})
     assert individual.gripper.grips == individual.gripper.holds == Finger.B, "asked to be where it is: let go"
+    assert where(individual, Finger.A) == (150, ARRIVED)
 
 
 def test_a_request_that_ends_at_the_object_is_no_contact(individual: Bench) -> None:
@@ -124,11 +125,6 @@ def test_an_object_that_goes_while_the_axis_presses_lets_it_go_on(individual: Be
     individual.gripper.remove_object()
     individual.settle()
     assert where(individual, Finger.A) == (200, ARRIVED)
-
-
-def test_retargeting_to_the_reading_ends_the_contact(holding: Bench) -> None:
-    holding.go({Finger.A: 150}, force=100)
-    assert where(holding, Finger.A) == (150, ARRIVED)
 
 
 @pytest.fixture(params=[CLOSING, OPENING], ids=["closing", "opening"])
@@ -212,13 +208,6 @@ def test_a_thin_object_takes_the_place_of_another(individual: Bench) -> None:
     individual.gripper.place_object(Finger.A, 150, thin=True)
     individual.close()
     assert individual.outcomes[:3] == (ARRIVED, CLOSING, CLOSING)
-
-
-def test_going_again_tries_again(holding: Bench) -> None:
-    holding.write(go=False)
-    holding.gripper.place_object(Finger.A, 160)
-    holding.write_and_settle(go=True)
-    assert where(holding, Finger.A) == (160, CLOSING)
 
 
 @pytest.mark.parametrize(("opening", "start", "on", "far"), [(False, 200, 230, 100), (True, 100, 50, 230)])

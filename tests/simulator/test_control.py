@@ -174,9 +174,3 @@ def test_a_mode_change_during_activation_follows_it(bench: Bench) -> None:
     bench.write_and_settle(mode=Mode.PINCH)
     assert bench.positions == (6, 6, 6, 219)
     assert bench.status.initialization is Initialization.COMPLETE
-
-
-def test_leaving_pinch_gives_the_fingers_their_stroke_back(bench: Bench) -> None:
-    bench.activate(mode=Mode.PINCH)
-    bench.reach(255, mode=Mode.BASIC)
-    assert bench.positions == (241, 241, 241, 137)

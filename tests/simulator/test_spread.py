@@ -128,6 +128,7 @@ def test_the_scissor_reads_what_belongs_to_its_mode(make_bench: Callable[..., Be
         bench = make_bench(spread=True, seed=seed)
         bench.activate(mode=mode)
         assert bench.positions[3] == {0: 137, 1: 219, 2: 24, 3: 15}[mode]
+        assert bench.status.mode is mode
 
 
 @pytest.mark.parametrize("speed", [0, 128, 255])
