@@ -116,36 +116,6 @@ def test_halt_stops_where_the_finger_is_and_going_again_resumes(active: Bench) -
     assert active.positions[:3] == (241, 241, 241)
 
 
-def test_retargeting_to_the_reading_moves_nothing(individual: Bench) -> None:
-    """What a hand does to an axis it does not address."""
-    individual.go(200)
-    individual.wait(0.777)
-    individual.write(go=False)
-    before = [individual.gripper.travel(axis) for axis in THREE_FINGER.axes]
-    individual.go({axis: individual.gripper.position(axis) for axis in THREE_FINGER.axes})
-    individual.wait(5)
-    assert [individual.gripper.travel(axis) for axis in THREE_FINGER.axes] == before
-    assert set(individual.outcomes) == {ObjectStatus.AT_POSITION}
-
-
-def test_only_the_commanded_axis_moves(individual: Bench) -> None:
-    before = {axis: individual.gripper.travel(axis) for axis in THREE_FINGER.axes}
-    individual.reach({Finger.B: 100})
-    moved = {axis for axis in THREE_FINGER.axes if individual.gripper.travel(axis) != before[axis]}
-    assert moved == {Finger.B}
-    assert individual.gripper.travel(Finger.B) == before[Finger.B] + 94
-
-
-def test_target_and_position_are_inspected_while_moving(individual: Bench) -> None:
-    individual.go({Finger.A: 255})
-    assert individual.gripper.is_moving
-    assert individual.gripper.target(Finger.A) == 241
-    individual.wait(1)
-    assert 6 < individual.gripper.position(Finger.A) < 241
-    individual.write(go=False)
-    assert individual.gripper.target(Finger.A) == individual.gripper.position(Finger.A)
-
-
 def test_speedup(make_bench: Callable[..., Bench]) -> None:
     bench = make_bench(speedup=10.0, device_cycle=0)
     bench.write_and_settle(activate=True)

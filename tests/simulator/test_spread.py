@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import pytest
 
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.enums import Finger, Mode, ObjectStatus
 from robotiq_async.values.model import THREE_FINGER
 
@@ -129,14 +128,3 @@ def test_the_scissor_reads_what_belongs_to_its_mode(make_bench: Callable[..., Be
         bench.activate(mode=mode)
         assert bench.positions[3] == {0: 137, 1: 219, 2: 24, 3: 15}[mode]
         assert bench.status.mode is mode
-
-
-@pytest.mark.parametrize("speed", [0, 128, 255])
-def test_a_full_closing_takes_as_long_as_measured(make_bench: Callable[..., Bench], speed: int) -> None:
-    for seed in SEEDS:
-        bench = one_of(make_bench, seed)
-        began = bench.now
-        bench.go(255, speed=speed)
-        while bench.status.is_moving:
-            bench.wait(0.005)
-        assert bench.now - began == pytest.approx(closing_time(speed), rel=0.01)
