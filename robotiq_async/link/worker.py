@@ -1,0 +1,148 @@
+"""Calls of foreign coroutines, made in a task of their own so that they cannot block the caller."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Awaitable, Callable
+from typing import Any, Final, TypeVar
+
+from ..runtime.concurrency import LateError
+from .watchdog import GRACE_S, HELD_S
+
+T = TypeVar("T")
+
+
+class Worker:
+    """Makes calls one after the other, all of them in one task.
+
+    The caller waits for a limited time. A late call is cancelled and its result dropped. A call that survives
+    its cancellation delays the next ones: two calls never run at once.
+
+    Args:
+        name: of the task, which starts with the first call.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._task: asyncio.Task[None] | None = None
+        self._calls: _Calls
+
+    async def call(self, what: Callable[[], Awaitable[T]], seconds: float) -> T:
+        """Make a call and wait for its result; ``what`` may raise before it returns an awaitable.
+
+        Raises:
+            LateError: the time limit expired.
+            Exception: raised by the call; a CancelledError of its own becomes a RuntimeError.
+        """
+        loop = asyncio.get_running_loop()
+        call = self._put(what)
+        due = loop.time() + seconds
+        try:
+            await asyncio.wait({call.done}, timeout=seconds)
+            if not call.done.done() and loop.time() - due > HELD_S:
+                # The loop was blocked: a result that was waiting meanwhile is in time.
+                await asyncio.wait({call.done}, timeout=GRACE_S)
+        finally:
+            call.give_up()
+        if not call.done.done():
+            why = "" if call.task else ": the call before goes on although it was cancelled"
+            raise LateError(f"within {seconds:g} s{why}")
+        if call.error is None:
+            result: T = call.result
+            return result
+        if isinstance(call.error, Exception):
+            raise call.error
+        raise RuntimeError(f"it ended with {call.error!r}") from call.error
+
+    def end(self, what: Callable[[], Awaitable[None]]) -> None:
+        """Make a last call, which must limit its own time and not fail, then end the task. Does not wait."""
+        self._put(what, is_last=True)
+
+    async def ended(self, seconds: float) -> bool:
+        """Wait for the end of the task; returns whether it has ended."""
+        if self._task is not None:
+            await asyncio.wait({self._task}, timeout=seconds)
+        return self._task is None or self._task.done()
+
+    def _put(self, what: Callable[[], Awaitable[Any]], *, is_last: bool = False) -> _Call:
+        loop = asyncio.get_running_loop()
+        call = _Call(what, loop.create_future(), is_last)
+        if self._task is None or self._task.done() or self._task.get_loop() is not loop:
+            self._calls = _Calls()
+            self._start(loop)
+        self._calls.put(call)
+        return call
+
+    def _start(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._task = loop.create_task(_work(self._calls), name=self._name)
+        self._task.add_done_callback(self._on_end)
+
+    def _on_end(self, task: asyncio.Task[None]) -> None:
+        """Start again if calls remain: asyncio.run() cancels all tasks at its end."""
+        if task is self._task and self._calls.waiting:
+            self._start(task.get_loop())
+
+
+async def _work(calls: _Calls) -> None:
+    """Make the calls, until the last one."""
+    while calls.waiting or not calls.has_ended:
+        call = await calls.get()
+        if not call.is_given_up:
+            calls.has_ended = call.is_last
+            await call.make()
+
+
+class _Calls:
+    """The queue of calls. ``asyncio.Queue`` raises when its loop is closed while a task waits for an item."""
+
+    def __init__(self) -> None:
+        self.waiting: deque[_Call] = deque()
+        self.has_ended = False  # whether the call that was started last is the last one
+        self._more = asyncio.Event()
+
+    def put(self, call: _Call) -> None:
+        self.waiting.append(call)
+        self._more.set()
+
+    async def get(self) -> _Call:
+        while not self.waiting:
+            self._more.clear()
+            await self._more.wait()
+        return self.waiting.popleft()
+
+
+class _Call:
+    """One call and its outcome."""
+
+    def __init__(self, what: Callable[[], Awaitable[Any]], done: asyncio.Future[None], is_last: bool) -> None:
+        self._what: Final = what
+        self.done: Final = done
+        self.is_last: Final = is_last
+        self.is_given_up = False
+        self.task: asyncio.Task[Any] | None = None  # the task that runs the call, once it has begun
+        self.result: Any = None
+        self.error: BaseException | None = None
+
+    async def make(self) -> None:
+        """Run the call; raises only what ends the task."""
+        self.task = task = asyncio.current_task()
+        assert task is not None
+        try:
+            self.result = await self._what()
+        except BaseException as error:
+            self.error = error
+            if not (isinstance(error, Exception) or self.is_given_up):
+                raise
+        finally:
+            if not self.done.get_loop().is_closed():
+                self.done.set_result(None)
+        while self.is_given_up and task.cancelling():
+            task.uncancel()
+
+    def give_up(self) -> None:
+        """Cancel the call if it has not ended."""
+        if not self.done.done():
+            self.is_given_up = True
+            if self.task is not None:
+                self.task.cancel()
