@@ -50,11 +50,9 @@ class Connection:
     """
 
     def __init__(self, hand: Hand, settings: Settings) -> None:
-        """Opens nothing. Belongs to the loop of the hand; other threads may read its attributes.
+        """Opens nothing; the hand, made with these settings, is not started.
 
-        Args:
-            hand: not started.
-            settings: those that the hand was made with.
+        Belongs to the loop of the hand; other threads may read its attributes.
         """
         self.hand = hand
         self.takes_commands = False
@@ -70,21 +68,12 @@ class Connection:
     # -- lifetime -------------------------------------------------------------------------------------
 
     async def open(self) -> None:
-        """Connect and read; write nothing to the gripper.
-
-        Raises:
-            RefusedError: the connection has been closed.
-            RobotiqError: there is no gripper, or the link failed.
-        """
+        """Connect and read; write nothing to the gripper."""
         self._check_open()
         await self.hand.start(activate=False)
 
     async def permit(self) -> None:
-        """Accept commands from now on. Moves nothing.
-
-        Raises:
-            RefusedError: the connection has been closed.
-        """
+        """Accept commands from now on. Moves nothing."""
         self._check_open()
         self.takes_commands = self._took_commands = True
 
@@ -122,12 +111,7 @@ class Connection:
     # -- commands --------------------------------------------------------------------------------------
 
     async def command(self, name: str) -> str:
-        """Carry out one of :data:`COMMANDS`; returns its outcome as a text.
-
-        Raises:
-            RefusedError: the node is not active, too many commands are under way, or a stop took over.
-            RobotiqError: the command failed.
-        """
+        """Carry out one of :data:`COMMANDS`; returns its outcome as a text."""
         if name == "halt":
             return await self._stop("a halt took over")
         self._check_active()
@@ -146,12 +130,7 @@ class Connection:
         return call.result()
 
     async def check_goal(self) -> None:
-        """Refuse a goal that cannot begin now.
-
-        Raises:
-            RefusedError: the node is not active, the link is down, the gripper is not in a state to move, or
-                it is being stopped.
-        """
+        """Refuse a goal that cannot begin now: RefusedError with the reason."""
         self._check_active()
         reason = why_not(self.hand)
         if reason is not None:
@@ -161,17 +140,9 @@ class Connection:
     async def run_goal(
         self, key: bytes, targets: Targets, settings: Settings, feedback: Callable[[], object], stops: int
     ) -> Outcome:
-        """Carry out a goal; see :meth:`GoalRunner.run`.
+        """Carry out a goal; see :meth:`GoalRunner.run`. ``stops`` is :attr:`stops` when it was accepted.
 
-        Args:
-            key: identifies the goal for :meth:`cancel_goal`.
-            targets: of its axes.
-            settings: the present ones.
-            feedback: called while it is under way.
-            stops: :attr:`stops` at the time when the goal was accepted.
-
-        Raises:
-            RefusedError: as :meth:`check_goal`, whose conditions may have changed; or a stop came between.
+        RefusedError: a stop came since, or the conditions of :meth:`check_goal` have changed.
         """
         if stops != self.stops:
             raise RefusedError("a stop took over before it began")

@@ -57,9 +57,7 @@ class _Goal:
 class GoalRunner:
     """Carries out goals on a hand, one at a time. A new goal replaces the one before, and all its axes.
 
-    Args:
-        hand: the hand; it moves only while a goal runs.
-        lost: called with the axes of a goal that a lost link has ended: they may still move.
+    ``lost`` is called with the axes of a goal that a lost link has ended: they may still move.
     """
 
     def __init__(self, hand: Hand, lost: Callable[[Finger], object] = lambda _: None) -> None:
@@ -79,13 +77,8 @@ class GoalRunner:
     ) -> Outcome:
         """Move the axes of a goal until they stop or the goal is ended. If cancelled, hold them.
 
-        Args:
-            key: identifies the goal for :meth:`cancel`.
-            targets: of its axes.
-            speed: of its axes, 0..255.
-            force: of its axes, 0..255.
-            allow_stalling: whether a contact is a success.
-            feedback: called 20 times a second while the axes move.
+        ``key`` identifies the goal for :meth:`cancel`. With ``allow_stalling`` a contact is a success.
+        ``feedback`` is called 20 times a second while the axes move.
         """
         goal, before = _Goal(key), self._newest
         self._newest = goal

@@ -32,13 +32,9 @@ class GripperAction:
     def __init__(
         self, node: Node, group: CallbackGroup, bridge: Bridge, configured: Callable[[], Configured]
     ) -> None:
-        """Offer the action.
+        """Offer the action; the callbacks of ``group`` may overlap.
 
-        Args:
-            node: the node of the action.
-            group: a callback group whose callbacks may overlap.
-            bridge: into the loop.
-            configured: returns what the node is configured with; raises RefusedError if it is not.
+        ``configured`` returns what the node is configured with, and raises RefusedError if it is not.
         """
         self._log = node.get_logger()
         self._bridge = bridge

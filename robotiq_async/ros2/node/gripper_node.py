@@ -35,10 +35,7 @@ _SUCCESS, _FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.
 class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
     """A gripper as a ROS 2 lifecycle node. It begins unconfigured, without a hand.
 
-    Args:
-        context: of ROS.
-        bridge: into the loop.
-        failed: called, in the loop, with an error that must end the process.
+    ``failed`` is called, in the loop, with an error that must end the process.
     """
 
     def __init__(self, context: Context, bridge: Bridge, failed: Callable[[BaseException], object]) -> None:

@@ -36,10 +36,7 @@ def guard(
 ) -> None:
     """Reject invalid values, and changes that need a new configuration; log the reason.
 
-    Args:
-        node: the node of the parameters.
-        is_configured: whether the node is configured.
-        changed: called with the accepted parameters of one request, once all of them are accepted.
+    ``changed`` is called with the parameters of one request, once all of them are accepted.
     """
 
     def check(given: Sequence[RosParameter]) -> SetParametersResult:

@@ -33,9 +33,7 @@ MOST_FAILURES: Final = 20  # failing callbacks per second: with more, the execut
 class Spinner(threading.Thread):
     """Runs an executor. An error in a callback of ROS itself is logged and does not end it.
 
-    Args:
-        executor: the executor.
-        died: called, in this thread, if it cannot continue.
+    ``died`` is called, in this thread, if it cannot continue.
     """
 
     def __init__(self, executor: SingleThreadedExecutor, died: Callable[[BaseException], object]) -> None:
@@ -68,13 +66,9 @@ class Spinner(threading.Thread):
 
 
 async def serve(arguments: Sequence[str]) -> None:
-    """Run the node until a signal arrives.
+    """Run the node, with the command line for ROS (``PROGRAM --ros-args ...``), until a signal arrives.
 
-    Args:
-        arguments: the command line with the program's name, for ROS: ``--ros-args ...``.
-
-    Raises:
-        RuntimeError: the executor, or publishing, failed; the hand has been stopped.
+    RuntimeError: the executor, or publishing, failed; the hand has been stopped.
     """
     loop = asyncio.get_running_loop()
     ended: asyncio.Future[None] = loop.create_future()

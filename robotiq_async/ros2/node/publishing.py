@@ -40,9 +40,7 @@ _LATEST: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL
 class Publishing:
     """The publishers of a node. They exist all the time, but publish only while there is a connection.
 
-    Args:
-        node: the node of the topics.
-        failed: called, in the loop, if publishing ends with an unexpected error.
+    ``failed`` is called, in the loop, if publishing ends with an unexpected error.
     """
 
     def __init__(self, node: Node, failed: Callable[[BaseException], object]) -> None:

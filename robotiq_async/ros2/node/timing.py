@@ -11,11 +11,7 @@ from ...values.errors import NotStartedError
 
 
 class Pace:
-    """Selects the statuses that are due. After a gap it continues from there, without catching up.
-
-    Args:
-        rate: statuses per second.
-    """
+    """Selects the statuses that are due, ``rate`` per second. After a gap nothing is caught up on."""
 
     def __init__(self, rate: float) -> None:
         self._period = 1 / rate
@@ -32,12 +28,10 @@ class Pace:
 
 
 class Timer:
-    """Calls a function periodically, at once and then until cancelled. Missed calls are skipped.
+    """Calls ``work`` at once and then every ``period`` seconds until cancelled. Missed calls are skipped.
 
-    Args:
-        period: seconds.
-        work: the function; NotStartedError, of a hand that was just stopped, is ignored.
-        failed: called with any other exception; the timer ends then.
+    NotStartedError, of a hand that was just stopped, is ignored. ``failed`` is called with any other
+    exception; the timer ends then.
     """
 
     def __init__(

@@ -13,15 +13,9 @@ _REFERENCES: Final = {"parent": "link", "child": "link", "mimic": "joint"}
 
 
 def robot_description(path: str, prefix: str) -> str:
-    """The URDF in a file, unchanged; without a file the packaged one, with the prefix on all names.
+    """The URDF in a file, unchanged; without a path the packaged one, with the prefix on all names.
 
-    Args:
-        path: of the file; empty for the packaged one.
-        prefix: of the names.
-
-    Raises:
-        OSError: the file cannot be read.
-        ValueError: the file is not a URDF.
+    OSError: the file cannot be read. ValueError: it is not a URDF.
     """
     if not path:
         return prefixed(urdf(), prefix)

@@ -83,10 +83,6 @@ def status_text(hand: Hand, *, takes_commands: bool) -> str:
     """The state as a JSON object; while connected, it includes the newest status.
 
     The fields of the status have the names of recordings.
-
-    Args:
-        hand: the hand.
-        takes_commands: whether the node accepts commands.
     """
     fields: dict[str, object] = {
         "state": hand.state.name,

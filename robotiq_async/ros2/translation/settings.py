@@ -88,11 +88,7 @@ class Settings:
 
 
 def check_settings(values: Mapping[str, object]) -> Settings:
-    """Check all parameters.
-
-    Raises:
-        ValueError: a value out of range or of the wrong type; names the parameter, the value and the range.
-    """
+    """Check all parameters: ValueError names the parameter, the value and the range."""
     checked = {name: check_parameter(name, values[name]) for name in PARAMETERS}
     own = {each.name for each in fields(Settings)}
     options = {name: _option_value(name, checked.pop(name)) for name in OF_HAND if name not in own}
@@ -105,11 +101,7 @@ def _option_value(name: str, value: Value) -> object:
 
 
 def check_parameter(name: str, value: object) -> Value:
-    """Check a value, and return it in the parameter's type. An integer is accepted for a float: 50 for 50.0.
-
-    Raises:
-        ValueError: out of range or of the wrong type.
-    """
+    """Check a value, and return it in the parameter's type; an integer is accepted for a float."""
     parameter = PARAMETERS[name]
     try:
         if isinstance(parameter.default, bool):
