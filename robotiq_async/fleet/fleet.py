@@ -7,7 +7,7 @@ import json
 import math
 import secrets
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import count
 from types import TracebackType
 from typing import Any, Final, Self
@@ -33,8 +33,6 @@ from .wire.values import reading, words
 LOOK_S: Final = 0.5  # seconds to wait for the tokens of agents
 LOOK_AGAIN_S: Final = 0.1  # seconds until the next look for agents, during a halt
 SETTLE_S: Final = 2.0  # seconds after which the links to all agents that can be reached are up
-
-
 STOPPED: Final = "stopped"
 
 
@@ -234,8 +232,7 @@ class Fleet:
 
     def _change(self, name: GripperName, **what: Any) -> None:  # noqa: ANN401
         before = self._members.get(name) or Member(name)
-        fields = {each: getattr(before, each) for each in Member.__slots__} | what
-        self._members[name] = after = Member(**fields)
+        self._members[name] = after = replace(before, **what)
         if after != before:
             self._changes.push(after)
 

@@ -29,8 +29,6 @@ SUMMARY_S: Final = 1.0  # seconds from one summary to the next
 BEATS: Final = 5  # statuses per window that are sent even if nothing changes
 LOOK_S: Final = 0.3  # seconds to wait for the tokens of other agents: a router may forward them late
 EPOCH_BITS: Final = 53  # bits of an epoch: JSON readers that use doubles represent it exactly
-
-
 _CLIENT: Final = re.compile(rb'"client": ?"([^"\\]{1,64})"')
 
 

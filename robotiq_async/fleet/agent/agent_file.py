@@ -25,8 +25,6 @@ from ..network.endpoints import check_endpoints
 from ..wire.names import check_name
 
 _GRIPPERS: Final = "grippers"
-
-
 Names = tuple[str, ...]
 _KEY: Final = re.compile(r"""\s*((?:"[^"\n]*"|'[^'\n]*'|[A-Za-z0-9_.\s-])+)=""")
 

@@ -21,8 +21,6 @@ END_S: Final = 0.5
 """Seconds for requests under way to end after the hand has been stopped, before they are cancelled."""
 T = TypeVar("T")
 Work = Coroutine[Any, Any, MoveResult | None]
-
-
 LABEL_MAX: Final = 200  # characters of a label that are shown
 
 

@@ -47,8 +47,6 @@ class Role(Enum):
 
 
 CLIENTS: Final = (Role.READ, Role.HALT, Role.OPERATE)
-
-
 _IN: Final = ("ingress",)  # from the client to the agent
 _OUT: Final = ("egress",)  # from the agent to the client
 _RIGHTS: Final = {

@@ -47,15 +47,8 @@ def check_endpoints(
 ) -> tuple[str, ...]:
     """Check endpoints to "listen" on, or to "connect" to, where others could read and write as well.
 
-    Args:
-        what: names the endpoints in messages.
-        endpoints: of zenoh.
-        has_keys: whether there are certificates for mutual TLS; without them only this machine is allowed.
-        insecure: the operator vouches for everyone on that network.
-
-    Raises:
-        TypeError: an endpoint is not a string.
-        ValueError: an endpoint is malformed or unprotected.
+    Without keys, which are certificates for mutual TLS, only this machine is allowed; with ``insecure`` the
+    operator vouches for everyone on that network. TypeError, ValueError: malformed or unprotected.
     """
     if has_keys and insecure:
         raise ValueError("keys and insecure cannot be combined: with keys everything is encrypted")

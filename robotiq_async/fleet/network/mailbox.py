@@ -19,8 +19,6 @@ GATHER_S: Final = 0.001
 """Seconds for which telemetry is collected under load, to wake the loop once for all of it."""
 TURN_S: Final = 0.002  # seconds of deliveries in one turn of the loop: the rest of the program must run, too
 MOST: Final = 2000  # Requests and telemetry that may wait. Beyond that they are dropped, as on a full network
-
-
 MOST_REPLIES: Final = 1000
 """Replies that may wait. Beyond that the query is dropped, also in this thread: zenoh notifies the client of
 it, which can block for as long. Clients repeat their requests."""

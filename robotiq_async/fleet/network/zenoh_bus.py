@@ -38,8 +38,6 @@ _PRIORITY: Final = {
     Urgency.TELEMETRY: zenoh.Priority.DATA,
 }
 _EXPRESS: Final = (Urgency.STOP, Urgency.COMMAND)  # sent at once, not batched
-
-
 RESOLVED_S: Final = 1.0  # seconds to resolve a host name; one that takes longer counts as unknown
 
 

@@ -30,8 +30,6 @@ RELEASE_S: Final = 0.9
 """Seconds for the answer to a release. Closing a session of zenoh may take 1 s, and a stop 2 s in total."""
 NOT_REACQUIRED: Final = ("taken", "halted", "held", "restarted")
 """Reasons after which the lease is not reacquired automatically: only an explicit acquire() does."""
-
-
 LOOK_S: Final = 0.5  # seconds to look for the tokens of agents
 TWO_AGENTS: Final = "two agents serve it, perhaps different grippers under one name: stop one of them"
 
@@ -141,7 +139,7 @@ class LeaseKeeper:
         if self._ending is None or ending > self._ending:
             self._ending = ending
             what = {"what": "release", "halt": ending > Ending.LEAVE, "keep_grip": ending is Ending.KEEP}
-            posted = self._run.post(self._run.call(what), "lease", timeout=RELEASE_S)
+            posted = self._run.requests.post(self._run.call(what), "lease", timeout=RELEASE_S)
             self._releasing = self._run.spawn(self._run.answer(posted))
             # After a stronger release, callers wait for that one, so the error of this one may go unread.
             self._releasing.add_done_callback(lambda task: task.cancelled() or task.exception())
@@ -187,7 +185,7 @@ class LeaseKeeper:
         # After a halt or a take by another client only an explicit acquire() gets it back.
         self._wants_control = self._wants_control and reason not in (*NOT_REACQUIRED, "released")
         self.lost = ControlLostError(f"lost control of {self._run.name}: {why}", reason)
-        self._run.fail_calls(self.lease, self.lost)
+        self._run.requests.lose_lease(self.lease, self.lost)
         if reason != "released":
             self._log.warning("lost control: %s", why)
 
@@ -202,8 +200,8 @@ class LeaseKeeper:
     async def _acquire(self, what: Fields) -> None:
         await self._run.agents.check_one()
         # Sent with the request for the lease, so that no motion precedes them.
-        settings = {"settings": self._run.settings.fields} if self._run.settings.fields else {}
-        call = self._run.call({**what, "label": label(), **settings})
+        settings = self._run.requests.settings.fields
+        call = self._run.call({**what, "label": label(), **({"settings": settings} if settings else {})})
         value = await self._run.send(call, "lease", timeout=ANSWER_S)
         with reading("a lease"):
             self.lease, self._lease_run = int(value["lease"]), self._run.mirror.epoch

@@ -6,14 +6,16 @@ import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from ...values.enums import Finger
 from ...values.errors import ControlLostError, NotStartedError, RobotiqError
 from ..network.bus import Urgency
 from ..wire.envelope import Call
 from .pending_request import PendingRequest
-from .session import RemoteSession
+
+if TYPE_CHECKING:
+    from .session import RemoteSession
 
 UNDER_WAY: Final = 4  # unanswered requests at a time: enough for 200 a second up to a round trip of 20 ms
 ANSWER_S: Final = 1.0  # seconds for the answer to a command
@@ -61,7 +63,9 @@ class Outbox:
             arguments = {"axes": {str(int(axis)): changes for axis, changes in waiting.items()}}
             # With the stamp of its first command: the time in the outbox counts like time in the network.
             call = replace(self._session.call(arguments), seen=asked.seen)
-            posted = self._session.post(call, "cmd/command", timeout=ANSWER_S, urgency=Urgency.COMMAND)
+            posted = self._session.requests.post(
+                call, "cmd/command", timeout=ANSWER_S, urgency=Urgency.COMMAND
+            )
             self._under_way += 1
             asking = self._session.spawn(self._await(posted))
             asking.add_done_callback(lambda _: self._done())

@@ -30,11 +30,8 @@ def of_its_run(call: Call) -> Callable[[Reply], bool]:
     """
 
     def decides(reply: Reply) -> bool:
-        try:
-            answer = unpack_answer(reply.payload)
-        except RobotiqError:
-            return False
-        return (answer.to, answer.number) == (call.to, call.number) and call.epoch in (0, answer.epoch)
+        answer = _answer(reply)
+        return answer is not None and _is_about(call, answer) and call.epoch in (0, answer.epoch)
 
     return decides
 
@@ -42,10 +39,19 @@ def of_its_run(call: Call) -> Callable[[Reply], bool]:
 def is_refusal(reply: Reply) -> bool:
     # A halt ends with the first refusal. Of two agents both must confirm it, so a success does not end the
     # wait.
+    answer = _answer(reply)
+    return answer is None or answer.error is not None
+
+
+def _answer(reply: Reply) -> Answer | None:
     try:
-        return unpack_answer(reply.payload).error is not None
+        return unpack_answer(reply.payload)
     except RobotiqError:
-        return True
+        return None
+
+
+def _is_about(call: Call, answer: Answer) -> bool:
+    return (answer.to, answer.number) == (call.to, call.number)
 
 
 class PendingRequest:
@@ -123,12 +129,8 @@ class PendingRequest:
         copy.add_done_callback(take)
 
     def _is_stray(self, reply: Reply) -> bool:
-        try:
-            answer = unpack_answer(reply.payload)
-        except RobotiqError:
-            return False
-        is_about_this = answer.to == self.call.to and answer.number == self.call.number
-        return bool(answer.number) and not is_about_this
+        answer = _answer(reply)
+        return answer is not None and bool(answer.number) and not _is_about(self.call, answer)
 
     def repeat(self, send: Callable[[], None]) -> None:
         """Call ``send`` if there is no answer in time."""
@@ -157,8 +159,5 @@ class PendingRequest:
 
 def _came_early(reply: Reply) -> bool:
     # The agent waits for a command that was sent before this one.
-    try:
-        answer: Answer = unpack_answer(reply.payload)
-    except RobotiqError:
-        return False
-    return isinstance(answer.error, dict) and answer.error.get("reason") == "early"
+    answer = _answer(reply)
+    return answer is not None and isinstance(answer.error, dict) and answer.error.get("reason") == "early"

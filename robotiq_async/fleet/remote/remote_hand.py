@@ -29,7 +29,6 @@ from ...values.status import RobotiqStatus
 from ..network.bus import Bus, Urgency
 from ..network.route import parse_remote_address
 from ..wire.values import Fields, read_result, reading
-from .outbox import Outbox
 from .requests import no_answer_as_lost_connection
 from .session import CONNECT_S, RemoteSession
 
@@ -108,7 +107,6 @@ class RemoteHand(Hand):
         self._shared_bus = bus
         self._opening: object = None
         """Identifies the start that opens a bus; None if there is none, or if stop() was called."""
-        self._outbox: Outbox | None = None  # of the present run, or the last one
 
     # -- lifetime --------------------------------------------------------------------------------------
 
@@ -129,7 +127,6 @@ class RemoteHand(Hand):
             owns_bus=bus is not self._shared_bus,
             before=None if before is None else before.mirror,
         )
-        self._outbox = Outbox(session)
         try:
             with no_answer_as_lost_connection():
                 await session.connect(max(self._connect_timeout, wait))
@@ -145,8 +142,7 @@ class RemoteHand(Hand):
         session = self._session
         if session is not None and not session.has_ended:
             session.check_loop()
-            assert self._outbox is not None, "made with the session"
-            self._outbox.drop()
+            session.outbox.drop()
             await session.close(Ending.of(halt=halt, keep_grip=keep_grip))
 
     async def _open_bus(self) -> Bus:
@@ -219,8 +215,7 @@ class RemoteHand(Hand):
         if self.state not in RUNNING:
             raise refusal(Trigger.ASK_COMMAND, self.state, session.mirror.status)
         changes = {"position": position, "speed": speed, "force": force}
-        assert self._outbox is not None, "made with the session"
-        self._outbox.put(axes, {name: value for name, value in changes.items() if value is not None})
+        session.outbox.put(axes, {name: value for name, value in changes.items() if value is not None})
 
     async def _move(
         self, axes: Finger, target: int, speed: int | None, force: int | None, timeout: float | None
@@ -244,8 +239,7 @@ class RemoteHand(Hand):
 
     async def _halt(self) -> None:
         session = self._running_session()
-        assert self._outbox is not None, "made with the session"
-        self._outbox.clear()
+        session.outbox.clear()
         halting = session.stops.halt()
         try:
             with no_answer_as_lost_connection():
@@ -272,8 +266,8 @@ class RemoteHand(Hand):
 
     async def _ask(self, name: str, arguments: Fields, timeout: float) -> Fields:
         """Have the agent carry out a command; if this call is cancelled, cancel the command there."""
-        session, outbox = self._running_session(), self._outbox
-        assert outbox is not None, "made with the session"
+        session = self._running_session()
+        outbox = session.outbox
         if self._control is None and not session.keeper.is_in_control and session.keeper.lost is None:
             with no_answer_as_lost_connection():
                 await session.keeper.acquire()
@@ -312,9 +306,8 @@ class RemoteHand(Hand):
 
     def _is_moving(self) -> bool:
         assert self._session is not None, "only asked of a hand that runs"
-        assert self._outbox is not None, "made with the session"
         newest = self._session.mirror.newest
-        return self._outbox.is_moving or (newest is not None and newest.is_moving)
+        return self._session.outbox.is_moving or (newest is not None and newest.is_moving)
 
     async def _wait_for_state(self, states: Collection[State], timeout: float | None) -> State:
         with self._running_session().waiters.watching(states, {}) as reached:

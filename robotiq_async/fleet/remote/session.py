@@ -35,6 +35,7 @@ from ..wire.status_message import unpack
 from ..wire.values import Fields, read_statistics, reading
 from .lease_keeper import ANSWER_S, RENEWALS, Agents, LeaseKeeper
 from .mirror import Mirror
+from .outbox import Outbox
 from .pending_request import PendingRequest
 from .requests import NoAnswerError, Requests
 from .stops import Stops
@@ -51,6 +52,7 @@ class RemoteSession:
 
     Attributes:
         waiters: calls that wait for a state.
+        requests, keeper, stops, outbox: the requests of this run, its lease, halts, and commands to be sent.
         is_over: whether the run has ended, or is ending.
         has_ended: whether all of it has ended.
         window: of the leases, in seconds.
@@ -81,12 +83,12 @@ class RemoteSession:
         self._closing: asyncio.Task[None] | None = None
         self.window = WINDOW_S
         self._arrived_at = 0.0  # arrival of the last message, current or not
-        self._requests = Requests(name, bus)
-        self.settings = self._requests.settings
+        self.requests = Requests(name, bus)
         self._tasks: set[asyncio.Task[Any]] = set()
         self._is_fetching = False
         self.keeper = LeaseKeeper(self, wants_control=wants_control)
         self.stops = Stops(self)
+        self.outbox = Outbox(self)
         self._querying: asyncio.Task[Any] | None = None
         channels.reopen(self.loop)
         self.mirror.begin(now())
@@ -150,10 +152,10 @@ class RemoteSession:
         """
         if self._closing is None:
             self.is_over = True
-            is_holding = self._requests.has_undelivered_hold
+            is_holding = self.requests.has_undelivered_hold
             ending = max(ending, self.stops.undelivered, Ending.KEEP if is_holding else Ending.LEAVE)
             self.mirror.shut_down(State.DO_SHUTDOWN, Trigger.ASK_STOP, now())
-            self._requests.end()
+            self.requests.end()
             self._closing = self.loop.create_task(self._close())
         self.keeper.end(ending)
         await wait_shielded(self._closing)
@@ -170,7 +172,7 @@ class RemoteSession:
             self.agents.end()
             for task in self._tasks:
                 task.cancel()
-            await self._requests.close()
+            await self.requests.close()
             await asyncio.gather(*self._tasks, return_exceptions=True)
             if self._owns_bus:
                 await self._bus.close()
@@ -252,11 +254,11 @@ class RemoteSession:
             return False
         if self.mirror.epoch not in (0, message.epoch):
             self.keeper.lose("closed", "the agent was restarted")
-            self._requests.fall_silent()  # requests to the previous run will not be answered
+            self.requests.fall_silent()  # requests to the previous run will not be answered
         self._arrived_at = arrival
         if not self.mirror.receive(message, arrival, in_turn=in_turn, window=self.window, asked=asked):
             return True  # about this gripper, but too old
-        self._requests.receive()
+        self.requests.receive()
         if in_turn:
             self.keeper.receive(message.lease)
         return True
@@ -295,10 +297,7 @@ class RemoteSession:
         self.log.warning("the agent is silent")
         self.mirror.fall_silent(at)
         self.keeper.lose("expired", "the agent is silent")
-        self._requests.fall_silent()
-
-    def fail_calls(self, lease: int, error: ControlLostError) -> None:
-        self._requests.lose_lease(lease, error)
+        self.requests.fall_silent()
 
     # -- control ---------------------------------------------------------------------------------------
 
@@ -313,18 +312,15 @@ class RemoteSession:
         return await self.send(self.call(arguments), verb, **how)
 
     def call(self, arguments: Fields | None = None) -> Call:
-        return self._requests.make(self.mirror, self.keeper.lease, arguments or {})
-
-    def post(self, call: Call, verb: str, **how: Any) -> PendingRequest:  # noqa: ANN401
-        return self._requests.post(call, verb, **how)
+        return self.requests.make(self.mirror, self.keeper.lease, arguments or {})
 
     async def send(self, call: Call, verb: str, **how: Any) -> Any:  # noqa: ANN401
-        return await self.answer(self.post(call, verb, **how))
+        return await self.answer(self.requests.post(call, verb, **how))
 
     async def answer(self, posted: PendingRequest) -> Any:  # noqa: ANN401
         """As :meth:`Requests.answer`, with the outcome of the answer, and NotStartedError after the end."""
         try:
-            answer, status = await self._requests.answer(posted)
+            answer, status = await self.requests.answer(posted)
         except NoAnswerError:
             if not posted.is_allowed_after_stop:
                 self.check_running()
