@@ -12,6 +12,8 @@ import asyncio
 import contextlib
 import functools
 import gc
+import inspect
+import math
 import os
 import selectors
 import socket
@@ -19,6 +21,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Coroutine
+from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -27,6 +30,8 @@ BLUR_S = 0.001
 """Time that others took counts from the last look at it, which is at most so long ago."""
 LATENCY_S = 0.0002
 """What bytes need from one end of a connection to the other."""
+LIMIT_S = 500.0
+"""Virtual seconds that a test inside a scene may take: what takes longer hangs."""
 
 
 class NothingWillHappenError(AssertionError):
@@ -95,6 +100,7 @@ class _Selector(selectors.DefaultSelector):
         super().__init__()
         # Far from the system's clock, however long the machine has run.
         self.now = 1e6
+        self.ends = math.inf
         self.turns = 0
         self.at_turn: tuple[int, Callable[[], object]] | None = None
         self.hold = HoldWatch()
@@ -114,6 +120,9 @@ class _Selector(selectors.DefaultSelector):
             raise NothingWillHappenError("all tasks wait, and nothing is going to happen")
         if not events and timeout:
             self.now += timeout
+            if self.now > self.ends:
+                self.ends = math.inf
+                raise NothingWillHappenError("this takes too long")
         return events
 
     def close(self) -> None:
@@ -139,6 +148,13 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def longest_hold(self) -> float:
         """The longest time, in real seconds, that callbacks have kept the loop."""
         return self._virtual.hold.longest
+
+    def end_after(self, seconds: float) -> None:
+        """Let what takes longer fail.
+
+        Not by a timer, which would change the order of others that are due at the same instant.
+        """
+        self._virtual.ends = self.time() + seconds
 
     def after_turns(self, count: int, call: Callable[[], object]) -> None:
         """Call something after so many more turns of the loop: between any two callbacks, if need be."""
@@ -272,20 +288,30 @@ class MemoryTransport(asyncio.Transport):
         self._resets |= option == socket.SO_LINGER
 
 
-def run(main: Callable[[], Coroutine[Any, Any, T]]) -> T:
+def run(main: Callable[[], Coroutine[Any, Any, T]], limit: float = math.inf) -> T:
     """Run a coroutine function in a virtual loop; nothing may be left running or complained about.
 
     Raises:
-        AssertionError: a task was left, or the loop had to complain.
+        AssertionError: a task was left, the loop had to complain, or ``limit`` virtual seconds have passed.
     """
     with asyncio.Runner(loop_factory=VirtualLoop) as runner:
         loop = runner.get_loop()
         assert isinstance(loop, VirtualLoop)
+        loop.end_after(limit)
         result = runner.run(main())
         left = asyncio.all_tasks(loop)
         assert not left, f"tasks left running: {left}"
         assert not loop.complaints, f"the event loop complained: {loop.complaints}"
         return result
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    """Wait until something is true, with a look at every millisecond: a gripper sends no events."""
+    loop = asyncio.get_running_loop()
+    while not condition():
+        turn = loop.create_future()
+        loop.call_later(0.001, turn.set_result, None)
+        await turn
 
 
 def virtual(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:
@@ -296,3 +322,45 @@ def virtual(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., Non
         run(lambda: test(**arguments))
 
     return in_virtual_time
+
+
+OPENED = {"hand", "reader"}
+
+
+def inside(
+    scene: Callable[..., AbstractAsyncContextManager[Any]], *given: str, **options: Any
+) -> Callable[[Callable[..., Coroutine[Any, Any, None]]], Callable[..., None]]:
+    """Let a coroutine function be a test inside a scene, in a virtual loop.
+
+    The test gets what it has parameters for: ``here`` is the scene; ``hand`` and ``reader`` are what its
+    methods of these names open.
+
+    Args:
+        scene: opens the scene.
+        given: names of arguments, of a parametrization or fixtures, that the scene takes.
+        options: other arguments of the scene.
+    """
+
+    def decorate(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:
+        wanted = inspect.signature(test).parameters
+
+        async def main(arguments: dict[str, Any]) -> None:
+            async with AsyncExitStack() as stack:
+                here = await stack.enter_async_context(
+                    scene(**{each: arguments[each] for each in given}, **options)
+                )
+                found = {**arguments, "here": here}
+                for name in OPENED.intersection(wanted):
+                    found[name] = await stack.enter_async_context(getattr(here, name)())
+                await test(**{name: found[name] for name in wanted})
+
+        @functools.wraps(test)
+        def in_scene(**arguments: Any) -> None:
+            run(lambda: main(arguments), LIMIT_S)
+
+        names = dict.fromkeys([*given, *(name for name in wanted if name not in {"here", *OPENED})])
+        kind = inspect.Parameter.KEYWORD_ONLY
+        in_scene.__signature__ = inspect.Signature([inspect.Parameter(name, kind) for name in names])  # type: ignore[attr-defined]
+        return in_scene
+
+    return decorate

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from pathlib import Path
 from typing import NamedTuple
 
 from robotiq_async.simulator import parse_troubles
 from robotiq_async.simulator.troubles.trouble import KINDS
 from tests.adversity.cell import LINE_PULLED
 from tests.adversity.phases import PHASES, Phase
-
-PAGE = Path(__file__).parents[2] / "docs" / "under-fault.md"
+from tests.pages import table
 
 
 class Cell(NamedTuple):
@@ -26,11 +24,7 @@ class Cell(NamedTuple):
 
 def cells() -> Iterator[Cell]:
     """Every cell, for every kind of link it fits."""
-    head, *rows = (
-        [word.strip() for word in line.strip("|").split("|")]
-        for line in PAGE.read_text(encoding="utf-8").splitlines()
-        if line.startswith("|") and not line.startswith("| --")
-    )
+    head, *rows = table("under-fault.md")
     phases = {phase.name: phase for phase in PHASES}
     assert head[1:] == list(phases), "a column for each phase"
     (_, *rests_in), *rows = rows

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger, RobotiqError, State
-from tests.adversity.test_cancellation import check_nothing_is_left, in_fault, rest
+from tests.adversity.test_cancellation import active, check_nothing_is_left, in_fault, rest
 from tests.adversity.test_cancellation import reset as in_reset
 from tests.adversity.world import World, world
 from tests.virtual import run
@@ -36,13 +36,6 @@ CALLS: dict[str, Call] = {
     "recover": lambda world: world.hand.recover(),
     "stop": lambda world: world.hand.stop(),
 }
-
-
-async def active(world: World) -> None:
-    await world.activate_beforehand()
-    await world.hand.start()
-
-
 READY: dict[str, tuple[Callable[[World], Awaitable[None]], tuple[str, ...]]] = {
     "active": (active, ("set_position", "set_force", "move", "hold", "halt", "reset", "stop")),
     "reset": (in_reset, ("activate", "recover", "reset", "stop")),

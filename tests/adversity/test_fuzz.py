@@ -25,7 +25,7 @@ def test_a_live_link(
     link: str, model: Model, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     async def main() -> dict[str, int]:
-        async with world(link, patch=monkeypatch, model=model) as here:
+        async with world(link, monkeypatch=monkeypatch, model=model) as here:
             await here.activate_beforehand()
             line = Line(random.Random(1), serial=link == "rtu", share=0.25, model=model)
             address = here.server.address if here.line is None else f"rtu://{here.line.NEAR}"

@@ -11,88 +11,83 @@ import pytest
 from robotiq_async import Fault, Finger, NotActivatedError, RobotiqHand, State
 from robotiq_async.simulator import Trouble
 from robotiq_async.values.request import Request
-from tests.adversity.world import started, world
-from tests.virtual import run, virtual
+from tests.adversity.world import World, started, world
+from tests.virtual import inside
 
 A = Finger.A
 POLL_S = 0.01
 
 
-@virtual
-async def test_what_was_missed_is_counted_and_skipped() -> None:
-    async with started(poll_interval=POLL_S) as here:
-        await anext(here.hand.statuses())
-        before, given = here.hand.statistics, len(here.gripper.stamps)
-        here.loop.hold_up(1.0)
-        await asyncio.sleep(0.5)
-        after = here.hand.statistics
-        assert after.overruns - before.overruns == pytest.approx(1.0 / POLL_S, abs=2)
-        assert after.longest_stall == pytest.approx(1.0, abs=0.02)
-        assert after.reconnects == 0
-        # Nothing is caught up on: half a second has its fifty polls, at their distance.
-        times = [at for at, _ in here.gripper.stamps[given + 1 :]]
-        assert len(times) == pytest.approx(0.5 / POLL_S, abs=2)
-        assert min(later - earlier for earlier, later in pairwise(times)) > POLL_S / 2
+@inside(started, poll_interval=POLL_S)
+async def test_what_was_missed_is_counted_and_skipped(here: World) -> None:
+    await anext(here.hand.statuses())
+    before, given = here.hand.statistics, len(here.gripper.stamps)
+    here.loop.hold_up(1.0)
+    await asyncio.sleep(0.5)
+    after = here.hand.statistics
+    assert after.overruns - before.overruns == pytest.approx(1.0 / POLL_S, abs=2)
+    assert after.longest_stall == pytest.approx(1.0, abs=0.02)
+    assert after.reconnects == 0
+    # Nothing is caught up on: half a second has its fifty polls, at their distance.
+    times = [at for at, _ in here.gripper.stamps[given + 1 :]]
+    assert len(times) == pytest.approx(0.5 / POLL_S, abs=2)
+    assert min(later - earlier for earlier, later in pairwise(times)) > POLL_S / 2
 
 
-def test_one_warning_a_second_at_most(caplog: pytest.LogCaptureFixture) -> None:
-    async def main() -> None:
-        async with started() as here:
-            began = here.loop.time()
-            while here.loop.time() - began < 10.0:
-                here.loop.hold_up(0.2)
-                await asyncio.sleep(0.025)
-
-    run(main)
+@inside(started)
+async def test_one_warning_a_second_at_most(here: World, caplog: pytest.LogCaptureFixture) -> None:
+    began = here.loop.time()
+    while here.loop.time() - began < 10.0:
+        here.loop.hold_up(0.2)
+        await asyncio.sleep(0.025)
     warnings = [each.message for each in caplog.records if "holds up the event loop" in each.message]
     assert 5 <= len(warnings) <= 11
 
 
-def test_slow_replies_are_not_blamed_on_the_loop_alone(caplog: pytest.LogCaptureFixture) -> None:
-    async def main() -> None:
-        async with world() as here:
-            here.server.policy = lambda frame: [(0.1, frame)]
-            await here.activate_beforehand()
-            await here.hand.start()
-            await asyncio.sleep(1.0)
-            assert here.hand.statistics.longest_stall < 0.01
-
-    run(main)
+@inside(world)
+async def test_slow_replies_are_not_blamed_on_the_loop_alone(
+    here: World, caplog: pytest.LogCaptureFixture
+) -> None:
+    here.server.policy = lambda frame: [(0.1, frame)]
+    await here.activate_beforehand()
+    await here.hand.start()
+    await asyncio.sleep(1.0)
+    assert here.hand.statistics.longest_stall < 0.01
     (warning,) = [each.message for each in caplog.records if "polling is" in each.message]
     assert "the gripper answers slowly" in warning
     assert "event loop" not in warning
 
 
-@virtual
+@inside(started)
 @pytest.mark.parametrize("held_s", [0.05, 0.3, 0.6, 3.0])
-async def test_a_move_survives(held_s: float) -> None:
-    async with started() as here:
-        moving = asyncio.create_task(here.hand.move(200, Finger.A, speed=0))
-        for _ in range(3):
-            # Between two exchanges: the simulator shares the loop, and would be held up with a request
-            # that a real gripper answers meanwhile.
-            await anext(here.hand.statuses())
-            here.loop.hold_up(held_s)
-        result = await moving
-        assert abs(result.positions[Finger.A] - 200) <= 2
-        assert here.hand.statistics.reconnects == 0
-        assert here.hand.statistics.foreign_commands == 0
-
-
-@virtual
-@pytest.mark.parametrize("turns", range(1, 25))
-async def test_the_link_survives_wherever_in_an_exchange_it_happens(turns: int) -> None:
-    async with started() as here:
+async def test_a_move_survives(here: World, held_s: float) -> None:
+    moving = asyncio.create_task(here.hand.move(200, Finger.A, speed=0))
+    for _ in range(3):
+        # Between two exchanges: the simulator shares the loop, and would be held up with a request
+        # that a real gripper answers meanwhile.
         await anext(here.hand.statuses())
-        here.loop.after_turns(turns, lambda: here.loop.hold_up(0.6))
-        await asyncio.sleep(2.0)
-        assert here.hand.statistics.longest_stall > 0.5
-        assert here.hand.statistics.reconnects == 0
+        here.loop.hold_up(held_s)
+    result = await moving
+    assert abs(result.positions[Finger.A] - 200) <= 2
+    assert here.hand.statistics.reconnects == 0
+    assert here.hand.statistics.foreign_commands == 0
 
 
-@virtual
-async def test_a_silent_gripper_is_given_up_on_also_in_a_loop_that_is_held_up_again_and_again() -> None:
-    async with started() as here, here.server.fault_injector.making(Trouble("silence")):
+@inside(started)
+@pytest.mark.parametrize("turns", range(1, 25))
+async def test_the_link_survives_wherever_in_an_exchange_it_happens(here: World, turns: int) -> None:
+    await anext(here.hand.statuses())
+    here.loop.after_turns(turns, lambda: here.loop.hold_up(0.6))
+    await asyncio.sleep(2.0)
+    assert here.hand.statistics.longest_stall > 0.5
+    assert here.hand.statistics.reconnects == 0
+
+
+@inside(started)
+async def test_a_silent_gripper_is_given_up_on_also_in_a_loop_that_is_held_up_again_and_again(
+    here: World,
+) -> None:
+    async with here.server.fault_injector.making(Trouble("silence")):
         began = here.loop.time()
         while here.hand.state is not State.DISCONNECTED:
             here.loop.hold_up(0.05)
@@ -103,79 +98,80 @@ async def test_a_silent_gripper_is_given_up_on_also_in_a_loop_that_is_held_up_ag
 # -- what happened meanwhile is seen before anything is written --------------------------------------------
 
 
-@virtual
+@inside(started)
 @pytest.mark.parametrize("how", ["command", "stop"])
-async def test_what_happened_while_the_loop_was_held_up_is_seen_before_the_next_write(how: str) -> None:
-    async with started() as here:
-        await here.hand.move(50, A)
-        here.gripper.write(0, [0x0000])  # another client resets the gripper ...
-        here.loop.hold_up(1.0)  # ... while other code holds the loop
-        if how == "command":
-            here.hand.command(A, position=100)
-        else:
-            await here.hand.stop()
-        await here.nothing_moves_for(6)
+async def test_what_happened_while_the_loop_was_held_up_is_seen_before_the_next_write(
+    here: World, how: str
+) -> None:
+    await here.hand.move(50, A)
+    here.gripper.write(0, [0x0000])  # another client resets the gripper ...
+    here.loop.hold_up(1.0)  # ... while other code holds the loop
+    if how == "command":
+        here.hand.command(A, position=100)
+    else:
+        await here.hand.stop()
+    await here.nothing_moves_for(6)
 
 
-@virtual
+@inside(started)
 @pytest.mark.parametrize("turns", range(1, 31))
 async def test_wherever_in_a_poll_the_loop_is_held_up_what_happened_meanwhile_is_seen_first(
-    turns: int,
+    here: World, turns: int
 ) -> None:
-    async with started() as here:
-        await here.hand.move(50, A)
+    await here.hand.move(50, A)
 
-        def hold_up() -> None:
-            here.gripper.write(0, [0x0000])
-            here.loop.hold_up(1.0)
-            here.hand.command(A, position=100)
-
-        here.loop.after_turns(turns, hold_up)
-        await asyncio.sleep(2.0)
-        await here.nothing_moves_for(6)
-        assert not Request.from_registers(here.gripper.request_registers).activate
-
-
-@virtual
-async def test_a_gripper_is_polled_once_more_when_the_loop_is_held_up_again_during_the_second_poll() -> None:
-    async with started() as here:
-        await here.hand.move(50, A)
-        await anext(here.hand.statuses())
-        here.loop.hold_up(0.3)
-        here.hand.command(A, position=100)
-        heard = len(here.server.heard)
-        await here.until(lambda: len(here.server.heard) > heard)
-        await asyncio.sleep(0.0001)
-        here.loop.hold_up(0.1)
-        here.gripper.write(0, [0x0000])
-        here.loop.hold_up(0.2)
-        await here.nothing_moves_for(6)
-
-
-@virtual
-async def test_a_release_is_called_off_when_the_gripper_was_reset_while_the_loop_was_held_up() -> None:
-    async with started() as here:
-        await here.hand.move(100)
-        here.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
-        await here.until_state(State.FAULT)
-        await asyncio.sleep(0.3)
+    def hold_up() -> None:
         here.gripper.write(0, [0x0000])
         here.loop.hold_up(1.0)
-        with pytest.raises(NotActivatedError):
-            await here.hand.atr()
-        await here.nothing_moves_for(6)
+        here.hand.command(A, position=100)
+
+    here.loop.after_turns(turns, hold_up)
+    await asyncio.sleep(2.0)
+    await here.nothing_moves_for(6)
+    assert not Request.from_registers(here.gripper.request_registers).activate
 
 
-@virtual
-async def test_a_move_cancelled_while_the_loop_was_held_up_stops_where_it_is_by_then() -> None:
-    async with started() as here:
-        moving = asyncio.create_task(here.hand.move(255, A, speed=0))
-        await asyncio.sleep(0.3)
-        moving.cancel()
-        here.loop.hold_up(0.5)
-        at = here.gripper.position(A)
-        await asyncio.sleep(2)
-        assert abs(here.gripper.position(A) - at) < 10
+@inside(started)
+async def test_a_gripper_is_polled_once_more_when_the_loop_is_held_up_again_during_the_second_poll(
+    here: World,
+) -> None:
+    await here.hand.move(50, A)
+    await anext(here.hand.statuses())
+    here.loop.hold_up(0.3)
+    here.hand.command(A, position=100)
+    heard = len(here.server.heard)
+    await here.until(lambda: len(here.server.heard) > heard)
+    await asyncio.sleep(0.0001)
+    here.loop.hold_up(0.1)
+    here.gripper.write(0, [0x0000])
+    here.loop.hold_up(0.2)
+    await here.nothing_moves_for(6)
+
+
+@inside(started)
+async def test_a_release_is_called_off_when_the_gripper_was_reset_while_the_loop_was_held_up(
+    here: World,
+) -> None:
+    await here.hand.move(100)
+    here.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    await here.until_state(State.FAULT)
+    await asyncio.sleep(0.3)
+    here.gripper.write(0, [0x0000])
+    here.loop.hold_up(1.0)
+    with pytest.raises(NotActivatedError):
+        await here.hand.atr()
+    await here.nothing_moves_for(6)
+
+
+@inside(started)
+async def test_a_move_cancelled_while_the_loop_was_held_up_stops_where_it_is_by_then(here: World) -> None:
+    moving = asyncio.create_task(here.hand.move(255, A, speed=0))
+    await asyncio.sleep(0.3)
+    moving.cancel()
+    here.loop.hold_up(0.5)
+    at = here.gripper.position(A)
+    await asyncio.sleep(2)
+    assert abs(here.gripper.position(A) - at) < 10
 
 
 # -- a loop that is not run, as between the prompts of IPython's terminal ---------------------------------

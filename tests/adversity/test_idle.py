@@ -10,7 +10,7 @@ from robotiq_async import ConnectionLostError, Finger, NotActivatedError, State
 from robotiq_async.simulator import Trouble
 from robotiq_async.values.request import Request
 from tests.adversity.world import World, started
-from tests.virtual import virtual
+from tests.virtual import inside
 
 A, B = Finger.A, Finger.B
 LINKS = ["tcp", "rtu"]
@@ -30,38 +30,34 @@ async def nothing_is_activated(world: World, since: int) -> None:
     assert (await world.hand.move(60, B)).positions[B] == pytest.approx(60, abs=2)
 
 
-@virtual
+@inside(started, "link", "monkeypatch")
 @pytest.mark.parametrize("link", LINKS)
-async def test_it_is_found_reset_when_the_link_is_back(link: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    async with started(link, patch=monkeypatch) as here:
-        moving = asyncio.create_task(here.hand.move(200, A, speed=0))
-        await here.until_moving()
-        writes = len(here.gripper.writes)
-        async with here.server.fault_injector.making(Trouble("idle-reset", 0.5)):
-            async with here.server.fault_injector.making(Trouble("silence")):
-                with pytest.raises(ConnectionLostError):
-                    await moving
-                await asyncio.sleep(1)
-                assert not here.gripper.is_moving
-            await here.until_state(State.RESET)
-            await nothing_is_activated(here, writes)
+async def test_it_is_found_reset_when_the_link_is_back(here: World) -> None:
+    moving = asyncio.create_task(here.hand.move(200, A, speed=0))
+    await here.until_moving()
+    writes = len(here.gripper.writes)
+    async with here.server.fault_injector.making(Trouble("idle-reset", 0.5)):
+        async with here.server.fault_injector.making(Trouble("silence")):
+            with pytest.raises(ConnectionLostError):
+                await moving
+            await asyncio.sleep(1)
+            assert not here.gripper.is_moving
+        await here.until_state(State.RESET)
+        await nothing_is_activated(here, writes)
 
 
-@virtual
+@inside(started, "link", "monkeypatch")
 @pytest.mark.parametrize("link", LINKS)
 @pytest.mark.parametrize("command", [False, True])
-async def test_it_loses_its_activation_while_the_loop_is_held_up(
-    link: str, command: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    async with started(link, patch=monkeypatch) as here:
-        moving = asyncio.create_task(here.hand.move(200, A, speed=0))
-        await here.until_moving()
-        writes = len(here.gripper.writes)
-        async with here.server.fault_injector.making(Trouble("idle-reset", 0.5)):
-            here.loop.hold_up(1.0)
-            if command:
-                here.hand.command(B, position=100)
-            with pytest.raises(NotActivatedError):
-                await moving
-            await nothing_is_activated(here, writes)
-        assert here.hand.statistics.reconnects == 0
+async def test_it_loses_its_activation_while_the_loop_is_held_up(here: World, command: bool) -> None:
+    moving = asyncio.create_task(here.hand.move(200, A, speed=0))
+    await here.until_moving()
+    writes = len(here.gripper.writes)
+    async with here.server.fault_injector.making(Trouble("idle-reset", 0.5)):
+        here.loop.hold_up(1.0)
+        if command:
+            here.hand.command(B, position=100)
+        with pytest.raises(NotActivatedError):
+            await moving
+        await nothing_is_activated(here, writes)
+    assert here.hand.statistics.reconnects == 0

@@ -13,7 +13,7 @@ from robotiq_async.simulator import Trouble
 from robotiq_async.values.request import AxisRequest, Request
 from tests.adversity.world import World, started, world
 from tests.simulator.test_server import raw_client
-from tests.virtual import virtual
+from tests.virtual import inside
 
 A, BCS = Finger.A, (Finger.B, Finger.C, Finger.SCISSOR)
 READ_STATUS = bytes.fromhex("04 0000 0008")
@@ -42,42 +42,40 @@ def nobody_else_moves(world: World) -> Iterator[None]:
     assert {axis: after[axis] - before[axis] for axis in BCS} == dict.fromkeys(BCS, 0)
 
 
-@virtual
-async def test_a_reply_that_is_left_over_moves_no_axis_that_nobody_addressed() -> None:
-    async with world() as here:
-        await here.activate_beforehand()
-        await send(here, 99, 200)
-        async with here.server.fault_injector.making(Trouble("multiplexer", 0.03)):
-            await ask_and_go(here)
-            await send(here, 40, 137)
-            with nobody_else_moves(here):
-                with contextlib.suppress(RobotiqConnectionError):
-                    await here.hand.start(activate=False)
-                    await here.hand.set_position(60, A)
-                await asyncio.sleep(5)
-            here.check_no_stale_status()
-
-
-@virtual
-async def test_after_what_was_left_over_the_next_start_finds_the_gripper() -> None:
-    async with world() as here:
-        await here.activate_beforehand()
-        async with here.server.fault_injector.making(Trouble("multiplexer", 0.03)):
-            await ask_and_go(here)
-            await asyncio.sleep(0.1)
-            with pytest.raises(ProtocolError, match="without a request"):
+@inside(world)
+async def test_a_reply_that_is_left_over_moves_no_axis_that_nobody_addressed(here: World) -> None:
+    await here.activate_beforehand()
+    await send(here, 99, 200)
+    async with here.server.fault_injector.making(Trouble("multiplexer", 0.03)):
+        await ask_and_go(here)
+        await send(here, 40, 137)
+        with nobody_else_moves(here):
+            with contextlib.suppress(RobotiqConnectionError):
                 await here.hand.start(activate=False)
+                await here.hand.set_position(60, A)
+            await asyncio.sleep(5)
+        here.check_no_stale_status()
+
+
+@inside(world)
+async def test_after_what_was_left_over_the_next_start_finds_the_gripper(here: World) -> None:
+    await here.activate_beforehand()
+    async with here.server.fault_injector.making(Trouble("multiplexer", 0.03)):
+        await ask_and_go(here)
+        await asyncio.sleep(0.1)
+        with pytest.raises(ProtocolError, match="without a request"):
             await here.hand.start(activate=False)
-            with nobody_else_moves(here):
-                assert (await here.hand.move(60, A, speed=255)).positions[A] == pytest.approx(60, abs=2)
-            here.check_no_stale_status()
+        await here.hand.start(activate=False)
+        with nobody_else_moves(here):
+            assert (await here.hand.move(60, A, speed=255)).positions[A] == pytest.approx(60, abs=2)
+        here.check_no_stale_status()
 
 
-@virtual
+@inside(started)
 @pytest.mark.parametrize("late", [0.03, 0.2, 0.39])
-async def test_a_hand_comes_back_through_a_multiplexer(late: float) -> None:
+async def test_a_hand_comes_back_through_a_multiplexer(here: World, late: float) -> None:
     """A connection that asked before it knew what was left over would leave its own reply to the next one."""
-    async with started() as here, here.server.fault_injector.making(Trouble("multiplexer", late)):
+    async with here.server.fault_injector.making(Trouble("multiplexer", late)):
         await asyncio.sleep(1)
         for _ in range(5):
             await here.server.fault_injector.begin(Trouble("close"))
@@ -87,20 +85,19 @@ async def test_a_hand_comes_back_through_a_multiplexer(late: float) -> None:
         here.check_no_stale_status()
 
 
-@virtual
+@inside(started)
 @pytest.mark.parametrize("late", [0.46, 0.5, 0.55, 0.7])
-async def test_no_status_is_older_than_a_reply_may_be(late: float) -> None:
+async def test_no_status_is_older_than_a_reply_may_be(here: World, late: float) -> None:
     """Each reply comes to the connection after the one that asked, which has given up by then."""
-    async with started() as here:
-        async with here.server.fault_injector.making(Trouble("multiplexer", late)):
-            for position in range(20):
-                with contextlib.suppress(RobotiqConnectionError):
-                    await here.hand.set_position(10 * position, A)
-                await asyncio.sleep(1)
-            here.check_no_stale_status()
-            with pytest.raises(ConnectionLostError):
-                await here.hand.set_position(0, A)
-        await here.hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
-        with nobody_else_moves(here):
-            await here.hand.move(60, A, speed=255)
+    async with here.server.fault_injector.making(Trouble("multiplexer", late)):
+        for position in range(20):
+            with contextlib.suppress(RobotiqConnectionError):
+                await here.hand.set_position(10 * position, A)
+            await asyncio.sleep(1)
         here.check_no_stale_status()
+        with pytest.raises(ConnectionLostError):
+            await here.hand.set_position(0, A)
+    await here.hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
+    with nobody_else_moves(here):
+        await here.hand.move(60, A, speed=255)
+    here.check_no_stale_status()

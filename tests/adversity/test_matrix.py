@@ -50,7 +50,7 @@ def expected(cell: Cell, model: Model) -> str:
 
 def tried(cell: Cell, model: Model, patch: pytest.MonkeyPatch) -> str:
     async def main() -> str:
-        async with world(cell.link, patch=patch, model=model) as here:
+        async with world(cell.link, monkeypatch=patch, model=model) as here:
             return await outcome(here, cell.phase, cell.trouble)
 
     try:

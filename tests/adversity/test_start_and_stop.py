@@ -11,98 +11,95 @@ from robotiq_async import Finger, NotStartedError, RobotiqError, State
 from robotiq_async.simulator import Trouble
 from robotiq_async.values.request import Request
 from tests.adversity.phases import PHASES, Phase
-from tests.adversity.world import started, world
-from tests.virtual import run, virtual
+from tests.adversity.world import World, started, world
+from tests.virtual import inside
 
 A = Finger.A
 
 
-@virtual
+@inside(world)
 @pytest.mark.parametrize("device_cycle", [0.005, 0.05, 0.1, 0.2])
 @pytest.mark.parametrize("after", [0.001, 0.02, 0.15])
 async def test_a_start_that_was_cancelled_does_not_disturb_the_next(
-    device_cycle: float, after: float
+    here: World, device_cycle: float, after: float
 ) -> None:
-    async with world() as here:
-        here.gripper.device_cycle = device_cycle * here.gripper.speedup
-        with pytest.raises(TimeoutError):
-            async with asyncio.timeout(after):
-                await here.hand.start()
-        await here.hand.start()
-        assert here.hand.state is State.RUNNING_IDLE
-        await here.nothing_moves_for(6)
+    here.gripper.device_cycle = device_cycle * here.gripper.speedup
+    with pytest.raises(TimeoutError):
+        async with asyncio.timeout(after):
+            await here.hand.start()
+    await here.hand.start()
+    assert here.hand.state is State.RUNNING_IDLE
+    await here.nothing_moves_for(6)
 
 
-@virtual
+@inside(world)
 @pytest.mark.parametrize("device_cycle", [0.01, 0.1])
-async def test_an_activation_that_was_cancelled_and_reset_can_be_asked_for_again(device_cycle: float) -> None:
-    async with world() as here:
-        here.gripper.device_cycle = device_cycle * here.gripper.speedup
-        await here.hand.start(activate=False)
-        with pytest.raises(TimeoutError):
-            async with asyncio.timeout(0.02):
-                await here.hand.activate()
-        await here.hand.reset()
-        assert here.hand.state is State.RESET
-        await here.nothing_moves_for(1)
-        await here.hand.activate()
+async def test_an_activation_that_was_cancelled_and_reset_can_be_asked_for_again(
+    here: World, device_cycle: float
+) -> None:
+    here.gripper.device_cycle = device_cycle * here.gripper.speedup
+    await here.hand.start(activate=False)
+    with pytest.raises(TimeoutError):
+        async with asyncio.timeout(0.02):
+            await here.hand.activate()
+    await here.hand.reset()
+    assert here.hand.state is State.RESET
+    await here.nothing_moves_for(1)
+    await here.hand.activate()
 
 
-@virtual
+@inside(world, speedup=1.0)
 @pytest.mark.parametrize("how", ["start", "stop"])
-async def test_an_activation_of_ours_is_taken_back_also_after_the_link_blinked(how: str) -> None:
-    async with world(speedup=1.0) as here:
-        if how == "stop":
-            await here.hand.start(activate=False)
-        activating = asyncio.create_task(here.hand.start() if how == "start" else here.hand.activate())
-        await here.until_moving()
-        await here.server.fault_injector.begin(Trouble("close"))
-        with pytest.raises(RobotiqError):
-            await activating
-        if how == "stop":
-            await asyncio.sleep(0.5)
-            await here.hand.stop()
-        await here.nothing_moves_for(6, tolerance=2)
-
-
-@virtual
-@pytest.mark.parametrize("device_cycle", [0.005, 0.05, 0.2])
-async def test_stop_during_a_reset_does_not_activate_again(device_cycle: float) -> None:
-    async with world() as here:
-        here.gripper.device_cycle = device_cycle * here.gripper.speedup
-        await here.activate_beforehand()
-        await here.hand.start()
-        resetting = asyncio.create_task(here.hand.reset())
-        await here.until_state(State.WF_RESET)
+async def test_an_activation_of_ours_is_taken_back_also_after_the_link_blinked(here: World, how: str) -> None:
+    if how == "stop":
+        await here.hand.start(activate=False)
+    activating = asyncio.create_task(here.hand.start() if how == "start" else here.hand.activate())
+    await here.until_moving()
+    await here.server.fault_injector.begin(Trouble("close"))
+    with pytest.raises(RobotiqError):
+        await activating
+    if how == "stop":
+        await asyncio.sleep(0.5)
         await here.hand.stop()
-        with pytest.raises(NotStartedError):
-            await resetting
-        await here.nothing_moves_for(6)
-        assert not Request.from_registers(here.gripper.request_registers).activate
+    await here.nothing_moves_for(6, tolerance=2)
 
 
-@virtual
+@inside(world)
+@pytest.mark.parametrize("device_cycle", [0.005, 0.05, 0.2])
+async def test_stop_during_a_reset_does_not_activate_again(here: World, device_cycle: float) -> None:
+    here.gripper.device_cycle = device_cycle * here.gripper.speedup
+    await here.activate_beforehand()
+    await here.hand.start()
+    resetting = asyncio.create_task(here.hand.reset())
+    await here.until_state(State.WF_RESET)
+    await here.hand.stop()
+    with pytest.raises(NotStartedError):
+        await resetting
+    await here.nothing_moves_for(6)
+    assert not Request.from_registers(here.gripper.request_registers).activate
+
+
+@inside(world)
 @pytest.mark.parametrize("device_cycle", [0.005, 0.2])
 @pytest.mark.parametrize("after", [0.0, 0.02, 0.3])
 @pytest.mark.parametrize(
     "phase", [phase for phase in PHASES if phase.name != "releasing"], ids=lambda phase: phase.name
 )
 async def test_a_stop_that_keeps_a_grip_leaves_nothing_moving_whatever_it_meets(
-    phase: Phase, after: float, device_cycle: float
+    here: World, phase: Phase, after: float, device_cycle: float
 ) -> None:
     """A release aside: rGTO does not end it, and no stop does."""
-    async with world() as here:
-        call = await phase.reach(here)
-        here.gripper.device_cycle = device_cycle * here.gripper.speedup
-        task = asyncio.ensure_future(asyncio.sleep(0) if call is None else call())
-        await asyncio.sleep(after)
-        began = here.loop.time()
-        await here.hand.stop(keep_grip=True)
-        assert here.loop.time() - began < 2.0
-        await asyncio.gather(task, return_exceptions=True)
-        await here.nothing_moves_for(6)
-        if phase.name == "holding":
-            assert here.gripper.grips == Finger.ABC
+    call = await phase.reach(here)
+    here.gripper.device_cycle = device_cycle * here.gripper.speedup
+    task = asyncio.ensure_future(asyncio.sleep(0) if call is None else call())
+    await asyncio.sleep(after)
+    began = here.loop.time()
+    await here.hand.stop(keep_grip=True)
+    assert here.loop.time() - began < 2.0
+    await asyncio.gather(task, return_exceptions=True)
+    await here.nothing_moves_for(6)
+    if phase.name == "holding":
+        assert here.gripper.grips == Finger.ABC
 
 
 class FullDisk(logging.Handler):
@@ -110,27 +107,25 @@ class FullDisk(logging.Handler):
         raise OSError(28, "no space left on device")
 
 
-def test_a_log_handler_that_fails_does_not_keep_the_fingers_from_stopping(
-    capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+@inside(started)
+async def test_a_log_handler_that_fails_does_not_keep_the_fingers_from_stopping(
+    here: World,
+    capsys: pytest.CaptureFixture[str],
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     caplog.set_level(logging.INFO, logger="robotiq_async")
     logger, handler = logging.getLogger("robotiq_async"), FullDisk()
-
-    async def main() -> None:
-        async with started() as here:
-            moving = asyncio.create_task(here.hand.move(255, A, speed=0))
-            waiting = asyncio.create_task(here.hand.wait_for_state(State.FAULT))
-            await asyncio.sleep(0.3)
-            logger.addHandler(handler)
-            await here.hand.stop()
-            assert not here.gripper.is_moving
-            for task in (moving, waiting):
-                with pytest.raises(NotStartedError):
-                    await task
-            await here.hand.start()
-
+    moving = asyncio.create_task(here.hand.move(255, A, speed=0))
+    waiting = asyncio.create_task(here.hand.wait_for_state(State.FAULT))
+    await asyncio.sleep(0.3)
+    logger.addHandler(handler)
     try:
-        run(main)
+        await here.hand.stop()
+        assert not here.gripper.is_moving
+        for task in (moving, waiting):
+            with pytest.raises(NotStartedError):
+                await task
+        await here.hand.start()
     finally:
         logger.removeHandler(handler)
     assert "no space left" in capsys.readouterr().err

@@ -183,7 +183,7 @@ class World:
 async def world(
     link: str = "tcp",
     *,
-    patch: pytest.MonkeyPatch | None = None,
+    monkeypatch: pytest.MonkeyPatch | None = None,
     speedup: float = SPEEDUP,
     model: Model = MODEL,
     **options: object,
@@ -192,7 +192,7 @@ async def world(
 
     Args:
         link: tcp or rtu.
-        patch: for rtu, where the fake serial ports are put in place.
+        monkeypatch: for rtu, where the fake serial ports are put in place.
         speedup: of the gripper.
         model: of the gripper, and of the hand.
         options: for the hand.
@@ -202,8 +202,8 @@ async def world(
     line: VirtualLine | None = None
     server: TcpServer | RtuServer
     if link == "rtu":
-        assert patch is not None
-        line = VirtualLine(patch)
+        assert monkeypatch is not None
+        line = VirtualLine(monkeypatch)
         server, address = RtuServer(line.FAR, gripper), f"rtu://{line.NEAR}"
     else:
         server, address = TcpServer(gripper), ""

@@ -3,32 +3,56 @@
 from __future__ import annotations
 
 import asyncio
-import functools
+import inspect
 from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from contextlib import asynccontextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import pytest
 
-from robotiq_async import Finger, RobotiqHand, State
+from robotiq_async import RobotiqHand, State
 from robotiq_async.hand import Hand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.values.model import THREE_FINGER, Model
 from robotiq_async.values.request import Request
 from tests.fleet.lab import SPEEDUP, Lab, lab
 from tests.grippers import activate_beforehand
-from tests.virtual import virtual
+from tests.virtual import inside, until
 
+T = TypeVar("T")
 LOCAL, REMOTE = "local", "remote"
 A, B, C, S = THREE_FINGER.axes
 HABIT: ContextVar[tuple[Trouble | None, Mapping[str, Any]]] = ContextVar("habit", default=(None, {}))
 """What is otherwise with the gripper of a hand of this process, and the options of that hand."""
+CALLS: dict[str, dict[str, Any]] = {
+    "move": {"fingers": A, "position": 3, "speed": 3, "force": 3, "timeout": 1.0},
+    "open": {"fingers": A, "speed": 3, "force": 3, "timeout": 1.0},
+    "close": {"fingers": A, "speed": 3, "force": 3, "timeout": 1.0},
+    "grasp": {"fingers": A, "at_least": 1, "speed": 3, "force": 3, "timeout": 1.0},
+    "set_position": {"fingers": A, "value": 3},
+    "set_speed": {"fingers": A, "value": 3},
+    "set_force": {"fingers": A, "value": 3},
+    "command": {"fingers": A, "position": 3, "speed": 3, "force": 3},
+    "hold": {"fingers": A},
+    "halt": {},
+    "reset": {},
+    "activate": {},
+    "atr": {},
+    "recover": {"timeout": 1.0},
+    "wait_for_state": {"states": (State.FAULT,), "timeout": 1.0},
+    "stop": {},
+    "statuses": {"buffer": 3},
+    "transitions": {},
+    "requests": {"buffer": 3},
+    "grip_events": {"fingers": A, "slip": 3},
+}
+"""The calls of a hand, with valid arguments in the order in which they are checked."""
+STREAMS = ("statuses", "transitions", "requests", "grip_events")
+COMMANDS = [name for name in CALLS if name not in (*STREAMS, "wait_for_state", "stop")]
 MODEL: ContextVar[Model] = ContextVar("model", default=THREE_FINGER)
 """What the gripper is."""
-LIMIT_S = 500.0
-"""Of virtual time: what takes longer hangs."""
 
 
 @dataclass
@@ -44,6 +68,16 @@ class Bench:
     server: SimulatorServer
     make: Callable[[], Hand]
     lab: Lab | None = None
+
+    @asynccontextmanager
+    async def hand(self) -> AsyncIterator[Hand]:
+        """A hand that is started, and activates nothing."""
+        hand = self.make()
+        try:
+            await hand.start(activate=False)
+            yield hand
+        finally:
+            await hand.stop()
 
     @property
     def writes(self) -> int:
@@ -61,13 +95,30 @@ class Bench:
         """Wait until the gripper moves."""
         await until(lambda: self.gripper.is_moving)
 
+    async def moving(self, work: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
+        """Begin a call, and wait until the gripper moves."""
+        task = asyncio.create_task(work)
+        await self.moves()
+        return task
+
+    async def unplug(self, hand: Hand) -> None:
+        """Take away the link between hand, or agent, and gripper, and wait until the hand shows it."""
+        self.server.refuse()
+        self.server.cut()
+        await hand.wait_for_state(State.DISCONNECTED)
+
+    async def plug(self, hand: Hand) -> None:
+        await self.server.accept()
+        await hand.wait_for_state(State.RUNNING_IDLE)
+
 
 @asynccontextmanager
 async def bench(where: str, *, active: bool = True) -> AsyncIterator[Bench]:
     """A gripper that is active, or reset, and a way to make hands on it."""
     if where == REMOTE:
         async with lab(active=active, model=MODEL.get()) as here:
-            await connected(here)
+            # Until the agent has its gripper.
+            await until(lambda: here.local.state not in (State.DISCONNECTED, State.SHUTDOWN))
             names = iter(range(1000))
             yield Bench(here.gripper, here.server, lambda: here.client(f"client {next(names)}"), here)
         return
@@ -83,30 +134,26 @@ async def bench(where: str, *, active: bool = True) -> AsyncIterator[Bench]:
         yield Bench(gripper, server, lambda: RobotiqHand(server.address, model=gripper.model, **options))
 
 
-async def connected(here: Lab) -> None:
-    """Wait until the agent has its gripper."""
-    await until(lambda: here.local.state not in (State.DISCONNECTED, State.SHUTDOWN))
+def contract(
+    test: Callable[..., Coroutine[Any, Any, None]] | None = None, *, active: bool = True
+) -> Callable[..., Any]:
+    """Let a coroutine function be a test of both hands, inside a :func:`bench`."""
+
+    def of_both(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:
+        both: Callable[..., None] = pytest.mark.parametrize("where", [LOCAL, REMOTE])(
+            inside(bench, "where", active=active)(test)
+        )
+        return both
+
+    return of_both if test is None else of_both(test)
 
 
-async def until(condition: Callable[[], bool]) -> None:
-    """Look at every virtual millisecond: a gripper sends no events."""
-    loop = asyncio.get_running_loop()
-    while not condition():
-        turn = loop.create_future()
-        loop.call_later(0.001, turn.set_result, None)
-        await turn
-
-
-def contract(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:
-    """Let a coroutine function be a test of both hands; ``where`` says of which."""
-
-    @functools.wraps(test)
-    async def within_limits(**arguments: Any) -> None:
-        async with asyncio.timeout(LIMIT_S):
-            await test(**arguments)
-
-    both: Callable[..., None] = pytest.mark.parametrize("where", [LOCAL, REMOTE])(virtual(within_limits))
-    return both
+async def called(hand: Any, name: str, **changed: Any) -> None:
+    """Make a call of the table, with other arguments where they are given."""
+    arguments = CALLS.get(name, {}) | changed
+    outcome = getattr(hand, name)(*arguments.pop("states", ()), **arguments)
+    if inspect.isawaitable(outcome):
+        await outcome
 
 
 async def at_rest(hand: Hand) -> None:
@@ -126,21 +173,3 @@ async def ended(task: asyncio.Task[Any]) -> BaseException | None:
     """How a task ends."""
     await asyncio.wait({task})
     return asyncio.CancelledError() if task.cancelled() else task.exception()
-
-
-__all__ = [
-    "LOCAL",
-    "REMOTE",
-    "A",
-    "B",
-    "Bench",
-    "C",
-    "Finger",
-    "S",
-    "at_rest",
-    "bench",
-    "contract",
-    "ended",
-    "statuses",
-    "until",
-]

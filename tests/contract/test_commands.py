@@ -3,242 +3,216 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Any
 
 import pytest
 
 from robotiq_async import Finger, MoveSupersededError, NotActivatedError, State
-from tests.contract.bench import A, B, C, S, at_rest, bench, contract, ended
+from robotiq_async.hand import Hand
+from tests.contract.bench import A, B, Bench, C, S, at_rest, contract, ended
 
 
 @contract
-async def test_set_position_returns_when_acknowledged(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        await hand.set_position(200, A)
-        assert here.last_write.position(A) == 200
-        assert here.gripper.position(A) < 100
-        assert hand.is_moving
+async def test_set_position_returns_when_acknowledged(here: Bench, hand: Hand) -> None:
+    await hand.set_position(200, A)
+    assert here.last_write.position(A) == 200
+    assert here.gripper.position(A) < 100
+    assert hand.is_moving
 
 
 @contract
-async def test_speed_and_force_start_no_motion(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        travels = here.travels
-        await hand.set_speed(7, A | S)
-        await hand.set_force(9, B)
-        assert [axis.speed for axis in here.last_write.axes] == [7, 128, 128, 7]
-        assert [axis.force for axis in here.last_write.axes] == [64, 9, 64, 64]
-        await asyncio.sleep(2)
-        assert here.travels == travels
+async def test_speed_and_force_start_no_motion(here: Bench, hand: Hand) -> None:
+    travels = here.travels
+    await hand.set_speed(7, A | S)
+    await hand.set_force(9, B)
+    assert [axis.speed for axis in here.last_write.axes] == [7, 128, 128, 7]
+    assert [axis.force for axis in here.last_write.axes] == [64, 9, 64, 64]
+    await asyncio.sleep(2)
+    assert here.travels == travels
 
 
 @contract
-async def test_a_command_moves_only_what_it_addresses(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        before = here.travels
-        await hand.set_position(100, B)
-        await at_rest(hand)
-        assert [after > was for after, was in zip(here.travels, before, strict=True)] == [
-            False,
-            True,
-            False,
-            False,
-        ]
+async def test_a_command_moves_only_what_it_addresses(here: Bench, hand: Hand) -> None:
+    before = here.travels
+    await hand.set_position(100, B)
+    await at_rest(hand)
+    assert [after > was for after, was in zip(here.travels, before, strict=True)] == [
+        False,
+        True,
+        False,
+        False,
+    ]
 
 
 @contract
-async def test_a_command_moves_from_the_moment_it_is_asked_for(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        hand.command(position=100)
-        moves = []
-        async for _ in hand.statuses():
-            moves.append(hand.is_moving)
-            if not moves[-1]:
-                break
-        assert len(moves) > 20, "it does not seem to stand in between"
-        assert here.gripper.position(A) == pytest.approx(100, abs=2)
+async def test_a_command_moves_from_the_moment_it_is_asked_for(here: Bench, hand: Hand) -> None:
+    hand.command(position=100)
+    moves = []
+    async for _ in hand.statuses():
+        moves.append(hand.is_moving)
+        if not moves[-1]:
+            break
+    assert len(moves) > 20, "it does not seem to stand in between"
+    assert here.gripper.position(A) == pytest.approx(100, abs=2)
 
 
 @contract
-async def test_is_moving_right_after_a_command(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        hand.command(speed=3)
-        assert not hand.is_moving
-        hand.command(position=100)
-        assert hand.is_moving
+async def test_is_moving_right_after_a_command(here: Bench, hand: Hand) -> None:
+    hand.command(speed=3)
+    assert not hand.is_moving
+    hand.command(position=100)
+    assert hand.is_moving
 
 
 @contract
-async def test_the_last_value_wins(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        writes = here.writes
-        for value in range(200):
-            hand.command(position=value)
-        hand.command(A, speed=255)
-        hand.command(C, force=11)
-        await at_rest(hand)
-        assert here.last_write.position(A) == 199
-        assert [axis.speed for axis in here.last_write.axes] == [255, 128, 128, 128]
-        assert here.last_write.axes[2].force == 11
-        assert here.writes <= writes + 5, "nothing queues"
+async def test_the_last_value_wins(here: Bench, hand: Hand) -> None:
+    writes = here.writes
+    for value in range(200):
+        hand.command(position=value)
+    hand.command(A, speed=255)
+    hand.command(C, force=11)
+    await at_rest(hand)
+    assert here.last_write.position(A) == 199
+    assert [axis.speed for axis in here.last_write.axes] == [255, 128, 128, 128]
+    assert here.last_write.axes[2].force == 11
+    assert here.writes <= writes + 5, "nothing queues"
 
 
 @contract
-async def test_a_loop_that_commands_at_every_status(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        value = 0
-        async for _ in hand.statuses():
-            value += 1
-            hand.command(position=value)
-            if value == 100:
-                break
-        await at_rest(hand)
-        assert here.last_write.position(A) == 100
+async def test_a_loop_that_commands_at_every_status(here: Bench, hand: Hand) -> None:
+    value = 0
+    async for _ in hand.statuses():
+        value += 1
+        hand.command(position=value)
+        if value == 100:
+            break
+    await at_rest(hand)
+    assert here.last_write.position(A) == 100
 
 
 @contract
-async def test_what_was_commanded_last_wins_whichever_way(where: str) -> None:
-    for waits in (0, 1, 30):
-        async with bench(where) as here, here.make() as hand:
-            for value in range(waits):
-                hand.command(position=value)
-            hand.command(position=90)
-            await hand.set_position(30)
-            await at_rest(hand)
-            assert here.last_write.position(A) == 30
-            assert here.gripper.position(A) == pytest.approx(30, abs=2)
+@pytest.mark.parametrize("waits", [0, 1, 30])
+async def test_what_was_commanded_last_wins_whichever_way(here: Bench, hand: Hand, waits: int) -> None:
+    for value in range(waits):
+        hand.command(position=value)
+    hand.command(position=90)
+    await hand.set_position(30)
+    await at_rest(hand)
+    assert here.last_write.position(A) == 30
+    assert here.gripper.position(A) == pytest.approx(30, abs=2)
 
 
 @contract
-async def test_awaited_commands_keep_their_order(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        await asyncio.gather(*(hand.set_position(value) for value in (200, 100, 40)))
-        await at_rest(hand)
-        assert here.gripper.position(A) == pytest.approx(40, abs=2)
+async def test_awaited_commands_keep_their_order(here: Bench, hand: Hand) -> None:
+    await asyncio.gather(*(hand.set_position(value) for value in (200, 100, 40)))
+    await at_rest(hand)
+    assert here.gripper.position(A) == pytest.approx(40, abs=2)
 
 
 @contract
-async def test_a_halt_stops_every_axis(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        await hand.set_position(255, Finger.ALL)
-        await here.moves()
-        await hand.halt()
-        assert not hand.is_moving
-        assert not here.gripper.is_moving
-        assert not here.last_write.go
-        await hand.move(20, A)
+async def test_a_halt_stops_every_axis(here: Bench, hand: Hand) -> None:
+    await hand.set_position(255, Finger.ALL)
+    await here.moves()
+    await hand.halt()
+    assert not hand.is_moving
+    assert not here.gripper.is_moving
+    assert not here.last_write.go
+    await hand.move(20, A)
 
 
 @contract
 @pytest.mark.parametrize("count", [1, 3, 50])
-async def test_nothing_commanded_before_a_halt_comes_after_it(where: str, count: int) -> None:
-    async with bench(where) as here, here.make() as hand:
-        for value in range(count):
-            hand.command(position=255 - value)
-        await hand.halt()
-        assert not hand.is_moving
-        await asyncio.sleep(1)
-        travels = here.travels
-        await asyncio.sleep(1)
-        assert here.travels == travels
-        assert not here.last_write.go
+async def test_nothing_commanded_before_a_halt_comes_after_it(here: Bench, hand: Hand, count: int) -> None:
+    for value in range(count):
+        hand.command(position=255 - value)
+    await hand.halt()
+    assert not hand.is_moving
+    await asyncio.sleep(1)
+    travels = here.travels
+    await asyncio.sleep(1)
+    assert here.travels == travels
+    assert not here.last_write.go
 
 
 @contract
-async def test_a_cancelled_halt_is_sent_all_the_same(where: str) -> None:
-    for turns in range(6):
-        async with bench(where) as here, here.make() as hand:
-            await hand.set_position(255, Finger.ALL)
-            await here.moves()
-            halting = asyncio.create_task(hand.halt())
-            for _ in range(turns + 1):
-                await asyncio.sleep(0)
-            halting.cancel()
-            assert isinstance(await ended(halting), asyncio.CancelledError)
-            await at_rest(hand)
-            assert here.gripper.position(A) < 200, turns
+@pytest.mark.parametrize("turns", range(6))
+async def test_a_cancelled_halt_is_sent_all_the_same(here: Bench, hand: Hand, turns: int) -> None:
+    await hand.set_position(255, Finger.ALL)
+    await here.moves()
+    halting = asyncio.create_task(hand.halt())
+    for _ in range(turns + 1):
+        await asyncio.sleep(0)
+    halting.cancel()
+    assert isinstance(await ended(halting), asyncio.CancelledError)
+    await at_rest(hand)
+    assert here.gripper.position(A) < 200, turns
+
+
+@contract(active=False)
+async def test_a_halt_during_an_activation_ends_in_reset(here: Bench, hand: Hand) -> None:
+    activating = await here.moving(hand.activate())
+    await hand.halt()
+    assert hand.state is State.RESET
+    assert not here.gripper.is_moving
+    assert isinstance(await ended(activating), NotActivatedError)
+    await hand.halt()
 
 
 @contract
-async def test_a_halt_during_an_activation_ends_in_reset(where: str) -> None:
-    async with bench(where, active=False) as here:
-        hand = here.make()
-        await hand.start(activate=False)
-        activating = asyncio.create_task(hand.activate())
-        await here.moves()
-        await hand.halt()
-        assert hand.state is State.RESET
-        assert not here.gripper.is_moving
-        assert isinstance(await ended(activating), NotActivatedError)
-        await hand.halt()
-        await hand.stop()
+async def test_a_hold_keeps_axes_where_they_are(here: Bench, hand: Hand) -> None:
+    await hand.set_speed(50)
+    await hand.set_position(200, Finger.ABC)
+    await here.moves()
+    await asyncio.sleep(0.2)
+    await hand.hold(A | B)
+    at = here.gripper.position(A)
+    await at_rest(hand)
+    assert here.gripper.position(A) == pytest.approx(at, abs=6)
+    assert here.gripper.position(A) < 150
+    assert here.gripper.position(C) == pytest.approx(200, abs=2)
 
 
 @contract
-async def test_a_hold_keeps_axes_where_they_are(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        holds: Any = hand
-        await hand.set_speed(50)
-        await hand.set_position(200, Finger.ABC)
-        await here.moves()
-        await asyncio.sleep(0.2)
-        await holds.hold(A | B)
-        at = here.gripper.position(A)
-        await at_rest(hand)
-        assert here.gripper.position(A) == pytest.approx(at, abs=6)
-        assert here.gripper.position(A) < 150
-        assert here.gripper.position(C) == pytest.approx(200, abs=2)
+async def test_a_hold_leaves_a_grip_alone(here: Bench, hand: Hand) -> None:
+    here.gripper.place_object(Finger.ABC, position=100)
+    await hand.move(255)
+    await hand.hold()
+    await asyncio.sleep(0.1)
+    assert here.last_write.position(A) == 255
+    assert hand.status.contacts == Finger.ABC
 
 
 @contract
-async def test_a_hold_leaves_a_grip_alone(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        holds: Any = hand
-        here.gripper.place_object(Finger.ABC, position=100)
-        await hand.move(255)
-        await holds.hold()
-        await asyncio.sleep(0.1)
-        assert here.last_write.position(A) == 255
-        assert hand.status.contacts == Finger.ABC
+@pytest.mark.parametrize("turns", range(8))
+async def test_a_cancelled_command_is_carried_out_or_not_and_the_next_one_works(
+    here: Bench, hand: Hand, turns: int
+) -> None:
+    setting = asyncio.create_task(hand.set_position(200))
+    for _ in range(turns):
+        await asyncio.sleep(0)
+    setting.cancel()
+    await ended(setting)
+    await hand.set_position(30)
+    await at_rest(hand)
+    assert here.gripper.position(A) == pytest.approx(30, abs=2)
 
 
-@contract
-async def test_a_cancelled_command_is_carried_out_or_not_and_the_next_one_works(where: str) -> None:
-    for turns in range(8):
-        async with bench(where) as here, here.make() as hand:
-            setting = asyncio.create_task(hand.set_position(200))
-            for _ in range(turns):
-                await asyncio.sleep(0)
-            setting.cancel()
-            await ended(setting)
-            await hand.set_position(30)
-            await at_rest(hand)
-            assert here.gripper.position(A) == pytest.approx(30, abs=2)
-
-
-@contract
-async def test_while_reset_nothing_moves(where: str) -> None:
-    async with bench(where, active=False) as here:
-        hand = here.make()
-        await hand.start(activate=False)
-        for call in (lambda: hand.move(100), lambda: hand.set_position(3), lambda: hand.set_speed(3)):
-            with pytest.raises(NotActivatedError):
-                await call()
+@contract(active=False)
+async def test_while_reset_nothing_moves(here: Bench, hand: Hand) -> None:
+    for call in (lambda: hand.move(100), lambda: hand.set_position(3), lambda: hand.set_speed(3)):
         with pytest.raises(NotActivatedError):
-            hand.command(position=3)
-        await hand.halt()
-        assert not here.writes
-        await hand.activate()
-        assert hand.state is State.RUNNING_IDLE
-        await hand.activate()
-        await hand.move(20, A)
-        await hand.stop()
+            await call()
+    with pytest.raises(NotActivatedError):
+        hand.command(position=3)
+    await hand.halt()
+    assert not here.writes
+    await hand.activate()
+    assert hand.state is State.RUNNING_IDLE
+    await hand.activate()
+    await hand.move(20, A)
 
 
 @contract
-async def test_another_command_ends_a_move(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        moving = asyncio.create_task(hand.move(255, speed=0))
-        await here.moves()
-        hand.command(A, position=20)
-        assert isinstance(await ended(moving), MoveSupersededError)
+async def test_another_command_ends_a_move(here: Bench, hand: Hand) -> None:
+    moving = await here.moving(hand.move(255, speed=0))
+    hand.command(A, position=20)
+    assert isinstance(await ended(moving), MoveSupersededError)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from pathlib import Path
 from typing import NamedTuple
 
 import pytest
@@ -12,9 +11,9 @@ import pytest
 from robotiq_async import RobotiqError, RobotiqHand, State
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.hand import Hand
-from tests.contract.bench import LOCAL, REMOTE, A, Bench, bench, contract, ended, until
-
-PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "fleet.md"
+from tests.contract.bench import A, Bench, contract, ended
+from tests.pages import table
+from tests.virtual import until
 
 
 class Row(NamedTuple):
@@ -25,13 +24,8 @@ class Row(NamedTuple):
 
 
 def rows() -> dict[str, Row]:
-    _, _, section = PAGE.read_text(encoding="utf-8").partition("\n## What differs\n")
-    _, *rows = (
-        Row(*(word.strip() for word in line.strip("|").split("|")))
-        for line in section.splitlines()
-        if line.startswith("|") and not line.startswith("| --")
-    )
-    return {row.what: row for row in rows}
+    _, *rows = table("how-to/fleet.md", after="\n## What differs\n")
+    return {row[0]: Row(*row) for row in rows}
 
 
 def only_reads(here: Bench) -> Hand:
@@ -75,6 +69,8 @@ async def start_to_read(here: Bench) -> str:
 
 
 async def start_reset(here: Bench) -> str:
+    here.gripper.write(0, [0] * 8)
+    await asyncio.sleep(0.1)
     hand = only_reads(here)
     await hand.start()
     word = {State.RESET: "left in RESET", State.RUNNING_IDLE: "activated"}[hand.state]
@@ -100,8 +96,7 @@ async def other_moves(here: Bench) -> None:
 
 async def second_halt(here: Bench) -> str:
     async with here.make() as hand:
-        moving = asyncio.create_task(hand.move(255, speed=0))
-        await here.moves()
+        moving = await here.moving(hand.move(255, speed=0))
         second = only_reads(here)
         try:
             await second.start()
@@ -128,8 +123,7 @@ async def after_stop(here: Bench) -> str:
 
 async def cut_move(here: Bench) -> str:
     async with here.make() as hand:
-        moving = asyncio.create_task(hand.move(255, A, speed=40))
-        await here.moves()
+        moving = await here.moving(hand.move(255, A, speed=40))
         await network_down(here, 3.0)
         word = await outcome(moving, "done")
         if here.gripper.position(A) < 200:
@@ -223,10 +217,9 @@ PROBES: dict[str, Callable[[Bench], Awaitable[str]]] = {
 
 @contract
 @pytest.mark.parametrize("what", PROBES)
-async def test_a_row(where: str, what: str) -> None:
+async def test_a_row(here: Bench, what: str) -> None:
     row = rows()[what]
-    async with bench(where, active="is reset" not in what) as here:
-        assert await PROBES[what](here) == {LOCAL: row.local, REMOTE: row.remote}[where]
+    assert await PROBES[what](here) == (row.local if here.lab is None else row.remote)
 
 
 def test_every_row_is_tried_and_says_of_what_differs_why() -> None:

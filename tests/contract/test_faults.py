@@ -13,156 +13,137 @@ from robotiq_async import (
     State,
     StateTimeoutError,
 )
-from tests.contract.bench import A, at_rest, bench, contract, ended
+from robotiq_async.hand import Hand
+from tests.contract.bench import A, Bench, at_rest, contract, ended
 
 
 @contract
-async def test_a_minor_fault_ends_a_move_and_nothing_resumes(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        moving = asyncio.create_task(hand.move(255, speed=0))
-        await here.moves()
-        here.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
-        error = await ended(moving)
-        assert isinstance(error, GripperFaultError)
-        assert error.fault is Fault.COMMUNICATION_NOT_READY
-        await hand.wait_for_state(State.RUNNING_IDLE)
-        at = here.gripper.position(A)
-        await at_rest(hand)
-        assert here.gripper.position(A) == pytest.approx(at, abs=2)
+async def test_a_minor_fault_ends_a_move_and_nothing_resumes(here: Bench, hand: Hand) -> None:
+    moving = await here.moving(hand.move(255, speed=0))
+    here.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
+    error = await ended(moving)
+    assert isinstance(error, GripperFaultError)
+    assert error.fault is Fault.COMMUNICATION_NOT_READY
+    await hand.wait_for_state(State.RUNNING_IDLE)
+    at = here.gripper.position(A)
+    await at_rest(hand)
+    assert here.gripper.position(A) == pytest.approx(at, abs=2)
 
 
 @contract
 @pytest.mark.parametrize("fault", [Fault.SCISSOR_BLOCKED, 0x0C])
-async def test_a_major_fault(where: str, fault: int) -> None:
-    async with bench(where) as here, here.make() as hand:
-        moving = asyncio.create_task(hand.move(255, speed=0))
-        await here.moves()
-        here.gripper.inject_fault(fault)
-        await hand.wait_for_state(State.FAULT)
-        assert hand.state is State.FAULT
-        assert hand.status.fault == fault, "the status that shows it is there"
-        for error in (
-            await ended(moving),
-            await ended(asyncio.create_task(hand.move(3))),
-            await ended(asyncio.create_task(hand.activate())),
-        ):
-            assert isinstance(error, GripperFaultError)
-            assert error.fault is Fault(fault)
-            assert str(error)
-        with pytest.raises(GripperFaultError) as caught:
-            hand.command(position=3)
-        assert caught.value.fault is Fault(fault)
-        await hand.recover()
-        assert hand.state is State.RUNNING_IDLE
-        await hand.move(60, A)
+async def test_a_major_fault(here: Bench, hand: Hand, fault: int) -> None:
+    moving = await here.moving(hand.move(255, speed=0))
+    here.gripper.inject_fault(fault)
+    await hand.wait_for_state(State.FAULT)
+    assert hand.state is State.FAULT
+    assert hand.status.fault == fault, "the status that shows it is there"
+    for error in (
+        await ended(moving),
+        await ended(asyncio.create_task(hand.move(3))),
+        await ended(asyncio.create_task(hand.activate())),
+    ):
+        assert isinstance(error, GripperFaultError)
+        assert error.fault is Fault(fault)
+        assert str(error)
+    with pytest.raises(GripperFaultError) as caught:
+        hand.command(position=3)
+    assert caught.value.fault is Fault(fault)
+    await hand.recover()
+    assert hand.state is State.RUNNING_IDLE
+    await hand.move(60, A)
 
 
 @contract
-async def test_recover_waits_for_a_minor_fault_and_writes_nothing(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        here.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 2.0)
-        await hand.wait_for_state(State.FAULT)
-        writes = here.writes
-        await hand.recover()
-        assert hand.state is State.RUNNING_IDLE
-        assert here.writes == writes
+async def test_recover_waits_for_a_minor_fault_and_writes_nothing(here: Bench, hand: Hand) -> None:
+    here.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 2.0)
+    await hand.wait_for_state(State.FAULT)
+    writes = here.writes
+    await hand.recover()
+    assert hand.state is State.RUNNING_IDLE
+    assert here.writes == writes
 
 
 @contract
-async def test_recover_gives_up_in_time(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        here.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
-        await hand.wait_for_state(State.FAULT)
-        began = asyncio.get_running_loop().time()
-        with pytest.raises(StateTimeoutError):
-            await hand.recover(timeout=0.5)
-        assert 0.4 < asyncio.get_running_loop().time() - began < 0.7
+async def test_recover_gives_up_in_time(here: Bench, hand: Hand) -> None:
+    here.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
+    await hand.wait_for_state(State.FAULT)
+    began = asyncio.get_running_loop().time()
+    with pytest.raises(StateTimeoutError):
+        await hand.recover(timeout=0.5)
+    assert 0.4 < asyncio.get_running_loop().time() - began < 0.7
 
 
 @contract
-async def test_recover_while_running_does_nothing(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        writes = here.writes
-        await hand.recover()
-        assert here.writes == writes
+async def test_recover_while_running_does_nothing(here: Bench, hand: Hand) -> None:
+    writes = here.writes
+    await hand.recover()
+    assert here.writes == writes
 
 
 @contract
-async def test_a_release_only_in_fault(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        with pytest.raises(InvalidStateError) as caught:
-            await hand.atr()
-        assert caught.value.state is State.RUNNING_IDLE
-        assert caught.value.allowed == {State.FAULT}
-
-
-@contract
-async def test_release_reset_activate(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        await hand.move(150)
-        here.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
-        await hand.wait_for_state(State.FAULT)
+async def test_a_release_only_in_fault(here: Bench, hand: Hand) -> None:
+    with pytest.raises(InvalidStateError) as caught:
         await hand.atr()
-        assert hand.state is State.ATR_DONE
-        assert here.gripper.position(A) < 20
-        with pytest.raises(GripperFaultError):
-            await hand.set_position(3)
-        with pytest.raises(GripperFaultError):
-            hand.command(position=3)
-        await hand.reset()
-        assert hand.state is State.RESET
-        assert hand.is_reset
-        await hand.activate()
-        assert hand.state is State.RUNNING_IDLE
-        assert hand.is_activated
+    assert caught.value.state is State.RUNNING_IDLE
+    assert caught.value.allowed == {State.FAULT}
 
 
 @contract
-async def test_an_emergency_release(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        here.gripper.emergency_release()
-        await hand.wait_for_state(State.ATR_DONE)
-        await hand.recover()
-        assert hand.state is State.RUNNING_IDLE
+async def test_release_reset_activate(here: Bench, hand: Hand) -> None:
+    await hand.move(150)
+    here.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    await hand.wait_for_state(State.FAULT)
+    await hand.atr()
+    assert hand.state is State.ATR_DONE
+    assert here.gripper.position(A) < 20
+    with pytest.raises(GripperFaultError):
+        await hand.set_position(3)
+    with pytest.raises(GripperFaultError):
+        hand.command(position=3)
+    await hand.reset()
+    assert hand.state is State.RESET
+    assert hand.is_reset
+    await hand.activate()
+    assert hand.state is State.RUNNING_IDLE
+    assert hand.is_activated
 
 
 @contract
-async def test_a_cancelled_activation_goes_on(where: str) -> None:
-    async with bench(where, active=False) as here:
-        hand = here.make()
-        await hand.start(activate=False)
-        activating = asyncio.create_task(hand.activate())
-        await here.moves()
-        activating.cancel()
-        await ended(activating)
-        assert await hand.wait_for_state(State.RUNNING_IDLE, timeout=20) is State.RUNNING_IDLE
-        await hand.stop()
+async def test_an_emergency_release(here: Bench, hand: Hand) -> None:
+    here.gripper.emergency_release()
+    await hand.wait_for_state(State.ATR_DONE)
+    await hand.recover()
+    assert hand.state is State.RUNNING_IDLE
+
+
+@contract(active=False)
+async def test_a_cancelled_activation_goes_on(here: Bench, hand: Hand) -> None:
+    activating = await here.moving(hand.activate())
+    activating.cancel()
+    await ended(activating)
+    assert await hand.wait_for_state(State.RUNNING_IDLE, timeout=20) is State.RUNNING_IDLE
+
+
+@contract(active=False)
+async def test_a_command_during_an_activation(here: Bench, hand: Hand) -> None:
+    activating = asyncio.create_task(hand.activate())
+    await hand.wait_for_state(State.WF_ACTIVATION)
+    with pytest.raises(InvalidStateError) as caught:
+        hand.command(position=3)
+    assert caught.value.state is State.WF_ACTIVATION
+    assert State.RUNNING_IDLE in caught.value.allowed
+    with pytest.raises(InvalidStateError) as awaited:
+        await hand.set_position(3)
+    assert str(awaited.value) == str(caught.value)
+    assert awaited.value.allowed == caught.value.allowed
+    await activating
 
 
 @contract
-async def test_a_command_during_an_activation(where: str) -> None:
-    async with bench(where, active=False) as here:
-        hand = here.make()
-        await hand.start(activate=False)
-        activating = asyncio.create_task(hand.activate())
-        await hand.wait_for_state(State.WF_ACTIVATION)
-        with pytest.raises(InvalidStateError) as caught:
-            hand.command(position=3)
-        assert caught.value.state is State.WF_ACTIVATION
-        assert State.RUNNING_IDLE in caught.value.allowed
-        with pytest.raises(InvalidStateError) as awaited:
-            await hand.set_position(3)
-        assert str(awaited.value) == str(caught.value)
-        assert awaited.value.allowed == caught.value.allowed
-        await activating
-        await hand.stop()
-
-
-@contract
-async def test_a_foreign_reset(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        here.gripper.write(0, [0] * 8)
-        await hand.wait_for_state(State.RESET)
-        assert hand.is_reset
-        assert not hand.is_activated
-        await hand.activate()
+async def test_a_foreign_reset(here: Bench, hand: Hand) -> None:
+    here.gripper.write(0, [0] * 8)
+    await hand.wait_for_state(State.RESET)
+    assert hand.is_reset
+    assert not hand.is_activated
+    await hand.activate()

@@ -20,7 +20,20 @@ from robotiq_async import (
 from robotiq_async.fleet.network.bus import Bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.hand import Hand
-from tests.contract.bench import LOCAL, REMOTE, A, B, Bench, C, bench, contract, ended, statuses, until
+from tests.contract.bench import (
+    COMMANDS,
+    LOCAL,
+    REMOTE,
+    A,
+    B,
+    Bench,
+    C,
+    called,
+    contract,
+    ended,
+    statuses,
+)
+from tests.virtual import until
 
 
 @pytest.mark.parametrize("where", [LOCAL, REMOTE])
@@ -36,393 +49,323 @@ def test_constructing_needs_no_loop(where: str) -> None:
 
 
 @contract
-async def test_an_active_gripper_is_adopted_and_nothing_is_written(where: str) -> None:
-    async with bench(where) as here:
-        writes, travels = here.writes, here.travels
-        hand = here.make()
-        await hand.start()
+async def test_an_active_gripper_is_adopted_and_nothing_is_written(here: Bench) -> None:
+    writes, travels = here.writes, here.travels
+    async with here.make() as hand:
         assert hand.state is State.RUNNING_IDLE
         assert hand.is_activated
         assert not hand.is_reset
         assert not hand.is_moving
         await statuses(hand, 20)
         assert (here.writes, here.travels) == (writes, travels)
-        await hand.stop()
-        assert hand.state is State.SHUTDOWN
+    assert hand.state is State.SHUTDOWN
 
 
-@contract
-async def test_a_reset_gripper_is_activated(where: str) -> None:
-    async with bench(where, active=False) as here, here.make() as hand:
+@contract(active=False)
+async def test_a_reset_gripper_is_activated(here: Bench) -> None:
+    async with here.make() as hand:
         assert hand.state is State.RUNNING_IDLE
         assert hand.is_activated
 
 
-@contract
-async def test_without_activation_nothing_is_written(where: str) -> None:
-    async with bench(where, active=False) as here:
-        hand = here.make()
-        await hand.start(activate=False)
-        assert hand.state is State.RESET
-        assert hand.is_reset
-        await hand.stop(halt=False)
-        assert not here.writes
+@contract(active=False)
+async def test_without_activation_nothing_is_written(here: Bench, hand: Hand) -> None:
+    assert hand.state is State.RESET
+    assert hand.is_reset
+    await hand.stop(halt=False)
+    assert not here.writes
 
 
 @contract
-async def test_one_in_fault_is_left_there(where: str) -> None:
-    async with bench(where) as here:
-        here.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
-        await asyncio.sleep(0.1)
-        writes = here.writes
-        async with here.make() as hand:
-            assert hand.state is State.FAULT
-            assert here.writes == writes
+async def test_one_in_fault_is_left_there(here: Bench) -> None:
+    here.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    await asyncio.sleep(0.1)
+    writes = here.writes
+    async with here.make() as hand:
+        assert hand.state is State.FAULT
+        assert here.writes == writes
 
 
 @contract
-async def test_one_that_is_released_is_left_so(where: str) -> None:
-    async with bench(where) as here:
-        async with here.make() as hand:
-            here.gripper.emergency_release()
-            await hand.wait_for_state(State.ATR_DONE)
-        async with here.make() as hand:
-            assert hand.state is State.ATR_DONE
-            await hand.recover()
-            assert hand.state is State.RUNNING_IDLE
-
-
-@contract
-async def test_an_activation_under_way_is_waited_for(where: str) -> None:
-    async with bench(where, active=False) as here:
-        first = here.make()
-        await first.start(activate=False)
-        activating = asyncio.create_task(first.activate())
-        await here.moves()
-        activating.cancel()
-        await ended(activating)
-        await first.stop(halt=False)
-        assert here.gripper.is_moving
-        async with here.make() as hand:
-            assert hand.state is State.RUNNING_IDLE
-            assert hand.is_activated
-
-
-@contract
-async def test_an_activation_that_ends_in_a_fault_fails_the_start(where: str) -> None:
-    async with bench(where, active=False) as here:
-        here.gripper.fail_activation = True
-        hand = here.make()
-        with pytest.raises(GripperFaultError) as caught:
-            await hand.start()
-        assert caught.value.fault is Fault.ACTIVATION_FAULT
-        assert hand.state is State.SHUTDOWN
-        await hand.start()
-        assert hand.state is State.FAULT, "one that is there already is not start()'s business"
+async def test_one_that_is_released_is_left_so(here: Bench) -> None:
+    async with here.make() as hand:
+        here.gripper.emergency_release()
+        await hand.wait_for_state(State.ATR_DONE)
+    async with here.make() as hand:
+        assert hand.state is State.ATR_DONE
         await hand.recover()
         assert hand.state is State.RUNNING_IDLE
-        await hand.stop()
+
+
+@contract(active=False)
+async def test_an_activation_under_way_is_waited_for(here: Bench, hand: Hand) -> None:
+    activating = await here.moving(hand.activate())
+    activating.cancel()
+    await ended(activating)
+    await hand.stop(halt=False)
+    assert here.gripper.is_moving
+    async with here.make() as second:
+        assert second.state is State.RUNNING_IDLE
+        assert second.is_activated
+
+
+@contract(active=False)
+async def test_an_activation_that_ends_in_a_fault_fails_the_start(here: Bench) -> None:
+    here.gripper.fail_activation = True
+    hand = here.make()
+    with pytest.raises(GripperFaultError) as caught:
+        await hand.start()
+    assert caught.value.fault is Fault.ACTIVATION_FAULT
+    assert hand.state is State.SHUTDOWN
+    await hand.start()
+    assert hand.state is State.FAULT, "one that is there already is not start()'s business"
+    await hand.recover()
+    assert hand.state is State.RUNNING_IDLE
+    await hand.stop()
 
 
 @contract
-async def test_starting_twice_is_refused_and_changes_nothing(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        with pytest.raises(InvalidStateError) as caught:
-            await hand.start()
-        assert caught.value.state is State.RUNNING_IDLE
+async def test_starting_twice_is_refused_and_changes_nothing(here: Bench, hand: Hand) -> None:
+    with pytest.raises(InvalidStateError) as caught:
+        await hand.start()
+    assert caught.value.state is State.RUNNING_IDLE
+    await hand.move(50, A)
+
+
+@contract
+async def test_starting_twice_at_once_is_refused(here: Bench) -> None:
+    hand = here.make()
+    first, second = await asyncio.gather(hand.start(), hand.start(), return_exceptions=True)
+    assert (first, type(second)) == (None, InvalidStateError)
+    await hand.move(50, A)
+    await hand.stop()
+
+
+@contract
+async def test_it_may_be_started_again(here: Bench) -> None:
+    hand, newest = here.make(), -1
+    for _ in range(3):
+        await hand.start()
+        assert hand.status.sequence > newest, "sequences go on"
         await hand.move(50, A)
-
-
-@contract
-async def test_starting_twice_at_once_is_refused(where: str) -> None:
-    async with bench(where) as here:
-        hand = here.make()
-        first, second = await asyncio.gather(hand.start(), hand.start(), return_exceptions=True)
-        assert (first, type(second)) == (None, InvalidStateError)
-        await hand.move(50, A)
+        newest = hand.status.sequence
         await hand.stop()
+        assert hand.state is State.SHUTDOWN
+        assert hand.status.sequence >= newest, "the last status stays"
+    assert hand.statistics.foreign_commands == 0
 
 
 @contract
-async def test_it_may_be_started_again(where: str) -> None:
-    async with bench(where) as here:
-        hand, newest = here.make(), -1
-        for _ in range(3):
-            await hand.start()
-            assert hand.status.sequence > newest, "sequences go on"
-            await hand.move(50, A)
-            newest = hand.status.sequence
-            await hand.stop()
-            assert hand.state is State.SHUTDOWN
-            assert hand.status.sequence >= newest, "the last status stays"
-        assert hand.statistics.foreign_commands == 0
+async def test_stop_stops_the_fingers_and_keeps_the_activation(here: Bench) -> None:
+    async with here.make() as hand:
+        await hand.set_position(255)
+        await here.moves()
+    assert (here.last_write.activate, here.last_write.go) == (True, False)
+    assert not here.gripper.is_moving
+    await hand.stop()
+    await hand.stop()
 
 
 @contract
-async def test_stop_stops_the_fingers_and_keeps_the_activation(where: str) -> None:
-    async with bench(where) as here:
+async def test_stop_may_leave_the_fingers_to_what_they_do(here: Bench, hand: Hand) -> None:
+    await hand.set_position(200)
+    await here.moves()
+    writes = here.writes
+    await hand.stop(halt=False)
+    await asyncio.sleep(10)
+    assert here.writes == writes
+    assert here.gripper.position(A) >= 195
+
+
+@contract
+async def test_stop_may_keep_a_grip(here: Bench, hand: Hand) -> None:
+    here.gripper.place_object(B | C, 100)
+    await hand.close(B | C)
+    writes = here.writes
+    await hand.stop(keep_grip=True)
+    assert hand.state is State.SHUTDOWN
+    await asyncio.sleep(5)
+    assert here.gripper.grips == B | C
+    assert here.writes == writes
+
+
+@contract
+async def test_a_stop_that_keeps_a_grip_holds_what_moves(here: Bench, hand: Hand) -> None:
+    here.gripper.place_object(B | C, 100)
+    await hand.close(B | C)
+    await hand.set_speed(0, A)
+    await hand.set_position(255, A)
+    await here.moves()
+    await hand.stop(keep_grip=True)
+    assert not here.gripper.is_moving
+    await asyncio.sleep(5)
+    assert here.gripper.position(A) < 40
+    assert here.gripper.grips == B | C
+
+
+@contract
+async def test_in_a_fault_no_grip_is_kept(here: Bench, hand: Hand) -> None:
+    here.gripper.place_object(B | C, 100)
+    await hand.close(B | C)
+    here.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
+    await hand.wait_for_state(State.FAULT)
+    await hand.stop(keep_grip=True)
+    assert not here.last_write.go
+
+
+@contract
+async def test_stop_before_any_start(here: Bench) -> None:
+    await here.make().stop()
+
+
+@contract
+async def test_everybody_who_stops_it_waits_until_it_has_stopped(here: Bench, hand: Hand) -> None:
+    await hand.set_position(255)
+    await here.moves()
+
+    async def stop() -> bool:
+        await hand.stop()
+        return here.gripper.is_moving
+
+    assert await asyncio.gather(*(stop() for _ in range(3))) == [False] * 3
+
+
+@contract
+async def test_a_start_right_after_a_stop_that_was_not_waited_for(here: Bench, hand: Hand) -> None:
+    stopping = asyncio.create_task(hand.stop())
+    await asyncio.sleep(0)
+    with pytest.raises(InvalidStateError):
+        await hand.start()
+    await stopping
+    assert hand.state is State.SHUTDOWN
+
+
+@contract
+async def test_a_cancelled_stop_still_stops(here: Bench, hand: Hand) -> None:
+    await hand.set_position(255)
+    await here.moves()
+    stopping = asyncio.create_task(hand.stop())
+    await asyncio.sleep(0)
+    stopping.cancel()
+    assert isinstance(await ended(stopping), asyncio.CancelledError)
+    assert hand.state is State.SHUTDOWN
+    assert not here.gripper.is_moving
+
+
+@contract(active=False)
+async def test_a_stop_while_it_starts_ends_the_start(here: Bench) -> None:
+    hand = here.make()
+    starting = asyncio.create_task(hand.start())
+    await asyncio.sleep(0)
+    await hand.stop()
+    assert isinstance(await ended(starting), NotStartedError)
+    assert hand.state is State.SHUTDOWN
+    await asyncio.sleep(1)
+    assert not here.gripper.is_moving
+
+
+@contract(active=False)
+async def test_a_cancelled_start_takes_its_activation_back(here: Bench) -> None:
+    hand = here.make()
+    starting = await here.moving(hand.start())
+    starting.cancel()
+    assert isinstance(await ended(starting), asyncio.CancelledError)
+    assert hand.state is State.SHUTDOWN
+    assert not here.gripper.is_moving
+    assert not here.last_write.activate
+    await hand.start(activate=False)
+    assert hand.state is State.RESET
+    await hand.stop()
+
+
+@contract
+async def test_leaving_through_an_exception_stops_the_fingers(here: Bench) -> None:
+    async def fail() -> None:
         async with here.make() as hand:
             await hand.set_position(255)
             await here.moves()
-        assert (here.last_write.activate, here.last_write.go) == (True, False)
-        assert not here.gripper.is_moving
-        await hand.stop()
-        await hand.stop()
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        await fail()
+    assert not here.gripper.is_moving
 
 
 @contract
-async def test_stop_may_leave_the_fingers_to_what_they_do(where: str) -> None:
-    async with bench(where) as here:
-        hand = here.make()
+async def test_leaving_by_cancellation_stops_the_fingers(here: Bench) -> None:
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(0.5), here.make() as hand:
+            await hand.move(255, speed=0)
+    assert not here.gripper.is_moving
+
+
+@contract
+async def test_nobody_there(here: Bench) -> None:
+    hand = here.make()
+    if here.lab is None:
+        here.server.refuse()
+        here.server.cut()
+    else:
+        await here.lab.end_agent()
+    with pytest.raises(ConnectFailedError) as caught:
         await hand.start()
-        await hand.set_position(200)
-        await here.moves()
-        writes = here.writes
-        await hand.stop(halt=False)
-        await asyncio.sleep(10)
-        assert here.writes == writes
-        assert here.gripper.position(A) >= 195
+    assert caught.value.address == hand.address
+    assert hand.state is State.SHUTDOWN
 
 
 @contract
-async def test_stop_may_keep_a_grip(where: str) -> None:
-    async with bench(where) as here:
-        here.gripper.place_object(B | C, 100)
-        hand = here.make()
-        await hand.start()
-        await hand.close(B | C)
-        writes = here.writes
-        await hand.stop(keep_grip=True)
-        assert hand.state is State.SHUTDOWN
-        await asyncio.sleep(5)
-        assert here.gripper.grips == B | C
-        assert here.writes == writes
-
-
-@contract
-async def test_a_stop_that_keeps_a_grip_holds_what_moves(where: str) -> None:
-    async with bench(where) as here:
-        here.gripper.place_object(B | C, 100)
-        hand = here.make()
-        await hand.start()
-        await hand.close(B | C)
-        await hand.set_speed(0, A)
-        await hand.set_position(255, A)
-        await here.moves()
-        await hand.stop(keep_grip=True)
-        assert not here.gripper.is_moving
-        await asyncio.sleep(5)
-        assert here.gripper.position(A) < 40
-        assert here.gripper.grips == B | C
-
-
-@contract
-async def test_in_a_fault_no_grip_is_kept(where: str) -> None:
-    async with bench(where) as here:
-        here.gripper.place_object(B | C, 100)
-        hand = here.make()
-        await hand.start()
-        await hand.close(B | C)
-        here.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
-        await hand.wait_for_state(State.FAULT)
-        await hand.stop(keep_grip=True)
-        assert not here.last_write.go
-
-
-@contract
-async def test_stop_before_any_start(where: str) -> None:
-    async with bench(where) as here:
-        await here.make().stop()
-
-
-@contract
-async def test_everybody_who_stops_it_waits_until_it_has_stopped(where: str) -> None:
-    async with bench(where) as here:
-        hand = here.make()
-        await hand.start()
-        await hand.set_position(255)
-        await here.moves()
-
-        async def stop() -> bool:
-            await hand.stop()
-            return here.gripper.is_moving
-
-        assert await asyncio.gather(*(stop() for _ in range(3))) == [False] * 3
-
-
-@contract
-async def test_a_start_right_after_a_stop_that_was_not_waited_for(where: str) -> None:
-    async with bench(where) as here:
-        hand = here.make()
-        await hand.start()
-        stopping = asyncio.create_task(hand.stop())
-        await asyncio.sleep(0)
-        with pytest.raises(InvalidStateError):
-            await hand.start()
-        await stopping
-        assert hand.state is State.SHUTDOWN
-
-
-@contract
-async def test_a_cancelled_stop_still_stops(where: str) -> None:
-    async with bench(where) as here:
-        hand = here.make()
-        await hand.start()
-        await hand.set_position(255)
-        await here.moves()
-        stopping = asyncio.create_task(hand.stop())
-        await asyncio.sleep(0)
-        stopping.cancel()
-        assert isinstance(await ended(stopping), asyncio.CancelledError)
-        assert hand.state is State.SHUTDOWN
-        assert not here.gripper.is_moving
-
-
-@contract
-async def test_a_stop_while_it_starts_ends_the_start(where: str) -> None:
-    async with bench(where, active=False) as here:
-        hand = here.make()
-        starting = asyncio.create_task(hand.start())
-        await asyncio.sleep(0)
-        await hand.stop()
-        assert isinstance(await ended(starting), NotStartedError)
-        assert hand.state is State.SHUTDOWN
-        await asyncio.sleep(1)
-        assert not here.gripper.is_moving
-
-
-@contract
-async def test_a_cancelled_start_takes_its_activation_back(where: str) -> None:
-    async with bench(where, active=False) as here:
-        hand = here.make()
-        starting = asyncio.create_task(hand.start())
-        await here.moves()
-        starting.cancel()
-        assert isinstance(await ended(starting), asyncio.CancelledError)
-        assert hand.state is State.SHUTDOWN
-        assert not here.gripper.is_moving
-        assert not here.last_write.activate
-        await hand.start(activate=False)
-        assert hand.state is State.RESET
-        await hand.stop()
-
-
-@contract
-async def test_leaving_through_an_exception_stops_the_fingers(where: str) -> None:
-    async with bench(where) as here:
-
-        async def fail() -> None:
-            async with here.make() as hand:
-                await hand.set_position(255)
-                await here.moves()
-                raise ZeroDivisionError
-
-        with pytest.raises(ZeroDivisionError):
-            await fail()
-        assert not here.gripper.is_moving
-
-
-@contract
-async def test_leaving_by_cancellation_stops_the_fingers(where: str) -> None:
-    async with bench(where) as here:
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(0.5), here.make() as hand:
-                await hand.move(255, speed=0)
-        assert not here.gripper.is_moving
-
-
-@contract
-async def test_nobody_there(where: str) -> None:
-    async with bench(where) as here:
-        hand = here.make()
-        if here.lab is None:
-            here.server.refuse()
-            here.server.cut()
-        else:
-            await here.lab.end_agent()
-        with pytest.raises(ConnectFailedError) as caught:
-            await hand.start()
-        assert caught.value.address == hand.address
-        assert hand.state is State.SHUTDOWN
-
-
-@contract
-async def test_what_it_was_told_while_it_did_not_run(where: str) -> None:
-    async with bench(where) as here:
-        hand = here.make()
-        for _ in range(2):
-            for call in (
-                lambda: hand.move(3),
-                lambda: hand.open(),
-                lambda: hand.close(),
-                lambda: hand.set_position(3),
-                lambda: hand.set_speed(3),
-                lambda: hand.set_force(3),
-                lambda: hand.hold(),
-                lambda: hand.halt(),
-                lambda: hand.reset(),
-                lambda: hand.atr(),
-                lambda: hand.activate(),
-                lambda: hand.recover(),
-            ):
-                with pytest.raises(NotStartedError):
-                    await call()
+async def test_what_it_was_told_while_it_did_not_run(here: Bench) -> None:
+    hand = here.make()
+    for _ in range(2):
+        for call in (*COMMANDS, "wait_for_state"):
             with pytest.raises(NotStartedError):
-                hand.command(position=3)
-            with pytest.raises(NotStartedError):
-                await hand.wait_for_state(State.FAULT)
-            await hand.start()
-            await hand.stop()
+                await called(hand, call)
+        await hand.start()
+        await hand.stop()
 
 
 @contract
 @pytest.mark.parametrize("value", [1, None, "yes"])
-async def test_flags_are_flags(where: str, value: object) -> None:
-    async with bench(where) as here:
-        hand = here.make()
-        with pytest.raises(TypeError, match="activate"):
-            await hand.start(activate=value)  # type: ignore[arg-type]
-        with pytest.raises(TypeError, match="halt"):
-            await hand.stop(halt=value)  # type: ignore[arg-type]
-        if value is not None:  # what the hand was made with
-            with pytest.raises(TypeError, match="keep_grip"):
-                await hand.stop(keep_grip=value)  # type: ignore[arg-type]
+async def test_flags_are_flags(here: Bench, value: object) -> None:
+    hand = here.make()
+    with pytest.raises(TypeError, match="activate"):
+        await hand.start(activate=value)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="halt"):
+        await hand.stop(halt=value)  # type: ignore[arg-type]
+    if value is not None:  # what the hand was made with
+        with pytest.raises(TypeError, match="keep_grip"):
+            await hand.stop(keep_grip=value)  # type: ignore[arg-type]
 
 
 @contract
-async def test_a_start_waits_for_a_gripper_that_has_no_power_yet(where: str) -> None:
-    async with bench(where) as here:
-        await cut_off(here, where)
-        hand = here.make()
-        starting = asyncio.create_task(hand.start(activate=False, wait=60.0))
-        await asyncio.sleep(20.0)
-        assert not starting.done()
-        await here.server.accept()
-        async with asyncio.timeout(5.0):
-            await starting
-        assert hand.state is State.RUNNING_IDLE
-        await hand.stop()
+async def test_a_start_waits_for_a_gripper_that_has_no_power_yet(here: Bench) -> None:
+    hand, starting = await starting_without_power(here, wait=60.0)
+    await here.server.accept()
+    async with asyncio.timeout(5.0):
+        await starting
+    assert hand.state is State.RUNNING_IDLE
+    await hand.stop()
 
 
 @contract
 @pytest.mark.parametrize("how", ["stop", "cancel"])
-async def test_the_wait_of_a_start_ends_at_once(where: str, how: str) -> None:
-    async with bench(where) as here:
-        await cut_off(here, where)
-        hand = here.make()
-        starting = asyncio.create_task(hand.start(activate=False, wait=3600.0))
-        await asyncio.sleep(20.0)
-        began = asyncio.get_running_loop().time()
-        await hand.stop() if how == "stop" else starting.cancel()
-        await asyncio.wait({starting}, timeout=10.0)
-        assert starting.done()
-        assert asyncio.get_running_loop().time() - began <= 2.0
-        assert starting.cancelled() if how == "cancel" else isinstance(starting.exception(), NotStartedError)
-        await hand.stop()
+async def test_the_wait_of_a_start_ends_at_once(here: Bench, how: str) -> None:
+    hand, starting = await starting_without_power(here, wait=3600.0)
+    began = asyncio.get_running_loop().time()
+    await hand.stop() if how == "stop" else starting.cancel()
+    error = await ended(starting)
+    assert isinstance(error, asyncio.CancelledError if how == "cancel" else NotStartedError)
+    assert asyncio.get_running_loop().time() - began <= 2.0
+    await hand.stop()
 
 
-async def cut_off(here: Bench, where: str) -> None:
-    """No answers from here on, and clients that were connected notice."""
+async def starting_without_power(here: Bench, wait: float) -> tuple[Hand, asyncio.Task[None]]:
+    """A hand that has been waiting for its gripper for 20 s."""
     here.server.refuse()
     here.server.cut()
-    await until(lambda: where == LOCAL or here.lab is None or here.lab.local.state is State.DISCONNECTED)
+    await until(lambda: here.lab is None or here.lab.local.state is State.DISCONNECTED)
+    hand = here.make()
+    starting = asyncio.create_task(hand.start(activate=False, wait=wait))
+    await asyncio.sleep(20.0)
+    assert not starting.done()
+    return hand, starting

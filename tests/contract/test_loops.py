@@ -4,100 +4,53 @@ from __future__ import annotations
 
 import asyncio
 import gc
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Coroutine, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
 
 from robotiq_async import NotStartedError, RobotiqStatus, State, Stream
 from robotiq_async.hand import Hand
-from tests.contract.bench import LOCAL, REMOTE, A, Bench, bench, contract
+from tests.contract.bench import CALLS, LOCAL, REMOTE, A, Bench, bench, called, contract
 from tests.virtual import VirtualLoop
 
-CALLS: dict[str, Callable[[Any], Any]] = {
-    "move": lambda hand: hand.move(3),
-    "open": lambda hand: hand.open(),
-    "close": lambda hand: hand.close(),
-    "grasp": lambda hand: hand.grasp(),
-    "set_position": lambda hand: hand.set_position(3),
-    "set_speed": lambda hand: hand.set_speed(3),
-    "set_force": lambda hand: hand.set_force(3),
-    "hold": lambda hand: hand.hold(),
-    "halt": lambda hand: hand.halt(),
-    "activate": lambda hand: hand.activate(),
-    "reset": lambda hand: hand.reset(),
-    "atr": lambda hand: hand.atr(),
-    "recover": lambda hand: hand.recover(),
-    "wait_for_state": lambda hand: hand.wait_for_state(State.FAULT),
-    "stop": lambda hand: hand.stop(),
-    "command": lambda hand: hand.command(position=3),
-    "statuses": lambda hand: hand.statuses(),
-    "transitions": lambda hand: hand.transitions(),
-    "requests": lambda hand: hand.requests(),
-    "grip_events": lambda hand: hand.grip_events(),
-}
 
-
-async def called(call: Callable[[Any], Any], hand: Hand) -> None:
-    outcome = call(hand)
-    if asyncio.iscoroutine(outcome):
-        await outcome
-
-
-def elsewhere(call: Callable[[Any], Any], hand: Hand) -> BaseException | None:
-    """What a call raises in the event loop of another thread."""
-    raised: list[BaseException] = []
-
-    def work() -> None:
-        try:
-            asyncio.run(called(call, hand))
-        except BaseException as error:  # noqa: BLE001  # whatever it is
-            raised.append(error)
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    thread.join()
-    return raised[0] if raised else None
+def elsewhere(work: Coroutine[Any, Any, object]) -> BaseException | None:
+    """What a coroutine raises in the event loop of another thread."""
+    with ThreadPoolExecutor() as threads:
+        return threads.submit(asyncio.run, work).exception()
 
 
 @contract
 @pytest.mark.parametrize("name", CALLS)
-async def test_another_loop(where: str, name: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        writes = here.writes
-        error = elsewhere(CALLS[name], hand)
-        assert isinstance(error, RuntimeError)
-        assert "outside of the event loop" in str(error)
-        await asyncio.sleep(0.1)
-        assert here.writes == writes
-        assert hand.state is State.RUNNING_IDLE
-        await hand.move(30, A)
+async def test_another_loop(here: Bench, hand: Hand, name: str) -> None:
+    writes = here.writes
+    error = elsewhere(called(hand, name))
+    assert isinstance(error, RuntimeError)
+    assert "outside of the event loop" in str(error)
+    await asyncio.sleep(0.1)
+    assert here.writes == writes
+    assert hand.state is State.RUNNING_IDLE
+    await hand.move(30, A)
 
 
 @contract
-async def test_starting_it_in_another_loop_is_refused_while_it_runs(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        assert elsewhere(lambda hand: hand.start(), hand) is not None
-        assert hand.state is State.RUNNING_IDLE
-        await hand.move(30, A)
+async def test_starting_it_in_another_loop_is_refused_while_it_runs(here: Bench, hand: Hand) -> None:
+    assert elsewhere(hand.start()) is not None
+    assert hand.state is State.RUNNING_IDLE
+    await hand.move(30, A)
 
 
 @contract
-async def test_reading_from_another_thread(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        seen: list[object] = []
+async def test_reading_from_another_thread(here: Bench, hand: Hand) -> None:
+    def read() -> tuple[object, ...]:
+        assert hand.status.sequence >= 0
+        assert hand.statistics.polls > 0
+        return hand.state, hand.is_moving, hand.is_activated, hand.is_reset
 
-        def read() -> None:
-            seen.extend((hand.state, hand.is_moving, hand.is_activated, hand.is_reset))
-            seen.append(hand.status.sequence)
-            seen.append(hand.statistics.polls)
-
-        thread = threading.Thread(target=read)
-        thread.start()
-        thread.join()
-        assert seen[:4] == [State.RUNNING_IDLE, False, True, False]
-        assert len(seen) == 6
+    with ThreadPoolExecutor() as threads:
+        assert threads.submit(read).result() == (State.RUNNING_IDLE, False, True, False)
 
 
 @pytest.fixture

@@ -10,36 +10,27 @@ import pytest
 
 from robotiq_async import ConnectionLostError, NotStartedError, RobotiqStatus, State
 from robotiq_async.hand import Hand
-from tests.contract.bench import LOCAL, A, Bench, at_rest, bench, contract, ended, statuses
+from tests.contract.bench import COMMANDS, A, Bench, at_rest, called, contract, ended, statuses
 
 PROPERTIES = ("is_moving", "is_activated", "is_reset")
 
 
-async def lose_the_gripper(here: Bench, hand: Hand) -> None:
-    here.server.refuse()
-    here.server.cut()
-    await hand.wait_for_state(State.DISCONNECTED)
+@contract
+async def test_it_is_called_by_its_address_unless_it_was_given_a_name(here: Bench) -> None:
+    hand = here.make()
+    assert hand.name == hand.address
+    assert hand.name in repr(hand)
 
 
 @contract
-async def test_it_is_called_by_its_address_unless_it_was_given_a_name(where: str) -> None:
-    async with bench(where) as here:
-        hand = here.make()
-        assert hand.name == hand.address
-        assert hand.name in repr(hand)
-
-
-@contract
-async def test_every_line_of_the_log_tells_its_hand(where: str, caplog: pytest.LogCaptureFixture) -> None:
-    async with bench(where) as here:
-        with caplog.at_level(logging.DEBUG, "robotiq_async"):
-            async with here.make() as hand:
-                hand.command(position=50)
-                await lose_the_gripper(here, hand)
-                await here.server.accept()
-                await hand.wait_for_state(State.RUNNING_IDLE)
-        # An agent calls its hands by their names in its file.
-        known = {hand.name if where == LOCAL else "left", here.server.address}
+async def test_every_line_of_the_log_tells_its_hand(here: Bench, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.DEBUG, "robotiq_async"):
+        async with here.make() as hand:
+            hand.command(position=50)
+            await here.unplug(hand)
+            await here.plug(hand)
+    # An agent calls its hands by their names in its file.
+    known = {hand.name if here.lab is None else "left", here.server.address}
     records = [each for each in caplog.records if each.name == "robotiq_async"]
     assert len(records) > 5
     for record in records:
@@ -49,132 +40,109 @@ async def test_every_line_of_the_log_tells_its_hand(where: str, caplog: pytest.L
 
 
 @contract
-async def test_before_the_start_nothing_is_known(where: str) -> None:
-    async with bench(where) as here:
-        hand = here.make()
-        assert hand.state is State.DISCONNECTED
-        for name in ("status", *PROPERTIES):
-            with pytest.raises(NotStartedError):
-                getattr(hand, name)
-        assert hand.statistics.polls == 0
+async def test_before_the_start_nothing_is_known(here: Bench) -> None:
+    hand = here.make()
+    assert hand.state is State.DISCONNECTED
+    for name in ("status", *PROPERTIES):
+        with pytest.raises(NotStartedError):
+            getattr(hand, name)
+    assert hand.statistics.polls == 0
 
 
 @contract
-async def test_after_the_stop_only_the_last_status(where: str) -> None:
-    async with bench(where) as here:
-        async with here.make() as hand:
-            await hand.move(100, A)
-        assert hand.state is State.SHUTDOWN
-        assert hand.status.position(A) == pytest.approx(100, abs=2)
-        for name in PROPERTIES:
-            with pytest.raises(NotStartedError):
-                getattr(hand, name)
+async def test_after_the_stop_only_the_last_status(here: Bench) -> None:
+    async with here.make() as hand:
+        await hand.move(100, A)
+    assert hand.state is State.SHUTDOWN
+    assert hand.status.position(A) == pytest.approx(100, abs=2)
+    for name in PROPERTIES:
+        with pytest.raises(NotStartedError):
+            getattr(hand, name)
 
 
 @contract
-async def test_while_the_link_is_down(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        await hand.move(50, A)
-        await lose_the_gripper(here, hand)
-        assert hand.state is State.DISCONNECTED
-        assert hand.status.position(A) == pytest.approx(50, abs=2)
-        for name in PROPERTIES:
-            with pytest.raises(ConnectionLostError):
-                getattr(hand, name)
+async def test_while_the_link_is_down(here: Bench, hand: Hand) -> None:
+    await hand.move(50, A)
+    await here.unplug(hand)
+    assert hand.state is State.DISCONNECTED
+    assert hand.status.position(A) == pytest.approx(50, abs=2)
+    for name in PROPERTIES:
         with pytest.raises(ConnectionLostError):
-            hand.command(position=3)
-        for call in (
-            lambda: hand.move(3),
-            lambda: hand.set_speed(3),
-            lambda: hand.hold(),
-            lambda: hand.halt(),
-            lambda: hand.reset(),
-            lambda: hand.activate(),
-            lambda: hand.atr(),
-            lambda: hand.recover(),
-        ):
-            with pytest.raises(ConnectionLostError):
-                await call()
-        writes = here.writes
-        await here.server.accept()
-        await hand.wait_for_state(State.RUNNING_IDLE)
-        await at_rest(hand)
-        assert here.writes == writes, "nothing is sent later"
-        await hand.move(30, A)
+            getattr(hand, name)
+    for command in COMMANDS:
+        with pytest.raises(ConnectionLostError):
+            await called(hand, command)
+    writes = here.writes
+    await here.plug(hand)
+    await at_rest(hand)
+    assert here.writes == writes, "nothing is sent later"
+    await hand.move(30, A)
 
 
 @contract
-async def test_a_lost_link_ends_a_move(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        moving = asyncio.create_task(hand.move(255, speed=0))
-        await here.moves()
-        await lose_the_gripper(here, hand)
-        assert isinstance(await ended(moving), ConnectionLostError)
-        await here.server.accept()
-        await hand.wait_for_state(State.RUNNING_IDLE)
+async def test_a_lost_link_ends_a_move(here: Bench, hand: Hand) -> None:
+    moving = await here.moving(hand.move(255, speed=0))
+    await here.unplug(hand)
+    assert isinstance(await ended(moving), ConnectionLostError)
+    await here.plug(hand)
 
 
 @contract
-async def test_the_newest_status(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        async for status in hand.statuses():
-            assert status is hand.status
-            assert isinstance(status, RobotiqStatus)
-            if status.sequence > 50:
-                break
+async def test_the_newest_status(here: Bench, hand: Hand) -> None:
+    async for status in hand.statuses():
+        assert status is hand.status
+        assert isinstance(status, RobotiqStatus)
+        if status.sequence > 50:
+            break
 
 
 @contract
-async def test_it_moves_from_the_call_until_the_end_of_a_move(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        moving = asyncio.create_task(hand.move(100, A))
-        await asyncio.sleep(0)
-        assert hand.is_moving
-        stream = hand.statuses()
-        while not moving.done():
-            await anext(stream)
-            assert hand.is_moving or moving.done() or not here.gripper.is_moving
-        await moving
-        assert not hand.is_moving
+async def test_it_moves_from_the_call_until_the_end_of_a_move(here: Bench, hand: Hand) -> None:
+    moving = asyncio.create_task(hand.move(100, A))
+    await asyncio.sleep(0)
+    assert hand.is_moving
+    stream = hand.statuses()
+    while not moving.done():
+        await anext(stream)
+        assert hand.is_moving or moving.done() or not here.gripper.is_moving
+    await moving
+    assert not hand.is_moving
 
 
 @contract
-async def test_timestamps_are_of_this_process_and_only_rise(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        now = asyncio.get_running_loop().time
-        stream, transitions, requests = hand.statuses(buffer=10_000), hand.transitions(), hand.requests()
-        began = now()
-        for value in (20, 100, 30):
-            await hand.move(value, A)
-            assert 0 <= now() - hand.status.timestamp < 0.05
-        stamps = [status.timestamp for status in stream.drain()]
-        assert len(stamps) > 50
-        assert all(before < after for before, after in itertools.pairwise(stamps))
-        for told in (
-            [each.timestamp for each in transitions.drain()],
-            [each.timestamp for each in requests.drain()],
-        ):
-            assert told == sorted(told)
-            assert began - 0.01 <= told[0] <= told[-1] <= now()
+async def test_timestamps_are_of_this_process_and_only_rise(here: Bench, hand: Hand) -> None:
+    now = asyncio.get_running_loop().time
+    stream, transitions, requests = hand.statuses(buffer=10_000), hand.transitions(), hand.requests()
+    began = now()
+    for value in (20, 100, 30):
+        await hand.move(value, A)
+        assert 0 <= now() - hand.status.timestamp < 0.05
+    stamps = [status.timestamp for status in stream.drain()]
+    assert len(stamps) > 50
+    assert all(before < after for before, after in itertools.pairwise(stamps))
+    for told in (
+        [each.timestamp for each in transitions.drain()],
+        [each.timestamp for each in requests.drain()],
+    ):
+        assert told == sorted(told)
+        assert began - 0.01 <= told[0] <= told[-1] <= now()
 
 
 @contract
-async def test_statistics(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        before = hand.statistics
-        await hand.move(60)
-        here.gripper.place_object(A, 150)
-        await hand.move(255)
-        moving = asyncio.create_task(hand.move(0, speed=0))
-        await here.moves()
-        moving.cancel()
-        await ended(moving)
-        await asyncio.sleep(1.1)
-        statistics = hand.statistics
-        assert statistics.polls > before.polls + 100
-        assert statistics.writes >= before.writes + 4
-        assert statistics.moves == {"reached": 1, "contact": 1, "cancelled": 1}
-        assert 0.004 < statistics.period_p50 < 0.006
-        assert 0 < statistics.round_trip_p50 <= statistics.round_trip_p99
-        assert statistics.reconnects == statistics.foreign_commands == statistics.faults == 0
-        assert len(await statuses(hand, 3)) == 3
+async def test_statistics(here: Bench, hand: Hand) -> None:
+    before = hand.statistics
+    await hand.move(60)
+    here.gripper.place_object(A, 150)
+    await hand.move(255)
+    moving = await here.moving(hand.move(0, speed=0))
+    moving.cancel()
+    await ended(moving)
+    await asyncio.sleep(1.1)
+    statistics = hand.statistics
+    assert statistics.polls > before.polls + 100
+    assert statistics.writes >= before.writes + 4
+    assert statistics.moves == {"reached": 1, "contact": 1, "cancelled": 1}
+    assert 0.004 < statistics.period_p50 < 0.006
+    assert 0 < statistics.round_trip_p50 <= statistics.round_trip_p99
+    assert statistics.reconnects == statistics.foreign_commands == statistics.faults == 0
+    assert len(await statuses(hand, 3)) == 3

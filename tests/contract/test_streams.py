@@ -6,193 +6,170 @@ import asyncio
 import gc
 import itertools
 import weakref
+from typing import TypeVar
 
 import pytest
 
-from robotiq_async import Fault, RobotiqStatus, SentRequest, State, Stream, Transition
-from tests.contract.bench import A, at_rest, bench, contract
+from robotiq_async import Fault, State, Stream
+from robotiq_async.hand import Hand
+from tests.contract.bench import A, Bench, at_rest, contract
+
+T = TypeVar("T")
 
 
-async def all_of(stream: Stream[RobotiqStatus]) -> list[int]:
-    return [status.sequence async for status in stream]
-
-
-async def changes(stream: Stream[Transition]) -> list[Transition]:
-    return [transition async for transition in stream]
-
-
-async def sent(stream: Stream[SentRequest]) -> list[SentRequest]:
-    return [request async for request in stream]
+async def all_of(stream: Stream[T]) -> list[T]:
+    return [each async for each in stream]
 
 
 @contract
-async def test_statuses_opened_before_the_start_end_after_the_stop(where: str) -> None:
-    async with bench(where) as here:
-        hand = here.make()
-        stream = hand.statuses(buffer=100_000)
-        collecting = asyncio.create_task(all_of(stream))
-        await asyncio.sleep(0)
-        async with hand:
-            await hand.move(50)
-        sequences = await collecting
-        assert len(sequences) > 20
-        assert sequences == list(range(sequences[0], sequences[0] + len(sequences))), "none twice, none lost"
-        assert stream.missed == 0
-        with pytest.raises(StopAsyncIteration):
-            await anext(stream)
-
-
-@contract
-async def test_a_slow_reader_costs_only_itself(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        slow, few, fast = hand.statuses(), hand.statuses(buffer=5), hand.statuses()
-        first = latest = await anext(slow)
-        for _ in range(20):
-            latest = await anext(fast)
-        while latest.sequence <= first.sequence + 10:
-            latest = await anext(fast)
-        assert (await anext(slow)).sequence == latest.sequence
-        assert slow.missed == latest.sequence - first.sequence - 1
-        assert [status.sequence for status in few.drain()] == list(
-            range(latest.sequence - 4, latest.sequence + 1)
-        )
-        assert few.take_nowait() is None
-        assert fast.missed == 0
-
-
-@contract
-async def test_a_second_reader_of_one_stream_is_refused(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        stream = hand.transitions()
-        first = asyncio.create_task(anext(stream))
-        await asyncio.sleep(0)
-        with pytest.raises(RuntimeError, match="one reader"):
-            await anext(stream)
-        await hand.set_position(20)
-        assert (await first).target is State.RUNNING_CC
-
-
-@contract
-async def test_a_cancelled_wait_loses_nothing(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        stream = hand.transitions()
-        waiting = asyncio.create_task(anext(stream))
-        await asyncio.sleep(0)
-        waiting.cancel()
-        await asyncio.wait({waiting})
-        await hand.set_position(20)
-        assert [(await anext(stream)).target for _ in range(2)] == [State.RUNNING_CC, State.RUNNING_IDLE]
-
-
-@contract
-async def test_a_closed_stream_ends_and_a_dropped_one_is_forgotten(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        stream = hand.statuses()
+async def test_statuses_opened_before_the_start_end_after_the_stop(here: Bench) -> None:
+    hand = here.make()
+    stream = hand.statuses(buffer=100_000)
+    collecting = asyncio.create_task(all_of(stream))
+    await asyncio.sleep(0)
+    async with hand:
+        await hand.move(50)
+    sequences = [status.sequence for status in await collecting]
+    assert len(sequences) > 20
+    assert sequences == list(range(sequences[0], sequences[0] + len(sequences))), "none twice, none lost"
+    assert stream.missed == 0
+    with pytest.raises(StopAsyncIteration):
         await anext(stream)
-        await stream.aclose()
-        await stream.aclose()
-        with pytest.raises(StopAsyncIteration):
-            await anext(stream)
-        waited_for = hand.transitions()
-        waiting = asyncio.create_task(anext(waited_for, None))
-        await asyncio.sleep(0)
-        await waited_for.aclose()
-        assert await waiting is None
-        dropped = [
-            weakref.ref(opened())
-            for opened in (hand.statuses, hand.transitions, hand.requests, hand.grip_events)
-            for _ in range(100)
-        ]
-        gc.collect()
-        assert not any(each() for each in dropped)
 
 
 @contract
-async def test_transitions_lose_nothing(where: str) -> None:
-    async with bench(where) as here:
-        hand = here.make()
-        for first in (State.DISCONNECTED, State.SHUTDOWN):
-            stream = hand.transitions()
-            collecting = asyncio.create_task(changes(stream))
-            async with hand:
-                for _ in range(20):
-                    await hand.set_position(20)
-                await hand.reset()
-                await hand.activate()
-            seen = await collecting
-            assert seen[0].source is first
-            assert seen[-1].target is State.SHUTDOWN
-            assert all(before.target is after.source for before, after in itertools.pairwise(seen))
-            assert all(each.source is not each.target for each in seen)
-            targets = [each.target for each in seen]
-            assert targets.count(State.RUNNING_CC) >= 20
-            for state in (
-                State.DO_RESET,
-                State.WF_RESET,
-                State.RESET,
-                State.DO_ACTIVATION,
-                State.WF_ACTIVATION,
-            ):
-                assert targets.count(state) == 1
+async def test_a_slow_reader_costs_only_itself(here: Bench, hand: Hand) -> None:
+    slow, few, fast = hand.statuses(), hand.statuses(buffer=5), hand.statuses()
+    first = latest = await anext(slow)
+    for _ in range(20):
+        latest = await anext(fast)
+    while latest.sequence <= first.sequence + 10:
+        latest = await anext(fast)
+    assert (await anext(slow)).sequence == latest.sequence
+    assert slow.missed == latest.sequence - first.sequence - 1
+    assert [status.sequence for status in few.drain()] == list(
+        range(latest.sequence - 4, latest.sequence + 1)
+    )
+    assert few.take_nowait() is None
+    assert fast.missed == 0
 
 
 @contract
-async def test_a_transition_finds_the_status_that_made_it(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
+async def test_a_second_reader_of_one_stream_is_refused(here: Bench, hand: Hand) -> None:
+    stream = hand.transitions()
+    first = asyncio.create_task(anext(stream))
+    await asyncio.sleep(0)
+    with pytest.raises(RuntimeError, match="one reader"):
+        await anext(stream)
+    await hand.set_position(20)
+    assert (await first).target is State.RUNNING_CC
+
+
+@contract
+async def test_a_cancelled_wait_loses_nothing(here: Bench, hand: Hand) -> None:
+    stream = hand.transitions()
+    waiting = asyncio.create_task(anext(stream))
+    await asyncio.sleep(0)
+    waiting.cancel()
+    await asyncio.wait({waiting})
+    await hand.set_position(20)
+    assert [(await anext(stream)).target for _ in range(2)] == [State.RUNNING_CC, State.RUNNING_IDLE]
+
+
+@contract
+async def test_a_closed_stream_ends_and_a_dropped_one_is_forgotten(here: Bench, hand: Hand) -> None:
+    stream = hand.statuses()
+    await anext(stream)
+    await stream.aclose()
+    await stream.aclose()
+    with pytest.raises(StopAsyncIteration):
+        await anext(stream)
+    waited_for = hand.transitions()
+    waiting = asyncio.create_task(anext(waited_for, None))
+    await asyncio.sleep(0)
+    await waited_for.aclose()
+    assert await waiting is None
+    dropped = [
+        weakref.ref(opened())
+        for opened in (hand.statuses, hand.transitions, hand.requests, hand.grip_events)
+        for _ in range(100)
+    ]
+    gc.collect()
+    assert not any(each() for each in dropped)
+
+
+@contract
+async def test_transitions_lose_nothing(here: Bench) -> None:
+    hand = here.make()
+    for first in (State.DISCONNECTED, State.SHUTDOWN):
         stream = hand.transitions()
-        here.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.5)
-        async for transition in stream:
-            if transition.target is State.FAULT:
-                break
-        assert hand.state is State.FAULT
-        assert hand.status.fault is Fault.COMMUNICATION_NOT_READY
-
-
-@contract
-async def test_streams_wait_out_a_lost_link(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        transitions, stream = hand.transitions(), hand.statuses(buffer=10_000)
-        here.server.refuse()
-        here.server.cut()
-        await hand.wait_for_state(State.DISCONNECTED)
-        await here.server.accept()
-        await hand.wait_for_state(State.RUNNING_IDLE)
-        assert [(await anext(transitions)).target for _ in range(2)] == [
-            State.DISCONNECTED,
-            State.RUNNING_IDLE,
-        ]
-        last = -1
-        for _ in range(50):
-            sequence = (await anext(stream)).sequence
-            assert sequence > last
-            last = sequence
-
-
-@contract
-async def test_requests(where: str) -> None:
-    async with bench(where) as here:
-        hand = here.make()
-        stream, newest = hand.requests(), hand.requests(buffer=1)
-        collecting = asyncio.create_task(sent(stream))
+        collecting = asyncio.create_task(all_of(stream))
         async with hand:
-            await hand.set_position(20, A)
-            await hand.set_speed(9)
-            await at_rest(hand)
-            assert newest.missed == 1
-        requests = await collecting
-        assert all(request.acknowledged for request in requests)
-        assert requests[0].request.position(A) == 20
-        assert requests[1].request.axes[1].speed == 9
-        assert [each.request.registers for each in requests] == [
-            write.registers for write in list(here.gripper.writes)[-len(requests) :]
-        ]
-        assert not requests[-1].request.go, "the stop is the last one"
+            for _ in range(20):
+                await hand.set_position(20)
+            await hand.reset()
+            await hand.activate()
+        seen = await collecting
+        assert seen[0].source is first
+        assert seen[-1].target is State.SHUTDOWN
+        assert all(before.target is after.source for before, after in itertools.pairwise(seen))
+        assert all(each.source is not each.target for each in seen)
+        targets = [each.target for each in seen]
+        assert targets.count(State.RUNNING_CC) >= 20
+        for name in ("DO_RESET", "WF_RESET", "RESET", "DO_ACTIVATION", "WF_ACTIVATION"):
+            assert targets.count(State[name]) == 1
 
 
 @contract
-async def test_a_request_that_another_client_wrote_is_not_ours(where: str) -> None:
-    async with bench(where) as here, here.make() as hand:
-        stream = hand.requests()
-        here.gripper.write(0, [0x0900, 0, 0, 0x0AFF, 0, 0, 0, 0])
-        await asyncio.sleep(0.5)
-        assert stream.take_nowait() is None
+async def test_a_transition_finds_the_status_that_made_it(here: Bench, hand: Hand) -> None:
+    stream = hand.transitions()
+    here.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.5)
+    async for transition in stream:
+        if transition.target is State.FAULT:
+            break
+    assert hand.state is State.FAULT
+    assert hand.status.fault is Fault.COMMUNICATION_NOT_READY
+
+
+@contract
+async def test_streams_wait_out_a_lost_link(here: Bench, hand: Hand) -> None:
+    transitions, stream = hand.transitions(), hand.statuses(buffer=10_000)
+    await here.unplug(hand)
+    await here.plug(hand)
+    assert [(await anext(transitions)).target for _ in range(2)] == [
+        State.DISCONNECTED,
+        State.RUNNING_IDLE,
+    ]
+    last = -1
+    for _ in range(50):
+        sequence = (await anext(stream)).sequence
+        assert sequence > last
+        last = sequence
+
+
+@contract
+async def test_requests(here: Bench) -> None:
+    hand = here.make()
+    stream, newest = hand.requests(), hand.requests(buffer=1)
+    collecting = asyncio.create_task(all_of(stream))
+    async with hand:
+        await hand.set_position(20, A)
+        await hand.set_speed(9)
+        await at_rest(hand)
+        assert newest.missed == 1
+    requests = await collecting
+    assert all(request.acknowledged for request in requests)
+    assert requests[0].request.position(A) == 20
+    assert requests[1].request.axes[1].speed == 9
+    assert [each.request.registers for each in requests] == [
+        write.registers for write in list(here.gripper.writes)[-len(requests) :]
+    ]
+    assert not requests[-1].request.go, "the stop is the last one"
+
+
+@contract
+async def test_a_request_that_another_client_wrote_is_not_ours(here: Bench, hand: Hand) -> None:
+    stream = hand.requests()
+    here.gripper.write(0, [0x0900, 0, 0, 0x0AFF, 0, 0, 0, 0])
+    await asyncio.sleep(0.5)
+    assert stream.take_nowait() is None

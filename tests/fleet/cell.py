@@ -7,27 +7,23 @@ import re
 from collections.abc import Callable, Coroutine, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
-from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from robotiq_async import Finger, RobotiqConnectionError, RobotiqError, State
+from robotiq_async import ConnectionLostError, Finger, RobotiqError, State
 from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.wire.envelope import Call, unpack_answer
-from robotiq_async.fleet.wire.names import GripperName
-from robotiq_async.values.errors import AgentError, ControlLostError
+from robotiq_async.values.errors import ControlLostError
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
+from tests.fleet.lab import LEFT, instantly
 from tests.fleet.world import PROMPT_S, WINDOW_S, Client, World, motions
+from tests.pages import table
 
 Trouble = Callable[[World], Coroutine[Any, Any, None]]
-
-
 TARGET = 130
 RATE_S = 0.01
 SETTLE_S = 2.5
 """After the trouble: so long everything has to come right by itself, and nothing may come late."""
-PAGE = Path(__file__).parents[2] / "docs" / "fleet-under-fault.md"
-LEFT = GripperName("lab", "cell", "left")
 
 
 # -- the client --------------------------------------------------------------------------------------------
@@ -37,47 +33,30 @@ async def client_killed(world: World) -> None:
     world.kill(world.holder.host)
 
 
-def client_frozen(seconds: float) -> Trouble:
+def frozen(who: str, seconds: float) -> Trouble:
     async def trouble(world: World) -> None:
-        world.freeze(world.holder.host)
+        host = getattr(world, who).host
+        world.freeze(host)
         await asyncio.sleep(seconds)
-        world.thaw(world.holder.host)
+        world.thaw(host)
 
     return trouble
 
 
-def client_held_up(seconds: float) -> Trouble:
+async def client_held_up(world: World) -> None:
     """A callback that blocks: zenoh's own threads go on, and the link stays."""
-
-    async def trouble(world: World) -> None:
-        world.holder.host.freeze()
-        await asyncio.sleep(seconds)
-        world.holder.host.thaw()
-
-    return trouble
+    world.holder.host.freeze()
+    await asyncio.sleep(2)
+    world.holder.host.thaw()
 
 
 # -- the agent ---------------------------------------------------------------------------------------------
 
 
-def agent_frozen(seconds: float) -> Trouble:
-    async def trouble(world: World) -> None:
-        world.freeze(world.agent.host)
-        await asyncio.sleep(seconds)
-        world.thaw(world.agent.host)
-
-    return trouble
-
-
-def agent_killed(seconds: float) -> Trouble:
-    """And the next one is started after some seconds."""
-
-    async def trouble(world: World) -> None:
-        world.kill(world.agent.host)
-        await asyncio.sleep(seconds)
-        await world.start_agent("next agent")
-
-    return trouble
+async def agent_killed(world: World) -> None:
+    world.kill(world.agent.host)
+    await asyncio.sleep(1)
+    await world.start_agent("next agent")
 
 
 async def agent_ended(world: World) -> None:
@@ -119,18 +98,16 @@ async def router_restarted(world: World) -> None:
         world.network.join(*pair)
 
 
-def bad(seconds: float = 4.0, *, requests_only: bool = False, **what: float) -> Trouble:
+def bad(*, requests_only: bool = False, **what: float) -> Trouble:
     async def trouble(world: World) -> None:
         here, there = world.holder.host.name, world.agent.host.name
         streams = world.network.both(here, there)[: 1 if requests_only else 2]
         usual = [{name: getattr(stream, name) for name in what} for stream in streams]
         for stream in streams:
-            for name, value in what.items():
-                setattr(stream, name, value)
-        await asyncio.sleep(seconds)
+            vars(stream).update(what)
+        await asyncio.sleep(4)
         for stream, values in zip(streams, usual, strict=True):
-            for name, value in values.items():
-                setattr(stream, name, value)
+            vars(stream).update(values)
             stream.free_at = min(stream.free_at, world.now())
 
     return trouble
@@ -150,15 +127,16 @@ def _swap(key: str) -> str:
 
 async def cuts(world: World) -> None:
     """One direction or both, for about a lease, again and again, while keys are mixed up."""
-    world.network.wrong_key = lambda key: _swap(key) if world.network.random.random() < 0.1 else key
+    network, chance = world.network, world.network.random
+    network.wrong_key = lambda key: _swap(key) if chance.random() < 0.1 else key
     for _ in range(24):
-        which = world.network.random.choice(((True, False), (False, True), (True, True)))
-        world.network.keeps_links = world.network.random.random() < 0.5
-        world.cut(world.holder, out=which[0], back=which[1])
-        await asyncio.sleep(world.network.random.uniform(0.7, 1.4))
+        out, back = chance.choice(((True, False), (False, True), (True, True)))
+        network.keeps_links = chance.random() < 0.5
+        world.cut(world.holder, out=out, back=back)
+        await asyncio.sleep(chance.uniform(0.7, 1.4))
         world.mend(world.holder)
-        await asyncio.sleep(world.network.random.uniform(0.05, 1.0))
-    world.network.wrong_key = lambda key: key
+        await asyncio.sleep(chance.uniform(0.05, 1.0))
+    network.wrong_key = lambda key: key
 
 
 # -- others ------------------------------------------------------------------------------------------------
@@ -180,12 +158,12 @@ async def other_halts(world: World) -> None:
 
 TROUBLES: Final[dict[str, Trouble]] = {
     "client killed": client_killed,
-    "client frozen for 0.5 s": client_frozen(0.5),
-    "client frozen for 3 s": client_frozen(3),
-    "client's loop held up for 2 s": client_held_up(2),
-    "agent frozen for 0.5 s": agent_frozen(0.5),
-    "agent frozen for 3 s": agent_frozen(3),
-    "agent killed, the next after 1 s": agent_killed(1),
+    "client frozen for 0.5 s": frozen("holder", 0.5),
+    "client frozen for 3 s": frozen("holder", 3),
+    "client's loop held up for 2 s": client_held_up,
+    "agent frozen for 0.5 s": frozen("agent", 0.5),
+    "agent frozen for 3 s": frozen("agent", 3),
+    "agent killed, the next after 1 s": agent_killed,
     "agent ended, the next at once": agent_ended,
     "a second agent that did not see the first": second_agent,
     "router away for 2 s": router_restarted,
@@ -274,21 +252,12 @@ PHASES: dict[str, Callable[[Doing], Coroutine[Any, Any, None]]] = {
 }
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What came of it.
-
-    Attributes:
-        words: as in the table.
-        held_after: seconds from the beginning of the trouble until nothing moved; None if it moved on.
-    """
-
-    words: str
-    held_after: float | None
-
-
-async def outcome(world: World, phase: str, trouble: Trouble) -> Outcome:
+async def outcome(world: World, phase: str, trouble: Trouble) -> tuple[str, float | None]:
     """Let it happen.
+
+    Returns:
+        The words of the table, and the seconds from the beginning of the trouble until nothing moved; None if
+        it moved on.
 
     Raises:
         AssertionError: a promise was broken.
@@ -319,11 +288,10 @@ async def outcome(world: World, phase: str, trouble: Trouble) -> Outcome:
         fingers = "at rest"
     check_commands(doing)
     check_travel(world, Finger.A)
-    lease = lease_of(world)
+    words = f"{what}, {fingers}, {lease_of(world)}"
     await works(world)
     world.check()
-    words = ", ".join(each for each in (what, fingers, lease) if each)
-    return Outcome(words, held)
+    return words, held
 
 
 async def said(doing: Doing) -> str:
@@ -404,9 +372,8 @@ async def told(work: Coroutine[Any, Any, Any]) -> str:
         await work
     except ControlLostError as error:
         return f"ControlLost {error.reason}"
-    except RobotiqConnectionError as error:
-        kinds = [kind.__name__ for kind in type(error).__mro__]
-        return "ConnectionLost" if "ConnectionLostError" in kinds else kinds[0].removesuffix("Error")
+    except ConnectionLostError:  # also without an answer
+        return "ConnectionLost"
     except RobotiqError as error:
         return type(error).__name__.removesuffix("Error")
     return "done"
@@ -420,10 +387,8 @@ async def works(world: World) -> None:
     assert heard == "done", heard
     assert world.now() - at < 1.0
     assert not world.gripper.is_moving
-    commander = holder
-    if holder.host.is_dead:
-        commander = other
-    else:
+    commander = other if holder.host.is_dead else holder
+    if commander is holder:
         # A client that lost the lease to a halt does not come back by itself.
         await asyncio.sleep(1.5)
         assert not holder.hand.is_in_control, "the old holder came back after a halt"
@@ -453,11 +418,7 @@ class Cell(NamedTuple):
 
 def cells() -> Iterator[Cell]:
     """Every cell."""
-    head, *rows = (
-        [word.strip() for word in line.strip("|").split("|")]
-        for line in PAGE.read_text(encoding="utf-8").splitlines()
-        if line.startswith("|") and not line.startswith("| --")
-    )
+    head, *rows = table("fleet-under-fault.md")
     for troubles, *outcomes, limit in rows:
         held_after = None if limit == "-" else float(limit.removesuffix(" s"))
         for trouble in re.findall(r"`(.+?)`", troubles):
@@ -475,7 +436,7 @@ async def move_slowly(here: World) -> asyncio.Task[str]:
     return doing.call
 
 
-async def ask(client: Client, verb: str, call: Call, key: str = "") -> AgentError | None:
+async def ask(client: Client, verb: str, call: Call, key: str = "") -> RobotiqError | None:
     """Ask something by hand; returns what it was refused with."""
 
     async def once() -> bytes:
@@ -485,7 +446,7 @@ async def ask(client: Client, verb: str, call: Call, key: str = "") -> AgentErro
 
     answer = unpack_answer(await client.do(once()))
     try:
-        answer.outcome(lambda stamp: stamp)
-    except AgentError as error:
+        answer.outcome(instantly)
+    except RobotiqError as error:
         return error
     return None

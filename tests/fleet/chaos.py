@@ -10,12 +10,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import os
 import random
 import signal
 import sys
 import tempfile
 import time
+from asyncio.subprocess import Process
 from collections import Counter
 from typing import Any
 
@@ -27,10 +27,11 @@ from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import Call
 from robotiq_async.simulator import SimulatorServer
 from robotiq_async.values.request import Request
-from tests.fleet.cuts import ENDPOINT, ROOT, Namespaces, missing
+from tests.fleet.cuts import ENDPOINT, PROGRAMS, WAYS, Namespaces, kill, missing, report
 from tests.fleet.programs import address, say
 from tests.grippers import active_gripper
 
+CHAOS = "tests.fleet.chaos"
 SPEED, FORCE = 10, 5
 BURST = 48
 LIMIT_S = 20.0
@@ -119,96 +120,58 @@ async def panel() -> None:
                 say(time.monotonic())
 
 
-class Cell:
-    """The processes."""
-
-    def __init__(self, namespaces: Namespaces, state: str) -> None:
-        self.namespaces = namespaces
-        self.state = state
-        self.running: list[asyncio.subprocess.Process] = []
-
-    async def start(self, where: str, module: str, *words: str) -> tuple[asyncio.subprocess.Process, str]:
-        process = await asyncio.create_subprocess_exec(
-            *("ip", "netns", "exec", where, sys.executable, "-m", f"tests.fleet.{module}", *words),
-            cwd=ROOT,
-            env={**os.environ, "STATE_DIRECTORY": self.state},
-            stdout=asyncio.subprocess.PIPE,
-        )
-        self.running.append(process)
-        assert process.stdout is not None
-        async with asyncio.timeout(LIMIT_S):
-            return process, (await process.stdout.readline()).decode().strip()
-
-    async def end(self, process: asyncio.subprocess.Process) -> Any:
-        """What it says at its end."""
-        process.send_signal(signal.SIGTERM)
-        async with asyncio.timeout(LIMIT_S):
-            said, _ = await process.communicate()
-        return json.loads(said.splitlines()[-1])
-
-    async def kill(self, process: asyncio.subprocess.Process) -> None:
-        if process.returncode is None:
-            process.kill()
-            await process.wait()
-
-
 async def chaos(rounds: int, seed: int = 1) -> dict[str, Any]:
-    chance, namespaces = random.Random(seed), Namespaces()
+    namespaces = Namespaces()
     with tempfile.TemporaryDirectory() as state:
         async with namespaces.made():
-            cell = Cell(namespaces, state)
-            try:
-                return await _run(cell, rounds, chance)
-            finally:
-                for process in cell.running:
-                    await cell.kill(process)
+            return await _run(namespaces, state, rounds, random.Random(seed))
 
 
-async def _run(cell: Cell, rounds: int, chance: random.Random) -> dict[str, Any]:
-    here, there = cell.namespaces.agent, cell.namespaces.client
-    grippers, where = await cell.start(here, "chaos", "gripper")
-    agent, _ = await cell.start(here, "programs", "agent", ENDPOINT, where)
-    client, _ = await cell.start(there, "chaos", "worker")
-    asking, _ = await cell.start(there, "chaos", "curious")
-    panel, _ = await cell.start(here, "chaos", "panel")
+async def _run(namespaces: Namespaces, state: str, rounds: int, chance: random.Random) -> dict[str, Any]:
+    here, there = namespaces.agent, namespaces.client
+    grippers, where = await namespaces.start(here, CHAOS, "gripper")
+
+    async def start_agent() -> Process:
+        words = (PROGRAMS, "agent", ENDPOINT, where)
+        return (await namespaces.start(here, *words, STATE_DIRECTORY=state))[0]
+
+    agent = await start_agent()
+    client, _ = await namespaces.start(there, CHAOS, "worker")
+    asking, _ = await namespaces.start(there, CHAOS, "curious")
+    panel, _ = await namespaces.start(here, CHAOS, "panel")
     barred: list[tuple[float, float]] = []
     happened: Counter[str] = Counter()
     for number in range(rounds):
         what = ("cut", "loss", "restart", "halt and restart")[number % 4]
         happened[what] += 1
         if what == "loss":
-            await cell.namespaces.drop("input", "output", share=chance.choice((5, 20)))
-            await asyncio.sleep(1.5)
-            await cell.namespaces.mend()
+            async with namespaces.dropping("input", "output", share=chance.choice((5, 20))):
+                await asyncio.sleep(1.5)
         elif what == "restart":
-            await cell.kill(agent)
+            await kill(agent)
             await asyncio.sleep(chance.uniform(0.0, 1.0))
-            agent, _ = await cell.start(here, "programs", "agent", ENDPOINT, where)
+            agent = await start_agent()
             await asyncio.sleep(2.0)
         else:
-            ways = (("input",), ("output",), ("input", "output"))
-            both = what != "cut" or number % 3 == 2
-            await cell.namespaces.drop(*(ways[2] if both else ways[number % 3]))
-            await asyncio.sleep(chance.uniform(0.0, 1.3))
             halted_at = 0.0
-            if what != "cut":
-                panel.send_signal(signal.SIGUSR1)
-                assert panel.stdout is not None
-                halted_at = float((await panel.stdout.readline()).decode())
-                happened["halts acknowledged"] += halted_at > 0
-                await cell.kill(agent)
-                agent, _ = await cell.start(here, "programs", "agent", ENDPOINT, where)
-            await cell.namespaces.mend()
+            async with namespaces.dropping(*WAYS[number % 3 if what == "cut" else 2]):
+                await asyncio.sleep(chance.uniform(0.0, 1.3))
+                if what != "cut":
+                    panel.send_signal(signal.SIGUSR1)
+                    assert panel.stdout is not None
+                    halted_at = float((await panel.stdout.readline()).decode())
+                    happened["halts acknowledged"] += halted_at > 0
+                    await kill(agent)
+                    agent = await start_agent()
             if halted_at:
                 await asyncio.sleep(4.0)
                 barred.append((halted_at, time.monotonic()))
                 client.send_signal(signal.SIGUSR1)
         await asyncio.sleep(chance.uniform(0.5, 1.5))
     await asyncio.sleep(3)
-    reports = {"worker": await cell.end(client), "curious": await cell.end(asking)}
-    await cell.kill(agent)
-    images = await cell.end(grippers)
-    return {"rounds": happened, **reports, **judged(images, barred)}
+    reports = {"worker": await report(client), "curious": await report(asking)}
+    await kill(agent)
+    return {"rounds": happened, **reports, **judged(await report(grippers), barred)}
 
 
 def judged(images: list[tuple[float, int, int]], barred: list[tuple[float, float]]) -> dict[str, Any]:
@@ -223,10 +186,10 @@ def judged(images: list[tuple[float, int, int]], barred: list[tuple[float, float
     }
 
 
-PROGRAMS = {"gripper": gripper, "worker": worker, "curious": curious, "panel": panel}
+PARTS = {"gripper": gripper, "worker": worker, "curious": curious, "panel": panel}
 
 if __name__ == "__main__":
-    if sys.argv[1:] and sys.argv[1] in PROGRAMS:
-        asyncio.run(PROGRAMS[sys.argv[1]]())
+    if sys.argv[1:] and sys.argv[1] in PARTS:
+        asyncio.run(PARTS[sys.argv[1]]())
     else:
         say(missing() or json.dumps(asyncio.run(chaos(int((sys.argv[1:] or ["20"])[0])))))

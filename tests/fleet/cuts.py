@@ -15,6 +15,7 @@ import random
 import shutil
 import signal
 import sys
+from asyncio.subprocess import Process
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,8 @@ ROOT = Path(__file__).parents[2]
 AGENT, CLIENT = "10.213.7.1", "10.213.7.2"
 ENDPOINT = f"tcp/{AGENT}:7447"
 LIMIT_S = 20.0
+PROGRAMS = "tests.fleet.programs"
+WAYS = (("input",), ("output",), ("input", "output"))
 
 
 def missing() -> str:
@@ -50,6 +53,7 @@ class Namespaces:
 
     def __init__(self) -> None:
         self.agent, self.client = f"rq{os.getpid()}a", f"rq{os.getpid()}c"
+        self.running: list[Process] = []
 
     @contextlib.asynccontextmanager
     async def made(self) -> AsyncIterator[None]:
@@ -66,11 +70,14 @@ class Namespaces:
                     await run("ip", "-n", name, "link", "set", device, "up")
             yield
         finally:
+            for process in self.running:
+                await kill(process)
             for name in (self.agent, self.client):
                 with contextlib.suppress(RuntimeError):
                     await run("ip", "netns", "del", name)
 
-    async def drop(self, *ways: str, share: int = 100) -> None:
+    @contextlib.asynccontextmanager
+    async def dropping(self, *ways: str, share: int = 100) -> AsyncIterator[None]:
         """Drop what comes in at the client ("input"), what it sends ("output"), or so many percent of it."""
         for way in ways:
             chance = [] if share == 100 else ["numgen", "random", "mod", "100", "<", str(share)]
@@ -78,61 +85,55 @@ class Namespaces:
             hook = f"{{ type filter hook {way} priority 0 ; }}"
             await self._nft("add", "chain", "inet", "rq", way, hook)
             await self._nft("add", "rule", "inet", "rq", way, *chance, "drop")
-
-    async def mend(self) -> None:
+        yield
         await self._nft("delete", "table", "inet", "rq")
 
     async def _nft(self, *words: str) -> None:
         await run("ip", "netns", "exec", self.client, "nft", *words)
 
-    async def start(self, where: str, *words: str) -> asyncio.subprocess.Process:
-        """Start a program of tests/fleet/programs.py in one of them, and wait until it is ready."""
+    async def start(self, where: str, *words: str, **environment: str) -> tuple[Process, str]:
+        """Start a module of tests/fleet in one of them; returns it with its first line."""
         process = await asyncio.create_subprocess_exec(
-            *("ip", "netns", "exec", where, sys.executable, "-m", "tests.fleet.programs", *words),
+            *("ip", "netns", "exec", where, sys.executable, "-m", *words),
             cwd=ROOT,
+            env=os.environ | environment,
             stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.DEVNULL,
         )
+        self.running.append(process)
         assert process.stdout is not None
         async with asyncio.timeout(LIMIT_S):
-            assert (await process.stdout.readline()).strip() == b"ready"
-        return process
+            return process, (await process.stdout.readline()).decode().strip()
 
 
-async def report(process: asyncio.subprocess.Process) -> dict[str, Any]:
+async def kill(process: Process) -> None:
+    if process.returncode is None:
+        process.kill()
+        await process.wait()
+
+
+async def report(process: Process) -> Any:
     """What a program says at its end."""
     process.send_signal(signal.SIGTERM)
     async with asyncio.timeout(LIMIT_S):
         said, _ = await process.communicate()
-    return dict(json.loads(said.splitlines()[-1]))
+    return json.loads(said.splitlines()[-1])
 
 
 async def marathon(cuts: int, seed: int = 1) -> dict[str, Any]:
     """Cut one direction or both, and lose a share of all for a while; returns what came of it."""
     chance, namespaces = random.Random(seed), Namespaces()
     async with namespaces.made():
-        agent = await namespaces.start(namespaces.agent, "served", ENDPOINT)
-        client = await namespaces.start(namespaces.client, "compare", ENDPOINT)
-        try:
-            for number in range(cuts):
-                ways = (("input",), ("output",), ("input", "output"))[number % 3]
-                await _while_dropping(namespaces, chance.uniform(0.3, 1.3), *ways)
-                await asyncio.sleep(chance.uniform(0.2, 0.8))
-            for share in (5, 20, 50):
-                await _while_dropping(namespaces, 1.5, "input", share=share)
-            await asyncio.sleep(2)
-            return {"cuts": cuts, **await report(client), **await report(agent)}
-        finally:
-            for process in (client, agent):
-                if process.returncode is None:
-                    process.kill()
-                    await process.wait()
-
-
-async def _while_dropping(namespaces: Namespaces, seconds: float, *ways: str, share: int = 100) -> None:
-    await namespaces.drop(*ways, share=share)
-    await asyncio.sleep(seconds)
-    await namespaces.mend()
+        agent, _ = await namespaces.start(namespaces.agent, PROGRAMS, "served", ENDPOINT)
+        client, _ = await namespaces.start(namespaces.client, PROGRAMS, "compare", ENDPOINT)
+        for number in range(cuts):
+            async with namespaces.dropping(*WAYS[number % 3]):
+                await asyncio.sleep(chance.uniform(0.3, 1.3))
+            await asyncio.sleep(chance.uniform(0.2, 0.8))
+        for share in (5, 20, 50):
+            async with namespaces.dropping("input", share=share):
+                await asyncio.sleep(1.5)
+        await asyncio.sleep(2)
+        return {"cuts": cuts, **await report(client), **await report(agent)}
 
 
 if __name__ == "__main__":

@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
-from robotiq_async import RobotiqHand
+from robotiq_async import Finger, RobotiqHand
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.network.bus import Reply, Urgency
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire import status_message
-from robotiq_async.fleet.wire.envelope import unpack_answer
+from robotiq_async.fleet.wire.envelope import Answer, Call, unpack_answer, unpack_call
+from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.fleet.wire.values import error_fields
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.model import THREE_FINGER, Model
 from tests.fleet.network import MemoryBus, Network
 from tests.grippers import activate_beforehand
+from tests.virtual import until
 
 SPEEDUP = 5.0
-__all__ = ["Lab", "MemoryBus", "lab"]
+LEFT = GripperName("lab", "cell", "left")
+
+
+def instantly(stamp: float) -> float:
+    """The clock of an agent that is ours."""
+    return stamp
 
 
 @dataclass
@@ -31,6 +38,7 @@ class Lab:
     Attributes:
         gripper: is active.
         local: the agent's hand.
+        serving: the run of the agent.
     """
 
     network: Network
@@ -44,14 +52,35 @@ class Lab:
         """A remote hand that is not started."""
         return RemoteHand("zenoh://lab/cell/left", bus=self.network.bus(name), **options)
 
+    def hand(self) -> RemoteHand:
+        return self.client()
+
+    def reader(self) -> RemoteHand:
+        """One that only reads."""
+        return self.client("reader", control=False)
+
     def client_over(self, bus: Any, **options: Any) -> RemoteHand:
         """The same, over a bus of the test's own."""
         return RemoteHand("zenoh://lab/cell/left", bus=bus, **options)
+
+    async def moving(self, hand: RemoteHand) -> asyncio.Task[Any]:
+        """Begin a slow move of finger A; how it ends may go unread."""
+        moving = asyncio.create_task(hand.move(255, Finger.A, speed=0))
+        moving.add_done_callback(lambda task: task.cancelled() or task.exception())
+        await until(lambda: self.gripper.is_moving)
+        return moving
 
     @property
     def lease(self) -> int:
         """The number of the lease, as every status of the agent tells it."""
         return status_message.unpack(self.agent.hands["left"].publisher.status_message()).lease
+
+    async def answer(self, verb: str, request: bytes) -> Answer:
+        """What the agent answers to a stranger's request."""
+        bus = self.network.bus("stranger")
+        reply = await bus.ask(LEFT.key(verb), request, timeout=1.0, urgency=Urgency.COMMAND)
+        assert reply is not None
+        return unpack_answer(reply.payload)
 
     async def end_agent(self) -> None:
         self.serving.cancel()
@@ -59,7 +88,22 @@ class Lab:
 
 
 @asynccontextmanager
+async def serving(agent: Agent) -> AsyncIterator[asyncio.Task[None]]:
+    """Run an agent that answers requests during a block."""
+    ready = asyncio.Event()
+    task = asyncio.create_task(agent.run(ready.set))
+    try:
+        await ready.wait()
+        yield task
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+@asynccontextmanager
 async def lab(
+    network: Network | None = None,
+    name: str = "agent",
     *,
     window: float = 1.0,
     active: bool = True,
@@ -67,23 +111,17 @@ async def lab(
     keep_grip: bool = False,
     model: Model = THREE_FINGER,
 ) -> AsyncIterator[Lab]:
-    """An agent that serves zenoh://lab/cell/left, and a network named by the buses "agent" and "client"."""
-    loop = asyncio.get_running_loop()
-    network = Network()
-    gripper = kind(loop.time, speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP, spread=False, model=model)
+    """An agent that serves zenoh://lab/cell/left, under a name in a network, by default one of its own."""
+    network = network or Network()
+    clock = asyncio.get_running_loop().time
+    gripper = kind(clock, speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP, spread=False, model=model)
     async with SimulatorServer(gripper) as server:
         if active:
             await activate_beforehand(gripper)
         hand = RobotiqHand(server.address, keep_grip=keep_grip, model=model)
-        agent = Agent("lab", "cell", {"left": hand}, network.bus("agent"), window=window)
-        ready = asyncio.Event()
-        serving = asyncio.create_task(agent.run(ready.set))
-        try:
-            await ready.wait()
-            yield Lab(network, gripper, server, hand, agent, serving)
-        finally:
-            serving.cancel()
-            await asyncio.gather(serving, return_exceptions=True)
+        agent = Agent("lab", "cell", {"left": hand}, network.bus(name), window=window)
+        async with serving(agent) as task:
+            yield Lab(network, gripper, server, hand, agent, task)
 
 
 # -- buses that spoil requests -----------------------------------------------------------------------------
@@ -100,38 +138,46 @@ class Between:
 
 
 class Spoiling(Between):
-    """A bus whose answers to one kind of request are spoiled: lost once, or another's."""
+    """A bus that loses requests or their answers, or answers in another's place.
+
+    Attributes:
+        left: how many requests are still to be spoiled.
+        commands: the commands that were asked for, spoiled or not.
+    """
 
     def __init__(
         self,
         bus: MemoryBus,
-        verb: str,
+        verb: str = "/cmd/",
         *,
+        spoils: Callable[[Call], bool] = lambda _: True,
         times: int = 1_000_000,
         answer: bytes | None = None,
-        is_sent: bool = True,
+        sends: bool = False,
     ) -> None:
         super().__init__(bus)
-        self._verb, self._answer, self.left = verb, answer, times
-        self._is_sent = is_sent
+        self.left = times
+        self.commands: list[Call] = []
+        self._verb, self._spoils, self._answer, self._sends = verb, spoils, answer, sends
 
-    def ask(
-        self, key: str, payload: bytes, *, timeout: float, urgency: Urgency, **how: Any
-    ) -> asyncio.Future[Reply | None]:
-        if not key.endswith(self._verb) or not self.left:
-            return self._bus.ask(key, payload, timeout=timeout, urgency=urgency, **how)
-        self.left -= 1
-        if self._answer is None:  # never sent
-            return asyncio.ensure_future(nothing(timeout))
-        return asyncio.ensure_future(self._another(key, payload, timeout, urgency))
+    def ask(self, key: str, payload: bytes, *, timeout: float, **how: Any) -> asyncio.Future[Reply | None]:
+        call = unpack_call(payload)
+        if "/cmd/" in key:
+            self.commands.append(call)
+        is_spoiled = self._verb in key and self.left > 0 and self._spoils(call)
+        self.left -= is_spoiled
+        if not is_spoiled:
+            return self._bus.ask(key, payload, timeout=timeout, **how)
+        if self._sends:
+            self._bus.ask(key, payload, timeout=timeout, **how)
+        return asyncio.ensure_future(self._spoiled(timeout))
 
-    async def _another(self, key: str, payload: bytes, timeout: float, urgency: Urgency) -> Reply | None:
-        if self._is_sent:
-            asking = self._bus.ask(key, payload, timeout=timeout, urgency=urgency)
-            await asyncio.sleep(0.1)
-            asking.cancel()
-        assert self._answer is not None
-        return _Answered(self._answer)
+    async def _spoiled(self, timeout: float) -> Reply | None:
+        if self._answer is None:
+            await asyncio.sleep(timeout)
+            return None
+        await asyncio.sleep(0.1 * self._sends)
+        return Answered(self._answer)
 
 
 class Garbling(Between):
@@ -150,15 +196,11 @@ class Garbling(Between):
         reply = await asking
         if reply is None:
             return None
-        return _Answered(replace(unpack_answer(reply.payload), **self._others).pack())
+        return Answered(replace(unpack_answer(reply.payload), **self._others).pack())
 
 
-class _Answered:
+class Answered:
     attachment = b""
 
     def __init__(self, payload: bytes) -> None:
         self.payload = payload
-
-
-async def nothing(timeout: float) -> None:
-    await asyncio.sleep(timeout)

@@ -14,9 +14,11 @@ import random
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 from robotiq_async.fleet.network.bus import PendingQuery, Query, Reply, Undo, Urgency, is_any, is_anything
 
+T = TypeVar("T")
 LATENCY_S = 0.0002
 LINK_LEASE_S = 1.0
 RECONNECT_S = 0.2
@@ -80,6 +82,10 @@ class Network:
 
     def both(self, one: str, other: str) -> list[Stream]:
         return [self.stream(one, other), self.stream(other, one)]
+
+    def delay(self, one: str, other: str, seconds: float) -> None:
+        for stream in self.both(one, other):
+            stream.delay = seconds
 
     def cut(self, *ways: tuple[str, str]) -> None:
         """Let nothing arrive from now on; each way is a source and a target."""
@@ -165,10 +171,20 @@ class Network:
 class _Query:
     """A request on its way to all who serve its key, until each has answered or is out of reach."""
 
-    def __init__(self, source: MemoryBus, targets: list[MemoryBus], decides: Callable[[Reply], bool]) -> None:
+    def __init__(
+        self, source: MemoryBus, targets: list[str], urgency: Urgency, decides: Callable[[Reply], bool]
+    ) -> None:
         self.source = source
         self.asking = PendingQuery(decides)
-        self._left = [target.name for target in targets]
+        self._left = targets
+        self._urgency = urgency
+
+    def carry_back(self, target: str, reply: Reply | None) -> None:
+        network = self.source.network
+        size = 0 if reply is None else len(reply.payload) + len(reply.attachment)
+        if not network.loop.is_closed():
+            take = functools.partial(self.take, target, reply)
+            network.carry(target, self.source, size, take, self._urgency)
 
     def take(self, target: str, reply: Reply | None) -> None:
         """It is answered, or is not going to be."""
@@ -198,6 +214,11 @@ class _Received:
         """A dropped query is reported to the client that asked."""
         if not self._is_answered:
             self._reply(None)
+
+
+def _entered(entries: list[T], entry: T) -> Undo:
+    entries.append(entry)
+    return lambda: entries.remove(entry) if entry in entries else None
 
 
 @dataclass(frozen=True)
@@ -245,9 +266,7 @@ class MemoryBus:
                 listener(key, payload)
 
     def subscribe(self, expression: str, listener: Callable[[str, bytes], None]) -> Undo:
-        entry = (expression, listener)
-        self.subscribers.append(entry)
-        return lambda: self.subscribers.remove(entry) if entry in self.subscribers else None
+        return _entered(self.subscribers, (expression, listener))
 
     def serve(
         self,
@@ -255,9 +274,9 @@ class MemoryBus:
         handler: Callable[[Query], None],
         allows: Callable[[bytes], bool] = is_anything,
     ) -> Undo:
-        entry = (expression, lambda query: handler(query) if allows(query.payload) else None)
-        self.queryables.append(entry)
-        return lambda: self.queryables.remove(entry) if entry in self.queryables else None
+        return _entered(
+            self.queryables, (expression, lambda query: handler(query) if allows(query.payload) else None)
+        )
 
     def ask(
         self,
@@ -273,51 +292,31 @@ class MemoryBus:
     async def _ask(
         self, key: str, payload: bytes, timeout: float, urgency: Urgency, decides: Callable[[Reply], bool]
     ) -> Reply | None:
-        found = self._find(key)
-        if not found or self.is_closed:
-            return None
-        query = _Query(self, [other for other, _ in found], decides)
-        self.network.pending.add(query)
-        for other, handler in found:
-            self._carry_question(other, handler, key, payload, query, urgency)
-        timer = self.loop.call_later(timeout, query.asking.end)
-        try:
-            return await query.asking.answered
-        finally:
-            timer.cancel()
-            self.network.pending.discard(query)
-
-    def _find(self, key: str) -> list[tuple[MemoryBus, Callable[[Query], None]]]:
-        return [
+        network = self.network
+        found = [
             (other, handler)
             for other in self._others()
             for expression, handler in other.queryables
             if matches(expression, key)
         ]
+        if not found or self.is_closed:
+            return None
+        query = _Query(self, [other.name for other, _ in found], urgency, decides)
+        network.pending.add(query)
 
-    def _carry_question(
-        self,
-        other: MemoryBus,
-        handler: Callable[[Query], None],
-        key: str,
-        payload: bytes,
-        query: _Query,
-        urgency: Urgency,
-    ) -> None:
-        network = self.network
-
-        def back(reply: Reply | None) -> None:
-            size = 0 if reply is None else len(reply.payload) + len(reply.attachment)
-            if not network.loop.is_closed():
-                network.carry(
-                    other.name, self, size, functools.partial(query.take, other.name, reply), urgency
-                )
-
-        def arrive() -> None:
+        def arrive(other: MemoryBus, handler: Callable[[Query], None]) -> None:
             if not other.is_closed:
-                handler(_Received(network.wrong_key(key), payload, back))
+                answer = functools.partial(query.carry_back, other.name)
+                handler(_Received(network.wrong_key(key), payload, answer))
 
-        network.carry(self.name, other, len(payload), arrive, urgency)
+        for other, handler in found:
+            network.carry(self.name, other, len(payload), functools.partial(arrive, other, handler), urgency)
+        timer = self.loop.call_later(timeout, query.asking.end)
+        try:
+            return await query.asking.answered
+        finally:
+            timer.cancel()
+            network.pending.discard(query)
 
     def announce(self, key: str) -> Undo:
         self.tokens.add(key)
@@ -352,13 +351,11 @@ class MemoryBus:
         )
 
     def watch(self, expression: str, listener: Callable[[str, bool], None]) -> Undo:
-        entry = (expression, listener)
-        self.watchers.append(entry)
         for bus in self.network.buses:
             for key in bus.tokens:
                 if matches(expression, key) and self.network.is_up(self.name, bus.name):
                     self.loop.call_later(LATENCY_S, listener, key, True)
-        return lambda: self.watchers.remove(entry) if entry in self.watchers else None
+        return _entered(self.watchers, (expression, listener))
 
     async def unreached(self) -> list[str]:
         there = {bus.name for bus in self._others() if not self.network.stream(bus.name, self.name).is_cut}

@@ -1,4 +1,4 @@
-"""Sessions of zenoh over loopback, with keys: an agent's side that answers everything, and clients."""
+"""Sessions of zenoh over loopback: an agent's side that answers everything, agents, and clients."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from typing import Any, Final
 from zenoh import SampleKind
 from zenoh.handlers import Callback
 
+from robotiq_async import RobotiqHand
+from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.network.bus import Query, Urgency
 from robotiq_async.fleet.network.configuration import (
     agent_configuration,
@@ -21,9 +23,8 @@ from robotiq_async.fleet.network.configuration import (
 )
 from robotiq_async.fleet.network.mailbox import Kind
 from robotiq_async.fleet.network.zenoh_bus import ZenohBus, open_bus
-from robotiq_async.fleet.wire.names import GripperName
+from tests.fleet.lab import LEFT, serving
 
-LEFT: Final = GripperName("lab", "cell-1", "left")
 TELEMETRY: Final = b"news"
 PATIENCE: Final = 10.0
 
@@ -62,7 +63,7 @@ class Client:
 
 
 @dataclass
-class Agent:
+class Answering:
     """Something that answers to every key of an agent."""
 
     bus: ZenohBus
@@ -79,46 +80,50 @@ class Line:
     endpoint: str
     stack: AsyncExitStack
 
-    async def _open(self, configuration: dict[str, object]) -> ZenohBus:
+    async def open(self, configuration: dict[str, object]) -> ZenohBus:
         bus = await open_bus(configuration, self.endpoint)
         self.stack.push_async_callback(bus.close)
         return bus
 
-    async def agent(self, keys: Path) -> Agent:
+    async def agent_bus(self, keys: Path | None = None) -> ZenohBus:
+        return await self.open(agent_configuration("lab", "cell", [self.endpoint], keys=keys))
+
+    async def answering(self, keys: Path) -> Answering:
         """The agent's side."""
-        bus = await self._open(agent_configuration("lab", "cell-1", [self.endpoint], keys=keys))
+        bus = await self.agent_bus(keys)
 
         def answer(query: Query) -> None:
             query.reply(b"!")
 
         for verb in ("info", "lease", "halt", "cmd/*"):
-            self.stack.callback(bus.serve(f"robotiq/v1/lab/cell-1/*/{verb}", answer))
+            self.stack.callback(bus.serve(f"robotiq/v1/lab/cell/*/{verb}", answer))
         self.stack.callback(bus.announce(LEFT.key("alive", "77")))
         publish = {
             name: bus.publisher(LEFT.key(name), Urgency.TELEMETRY) for name in ("feed", "summary", "other")
         }
-        agent = Agent(bus, lambda name: publish[name](TELEMETRY))
+        side = Answering(bus, lambda name: publish[name](TELEMETRY))
         # What it publishes itself is heard too.
         self.stack.callback(
-            bus.subscribe("**", lambda _, payload: None if payload == TELEMETRY else agent.heard.set())
+            bus.subscribe("**", lambda _, payload: None if payload == TELEMETRY else side.heard.set())
         )
-        return agent
+        return side
+
+    async def serve(self, hand: RobotiqHand, keys: Path | None = None) -> None:
+        """An agent that serves a hand as zenoh://lab/cell/left."""
+        served = Agent("lab", "cell", {"left": hand}, await self.agent_bus(keys))
+        await self.stack.enter_async_context(serving(served))
 
     async def server(self, keys: Path) -> None:
         """Something that listens with any keys."""
-        await self._open(session_configuration([self.endpoint], [], keys))
+        await self.open(session_configuration([self.endpoint], [], keys))
 
     async def client(self, keys: Path | None, mode: str = "peer") -> Client:
         """A client that has tried to connect; without keys it is one that zenoh's own tools would be."""
-        configuration: dict[str, Any]
         if keys is None:
             configuration = session_configuration([], [self.endpoint])
         else:
             configuration = client_configuration([self.endpoint], keys=keys)
-        return self._client(await self._open(configuration | {"mode": mode}))
-
-    def _client(self, bus: ZenohBus) -> Client:
-        client = Client(bus)
+        client = Client(bus := await self.open(configuration | {"mode": mode}))
 
         def tell(event: Any) -> None:
             is_there = event.kind == SampleKind.PUT
@@ -132,6 +137,8 @@ class Line:
 
 
 @asynccontextmanager
-async def line(host: str = "127.0.0.1") -> AsyncIterator[Line]:
-    async with AsyncExitStack() as stack, asyncio.timeout(PATIENCE):
-        yield Line(f"tls/{host}:{free_port()}", stack)
+async def line(
+    host: str = "127.0.0.1", protocol: str = "tls", patience: float = PATIENCE
+) -> AsyncIterator[Line]:
+    async with AsyncExitStack() as stack, asyncio.timeout(patience):
+        yield Line(f"{protocol}/{host}:{free_port()}", stack)

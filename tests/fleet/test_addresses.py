@@ -65,8 +65,9 @@ def test_what_is_no_name(name: str) -> None:
 def test_what_is_no_string(name: object) -> None:
     with pytest.raises(TypeError, match="host must be a string"):
         check_name("host", name)
-    with pytest.raises(TypeError, match="address must be a string"):
-        GripperName.parse(name)
+    for parse in (GripperName.parse, parse_remote_address):
+        with pytest.raises(TypeError, match="address must be a string"):
+            parse(name)
 
 
 @given(st.text(max_size=70))
@@ -89,15 +90,6 @@ def test_addresses_and_keys_lead_back_to_the_name(site: str, host: str, gripper:
     assert GripperName.of_key(name.key("feed")) == name
     assert name.key("halt") == f"{ROOT}/{site}/{host}/{gripper}/halt"
     assert 0 <= name.mark < 2**32
-
-
-@pytest.mark.parametrize(
-    "address",
-    ["", "zenoh://a/b", "zenoh://a/b/c/d", "tcp://a/b/c", "zenoh:/a/b/c"],
-)
-def test_what_is_no_address(address: str) -> None:
-    with pytest.raises(ValueError, match="zenoh://SITE/HOST/GRIPPER"):
-        GripperName.parse(address)
 
 
 def test_a_scheme_is_a_scheme_in_capitals_too() -> None:
@@ -128,7 +120,7 @@ def empty_environment(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_without_options_it_is_an_agent_on_this_machine() -> None:
-    assert parse_remote_address(PLAIN) == (NAME, Route((), None, False))
+    assert parse_remote_address(PLAIN) == (NAME, Route())
 
 
 def test_options() -> None:
@@ -160,9 +152,11 @@ def test_an_empty_environment_is_none(monkeypatch: pytest.MonkeyPatch, value: st
 @pytest.mark.parametrize(
     "address",
     [
+        "",
         "zenoh://lab/cell-1",
         "zenoh://lab/cell-1/left/more",
         "zenoh://lab/*/left",
+        "zenoh:/lab/cell-1/left",
         "tcp://lab/cell-1/left",
         f"{PLAIN}?conect=tls/a:1",
         f"{PLAIN}?connect",
@@ -175,11 +169,6 @@ def test_malformed(address: str) -> None:
         parse_remote_address(address)
     assert repr(address) in str(caught.value)
     assert (str(caught.value).count("malformed"), str(caught.value).count("accepted")) == (1, 1)
-
-
-def test_no_string() -> None:
-    with pytest.raises(TypeError, match="address must be a string, got 3"):
-        parse_remote_address(3)
 
 
 @pytest.mark.parametrize(
@@ -231,15 +220,8 @@ def test_with_keys_everything_is_encrypted(endpoint: str) -> None:
 @pytest.mark.parametrize(
     "endpoint",
     [
-        "",
-        "127.0.0.1:7447",
-        "tcp/127.0.0.1",
-        "tcp/127.0.0.1:0",
-        "tcp/127.0.0.1:65536",
-        "tcp/::1:7447",
-        "udp/127.0.0.1:7447",
-        "tls/cell-1:7447#enable_mtls=false",
-        "tls/cell-1:7447?rel=0",
+        *("", "127.0.0.1:7447", "tcp/127.0.0.1", "tcp/127.0.0.1:0", "tcp/127.0.0.1:65536", "tcp/::1:7447"),
+        *("udp/127.0.0.1:7447", "tls/cell-1:7447#enable_mtls=false", "tls/cell-1:7447?rel=0"),
         "tcp/127.0.0.1:7447\n",
     ],
 )
@@ -271,11 +253,7 @@ import asyncio, sys
 sys.modules["zenoh"] = None
 from robotiq_async.fleet import Fleet, RemoteHand
 
-async def main():
-    async with {use}:
-        pass
-
-asyncio.run(main())
+asyncio.run({use}.__aenter__())
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
     last = done.stderr.splitlines()[-1]

@@ -15,97 +15,70 @@ from robotiq_async import Finger, State
 from robotiq_async.fleet.agent import records
 from robotiq_async.fleet.agent.records import FileRecords, NoRecords, file_records
 from robotiq_async.fleet.control.lease import Holder, Lease
-from robotiq_async.fleet.network.bus import Urgency
+from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import Call
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.values.errors import AgentError, ControlLostError
 from robotiq_async.values.request import Request as Image
 from tests.fleet.cell import told
-from tests.fleet.lab import Garbling, Spoiling, lab
+from tests.fleet.lab import LEFT, Garbling, Lab, Spoiling, lab
 from tests.fleet.world import World, world
-from tests.virtual import virtual
-
-LEFT = GripperName("lab", "cell", "left")
-
+from tests.virtual import inside, until
 
 # -- control -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("after", [0.4, 1.6])
-@pytest.mark.parametrize("what", ["halt", "take"])
-@virtual
-async def test_who_was_cut_off_does_not_come_back_after_a_halt_or_a_take(what: str, after: float) -> None:
-    """It hears of neither: for it the lease has ended because the link was lost. Before that, and after."""
-    async with world() as here:
-        here.cut(here.holder)
-        await asyncio.sleep(after)
-        other = here.other.hand
-        await here.other.do(other.halt() if what == "halt" else other.take())
-        if what == "take":
-            await here.other.do(other.release())
-        await asyncio.sleep(1.5)
-        here.mend(here.holder)
-        await asyncio.sleep(3)
-        assert not here.holder.hand.is_in_control
-        word = {"halt": "halted", "take": "taken"}[what]
-        assert await here.holder.do(told(here.holder.hand.set_speed(9))) == f"ControlLost {word}"
-        await here.holder.do(here.holder.hand.acquire())
-        await here.holder.do(here.holder.hand.set_speed(9))
-
-
-@virtual
-async def test_who_was_cut_off_does_not_come_back_after_a_halt_of_the_next_holder() -> None:
+@inside(lab)
+async def test_who_was_cut_off_does_not_come_back_after_a_halt_of_the_next_holder(
+    here: Lab, hand: RemoteHand
+) -> None:
     """Only a halt of a client that had not held the lease barred the one before."""
-    async with lab() as here:
-        first = here.client("first")
-        await first.start()
-        here.network.cut(("first", "agent"), ("agent", "first"))
-        await asyncio.sleep(2)
-        async with here.client("next") as other:
-            await other.halt()
-        here.network.mend(*here.network.both("first", "agent"))
-        await asyncio.sleep(3)
-        assert not first.is_in_control
-        with pytest.raises(ControlLostError):
-            await first.move(30)
-        await first.stop()
+    here.network.cut(("client", "agent"), ("agent", "client"))
+    await asyncio.sleep(2)
+    async with here.client("next") as other:
+        await other.halt()
+    here.network.mend(*here.network.both("client", "agent"))
+    await asyncio.sleep(3)
+    assert not hand.is_in_control
+    with pytest.raises(ControlLostError):
+        await hand.move(30)
 
 
-@virtual
-async def test_its_own_halt_bars_nobody() -> None:
-    async with world() as here:
-        here.cut(here.holder)
-        await asyncio.sleep(2)
-        here.mend(here.holder)
-        await here.holder.do(here.holder.hand.halt())
-        await here.until(lambda: here.holder.hand.is_in_control)
+@inside(world)
+async def test_its_own_halt_bars_nobody(here: World) -> None:
+    here.cut(here.holder)
+    await asyncio.sleep(2)
+    here.mend(here.holder)
+    await here.holder.do(here.holder.hand.halt())
+    await here.until(lambda: here.holder.hand.is_in_control)
 
 
-@virtual
+@inside(lab)
 @pytest.mark.parametrize(("lost", "keeps"), [(1, True), (100, False)])
-async def test_one_lost_renewal_does_not_lose_the_lease(lost: int, keeps: bool) -> None:
-    async with lab() as here:
-        bus = Spoiling(here.network.bus("client"), "/lease", times=0)
-        async with here.client_over(bus) as hand:
-            bus.left = lost
-            moving = asyncio.create_task(hand.move(215, Finger.A, speed=0))
-            for _ in range(300):
-                await asyncio.sleep(0.01)
-                if not hand.is_in_control:
-                    break
-            assert hand.is_in_control is keeps
-            bus.left = 0
-            if keeps:
-                assert (await moving).positions[Finger.A] == pytest.approx(215, abs=2)
-            else:
-                with pytest.raises(ControlLostError):
-                    await moving
+async def test_one_lost_renewal_does_not_lose_the_lease(here: Lab, lost: int, keeps: bool) -> None:
+    bus = Spoiling(here.network.bus("client"), "/lease", times=0)
+    async with here.client_over(bus) as hand:
+        bus.left = lost
+        moving = asyncio.create_task(hand.move(215, Finger.A, speed=0))
+        for _ in range(300):
+            await asyncio.sleep(0.01)
+            if not hand.is_in_control:
+                break
+        assert hand.is_in_control is keeps
+        bus.left = 0
+        if keeps:
+            assert (await moving).positions[Finger.A] == pytest.approx(215, abs=2)
+        else:
+            with pytest.raises(ControlLostError):
+                await moving
 
 
-@virtual
-async def test_whoever_lost_the_lease_notices_although_the_agent_does_not_understand_the_question() -> None:
+@inside(lab)
+async def test_whoever_lost_the_lease_notices_although_the_agent_does_not_understand_the_question(
+    here: Lab,
+) -> None:
     """The question ended in a TypeError, and the hand took itself for the one that commands."""
-    async with lab() as here, here.client("other", control=False) as other:
+    async with here.client("other", control=False) as other:
         bus = Garbling(here.network.bus("client"))
         async with here.client_over(bus) as hand:
             bus.verb = "/lease"
@@ -117,44 +90,38 @@ async def test_whoever_lost_the_lease_notices_although_the_agent_does_not_unders
             bus.verb = "nothing"
 
 
-@virtual
-async def test_silence_is_noticed_while_the_lease_is_asked_for_again() -> None:
+@inside(lab)
+async def test_silence_is_noticed_while_the_lease_is_asked_for_again(here: Lab, hand: RemoteHand) -> None:
     """The last status of an agent that had died was shown as the present one for ever."""
-    async with lab() as here, here.client() as hand:
-        here.network.cut(("client", "agent"))
-        while hand.is_in_control:  # noqa: ASYNC110  # there is no event to wait for
-            await asyncio.sleep(0.01)
-        here.network.cut(("agent", "client"))
-        await asyncio.sleep(3)
-        assert hand.state is State.DISCONNECTED
+    here.network.cut(("client", "agent"))
+    await until(lambda: not hand.is_in_control)
+    here.network.cut(("agent", "client"))
+    await asyncio.sleep(3)
+    assert hand.state is State.DISCONNECTED
 
 
-@virtual
-async def test_an_agent_that_is_ending_refuses_and_says_so() -> None:
+@inside(lab)
+async def test_an_agent_that_is_ending_refuses_and_says_so(here: Lab, reader: RemoteHand) -> None:
     """It acknowledged what it no longer did."""
-    async with lab() as here, here.client("reader", control=False) as reader:
-        await here.local.set_speed(0)
-        await here.local.set_position(250, Finger.A)
-        writes = len(here.gripper.writes)
-        here.serving.cancel()
-        with pytest.raises(ControlLostError, match="the agent is ending; nothing was done") as refused:
-            await reader.acquire()
-        assert refused.value.reason == "closed"
-        await asyncio.gather(here.serving, return_exceptions=True)
-        assert not here.gripper.is_moving
-        ends = [Image.from_registers(write.registers) for write in here.gripper.writes[writes:]]
-        assert ends, "the halt"
-        assert not any(image.go for image in ends), "and nothing else"
+    await here.local.set_speed(0)
+    await here.local.set_position(250, Finger.A)
+    writes = len(here.gripper.writes)
+    here.serving.cancel()
+    with pytest.raises(ControlLostError, match="the agent is ending; nothing was done") as refused:
+        await reader.acquire()
+    assert refused.value.reason == "closed"
+    await asyncio.gather(here.serving, return_exceptions=True)
+    assert not here.gripper.is_moving
+    ends = [Image.from_registers(write.registers) for write in here.gripper.writes[writes:]]
+    assert ends, "the halt"
+    assert not any(image.go for image in ends), "and nothing else"
 
 
-@virtual
-async def test_the_holders_secret_is_told_to_nobody() -> None:
-    async with lab() as here, here.client("first"), here.client("reader", control=False) as reader:
-        bus = here.network.bus("stranger")
-        call = Call("robotiq/v1/lab/cell/left", "stranger")
-        reply = await bus.ask(f"{call.to}/info", call.pack(), timeout=1.0, urgency=Urgency.COMMAND)
-        assert reply is not None
-        assert b'"client"' not in reply.payload
+@inside(lab)
+async def test_the_holders_secret_is_told_to_nobody(here: Lab, reader: RemoteHand) -> None:
+    async with here.client("first"):
+        answer = await here.answer("info", Call(LEFT.base, "stranger").pack())
+        assert b'"client"' not in answer.pack()
         assert reader.state is State.RUNNING_IDLE
 
 
@@ -170,82 +137,70 @@ async def restart(here: World, how: str) -> None:
     await here.start_agent("next agent")
 
 
-@pytest.mark.parametrize("how", ["killed", "ended"])
-@pytest.mark.parametrize("what", ["halt", "take", "command"])
-@virtual
-async def test_who_was_cut_off_does_not_come_back_although_the_agent_was_started_anew(
-    what: str, how: str
+INTERVENTIONS = [
+    *((what, after, ()) for what in ("halt", "take") for after in (0.4, 1.6)),
+    *((what, 0.0, (how,)) for what in ("halt", "take", "command") for how in ("killed", "ended")),
+    *(("halt", 2.0, (how, how)) for how in ("killed", "ended")),
+]
+"""What another client does, how long after the cut (at 2 s the lease has ended by itself), and restarts."""
+
+
+@pytest.mark.parametrize(("what", "after", "restarts"), INTERVENTIONS)
+@inside(world)
+async def test_a_client_that_was_cut_off_does_not_come_back_after_an_intervention(
+    here: World, what: str, after: float, restarts: tuple[str, ...]
 ) -> None:
-    """It came back by itself, and moved 3 s after another client's halt."""
-    async with world() as here:
-        hand, other = here.holder.hand, here.other.hand
+    """It hears of none: for it the link was lost. It came back, and moved 3 s after another client's halt."""
+    hand, other = here.holder.hand, here.other.hand
 
-        async def loop() -> None:
-            """A program that goes on as soon as it may."""
-            while True:
-                await told(hand.move(200, Finger.A, speed=0))
-                await asyncio.sleep(0.05)
+    async def loop() -> None:
+        """A program that goes on as soon as it may."""
+        while True:
+            await told(hand.move(200, Finger.A, speed=0))
+            await asyncio.sleep(0.05)
 
-        looping = here.holder.host.start(loop())
-        await here.until(lambda: here.gripper.is_moving)
-        here.cut(here.holder)
-        if what == "halt":
-            await here.other.do(other.halt())
-        else:
-            await here.other.do(other.take())
-            if what == "command":  # the gripper's rGTO is set again
-                await here.other.do(other.move(0, Finger.B))
-            await here.other.do(other.release())
+    looping = here.holder.host.start(loop())
+    await here.until(lambda: here.gripper.is_moving)
+    here.cut(here.holder)
+    await asyncio.sleep(after)
+    if what == "halt":
+        await here.other.do(other.halt())
+    else:
+        await here.other.do(other.take())
+        if what == "command":  # the gripper's rGTO is set again
+            await here.other.do(other.move(0, Finger.B))
+        await here.other.do(other.release())
+    for how in restarts:
         await restart(here, how)
-        here.mend(here.holder)
-        stood = here.gripper.travel(Finger.A)
-        await asyncio.sleep(4)
-        assert not hand.is_in_control
-        assert here.gripper.travel(Finger.A) == stood
-        word = "halted" if what == "halt" else "taken"
-        assert await here.holder.do(told(hand.set_speed(9))) == f"ControlLost {word}"
-        looping.cancel()
-        await here.holder.do(hand.acquire())
-        await here.holder.do(hand.move(60, Finger.A))
+    await asyncio.sleep(1.5)
+    here.mend(here.holder)
+    stood = here.gripper.travel(Finger.A)
+    await asyncio.sleep(4)
+    assert not hand.is_in_control
+    assert here.gripper.travel(Finger.A) == stood
+    word = "halted" if what == "halt" else "taken"
+    assert await here.holder.do(told(hand.set_speed(9))) == f"ControlLost {word}"
+    looping.cancel()
+    await here.holder.do(hand.acquire())
+    await here.holder.do(hand.move(60, Finger.A))
 
 
-@pytest.mark.parametrize("how", ["killed", "ended"])
-@virtual
-async def test_a_halt_without_a_holder_counts_as_well(how: str) -> None:
-    async with world() as here:
-        here.cut(here.holder)
-        await asyncio.sleep(2)  # its lease has ended by itself
-        await here.other.do(here.other.hand.halt())
-        await restart(here, how)
-        await restart(here, how)
-        here.mend(here.holder)
-        await asyncio.sleep(3)
-        assert not here.holder.hand.is_in_control
-
-
-@virtual
-async def test_where_nothing_is_known_nobody_comes_back_by_itself() -> None:
-    async with world() as here:
-        here.kill(here.agent.host)
-        await asyncio.sleep(1)
-        here.records.records.clear()
-        await here.start_agent("next agent")
-        await asyncio.sleep(3)
-        assert not here.holder.hand.is_in_control
-        assert await here.holder.do(told(here.holder.hand.set_speed(9))) == "ControlLost restarted"
-        await here.holder.do(here.holder.hand.acquire())
-
-
-@virtual
-async def test_a_record_that_is_none_lets_nobody_back(caplog: pytest.LogCaptureFixture) -> None:
-    async with world() as here:
-        here.kill(here.agent.host)
-        await asyncio.sleep(1)
-        here.records.records[LEFT] = {"runs": "?", "number": 3, "barred": [1, "x"]}
-        await here.start_agent("next agent")
-        assert "the record of the lease cannot be read" in caplog.text
-        await asyncio.sleep(3)
-        assert not here.holder.hand.is_in_control
+@pytest.mark.parametrize("record", [None, {"runs": "?", "number": 3, "barred": [1, "x"]}])
+@inside(world)
+async def test_without_a_record_no_client_comes_back_by_itself(
+    here: World, record: dict[str, Any] | None, caplog: pytest.LogCaptureFixture
+) -> None:
+    here.kill(here.agent.host)
+    await asyncio.sleep(1)
+    here.records.records.clear()
+    if record is not None:
+        here.records.records[LEFT] = record
+    await here.start_agent("next agent")
+    assert ("the record of the lease cannot be read" in caplog.text) is (record is not None)
+    await asyncio.sleep(3)
+    assert not here.holder.hand.is_in_control
+    assert await here.holder.do(told(here.holder.hand.set_speed(9))) == "ControlLost restarted"
+    await here.holder.do(here.holder.hand.acquire())
 
 
 def test_a_lease_goes_on_where_the_last_run_ended() -> None:
@@ -281,9 +236,8 @@ async def test_files_are_kept_for_their_owner_alone_and_the_newest_counts(tmp_pa
     assert one.read(LEFT) is None
     for number in range(100):
         one.keep(LEFT, {"number": number})
-    while one._writing:
-        await one.kept()
-    assert FileRecords(folder).read(LEFT)["number"] == 99  # type: ignore[index]
+    await one.kept()
+    assert FileRecords(folder).read(LEFT)["number"] == 99, "one that waited for the one before it counts, too"  # type: ignore[index]
     (file,) = folder.iterdir()
     assert file.name == "lab+cell+left.json"
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
@@ -352,22 +306,10 @@ def test_where_the_files_are(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
     assert isinstance(file_records(), NoRecords)
 
 
-@virtual
-async def test_an_agent_without_records_serves_all_the_same() -> None:
-    async with world(records=None) as here:
-        await here.holder.do(here.holder.hand.move(30, Finger.A))
-        here.cut(here.holder)
-        await asyncio.sleep(2)
-        here.mend(here.holder)
-        await here.until(lambda: here.holder.hand.is_in_control)
-
-
-async def test_all_that_was_kept_is_waited_for(tmp_path: Path) -> None:
-    """A record that waited for the one before it was not: a halt was answered with its grant on the disk."""
-    records, name = FileRecords(tmp_path), GripperName("lab", "cell", "left")
-    for number in range(5):
-        records.keep(name, {"number": number})
-    await records.kept()
-    record = FileRecords(tmp_path).read(name)
-    assert record is not None
-    assert record["number"] == 4
+@inside(world, records=None)
+async def test_an_agent_without_records_serves_all_the_same(here: World) -> None:
+    await here.holder.do(here.holder.hand.move(30, Finger.A))
+    here.cut(here.holder)
+    await asyncio.sleep(2)
+    here.mend(here.holder)
+    await here.until(lambda: here.holder.hand.is_in_control)

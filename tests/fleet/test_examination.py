@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger
-from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.keys.access import Role
 from robotiq_async.fleet.keys.certificates import issue, make_authority
 from robotiq_async.fleet.network.bus import Query, Urgency
+from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import Answer
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.hand.robotiq_hand import RobotiqHand
@@ -24,11 +24,11 @@ from robotiq_async.simulator import SimulatorServer
 from robotiq_async.tools.doctor import Finding, Level, examine_remote
 from robotiq_async.tools.doctor.findings import GiveUpError
 from robotiq_async.tools.doctor.fleet import examine_keys
-from tests.fleet.lab import Lab, lab
+from tests.fleet.lab import LEFT, Lab, lab
 from tests.fleet.network import MemoryBus, Network
-from tests.virtual import virtual
+from tests.fleet.sessions import line
+from tests.virtual import inside, virtual
 
-LEFT = GripperName("lab", "cell", "left")
 HEALTHY = [
     "address",
     "agent",
@@ -61,35 +61,32 @@ async def examined(here: Lab) -> dict[str, Finding]:
 # -- an agent and a gripper --------------------------------------------------------------------------------
 
 
-@virtual
-async def test_a_healthy_one() -> None:
-    async with lab() as here:
-        writes = len(here.gripper.writes)
-        found = await examined(here)
-        assert len(here.gripper.writes) == writes
+@inside(lab)
+async def test_a_healthy_one(here: Lab) -> None:
+    writes = len(here.gripper.writes)
+    found = await examined(here)
+    assert len(here.gripper.writes) == writes
     assert list(found) == HEALTHY
     assert levels(found) == {Level.GOOD}
     assert " a second, 0.0 % lost" in found["statuses"].found
     assert found["commanded by"].found == "no client"
 
 
-@virtual
-async def test_whoever_commands_keeps_the_lease() -> None:
-    async with lab() as here, here.client() as hand:
-        examining = asyncio.create_task(examined(here))
-        for _ in range(4):
-            await hand.move(100, Finger.A)
-            await hand.move(0, Finger.A)
-        found = await examining
-        assert hand.is_in_control
+@inside(lab)
+async def test_whoever_commands_keeps_the_lease(here: Lab, hand: RemoteHand) -> None:
+    examining = asyncio.create_task(examined(here))
+    for _ in range(4):
+        await hand.move(100, Finger.A)
+        await hand.move(0, Finger.A)
+    found = await examining
+    assert hand.is_in_control
     assert levels(found) == {Level.GOOD}
     assert "@" in found["commanded by"].found
 
 
-@virtual
-async def test_a_gripper_of_another_name() -> None:
-    async with lab() as here:
-        found = await findings("zenoh://lab/cell/right", here.network.bus("doctor"))
+@inside(lab)
+async def test_a_gripper_of_another_name(here: Lab) -> None:
+    found = await findings("zenoh://lab/cell/right", here.network.bus("doctor"))
     assert list(found) == ["address", "agent"]
     assert found["agent"].level is Level.BAD
     assert str(LEFT) in found["agent"].found
@@ -108,8 +105,7 @@ def out_of_reach(here: Lab) -> None:
 
 
 def slow(here: Lab) -> None:
-    for stream in here.network.both("agent", "doctor"):
-        stream.delay = 0.15
+    here.network.delay("agent", "doctor", 0.15)
 
 
 @pytest.mark.parametrize(
@@ -121,30 +117,28 @@ def slow(here: Lab) -> None:
         (slow, "round trip", "lose the lease"),
     ],
 )
-@virtual
-async def test_an_ailment(ail: Callable[[Lab], object], what: str, words: str) -> None:
-    async with lab() as here:
-        ail(here)
-        await asyncio.sleep(0.1)
-        found = (await examined(here))[what]
+@inside(lab)
+async def test_an_ailment(here: Lab, ail: Callable[[Lab], object], what: str, words: str) -> None:
+    ail(here)
+    await asyncio.sleep(0.1)
+    found = (await examined(here))[what]
     assert found.level is Level.BAD
     assert words in found.found + found.advice
 
 
-@virtual
-async def test_messages_under_the_wrong_key() -> None:
-    async with lab() as here:
-        publish = here.network.bus("stray").publisher(LEFT.key("feed"), Urgency.TELEMETRY)
-        other = GripperName("lab", "cell", "right")
+@inside(lab)
+async def test_messages_under_the_wrong_key(here: Lab) -> None:
+    publish = here.network.bus("stray").publisher(LEFT.key("feed"), Urgency.TELEMETRY)
+    other = GripperName("lab", "cell", "right")
 
-        async def stray() -> None:
-            while True:
-                publish(json.dumps({"mark": other.mark}).encode())
-                await asyncio.sleep(0.1)
+    async def stray() -> None:
+        while True:
+            publish(json.dumps({"mark": other.mark}).encode())
+            await asyncio.sleep(0.1)
 
-        task = asyncio.create_task(stray())
-        found = await examined(here)
-        task.cancel()
+    task = asyncio.create_task(stray())
+    found = await examined(here)
+    task.cancel()
     assert found["misrouted"].level is Level.DOUBT
 
 
@@ -323,36 +317,14 @@ async def test_a_malformed_address(address: str) -> None:
 # -- all of it, over zenoh ---------------------------------------------------------------------------------
 
 
-@asynccontextmanager
-async def serving(keys: Path) -> AsyncIterator[str]:
-    """An agent over zenoh with keys; gives its endpoint."""
-    from robotiq_async.fleet.network.configuration import agent_configuration  # noqa: PLC0415
-    from robotiq_async.fleet.network.zenoh_bus import open_bus  # noqa: PLC0415
-
-    async with listening(hang_up) as where:
-        pass
-    configuration = agent_configuration("lab", "cell", [f"tls/{where}"], keys=keys)
-    async with SimulatorServer() as server:
-        bus = await open_bus(configuration, where)
-        agent = Agent("lab", "cell", {"left": RobotiqHand(server.address)}, bus)
-        ready = asyncio.Event()
-        task = asyncio.create_task(agent.run(ready.set))
-        try:
-            await ready.wait()
-            yield f"tls/{where}"
-        finally:
-            task.cancel()
-            await asyncio.gather(task, return_exceptions=True)
-            await bus.close()
-
-
 async def test_each_role_over_zenoh(authority: Path, tmp_path: Path) -> None:
     make_authority(tmp_path)
     stranger = issue(tmp_path, "bob", Role.OPERATE)
     folders = [authority / "operate-bob", authority / "read-alice", stranger]
-    async with serving(authority / "agent-cell") as endpoint:
+    async with line(patience=60) as here, SimulatorServer() as server:
+        await here.serve(RobotiqHand(server.address), authority / "agent-cell")
         operator, reader, refused = await asyncio.gather(
-            *(findings(f"{LEFT}?connect={endpoint}&keys={folder}") for folder in folders)
+            *(findings(f"{LEFT}?connect={here.endpoint}&keys={folder}") for folder in folders)
         )
     for found in (operator, reader):
         assert {each.what for each in found.values() if each.level is Level.BAD} == set()

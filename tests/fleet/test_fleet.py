@@ -11,13 +11,11 @@ import pytest
 from robotiq_async import State
 from robotiq_async.fleet.fleet import Fleet, Summaries
 from robotiq_async.fleet.network.bus import Urgency
-from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.values.errors import ProtocolError
-from tests.fleet.lab import lab
+from tests.fleet.lab import LEFT, Lab, lab
 from tests.fleet.network import Network
-from tests.virtual import virtual
+from tests.virtual import inside, virtual
 
-LEFT = GripperName("lab", "cell", "left")
 AHEAD = 5000.0
 """Our clock is so far ahead of the agent's."""
 
@@ -86,9 +84,9 @@ def test_what_is_none_is_refused(payload: bytes) -> None:
         Summaries().read(payload, 1.0)
 
 
-@virtual
-async def test_the_age_of_a_gripper_that_is_out_of_reach_grows_although_its_agent_is_heard() -> None:
-    async with lab() as here, Fleet("lab", bus=here.network.bus("screen")) as fleet:
+@inside(lab)
+async def test_the_age_of_a_gripper_that_is_out_of_reach_grows_although_its_agent_is_heard(here: Lab) -> None:
+    async with Fleet("lab", bus=here.network.bus("screen")) as fleet:
         loop = asyncio.get_running_loop()
         await asyncio.sleep(1.5)
         seen = fleet.members[LEFT].seen_at

@@ -16,33 +16,32 @@ from robotiq_async.fleet.remote.stops import until_answered
 from robotiq_async.fleet.wire.envelope import Answer, Call
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.values.errors import AgentError, NotAllowedError, NotAllStoppedError, RobotiqStateError
-from tests.fleet.cell import LEFT, ask, move_slowly, told
-from tests.fleet.lab import Spoiling, lab
-from tests.fleet.world import motions, world
+from tests.fleet.cell import ask, move_slowly, told
+from tests.fleet.lab import LEFT, Lab, Spoiling, lab
+from tests.fleet.world import World, motions, world
 from tests.grippers import Restless
-from tests.virtual import VirtualLoop, virtual
+from tests.virtual import VirtualLoop, inside, virtual
 
 # -- halts -------------------------------------------------------------------------------------------------
 
 
-@virtual
-async def test_a_second_halt_is_not_dropped_as_a_duplicate() -> None:
+@inside(world)
+async def test_a_second_halt_is_not_dropped_as_a_duplicate(here: World) -> None:
     """strands-labs/robots 1617. The very same request, once more, stops what has been set going since."""
-    async with world() as here:
-        halt = Call(LEFT.base, "somebody", number=1)
-        for _ in range(2):
-            call = await move_slowly(here)
-            assert await ask(here.other, "halt", halt) is None
-            assert not here.gripper.is_moving
-            assert await call == "ControlLost halted"
-            await here.holder.do(here.holder.hand.acquire())
-            await here.holder.do(here.holder.hand.move(0, Finger.A, speed=255))
+    halt = Call(LEFT.base, "somebody", number=1)
+    for _ in range(2):
+        call = await move_slowly(here)
+        assert await ask(here.other, "halt", halt) is None
+        assert not here.gripper.is_moving
+        assert await call == "ControlLost halted"
+        await here.holder.do(here.holder.hand.acquire())
+        await here.holder.do(here.holder.hand.move(0, Finger.A, speed=255))
 
 
-@virtual
-async def test_a_halt_that_failed_is_not_counted_as_one() -> None:
+@inside(world)
+async def test_a_halt_that_failed_is_not_counted_as_one(here: World) -> None:
     """strands-labs/robots 1680."""
-    async with world() as here, Fleet("lab", bus=here.network.bus("console")) as fleet:
+    async with Fleet("lab", bus=here.network.bus("console")) as fleet:
         await move_slowly(here)
         await here.servers["left"].stop()
         await here.until(lambda: here.other.hand.state is State.DISCONNECTED)
@@ -64,31 +63,30 @@ async def test_halting_an_empty_fleet_is_an_error() -> None:
         await Fleet("lab", bus=here.network.bus("console")).halt_all()
 
 
-@virtual
-async def test_a_halt_of_all_names_what_it_did_not_reach() -> None:
+@inside(world)
+async def test_a_halt_of_all_names_what_it_did_not_reach(here: World) -> None:
     """An endpoint of its route was down, and "all" of the others stopped."""
-    async with world() as here:
-        bus = here.network.bus("console")
-        bus.endpoints = ["agent", "tls/cell-2:7447"]
-        async with Fleet("lab", bus=bus) as fleet:
-            with pytest.raises(NotAllStoppedError) as failed:
-                await fleet.halt_all()
-            assert str(failed.value) == "halted 2 of 2; not reached: tls/cell-2:7447"
-            assert failed.value.unreached == ("tls/cell-2:7447",)
-            assert set(failed.value.outcomes.values()) == {"stopped"}
-            here.kill(here.agent.host)
-            await asyncio.sleep(1)
-            with pytest.raises(NotAllStoppedError) as failed:
-                await fleet.halt_all()
-            left, right = "zenoh://lab/cell/left: no answer", "zenoh://lab/cell/right: no answer"
-            assert str(failed.value) == f"halted 0 of 2; {left}; {right}; not reached: agent, tls/cell-2:7447"
-            await here.start_agent("agent")
+    bus = here.network.bus("console")
+    bus.endpoints = ["agent", "tls/cell-2:7447"]
+    async with Fleet("lab", bus=bus) as fleet:
+        with pytest.raises(NotAllStoppedError) as failed:
+            await fleet.halt_all()
+        assert str(failed.value) == "halted 2 of 2; not reached: tls/cell-2:7447"
+        assert failed.value.unreached == ("tls/cell-2:7447",)
+        assert set(failed.value.outcomes.values()) == {"stopped"}
+        here.kill(here.agent.host)
+        await asyncio.sleep(1)
+        with pytest.raises(NotAllStoppedError) as failed:
+            await fleet.halt_all()
+        left, right = "zenoh://lab/cell/left: no answer", "zenoh://lab/cell/right: no answer"
+        assert str(failed.value) == f"halted 0 of 2; {left}; {right}; not reached: agent, tls/cell-2:7447"
+        await here.start_agent("agent")
 
 
-@virtual
-async def test_a_halt_of_all_looks_on_for_links_that_come_up_late() -> None:
+@inside(world)
+async def test_a_halt_of_all_looks_on_for_links_that_come_up_late(here: World) -> None:
     """It knew nothing of agents whose links came up after it had looked; another client watches."""
-    async with world() as here, Fleet(bus=here.network.bus("screen")) as screen:
+    async with Fleet(bus=here.network.bus("screen")) as screen:
         changes = screen.changes()
         call = await move_slowly(here)
         here.network.part("agent", "console")
@@ -102,36 +100,33 @@ async def test_a_halt_of_all_looks_on_for_links_that_come_up_late() -> None:
         assert list(changes.drain())
 
 
-@virtual
-async def test_a_halt_is_acknowledged_however_slowly() -> None:
+@inside(world)
+async def test_a_halt_is_acknowledged_however_slowly(here: World) -> None:
     """A round trip that is longer than the time between two attempts."""
-    async with world() as here, Fleet("lab", bus=here.network.bus("console")) as fleet:
+    async with Fleet("lab", bus=here.network.bus("console")) as fleet:
         await move_slowly(here)
         for name in ("other", "console"):
-            for stream in here.network.both(name, "agent"):
-                stream.delay = 0.4
+            here.network.delay(name, "agent", 0.4)
         await here.other.do(here.other.hand.halt())
         assert set((await fleet.halt_all()).values()) == {"stopped"}
 
 
-@virtual
-async def test_what_was_asked_before_a_halt_does_not_go_out_after_it() -> None:
-    async with world() as here:
-        hand = here.holder.hand
-        for stream in here.network.both("holder", "agent"):
-            stream.delay = 0.05
+@inside(world)
+async def test_what_was_asked_before_a_halt_does_not_go_out_after_it(here: World) -> None:
+    hand = here.holder.hand
+    here.network.delay("holder", "agent", 0.05)
 
-        async def loop_and_halt() -> None:
-            for number in range(40):  # more than may be under way: the last ones wait
-                hand.command(Finger.A, position=200 + number, speed=0)
-                await asyncio.sleep(0.002)
-            await hand.halt()
+    async def loop_and_halt() -> None:
+        for number in range(40):  # more than may be under way: the last ones wait
+            hand.command(Finger.A, position=200 + number, speed=0)
+            await asyncio.sleep(0.002)
+        await hand.halt()
 
-        await here.holder.do(loop_and_halt())
-        writes = len(here.gripper.writes)
-        await asyncio.sleep(1)
-        assert not here.gripper.is_moving
-        assert not motions(here, writes)
+    await here.holder.do(loop_and_halt())
+    writes = len(here.gripper.writes)
+    await asyncio.sleep(1)
+    assert not here.gripper.is_moving
+    assert not motions(here, writes)
 
 
 @virtual
@@ -150,9 +145,8 @@ async def test_two_answers_in_one_turn_leave_no_exception_behind() -> None:
         await answered.wait()
         raise RobotiqStateError("refused")
 
-    with contextlib.suppress(
-        RobotiqStateError
-    ):  # and nothing keeps its traceback, with what was awaited in it
+    # Nothing keeps its traceback, with what was awaited in it.
+    with contextlib.suppress(RobotiqStateError):
         await until_answered(attempt, 2.0)
     assert asked == 2
     gc.collect()
@@ -183,32 +177,26 @@ async def cut_off(hand: RemoteHand) -> None:
             await hand.move(255, Finger.A, speed=0)
 
 
-@virtual
-async def test_what_moves_is_held_as_soon_as_the_gripper_is_reached_again() -> None:
+@inside(world)
+async def test_what_moves_is_held_as_soon_as_the_gripper_is_reached_again(here: World) -> None:
     """The lease ends while the agent has lost its gripper, which goes on to its target."""
-    async with world() as here:
-        await move_slowly(here)
-        await here.servers["left"].stop()
-        await here.until(lambda: here.other.hand.state is State.DISCONNECTED)
-        here.kill(here.holder.host)
-        await asyncio.sleep(1.5)
-        assert here.gripper.is_moving
-        await here.servers["left"].start()
-        await here.until(lambda: here.other.hand.state is State.RUNNING_IDLE)
-        await asyncio.sleep(0.2)
-        assert not here.gripper.is_moving
+    await move_slowly(here)
+    await here.servers["left"].stop()
+    await here.until(lambda: here.other.hand.state is State.DISCONNECTED)
+    here.kill(here.holder.host)
+    await asyncio.sleep(1.5)
+    assert here.gripper.is_moving
+    await here.servers["left"].start()
+    await here.until(lambda: here.other.hand.state is State.RUNNING_IDLE)
+    await asyncio.sleep(0.2)
+    assert not here.gripper.is_moving
 
 
-@virtual
-async def test_a_refused_command_does_not_forget_the_hold_that_is_owed() -> None:
+@inside(lab)
+async def test_a_refused_command_does_not_forget_the_hold_that_is_owed(here: Lab) -> None:
     """It was forgotten before the command was known to be carried out, and a dead holder's fingers ran on."""
-    async with lab() as here:
-        gone, other = here.client("gone"), here.client("other", control=False)
-        await gone.start()
-        await other.start()
-        moving = asyncio.create_task(gone.move(255, Finger.ABC, speed=0))
-        while not here.gripper.is_moving:  # noqa: ASYNC110  # there is no event to wait for
-            await asyncio.sleep(0.001)
+    async with here.client("gone") as gone, here.client("other", control=False) as other:
+        await here.moving(gone)
         await here.server.stop()
         here.network.cut(("gone", "agent"), ("agent", "gone"))
         await asyncio.sleep(1.2)
@@ -218,102 +206,94 @@ async def test_a_refused_command_does_not_forget_the_hold_that_is_owed() -> None
         await here.server.start()
         await asyncio.sleep(1.0)
         assert not here.gripper.is_moving
-        await asyncio.gather(moving, return_exceptions=True)
-        await other.stop()
-        await gone.stop()
 
 
-@virtual
+@inside(lab)
 @pytest.mark.parametrize("lost", [1, 1_000_000])
-async def test_a_cancelled_move_is_called_off_although_that_was_lost(lost: int) -> None:
+async def test_a_cancelled_move_is_called_off_although_that_was_lost(here: Lab, lost: int) -> None:
     """It was asked once, and the fingers ran on under a lease that was renewed."""
-    async with lab() as here:
-        bus = Spoiling(here.network.bus("client"), "cmd/cancel", times=lost)
-        async with here.client_over(bus) as hand:
-            await cut_off(hand)
-            await asyncio.sleep(2.5)
-            assert not here.gripper.is_moving
-            assert here.gripper.position(Finger.A) < 220
+    bus = Spoiling(here.network.bus("client"), "cmd/cancel", times=lost)
+    async with here.client_over(bus) as hand:
+        await cut_off(hand)
+        await asyncio.sleep(2.5)
+        assert not here.gripper.is_moving
+        assert here.gripper.position(Finger.A) < 220
 
 
-@virtual
-async def test_a_cancelled_move_is_called_off_although_that_was_misrouted() -> None:
+@inside(lab)
+async def test_a_cancelled_move_is_called_off_although_that_was_misrouted(here: Lab) -> None:
     """Any refusal counted as the end of the lease, and the fingers ran on under one that was renewed."""
-    async with lab() as here:
-        answer = Answer("robotiq/v1/lab/cell/right", 3, 1, {}).pack()
-        bus = Spoiling(here.network.bus("client"), "cmd/cancel", times=1, answer=answer, is_sent=False)
-        async with here.client_over(bus) as hand:
-            await cut_off(hand)
-            await asyncio.sleep(0.2)
-            assert not here.gripper.is_moving
-            assert hand.is_in_control
+    answer = Answer("robotiq/v1/lab/cell/right", 3, 1, {}).pack()
+    bus = Spoiling(here.network.bus("client"), "cmd/cancel", times=1, answer=answer)
+    async with here.client_over(bus) as hand:
+        await cut_off(hand)
+        await asyncio.sleep(0.2)
+        assert not here.gripper.is_moving
+        assert hand.is_in_control
 
 
-@virtual
-async def test_a_move_whose_answer_was_anothers_is_called_off() -> None:
-    async with lab() as here:
-        answer = Answer("robotiq/v1/lab/cell/right", 3, 1, {}).pack()
-        async with here.client_over(Spoiling(here.network.bus("client"), "cmd/move", answer=answer)) as hand:
-            with pytest.raises(AgentError, match="another answer"):
-                await hand.move(255, Finger.A, speed=0)
-            await asyncio.sleep(0.5)
-            assert not here.gripper.is_moving
+@inside(lab)
+async def test_a_move_whose_answer_was_anothers_is_called_off(here: Lab) -> None:
+    answer = Answer("robotiq/v1/lab/cell/right", 3, 1, {}).pack()
+    bus = Spoiling(here.network.bus("client"), "cmd/move", answer=answer, sends=True)
+    async with here.client_over(bus) as hand:
+        with pytest.raises(AgentError, match="another answer"):
+            await hand.move(255, Finger.A, speed=0)
+        await asyncio.sleep(0.5)
+        assert not here.gripper.is_moving
 
 
 # -- kept grips --------------------------------------------------------------------------------------------
 
 
-@virtual
-async def test_a_grip_is_kept_by_a_hand_that_was_made_for_it() -> None:
-    async with lab() as here:
-        here.gripper.place_object(Finger.B | Finger.C, 100)
-        async with here.client(keep_grip=True) as hand:
-            await hand.close(Finger.B | Finger.C)
-            await hand.set_speed(0, Finger.A)
-            await hand.set_position(255, Finger.A)
-        await asyncio.sleep(5)
-        assert here.gripper.grips == Finger.B | Finger.C
-        assert here.gripper.position(Finger.A) < 40
-        async with here.client("next") as hand:
-            await hand.move(60, Finger.A)
-            assert here.gripper.grips == Finger.B | Finger.C, "and by who comes next"
-        assert not here.gripper.grips
+@inside(lab)
+async def test_a_grip_is_kept_by_a_hand_that_was_made_for_it(here: Lab) -> None:
+    here.gripper.place_object(Finger.B | Finger.C, 100)
+    async with here.client(keep_grip=True) as hand:
+        await hand.close(Finger.B | Finger.C)
+        await hand.set_speed(0, Finger.A)
+        await hand.set_position(255, Finger.A)
+    await asyncio.sleep(5)
+    assert here.gripper.grips == Finger.B | Finger.C
+    assert here.gripper.position(Finger.A) < 40
+    async with here.client("next") as hand:
+        await hand.move(60, Finger.A)
+        assert here.gripper.grips == Finger.B | Finger.C, "and by who comes next"
+    assert not here.gripper.grips
 
 
-@virtual
-async def test_a_grip_is_kept_when_the_lease_is_given_back() -> None:
-    async with lab() as here, here.client() as hand:
-        here.gripper.place_object(Finger.ABC, 100)
+@inside(lab)
+async def test_a_grip_is_kept_when_the_lease_is_given_back(here: Lab, hand: RemoteHand) -> None:
+    here.gripper.place_object(Finger.ABC, 100)
+    await hand.close()
+    await hand.release(keep_grip=True)
+    assert here.gripper.grips == Finger.ABC
+    await hand.acquire()
+    await hand.release()
+    assert not here.gripper.grips
+
+
+@inside(lab, kind=Restless)
+async def test_what_does_not_come_to_rest_is_halted(here: Lab, hand: RemoteHand) -> None:
+    await hand.release(keep_grip=True)
+    assert not here.local.status.go_echo
+
+
+@inside(lab, kind=Restless)
+async def test_what_does_not_come_to_rest_is_left_to_whoever_commands_it_by_then(
+    here: Lab, hand: RemoteHand
+) -> None:
+    releasing = asyncio.create_task(hand.release(keep_grip=True))
+    await asyncio.sleep(0.1)
+    async with here.client("next"):
+        await releasing
+        assert here.local.status.go_echo
+
+
+@inside(lab, keep_grip=True)
+async def test_an_agent_may_keep_a_grip_at_its_own_end(here: Lab) -> None:
+    here.gripper.place_object(Finger.ABC, 100)
+    async with here.client(keep_grip=True) as hand:
         await hand.close()
-        await hand.release(keep_grip=True)
-        assert here.gripper.grips == Finger.ABC
-        await hand.acquire()
-        await hand.release()
-        assert not here.gripper.grips
-
-
-@virtual
-async def test_what_does_not_come_to_rest_is_halted() -> None:
-    async with lab(kind=Restless) as here, here.client() as hand:
-        await hand.release(keep_grip=True)
-        assert not here.local.status.go_echo
-
-
-@virtual
-async def test_what_does_not_come_to_rest_is_left_to_whoever_commands_it_by_then() -> None:
-    async with lab(kind=Restless) as here, here.client() as hand:
-        releasing = asyncio.create_task(hand.release(keep_grip=True))
-        await asyncio.sleep(0.1)
-        async with here.client("next"):
-            await releasing
-            assert here.local.status.go_echo
-
-
-@virtual
-async def test_an_agent_may_keep_a_grip_at_its_own_end() -> None:
-    async with lab(keep_grip=True) as here:
-        here.gripper.place_object(Finger.ABC, 100)
-        async with here.client(keep_grip=True) as hand:
-            await hand.close()
-        await here.end_agent()
-        assert here.gripper.grips == Finger.ABC
+    await here.end_agent()
+    assert here.gripper.grips == Finger.ABC

@@ -36,10 +36,7 @@ class Postman:
         self.late: list[float] = []
         self.opened: list[int] = []
 
-    def bring(self, number: int, *, urgent: bool = False) -> None:
-        self.put(number, Kind.REQUEST if urgent else Kind.TELEMETRY)
-
-    def put(self, number: int, kind: Kind) -> None:
+    def bring(self, number: int, kind: Kind = Kind.TELEMETRY) -> None:
         self.mailbox.put(partial(self._open, number, self.loop.time()), kind)
 
     def _open(self, number: int, brought_at: float) -> None:
@@ -78,7 +75,7 @@ async def test_what_is_urgent_is_not_kept_waiting_nor_does_it_overtake() -> None
         postman.bring(number)
         await asyncio.sleep(0.0001)
     postman.bring(22)
-    postman.bring(23, urgent=True)
+    postman.bring(23, Kind.REQUEST)
     await asyncio.sleep(0)
     await asyncio.sleep(0)
     assert postman.opened[-2:] == [22, 23]
@@ -125,8 +122,8 @@ async def test_a_halt_comes_before_a_flood() -> None:
     """A reader that flooded the agent kept the halts of others waiting for seconds."""
     postman = Postman()
     for number in range(1000):
-        postman.put(number, Kind.REQUEST)
-    postman.put(-1, Kind.HALT)
+        postman.bring(number, Kind.REQUEST)
+    postman.bring(-1, Kind.HALT)
     await asyncio.sleep(0.1)
     assert postman.opened == [-1, *range(1000)]
 
@@ -135,8 +132,8 @@ async def test_a_halt_comes_before_a_flood() -> None:
 async def test_what_is_too_much_is_dropped_but_no_answer(caplog: pytest.LogCaptureFixture) -> None:
     postman = Postman()
     for number in range(MOST + 10):
-        postman.put(number, Kind.REQUEST)
-    postman.put(-1, Kind.ANSWER)
+        postman.bring(number, Kind.REQUEST)
+    postman.bring(-1, Kind.ANSWER)
     await asyncio.sleep(0.1)
     assert postman.opened == [*range(MOST), -1]
     assert "10 fleet messages dropped" in caplog.text

@@ -7,8 +7,9 @@ import contextlib
 import signal
 import socket
 import sys
+from asyncio.subprocess import PIPE, Process
 from collections.abc import AsyncIterator, Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,7 @@ from robotiq_async import ConnectionLostError, Finger, State
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.fleet import cuts
-from tests.grippers import ACTIVATION, OPENING
+from tests.grippers import active_gripper
 
 ROOT = Path(__file__).parents[2]
 LIMIT_S = 8.0
@@ -27,24 +28,11 @@ LIMIT_S = 8.0
 # -- processes ---------------------------------------------------------------------------------------------
 
 
-@dataclass
-class Program:
-    """A process that says where it stands."""
-
-    process: asyncio.subprocess.Process
-
-    async def says(self, word: str) -> None:
-        assert self.process.stdout is not None
-        async with asyncio.timeout(2 * LIMIT_S):
-            line = (await self.process.stdout.readline()).decode().strip()
-        assert line == word
-
-    def signal(self, number: signal.Signals) -> None:
-        self.process.send_signal(number)
-
-    async def ends(self) -> int:
-        async with asyncio.timeout(LIMIT_S):
-            return await self.process.wait()
+async def said(process: Process) -> str:
+    """The next line of a program, which says where it stands."""
+    assert process.stdout is not None
+    async with asyncio.timeout(2 * LIMIT_S):
+        return (await process.stdout.readline()).decode().strip()
 
 
 @dataclass
@@ -58,31 +46,18 @@ class Site:
     gripper: SimulatedGripper
     server: SimulatorServer
     endpoint: str
-    programs: list[Program]
+    programs: list[Process] = field(default_factory=list)
 
-    async def start(self, *words: str) -> Program:
-        process = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", "tests.fleet.programs", *words, cwd=ROOT, stdout=asyncio.subprocess.PIPE
-        )
-        program = Program(process)
-        self.programs.append(program)
-        return program
+    async def start(self, name: str, *words: str, says: str = "ready") -> Process:
+        """Start a program of tests/fleet/programs.py, and wait for its first word."""
+        words = ("-m", "tests.fleet.programs", name, self.endpoint, *words)
+        process = await asyncio.create_subprocess_exec(sys.executable, *words, cwd=ROOT, stdout=PIPE)
+        self.programs.append(process)
+        assert await said(process) == says
+        return process
 
-    async def start_agent(self) -> Program:
-        agent = await self.start("agent", self.endpoint, self.server.address)
-        await agent.says("ready")
-        return agent
-
-    async def start_router(self) -> Program:
-        router = await self.start("router", self.endpoint)
-        await router.says("ready")
-        return router
-
-    async def start_mover(self) -> Program:
-        mover = await self.start("move", self.endpoint)
-        await mover.says("moving")
-        await self.until(lambda: self.gripper.is_moving)
-        return mover
+    async def start_agent(self, name: str = "agent") -> Process:
+        return await self.start(name, self.server.address)
 
     def hand(self) -> RemoteHand:
         return RemoteHand(f"zenoh://lab/cell/left?connect={self.endpoint}")
@@ -99,39 +74,34 @@ class Site:
 
 @pytest.fixture
 async def site() -> AsyncIterator[Site]:
-    loop, jumped = asyncio.get_running_loop(), [0.0]
-    gripper = SimulatedGripper(lambda: loop.time() + jumped[0], spread=False)
-    for image in (ACTIVATION, OPENING):
-        gripper.write(0, image)
-        jumped[0] += 30
-        gripper.status_registers()
+    gripper = active_gripper(1.0, spread=False)
     with contextlib.closing(socket.create_server(("127.0.0.1", 0))) as free:
         endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
     async with SimulatorServer(gripper) as server:
-        here = Site(gripper, server, endpoint, [])
+        here = Site(gripper, server, endpoint)
         try:
             yield here
         finally:
-            for program in here.programs:
-                if program.process.returncode is None:
-                    program.process.kill()
-                await program.process.wait()
-                program.process._transport.close()  # type: ignore[attr-defined]
+            for process in here.programs:
+                if process.returncode is None:
+                    process.kill()
+                await process.wait()
+                process._transport.close()  # type: ignore[attr-defined]
 
 
 async def test_a_client_is_frozen_and_goes_on(site: Site) -> None:
     await site.start_agent()
-    mover = await site.start_mover()
-    mover.signal(signal.SIGSTOP)
+    mover = await site.start("move", says="moving")
+    await site.until(lambda: site.gripper.is_moving)
+    mover.send_signal(signal.SIGSTOP)
     assert await site.until(lambda: not site.gripper.is_moving) < 3
     stood = site.gripper.position(Finger.A)
     async with site.hand() as hand:
         await hand.halt()
-    mover.signal(signal.SIGCONT)
-    assert mover.process.stdout is not None
-    told = (await mover.process.stdout.readline()).decode().strip()
-    assert told in ("ControlLostError", "ConnectionLostError", "NoAnswerError")
-    await mover.ends()
+    mover.send_signal(signal.SIGCONT)
+    assert await said(mover) in ("ControlLostError", "ConnectionLostError", "NoAnswerError")
+    async with asyncio.timeout(LIMIT_S):
+        await mover.wait()
     assert site.gripper.position(Finger.A) == stood
 
 
@@ -140,7 +110,7 @@ async def test_an_agent_is_killed_and_the_next_one_holds(site: Site) -> None:
     async with site.hand() as hand:
         moving = asyncio.ensure_future(hand.move(255, Finger.A, speed=0))
         await site.until(lambda: site.gripper.position(Finger.A) > 15)
-        agent.signal(signal.SIGKILL)
+        agent.send_signal(signal.SIGKILL)
         with pytest.raises(ConnectionLostError):
             async with asyncio.timeout(LIMIT_S):
                 await moving
@@ -155,11 +125,10 @@ async def test_an_agent_is_killed_and_the_next_one_holds(site: Site) -> None:
 
 async def test_a_frozen_reader_holds_up_nobody(site: Site) -> None:
     await site.start_agent()
-    reader = await site.start("read", site.endpoint)
-    await reader.says("reading")
+    reader = await site.start("read", says="reading")
     loop = asyncio.get_running_loop()
     async with site.hand() as hand:
-        reader.signal(signal.SIGSTOP)
+        reader.send_signal(signal.SIGSTOP)
         longest, before = 0.0, loop.time()
         ends = loop.time() + 3
         statuses = hand.statuses()
@@ -169,18 +138,18 @@ async def test_a_frozen_reader_holds_up_nobody(site: Site) -> None:
             longest, before = max(longest, loop.time() - before), loop.time()
         assert longest < 1
         await hand.set_speed(200)
-        reader.signal(signal.SIGCONT)
+        reader.send_signal(signal.SIGCONT)
         await hand.set_speed(100)
 
 
 async def test_a_router_is_killed_and_comes_back(site: Site) -> None:
     """Agent and client know the router and nothing of each other."""
-    router = await site.start_router()
-    await (await site.start("behind", site.endpoint, site.server.address)).says("ready")
+    router = await site.start("router")
+    await site.start_agent("behind")
     async with site.hand() as hand:
         moving = asyncio.ensure_future(hand.move(255, Finger.A, speed=0))
         await site.until(lambda: site.gripper.position(Finger.A) > 15)
-        router.signal(signal.SIGKILL)
+        router.send_signal(signal.SIGKILL)
         assert await site.until(lambda: not site.gripper.is_moving) < 3
         with pytest.raises(ConnectionLostError):
             async with asyncio.timeout(LIMIT_S):
@@ -188,7 +157,7 @@ async def test_a_router_is_killed_and_comes_back(site: Site) -> None:
         await site.until(lambda: hand.state is State.DISCONNECTED)
         assert not hand.is_in_control
         stood, writes = site.gripper.position(Finger.A), len(site.gripper.writes)
-        await site.start_router()
+        await site.start("router")
         await site.until(lambda: hand.is_in_control)
         sequence = hand.status.sequence
         await site.until(lambda: hand.status.sequence > sequence + 20)

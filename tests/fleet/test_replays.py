@@ -9,10 +9,10 @@ import pytest
 from robotiq_async import ConnectionLostError, Finger, RobotiqError, State
 from robotiq_async.simulator.physics.gripper import Write
 from robotiq_async.values.request import Request
-from tests.fleet.cell import LEFT, move_slowly, told
-from tests.fleet.lab import Garbling, lab
+from tests.fleet.cell import move_slowly, told
+from tests.fleet.lab import LEFT, Garbling, Lab, lab
 from tests.fleet.world import POLL_S, World, motions, world
-from tests.virtual import LATENCY_S, virtual
+from tests.virtual import LATENCY_S, inside, virtual
 
 A = Finger.A
 FROZEN_S = 2.1
@@ -31,26 +31,25 @@ async def status_on_its_way(here: World) -> tuple[str, bytes]:
 
 
 @pytest.mark.parametrize("seconds", [0.5, 0.9, 1.0, 1.1, 3.0])
-@virtual
-async def test_commands_that_waited_for_the_link_are_never_carried_out(seconds: float) -> None:
+@inside(world)
+async def test_commands_that_waited_for_the_link_are_never_carried_out(here: World, seconds: float) -> None:
     """Valetudo 640, nats-py: a queued command ran when the robot came back."""
-    async with world() as here:
-        here.network.keeps_links = True
-        hand, asked = here.holder.hand, here.now()
-        here.cut(here.holder)
+    here.network.keeps_links = True
+    hand, asked = here.holder.hand, here.now()
+    here.cut(here.holder)
 
-        async def command() -> None:
-            for number in range(20):
-                hand.command(Finger.A, position=200 + number, speed=0)
-                await asyncio.sleep(0.005)
+    async def command() -> None:
+        for number in range(20):
+            hand.command(Finger.A, position=200 + number, speed=0)
+            await asyncio.sleep(0.005)
 
-        await here.holder.do(command())
-        await asyncio.sleep(seconds)
-        here.mend(here.holder)
-        await asyncio.sleep(3)
-        late = [at - asked for at, what in motions(here, 0) if what[0] >= 200]
-        assert all(each <= 1.1 for each in late)
-        assert bool(late) is (seconds < 0.9)
+    await here.holder.do(command())
+    await asyncio.sleep(seconds)
+    here.mend(here.holder)
+    await asyncio.sleep(3)
+    late = [at - asked for at, what in motions(here, 0) if what[0] >= 200]
+    assert all(each <= 1.1 for each in late)
+    assert bool(late) is (seconds < 0.9)
 
 
 @virtual
@@ -72,95 +71,92 @@ async def test_nothing_from_before_a_suspension_is_carried_out() -> None:
 
 @pytest.mark.parametrize("seconds", [0.8, 3.0])
 @pytest.mark.parametrize("keeps_links", [True, False])
-@virtual
-async def test_a_suspended_laptop_commands_nothing_from_before(keeps_links: bool, seconds: float) -> None:
+@inside(world)
+async def test_a_suspended_laptop_commands_nothing_from_before(
+    here: World, keeps_links: bool, seconds: float
+) -> None:
     """Its clock stood still: to itself its loop is in time, and so is what lay in its sockets."""
-    async with world() as here:
-        here.network.keeps_links = keeps_links
-        hand, host, stopped = here.holder.hand, here.holder.host, False
+    here.network.keeps_links = keeps_links
+    hand, host, stopped = here.holder.hand, here.holder.host, False
 
-        async def loop() -> None:
-            number = 0
-            while not stopped:
-                hand.command(Finger.A, position=100 + number % 100, speed=0)
-                number += 1
-                await asyncio.sleep(0.01)
+    async def loop() -> None:
+        number = 0
+        while not stopped:
+            hand.command(Finger.A, position=100 + number % 100, speed=0)
+            number += 1
+            await asyncio.sleep(0.01)
 
-        looping = host.start(told(loop()))
-        await asyncio.sleep(0.5)
-        (host.freeze if keeps_links else lambda: here.freeze(host))()
-        await asyncio.sleep(seconds)
-        stood, writes = here.gripper.position(Finger.A), len(here.gripper.writes)
-        assert here.gripper.is_moving is (seconds < 1.0)
-        host.wake(seconds)
-        for bus in here.network.buses:
-            here.network.join(host.name, bus.name)
-        await asyncio.sleep(3)
-        if seconds > 1.0:
-            assert looping.result().startswith(("ControlLost", "ConnectionLost"))
-            assert here.gripper.position(Finger.A) == stood
-            assert not motions(here, writes)
-        await here.until(lambda: hand.is_in_control)
-        stopped = True
-        await here.until(looping.done)
-        await here.holder.do(hand.move(30, Finger.A, speed=255))
-
-
-@virtual
-async def test_a_request_is_carried_out_once_and_answered_as_often_as_it_comes() -> None:
-    async with world() as here:
-        stream = here.network.stream("holder", "agent")
-        stream.copies, stream.lateness = 3, 0.3
-        await here.holder.do(here.holder.hand.set_position(90, Finger.A))
-        await here.holder.do(here.holder.hand.set_position(20, Finger.A))
-        await asyncio.sleep(2)
-        assert [what[0] for _, what in motions(here, 0) if what[0] in (90, 20)][-1] == 20
-        positions = [what[0] for _, what in motions(here, 0)]
-        assert positions.count(90) <= 1
+    looping = host.start(told(loop()))
+    await asyncio.sleep(0.5)
+    (host.freeze if keeps_links else lambda: here.freeze(host))()
+    await asyncio.sleep(seconds)
+    stood, writes = here.gripper.position(Finger.A), len(here.gripper.writes)
+    assert here.gripper.is_moving is (seconds < 1.0)
+    host.wake(seconds)
+    for bus in here.network.buses:
+        here.network.join(host.name, bus.name)
+    await asyncio.sleep(3)
+    if seconds > 1.0:
+        assert looping.result().startswith(("ControlLost", "ConnectionLost"))
+        assert here.gripper.position(Finger.A) == stood
+        assert not motions(here, writes)
+    await here.until(lambda: hand.is_in_control)
+    stopped = True
+    await here.until(looping.done)
+    await here.holder.do(hand.move(30, Finger.A, speed=255))
 
 
-@virtual
-async def test_a_stale_status_is_not_the_state_of_now() -> None:
+@inside(world)
+async def test_a_request_is_carried_out_once_and_answered_as_often_as_it_comes(here: World) -> None:
+    stream = here.network.stream("holder", "agent")
+    stream.copies, stream.lateness = 3, 0.3
+    await here.holder.do(here.holder.hand.set_position(90, Finger.A))
+    await here.holder.do(here.holder.hand.set_position(20, Finger.A))
+    await asyncio.sleep(2)
+    assert [what[0] for _, what in motions(here, 0) if what[0] in (90, 20)][-1] == 20
+    positions = [what[0] for _, what in motions(here, 0)]
+    assert positions.count(90) <= 1
+
+
+@inside(world)
+async def test_a_stale_status_is_not_the_state_of_now(here: World) -> None:
     """unh_marine_autonomy 139: a relay sent an old frame once more."""
-    async with world() as here:
-        old = await status_on_its_way(here)
-        here.cut(here.other)
-        await asyncio.sleep(2)
-        assert here.other.hand.state is State.DISCONNECTED
-        newest = here.other.hand.status
-        here.other.host.call_soon(here.other.bus.hear, *old)
-        await asyncio.sleep(0.1)
-        assert here.other.hand.state is State.DISCONNECTED
-        assert here.other.hand.status.sequence == newest.sequence
-        here.mend(here.other)
-        await here.until(lambda: here.other.hand.state is State.RUNNING_IDLE)
+    old = await status_on_its_way(here)
+    here.cut(here.other)
+    await asyncio.sleep(2)
+    assert here.other.hand.state is State.DISCONNECTED
+    newest = here.other.hand.status
+    here.other.host.call_soon(here.other.bus.hear, *old)
+    await asyncio.sleep(0.1)
+    assert here.other.hand.state is State.DISCONNECTED
+    assert here.other.hand.status.sequence == newest.sequence
+    here.mend(here.other)
+    await here.until(lambda: here.other.hand.state is State.RUNNING_IDLE)
 
 
-@virtual
-async def test_a_status_of_a_former_run_brings_nothing_back() -> None:
-    async with world() as here:
-        old = await status_on_its_way(here)
-        await here.agent.end()
-        await here.start_agent("next agent")
-        await here.until(lambda: here.holder.hand.is_in_control)
-        here.holder.had_control.clear()
-        here.holder.host.call_soon(here.holder.bus.hear, *old)
-        await asyncio.sleep(0.5)
-        assert here.holder.had_control == [True]
+@inside(world)
+async def test_a_status_of_a_former_run_brings_nothing_back(here: World) -> None:
+    old = await status_on_its_way(here)
+    await here.agent.end()
+    await here.start_agent("next agent")
+    await here.until(lambda: here.holder.hand.is_in_control)
+    here.holder.had_control.clear()
+    here.holder.host.call_soon(here.holder.bus.hear, *old)
+    await asyncio.sleep(0.5)
+    assert here.holder.had_control == [True]
 
 
-@virtual
-async def test_what_another_run_of_the_agent_says_acknowledges_nothing() -> None:
-    async with lab() as here:
-        bus = Garbling(here.network.bus("client"), epoch=5)
-        async with here.client_over(bus) as hand:
-            for verb, ask in (("cmd/set_speed", hand.set_speed(9)), ("cmd/move", hand.move(30))):
-                bus.verb = verb
-                with pytest.raises(ConnectionLostError, match="another run of its agent answered"):
-                    await ask
-            bus.verb = "/halt"
-            await hand.halt()
-            bus.verb = "nothing"
+@inside(lab)
+async def test_what_another_run_of_the_agent_says_acknowledges_nothing(here: Lab) -> None:
+    bus = Garbling(here.network.bus("client"), epoch=5)
+    async with here.client_over(bus) as hand:
+        for verb, ask in (("cmd/set_speed", hand.set_speed(9)), ("cmd/move", hand.move(30))):
+            bus.verb = verb
+            with pytest.raises(ConnectionLostError, match="another run of its agent answered"):
+                await ask
+        bus.verb = "/halt"
+        await hand.halt()
+        bus.verb = "nothing"
 
 
 # -- late settings -----------------------------------------------------------------------------------------
@@ -175,27 +171,28 @@ def has_it(write: Write) -> bool:
     "delay", [each * POLL_S / 8 for each in range(0, 10, 2)], ids=lambda s: f"{s * 1000:g}ms"
 )
 @pytest.mark.parametrize("name", ["speed", "force", "command"])
-@virtual
-async def test_an_agent_that_was_frozen_writes_no_part_of_a_late_command(name: str, delay: float) -> None:
+@inside(world)
+async def test_an_agent_that_was_frozen_writes_no_part_of_a_late_command(
+    here: World, name: str, delay: float
+) -> None:
     """Frozen between letting it in and writing it, it wrote the speed on waking, 2.14 s late."""
-    async with world() as here:
-        await move_slowly(here)
-        hand = here.holder.hand
+    await move_slowly(here)
+    hand = here.holder.hand
 
-        async def ask() -> None:
-            if name == "command":
-                hand.command(A, speed=201, force=201)
-            else:
-                await getattr(hand, f"set_{name}")(201, A)
+    async def ask() -> None:
+        if name == "command":
+            hand.command(A, speed=201, force=201)
+        else:
+            await getattr(hand, f"set_{name}")(201, A)
 
-        asking = asyncio.create_task(here.holder.do(ask()))
-        await asyncio.sleep(delay)
-        here.agent.host.freeze()
-        frozen_at = here.now()
-        await asyncio.sleep(FROZEN_S)
-        here.agent.host.thaw()
-        await asyncio.sleep(1.0)
-        first = [write.time for write in here.gripper.writes if has_it(write)][:1]
-        assert all(at < frozen_at + 2 * LATENCY_S for at in first), "it was written late"
-        await asyncio.wait({asking})
-        assert asking.exception() is None or isinstance(asking.exception(), RobotiqError)
+    asking = asyncio.create_task(here.holder.do(ask()))
+    await asyncio.sleep(delay)
+    here.agent.host.freeze()
+    frozen_at = here.now()
+    await asyncio.sleep(FROZEN_S)
+    here.agent.host.thaw()
+    await asyncio.sleep(1.0)
+    first = [write.time for write in here.gripper.writes if has_it(write)][:1]
+    assert all(at < frozen_at + 2 * LATENCY_S for at in first), "it was written late"
+    await asyncio.wait({asking})
+    assert asking.exception() is None or isinstance(asking.exception(), RobotiqError)

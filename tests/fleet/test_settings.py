@@ -8,13 +8,14 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger, State
+from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.remote.requests import Settings
 from robotiq_async.fleet.wire.envelope import Call
 from robotiq_async.fleet.wire.settings import read_settings, settings_fields, settings_of
 from robotiq_async.values.request import Request
-from tests.fleet.lab import lab
+from tests.fleet.lab import Lab, instantly, lab
 from tests.fleet.world import World, world
-from tests.virtual import virtual
+from tests.virtual import inside
 
 A, ALL = Finger.A, Finger.ALL
 MOTIONS: dict[str, Any] = {
@@ -47,89 +48,76 @@ async def next_agent(here: World) -> int:
 
 
 @pytest.mark.parametrize("motion", [*MOTIONS, "command", "many commands"])
-@virtual
-async def test_an_agent_that_was_started_anew_moves_with_what_was_asked_of_the_former(motion: str) -> None:
+@inside(world)
+async def test_an_agent_that_was_started_anew_moves_with_what_was_asked_of_the_former(
+    here: World, motion: str
+) -> None:
     """Speed 10 and force 5 were asked for; after a restart it moved with 128 and 64."""
-    async with world() as here:
-        hand = here.holder.hand
-        await here.holder.do(hand.set_speed(10, ALL))
-        await here.holder.do(hand.set_force(5, ALL))
-        since = await next_agent(here)
-        if "command" in motion:
-
-            async def command() -> None:
-                for position in range(30, 31 if motion == "command" else 50):
-                    hand.command(A, position=position)
-                    await asyncio.sleep(0.005)
-
-            await here.holder.do(command())
-            await asyncio.sleep(0.5)
-        else:
-            await here.holder.do(MOTIONS[motion](hand))
-        written = images(here, since)
-        assert written or motion == "hold"
-        for image in written:
-            assert [(axis.speed, axis.force) for axis in image.axes] == [(10, 5)] * 4
+    hand = here.holder.hand
+    await here.holder.do(hand.set_speed(10, ALL))
+    await here.holder.do(hand.set_force(5, ALL))
+    since = await next_agent(here)
+    if "command" in motion:
+        for position in range(30, 31 if motion == "command" else 50):
+            await here.holder.command(A, position=position)
+            await asyncio.sleep(0.005)
+        await asyncio.sleep(0.5)
+    else:
+        await here.holder.do(MOTIONS[motion](hand))
+    written = images(here, since)
+    assert written or motion == "hold"
+    for image in written:
+        assert [(axis.speed, axis.force) for axis in image.axes] == [(10, 5)] * 4
 
 
-@virtual
-async def test_what_is_asked_for_by_a_move_and_by_axis_counts_too() -> None:
-    async with world() as here:
-        hand = here.holder.hand
-        await here.holder.do(hand.move(5, A, speed=200, force=7))
-        await here.holder.do(hand.set_speed(3, Finger.B))
+@inside(world)
+async def test_what_is_asked_for_by_a_move_and_by_axis_counts_too(here: World) -> None:
+    hand = here.holder.hand
+    await here.holder.do(hand.move(5, A, speed=200, force=7))
+    await here.holder.do(hand.set_speed(3, Finger.B))
 
-        async def command() -> None:
-            hand.command(Finger.C, speed=9)
-
-        await here.holder.do(command())
-        await asyncio.sleep(0.2)
-        since = await next_agent(here)
-        await here.holder.do(hand.set_speed(20, A))
-        await here.holder.do(hand.move(30, A))
-        for image in images(here, since):
-            assert [axis.speed for axis in image.axes] == [20, 3, 9, 128]
-            assert [axis.force for axis in image.axes] == [7, 64, 64, 64]
+    await here.holder.command(Finger.C, speed=9)
+    await asyncio.sleep(0.2)
+    since = await next_agent(here)
+    await here.holder.do(hand.set_speed(20, A))
+    await here.holder.do(hand.move(30, A))
+    for image in images(here, since):
+        assert [axis.speed for axis in image.axes] == [20, 3, 9, 128]
+        assert [axis.force for axis in image.axes] == [7, 64, 64, 64]
 
 
-@virtual
-async def test_it_is_given_again_until_the_gripper_has_it() -> None:
+@inside(world)
+async def test_it_is_given_again_until_the_gripper_has_it(here: World) -> None:
     """The link to the gripper goes down with the first command, and the second comes."""
-    async with world() as here:
-        hand = here.holder.hand
-        await here.holder.do(hand.set_speed(10, ALL))
-        await next_agent(here)
-        local = here.agent.hands["left"]
-
-        async def command() -> None:
-            hand.command(A, position=30)
-
-        await here.servers["left"].stop()
-        await here.holder.do(command())
-        await here.until(lambda: local.state is State.DISCONNECTED)
-        await here.servers["left"].start()
-        await here.until(lambda: hand.state is State.RUNNING_IDLE)
-        since = len(here.gripper.writes)
-        await here.holder.do(hand.move(30, A))
-        assert images(here, since)
-        for image in images(here, since):
-            assert [axis.speed for axis in image.axes] == [10] * 4
+    hand = here.holder.hand
+    await here.holder.do(hand.set_speed(10, ALL))
+    await next_agent(here)
+    local = here.agent.hands["left"]
+    await here.servers["left"].stop()
+    await here.holder.command(A, position=30)
+    await here.until(lambda: local.state is State.DISCONNECTED)
+    await here.servers["left"].start()
+    await here.until(lambda: hand.state is State.RUNNING_IDLE)
+    since = len(here.gripper.writes)
+    await here.holder.do(hand.move(30, A))
+    assert images(here, since)
+    for image in images(here, since):
+        assert [axis.speed for axis in image.axes] == [10] * 4
 
 
-@virtual
-async def test_it_is_given_again_after_somebody_else_has_set_another() -> None:
-    async with lab() as here, here.client() as hand:
-        await hand.set_force(5)
-        async with here.client("other", control=False) as other:
-            await other.take()
-            await other.set_force(200)
-            await other.set_speed(3)
-            await other.release()
-        await hand.acquire()
-        await hand.set_position(30, A)
-        image = Request.from_registers(here.gripper.request_registers)
-        assert [axis.force for axis in image.axes] == [5] * 4
-        assert [axis.speed for axis in image.axes] == [3] * 4, "of that it has asked for nothing"
+@inside(lab)
+async def test_it_is_given_again_after_somebody_else_has_set_another(here: Lab, hand: RemoteHand) -> None:
+    await hand.set_force(5)
+    async with here.client("other", control=False) as other:
+        await other.take()
+        await other.set_force(200)
+        await other.set_speed(3)
+        await other.release()
+    await hand.acquire()
+    await hand.set_position(30, A)
+    image = Request.from_registers(here.gripper.request_registers)
+    assert [axis.force for axis in image.axes] == [5] * 4
+    assert [axis.speed for axis in image.axes] == [3] * 4, "of that it has asked for nothing"
 
 
 @pytest.mark.parametrize(
@@ -160,36 +148,29 @@ def test_settings_that_are_none(fields: object) -> None:
         read_settings(fields)
 
 
-@virtual
-async def test_a_lease_with_settings_that_are_none_is_refused() -> None:
-    async with lab() as here, here.client("other", control=False) as other:
-        session = other._session
-        assert session is not None
-        call = session.call({"what": "acquire", "label": "", "settings": {"1": {"speed": 999}}})
-        assert isinstance(call, Call)
-        with pytest.raises(Exception, match="speed"):
-            await session.send(call, "lease", timeout=1.0)
-        assert here.lease == 0
+@inside(lab)
+async def test_a_lease_with_settings_that_are_none_is_refused(here: Lab, reader: RemoteHand) -> None:
+    assert reader._session is not None
+    settings = {"settings": {"1": {"speed": 999}}}
+    call = reader._session.call({"what": "acquire", "label": "", **settings})
+    with pytest.raises(ValueError, match="speed"):
+        (await here.answer("lease", call.pack())).outcome(instantly)
+    assert here.lease == 0
 
 
 # -- restarted agents --------------------------------------------------------------------------------------
 
 
-@virtual
-async def test_what_is_asked_for_anew_goes_before_what_was_asked_before() -> None:
-    async with world() as here:
-        hand = here.holder.hand
-
-        async def set_up() -> None:
-            await hand.set_speed(10)
-            await hand.set_force(5)
-
-        await here.holder.do(set_up())
-        writes = await next_agent(here)
-        await here.holder.do(hand.move(40, A, speed=33))
-        found = [image for image in images(here, writes) if image.go]
-        assert (found[-1].axes[0].speed, found[-1].axes[0].force) == (33, 5)
-        assert (found[-1].axes[1].speed, found[-1].axes[1].force) == GENTLE
+@inside(world)
+async def test_what_is_asked_for_anew_goes_before_what_was_asked_before(here: World) -> None:
+    hand = here.holder.hand
+    await here.holder.do(hand.set_speed(10))
+    await here.holder.do(hand.set_force(5))
+    writes = await next_agent(here)
+    await here.holder.do(hand.move(40, A, speed=33))
+    found = [image for image in images(here, writes) if image.go]
+    assert (found[-1].axes[0].speed, found[-1].axes[0].force) == (33, 5)
+    assert (found[-1].axes[1].speed, found[-1].axes[1].force) == GENTLE
 
 
 def test_what_was_never_asked_for_is_not_given() -> None:

@@ -6,68 +6,41 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
 
 import pytest
 
 from robotiq_async import ConnectionLostError, Finger, RobotiqHand, State
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.fleet import Fleet
-from robotiq_async.fleet.network.bus import PendingQuery, is_any
+from robotiq_async.fleet.network.bus import PendingQuery
 from robotiq_async.fleet.remote.pending_request import is_refusal, of_its_run
+from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import Answer, Call, failure
-from robotiq_async.fleet.wire.names import GripperName
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.errors import AgentError, ControlLostError, NotAllStoppedError
-from tests.fleet.lab import SPEEDUP, Lab, lab
-from tests.fleet.world import ServingAgent, world
-from tests.grippers import activate_beforehand
-from tests.virtual import virtual
+from tests.fleet.lab import LEFT, Answered, Lab, lab, serving
+from tests.fleet.world import ServingAgent, World, world
+from tests.virtual import inside, until
 
-LEFT = GripperName("lab", "cell", "left")
 WORDS = "two agents serve it"
 
 
-@dataclass
-class Other:
-    """A second agent, with a gripper of its own under the name of the first one's."""
-
-    gripper: SimulatedGripper
-    server: SimulatorServer
-    local: RobotiqHand
-    serving: asyncio.Task[None]
-
-    async def end(self) -> None:
-        self.serving.cancel()
-        await asyncio.gather(self.serving, return_exceptions=True)
-
-
 @asynccontextmanager
-async def another(here: Lab) -> AsyncIterator[Other]:
-    gripper = SimulatedGripper(asyncio.get_running_loop().time, speedup=SPEEDUP, spread=False)
-    async with SimulatorServer(gripper) as server:
-        await activate_beforehand(gripper)
-        bus = here.network.bus("other agent")
-        here.network.part("agent", "other agent")
-        hand, ready = RobotiqHand(server.address), asyncio.Event()
-        serving = asyncio.create_task(Agent("lab", "cell", {"left": hand}, bus).run(ready.set))
-        other = Other(gripper, server, hand, serving)
-        try:
-            await ready.wait()
-            while hand.state is not State.RUNNING_IDLE:  # noqa: ASYNC110  # there is no event to wait for
-                await asyncio.sleep(0.01)
-            await asyncio.sleep(0.01)  # until clients have heard of it
-            yield other
-        finally:
-            await other.end()
+async def another(here: Lab) -> AsyncIterator[Lab]:
+    """A second agent, with a gripper of its own under the name of the first one's."""
+    here.network.part("agent", "other agent")
+    async with lab(here.network, "other agent") as other:
+        await until(lambda: other.local.state is State.RUNNING_IDLE)
+        await asyncio.sleep(0.01)  # until clients have heard of it
+        yield other
 
 
-@virtual
-async def test_the_answer_of_the_one_that_commands_counts_and_not_the_quicker_refusal() -> None:
-    async with lab() as here, here.client() as hand, another(here) as other:
+@inside(lab)
+async def test_the_answer_of_the_one_that_commands_counts_and_not_the_quicker_refusal(
+    here: Lab, hand: RemoteHand
+) -> None:
+    async with another(here) as other:
         before = len(other.gripper.writes)
-        for stream in here.network.both("client", "agent"):
-            stream.delay = 0.05
+        here.network.delay("client", "agent", 0.05)
         await hand.set_speed(255)
         result = await hand.move(60, Finger.A)
         hand.command(Finger.B, position=60)
@@ -78,22 +51,26 @@ async def test_the_answer_of_the_one_that_commands_counts_and_not_the_quicker_re
         assert hand.is_in_control
 
 
-@virtual
-async def test_whoever_is_told_by_two_says_so_and_begins_no_command(caplog: pytest.LogCaptureFixture) -> None:
-    async with lab() as here, here.client("reader", control=False) as reader, another(here) as other:
+@inside(lab)
+async def test_whoever_is_told_by_two_says_so_and_begins_no_command(
+    here: Lab, reader: RemoteHand, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with another(here) as other:
         assert caplog.text.count(WORDS) == 1
         for begin in (here.client("next").start, reader.acquire, reader.take):
             with pytest.raises(AgentError, match=WORDS):
                 await begin()
-        await other.end()
+        await other.end_agent()
         await reader.acquire()
         await reader.move(30, Finger.A)
 
 
-@virtual
-async def test_control_does_not_come_back_by_itself_from_the_one_to_the_other() -> None:
+@inside(lab)
+async def test_control_does_not_come_back_by_itself_from_the_one_to_the_other(
+    here: Lab, hand: RemoteHand
+) -> None:
     """It may be another gripper: a loop that tries again would move that one."""
-    async with lab() as here, here.client() as hand, another(here) as other:
+    async with another(here) as other:
         before = len(other.gripper.writes)
         here.network.cut(("client", "agent"), ("agent", "client"))
         await asyncio.sleep(5)
@@ -105,14 +82,13 @@ async def test_control_does_not_come_back_by_itself_from_the_one_to_the_other() 
         here.network.mend(*here.network.both("client", "agent"))
 
 
-@virtual
-async def test_a_halt_stops_both_and_says_so_only_then() -> None:
-    async with lab() as here, here.client("reader", control=False) as reader, another(here) as other:
+@inside(lab)
+async def test_a_halt_stops_both_and_says_so_only_then(here: Lab, reader: RemoteHand) -> None:
+    async with another(here) as other:
         for hand in (here.local, other.local):
             await hand.set_speed(0)
             await hand.set_position(255, Finger.A)
-        while not (here.gripper.is_moving and other.gripper.is_moving):  # noqa: ASYNC110  # there is no event to wait for
-            await asyncio.sleep(0.001)
+        await until(lambda: here.gripper.is_moving and other.gripper.is_moving)
         here.network.stream("other agent", "reader").delay = 0.3  # the answer that is longed for comes first
         await reader.halt()
         assert not here.gripper.is_moving
@@ -124,9 +100,9 @@ async def test_a_halt_stops_both_and_says_so_only_then() -> None:
         await other.server.start()
 
 
-@virtual
-async def test_the_halt_of_all_counts_agents_and_not_names() -> None:
-    async with lab() as here, another(here), Fleet("lab", bus=here.network.bus("console")) as fleet:
+@inside(lab)
+async def test_the_halt_of_all_counts_agents_and_not_names(here: Lab) -> None:
+    async with another(here), Fleet("lab", bus=here.network.bus("console")) as fleet:
         assert await fleet.halt_all() == {LEFT: "stopped"}
         here.network.stream("console", "other agent").is_cut = True
         with pytest.raises(NotAllStoppedError) as failed:
@@ -134,10 +110,10 @@ async def test_the_halt_of_all_counts_agents_and_not_names() -> None:
         assert failed.value.outcomes == {LEFT: "no answer from 1 of 2 agents"}
 
 
-@virtual
-async def test_the_halt_of_all_stops_a_second_one_whose_link_comes_up_late() -> None:
+@inside(lab)
+async def test_the_halt_of_all_stops_a_second_one_whose_link_comes_up_late(here: Lab) -> None:
     """The name had been halted already, at the first one."""
-    async with lab() as here, another(here) as other:
+    async with another(here) as other:
         here.network.part("other agent", "console")
         here.network.loop.call_later(1.0, here.network.join, "other agent", "console")
         await other.local.set_speed(0)
@@ -151,107 +127,91 @@ async def test_the_halt_of_all_stops_a_second_one_whose_link_comes_up_late() -> 
             assert other.gripper.position(Finger.A) < 230
 
 
-@virtual
-async def test_a_second_agent_of_a_host_is_refused_whatever_it_serves() -> None:
-    async with lab() as here:
-        for name, words in (("left", "serves zenoh://lab/cell/left already"), ("right", "a host of its own")):
-            agent = Agent("lab", "cell", {name: RobotiqHand("sim://")}, here.network.bus(f"second {name}"))
-            with pytest.raises(AgentError, match=words):
-                await agent.run()
-        host = Agent("lab", "cell-2", {"left": RobotiqHand("sim://")}, here.network.bus("of another host"))
-        ready = asyncio.Event()
-        serving = asyncio.create_task(host.run(ready.set))
-        await ready.wait()
-        serving.cancel()
-        await asyncio.gather(serving, return_exceptions=True)
-
-
-class _Came:
-    attachment = b""
-
-    def __init__(self, answer: Answer | bytes) -> None:
-        self.payload = answer if isinstance(answer, bytes) else answer.pack()
+@inside(lab)
+async def test_a_second_agent_of_a_host_is_refused_whatever_it_serves(here: Lab) -> None:
+    for name, words in (("left", "serves zenoh://lab/cell/left already"), ("right", "a host of its own")):
+        agent = Agent("lab", "cell", {name: RobotiqHand("sim://")}, here.network.bus(f"second {name}"))
+        with pytest.raises(AgentError, match=words):
+            await agent.run()
+    host = Agent("lab", "cell-2", {"left": RobotiqHand("sim://")}, here.network.bus("of another host"))
+    async with serving(host):
+        pass
 
 
 CALL = Call(LEFT.base, "somebody", epoch=7, number=3)
-RIGHT_ONE = Answer(LEFT.base, 3, 7, {})
 
 
 @pytest.mark.parametrize(
     ("reply", "counts", "refuses"),
     [
-        (RIGHT_ONE, True, False),
-        (failure(CALL, 7, AgentError("late")), True, True),
-        (failure(CALL, 8, AgentError("anew")), False, True),
-        (Answer(LEFT.base, 4, 7, {}), False, False),
-        (Answer("robotiq/v1/lab/cell/right", 3, 7, {}), False, False),
+        (Answer(LEFT.base, 3, 7, {}).pack(), True, False),
+        (failure(CALL, 7, AgentError("late")).pack(), True, True),
+        (failure(CALL, 8, AgentError("anew")).pack(), False, True),
+        (Answer(LEFT.base, 4, 7, {}).pack(), False, False),
+        (Answer("robotiq/v1/lab/cell/right", 3, 7, {}).pack(), False, False),
         (b"?", False, True),
     ],
 )
-def test_which_reply_decides(reply: Answer | bytes, counts: bool, refuses: bool) -> None:
-    assert of_its_run(CALL)(_Came(reply)) is counts
-    assert is_refusal(_Came(reply)) is refuses
+def test_which_reply_decides(reply: bytes, counts: bool, refuses: bool) -> None:
+    assert of_its_run(CALL)(Answered(reply)) is counts
+    assert is_refusal(Answered(reply)) is refuses
 
 
-async def test_without_one_that_decides_it_is_the_last() -> None:
-    one, other = _Came(b"1"), _Came(b"2")
-    asking = PendingQuery(lambda _: False)
-    for reply in (one, other):
-        asking.take(reply)
-    assert not asking.answered.done()
+@pytest.mark.parametrize(
+    ("replies", "decides", "result"),
+    [([b"1", b"2"], False, b"2"), ([b"1", b"2"], True, b"1"), ([], True, None), ([], False, None)],
+)
+async def test_without_one_that_decides_it_is_the_last(
+    replies: list[bytes], decides: bool, result: bytes | None
+) -> None:
+    asking = PendingQuery(lambda _: decides)
+    for reply in replies:
+        asking.take(Answered(reply))
+        assert asking.answered.done() is decides
     asking.end()
-    assert await asking.answered is other
-    first = PendingQuery(is_any)
-    for reply in (one, other):
-        first.take(reply)
-    first.end()
-    assert await first.answered is one
-    nobody = PendingQuery(is_any)
-    nobody.end()
-    assert await nobody.answered is None
+    last = await asking.answered
+    assert (last and last.payload) == result
 
 
-@virtual
-async def test_of_two_agents_that_start_at_once_one_stays() -> None:
-    async with world() as here:
-        await here.agent.end()
-        here.agents.clear()
-        here.network.part("one", "two")  # a router that has not told yet
-        here.network.loop.call_later(0.4, here.network.join, "one", "two")
+@inside(world)
+async def test_of_two_agents_that_start_at_once_one_stays(here: World) -> None:
+    await here.agent.end()
+    here.agents.clear()
+    here.network.part("one", "two")  # a router that has not told yet
+    here.network.loop.call_later(0.4, here.network.join, "one", "two")
 
-        async def start(name: str) -> str:
-            agent = ServingAgent(here, name, {})
-            try:
-                await agent.start()
-            except TimeoutError:
-                assert agent.serving is not None
-                assert isinstance(agent.serving.exception(), AgentError)
-                await agent.host.bury()
-                return "gave up"
-            here.agents.append(agent)
-            return "serves"
+    async def start(name: str) -> str:
+        agent = ServingAgent(here, name, {})
+        try:
+            await agent.start()
+        except TimeoutError:
+            assert agent.serving is not None
+            assert isinstance(agent.serving.exception(), AgentError)
+            await agent.host.bury()
+            return "gave up"
+        here.agents.append(agent)
+        return "serves"
 
-        assert sorted(await asyncio.gather(start("one"), start("two"))) == ["gave up", "serves"]
+    assert sorted(await asyncio.gather(start("one"), start("two"))) == ["gave up", "serves"]
 
 
-@virtual
+@inside(lab)
 async def test_another_agent_that_comes_and_goes_does_not_fill_log_and_events(
-    caplog: pytest.LogCaptureFixture,
+    here: Lab, caplog: pytest.LogCaptureFixture
 ) -> None:
     """2,478 lines, and as many events."""
-    async with lab() as here:
-        client = here.client(control=False)
-        await client.start()
-        events = here.agent.hands["left"].publisher._count
-        key = LEFT.key("alive", "12345")
-        with caplog.at_level(logging.ERROR, logger="robotiq_async"):
-            for _ in range(500):
-                here.agent._report_conflict(key, is_there=True)
-                here.agent._report_conflict(key, is_there=False)
-            assert here.agent.hands["left"].publisher._count == events + 1
-            for number in range(500):
-                client_agents = client._session.agents  # type: ignore[union-attr]
-                client_agents._update_token(f"{key}{number}", is_there=True)
-                client_agents._update_token(f"{key}{number}", is_there=False)
-        assert len(caplog.records) <= 2
-        await client.stop()
+    client = here.client(control=False)
+    await client.start()
+    events = here.agent.hands["left"].publisher._count
+    key = LEFT.key("alive", "12345")
+    with caplog.at_level(logging.ERROR, logger="robotiq_async"):
+        for _ in range(500):
+            here.agent._report_conflict(key, is_there=True)
+            here.agent._report_conflict(key, is_there=False)
+        assert here.agent.hands["left"].publisher._count == events + 1
+        for number in range(500):
+            client_agents = client._session.agents  # type: ignore[union-attr]
+            client_agents._update_token(f"{key}{number}", is_there=True)
+            client_agents._update_token(f"{key}{number}", is_there=False)
+    assert len(caplog.records) <= 2
+    await client.stop()

@@ -8,8 +8,8 @@ import pytest
 
 from robotiq_async import Finger
 from tests.fleet.cell import PHASES, TARGET, TROUBLES, Cell, Doing, cells, moving, outcome, told
-from tests.fleet.world import world
-from tests.virtual import run, virtual
+from tests.fleet.world import World, world
+from tests.virtual import inside
 
 CELLS = list(cells())
 HALTED_AFTER_S = 0.25
@@ -17,15 +17,12 @@ HALTED_AFTER_S = 0.25
 
 
 @pytest.mark.parametrize("cell", CELLS, ids=lambda cell: f"{cell.phase}-{cell.trouble}".replace(" ", "_"))
-def test_cell(cell: Cell) -> None:
-    async def main() -> None:
-        async with world() as here:
-            came = await outcome(here, cell.phase, TROUBLES[cell.trouble])
-            assert came.words in cell.outcomes
-            if cell.held_after is not None and came.held_after is not None:
-                assert came.held_after <= cell.held_after
-
-    run(main)
+@inside(world)
+async def test_cell(here: World, cell: Cell) -> None:
+    words, held_after = await outcome(here, cell.phase, TROUBLES[cell.trouble])
+    assert words in cell.outcomes
+    if cell.held_after is not None and held_after is not None:
+        assert held_after <= cell.held_after
 
 
 def test_the_table_is_complete() -> None:
@@ -35,27 +32,26 @@ def test_the_table_is_complete() -> None:
 
 
 @pytest.mark.parametrize("trouble", TROUBLES)
-@virtual
-async def test_a_halt_in_the_midst(trouble: str) -> None:
+@inside(world)
+async def test_a_halt_in_the_midst(here: World, trouble: str) -> None:
     """A client that asks hears the truth, and the old holder does not come back."""
-    async with world() as here:
-        doing = Doing(here)
-        await moving(doing)
-        going_on = asyncio.create_task(TROUBLES[trouble](here))
-        await asyncio.sleep(HALTED_AFTER_S)
-        at = here.now()
-        heard = await here.other.do(told(here.other.hand.halt()))
-        assert here.now() - at <= 2.5
-        if heard == "done":
-            assert not here.gripper.is_moving
-        else:
-            assert heard == "ConnectionLost"
-        await going_on
-        await asyncio.sleep(2.5)
-        assert not here.gripper.is_moving or heard != "done"
-        if heard == "done":
-            assert here.gripper.position(Finger.A) < TARGET / 2
-        if not here.holder.host.is_dead:
-            assert heard != "done" or not here.holder.hand.is_in_control
-            assert doing.call is not None
-            await here.until(doing.call.done)
+    doing = Doing(here)
+    await moving(doing)
+    going_on = asyncio.create_task(TROUBLES[trouble](here))
+    await asyncio.sleep(HALTED_AFTER_S)
+    at = here.now()
+    heard = await here.other.do(told(here.other.hand.halt()))
+    assert here.now() - at <= 2.5
+    if heard == "done":
+        assert not here.gripper.is_moving
+    else:
+        assert heard == "ConnectionLost"
+    await going_on
+    await asyncio.sleep(2.5)
+    assert not here.gripper.is_moving or heard != "done"
+    if heard == "done":
+        assert here.gripper.position(Finger.A) < TARGET / 2
+    if not here.holder.host.is_dead:
+        assert heard != "done" or not here.holder.hand.is_in_control
+        assert doing.call is not None
+        await here.until(doing.call.done)

@@ -11,15 +11,16 @@ import pytest
 from robotiq_async import Finger, State
 from robotiq_async.fleet.limited_log import EVERY_S
 from robotiq_async.fleet.network.bus import Urgency
-from robotiq_async.fleet.wire.envelope import Call, unpack_answer
+from robotiq_async.fleet.remote.remote_hand import RemoteHand
+from robotiq_async.fleet.wire.envelope import Call
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.fleet.wire.status_message import StatusMessage
 from robotiq_async.fleet.wire.values import read_error
 from robotiq_async.values.errors import AgentError, ControlLostError, ProtocolError, RobotiqError
-from tests.fleet.cell import LEFT, ask, move_slowly
-from tests.fleet.lab import Lab, lab
-from tests.fleet.world import world
-from tests.virtual import virtual
+from tests.fleet.cell import ask, move_slowly
+from tests.fleet.lab import LEFT, Lab, instantly, lab
+from tests.fleet.world import World, world
+from tests.virtual import inside
 
 INFINITE = float("inf")  # JSON of Python has it
 STRANGE: list[tuple[str, Any]] = [
@@ -48,139 +49,111 @@ OTHERS = StatusMessage(LEFT.mark + 1, 2, 3.0, State.RUNNING_IDLE, 4, False, 5, F
 # -- malformed requests ------------------------------------------------------------------------------------
 
 
-async def asked(here: Lab, verb: str, call: Call) -> Any:
-    reply = await here.network.bus("stranger").ask(
-        LEFT.key(verb), call.pack(), timeout=1.0, urgency=Urgency.COMMAND
-    )
-    assert reply is not None
-    return unpack_answer(reply.payload).outcome(lambda stamp: stamp)
-
-
-@virtual
+@inside(lab)
 @pytest.mark.parametrize(("verb", "arguments"), STRANGE)
-async def test_from_who_holds_the_lease(verb: str, arguments: Any) -> None:
-    async with lab() as here, here.client() as hand:
-        session = hand._session
-        assert session is not None
-        writes = len(here.gripper.writes)
-        call = session.call(arguments)
-        reply = await here.network.bus("stranger").ask(
-            session.name.key(verb), call.pack(), timeout=1.0, urgency=Urgency.COMMAND
-        )
-        assert reply is not None
-        answer = unpack_answer(reply.payload)
-        assert answer.number == call.number
-        with pytest.raises((RobotiqError, TypeError, ValueError)):
-            answer.outcome(lambda stamp: stamp)
-        assert len(here.gripper.writes) == writes
-        await hand.move(20, 1)
+async def test_from_who_holds_the_lease(here: Lab, hand: RemoteHand, verb: str, arguments: Any) -> None:
+    assert hand._session is not None
+    writes = len(here.gripper.writes)
+    call = hand._session.call(arguments)
+    answer = await here.answer(verb, call.pack())
+    assert answer.number == call.number
+    with pytest.raises((RobotiqError, TypeError, ValueError)):
+        answer.outcome(instantly)
+    assert len(here.gripper.writes) == writes
+    await hand.move(20, 1)
 
 
-@virtual
+@inside(lab)
 @pytest.mark.parametrize(
-    "payload", [b"", b"{}", b"[1", b"null", b"\xff", json.dumps({"version": 9}).encode()]
+    "request_", [b"", b"{}", b"[1", b"null", b"\xff", json.dumps({"version": 9}).encode()]
 )
 @pytest.mark.parametrize("verb", ["info", "lease", "halt", "cmd/move"])
-async def test_that_are_none(verb: str, payload: bytes) -> None:
-    async with lab() as here, here.client() as hand:
-        session = hand._session
-        assert session is not None
-        bus = here.network.bus("stranger")
-        reply = await bus.ask(session.name.key(verb), payload, timeout=1.0, urgency=Urgency.COMMAND)
-        assert reply is not None
-        with pytest.raises((ProtocolError, AgentError)):
-            unpack_answer(reply.payload).outcome(lambda stamp: stamp)
-        await hand.move(20, 1)
+async def test_that_are_none(here: Lab, hand: RemoteHand, verb: str, request_: bytes) -> None:
+    with pytest.raises((ProtocolError, AgentError)):
+        (await here.answer(verb, request_)).outcome(instantly)
+    await hand.move(20, 1)
 
 
-@virtual
+@inside(lab)
 @pytest.mark.parametrize(("later", "refusal"), [(0, ControlLostError), (1, AgentError)])
-async def test_a_command_without_a_lease_or_for_another_run(later: int, refusal: type[RobotiqError]) -> None:
+async def test_a_command_without_a_lease_or_for_another_run(
+    here: Lab, later: int, refusal: type[RobotiqError]
+) -> None:
     """The arguments are valid for no command, so the refusal comes before they are read."""
-    async with lab() as here:
-        epoch = (await asked(here, "info", Call(LEFT.base, "stranger", number=1)))["epoch"]
-        call = Call(LEFT.base, "stranger", epoch + later, number=2, arguments={"fingers": 0})
-        writes = len(here.gripper.writes)
-        with pytest.raises(refusal):
-            await asked(here, "cmd/hold", call)
-        assert len(here.gripper.writes) == writes
+    call = Call(LEFT.base, "stranger", here.agent.epoch + later, number=2, arguments={"fingers": 0})
+    writes = len(here.gripper.writes)
+    with pytest.raises(refusal):
+        (await here.answer("cmd/hold", call.pack())).outcome(instantly)
+    assert len(here.gripper.writes) == writes
 
 
-@virtual
-async def test_of_a_command_for_several_axes_all_is_carried_out_or_nothing() -> None:
-    async with lab() as here, here.client() as hand:
-        session = hand._session
-        assert session is not None
-        axes = {"1": {"position": 90}, "2": {"position": 999}}
-        with pytest.raises(ValueError, match="999"):
-            await session.ask("cmd/command", {"axes": axes}, timeout=1.0)
-        await asyncio.sleep(1)
-        assert here.gripper.position(Finger.A) < 10
+@inside(lab)
+async def test_of_a_command_for_several_axes_all_is_carried_out_or_nothing(
+    here: Lab, hand: RemoteHand
+) -> None:
+    assert hand._session is not None
+    axes = {"1": {"position": 90}, "2": {"position": 999}}
+    with pytest.raises(ValueError, match="999"):
+        await hand._session.ask("cmd/command", {"axes": axes}, timeout=1.0)
+    await asyncio.sleep(1)
+    assert here.gripper.position(Finger.A) < 10
 
 
-@virtual
-async def test_arguments_that_do_not_fit_leave_nothing_behind() -> None:
+@inside(lab)
+async def test_arguments_that_do_not_fit_leave_nothing_behind(here: Lab, hand: RemoteHand) -> None:
     """The axes counted as commanded, and what others had set going was held at the end of the lease."""
-    async with lab() as here, here.client() as hand:
-        session = hand._session
-        assert session is not None
-        await here.local.set_speed(0)
-        await here.local.set_position(250, Finger.B)
-        for arguments in ({"position": 9, "fingers": 2, "more": 1}, {"position": 9, "fingers": float("inf")}):
-            with pytest.raises((TypeError, ValueError, OverflowError, AgentError)):
-                await session.ask("cmd/move", arguments, timeout=1.0)
-        async with here.client("other", control=False) as other:
-            await other.take()
-            await asyncio.sleep(0.2)
-            assert here.gripper.is_moving
-            await other.release()
-        assert not here.gripper.is_moving
+    assert hand._session is not None
+    await here.local.set_speed(0)
+    await here.local.set_position(250, Finger.B)
+    for arguments in ({"position": 9, "fingers": 2, "more": 1}, {"position": 9, "fingers": INFINITE}):
+        with pytest.raises((TypeError, ValueError, OverflowError, AgentError)):
+            await hand._session.ask("cmd/move", arguments, timeout=1.0)
+    async with here.client("other", control=False) as other:
+        await other.take()
+        await asyncio.sleep(0.2)
+        assert here.gripper.is_moving
+        await other.release()
+    assert not here.gripper.is_moving
 
 
 @pytest.mark.parametrize("key", ["robotiq/v1/lab/cell/*/halt", "robotiq/v1/lab/cell/a$b/halt"])
-@virtual
-async def test_a_request_under_a_wildcard_is_refused(key: str) -> None:
-    async with world() as here:
-        call = await move_slowly(here)
-        refused = await ask(here.other, "halt", Call(LEFT.base, "somebody", number=1), key)
-        assert refused is not None
-        assert here.gripper.is_moving
-        await here.holder.do(here.holder.hand.halt())
-        await call
+@inside(world)
+async def test_a_request_under_a_wildcard_is_refused(here: World, key: str) -> None:
+    call = await move_slowly(here)
+    refused = await ask(here.other, "halt", Call(LEFT.base, "somebody", number=1), key)
+    assert refused is not None
+    assert here.gripper.is_moving
+    await here.holder.do(here.holder.hand.halt())
+    await call
 
 
-@virtual
-async def test_a_request_for_another_gripper_is_refused() -> None:
+@inside(world)
+async def test_a_request_for_another_gripper_is_refused(here: World) -> None:
     """It came under the wrong key."""
-    async with world() as here:
-        right = Call(GripperName("lab", "cell", "right").base, "somebody", number=1)
-        refused = await ask(here.other, "lease", right)
-        assert "right" in str(refused)
-        assert here.holder.hand.is_in_control
+    right = Call(GripperName("lab", "cell", "right").base, "somebody", number=1)
+    refused = await ask(here.other, "lease", right)
+    assert "right" in str(refused)
+    assert here.holder.hand.is_in_control
 
 
 # -- untrusted input ---------------------------------------------------------------------------------------
 
 
-@virtual
-async def test_what_a_client_calls_itself(caplog: pytest.LogCaptureFixture) -> None:
-    async with lab() as here, here.client("reader", control=False) as reader:
-        session = reader._session
-        assert session is not None
-        seen = session.mirror.stamp
-        bus = here.network.bus("eve")
-        for verb, number in (("lease", 1), ("halt", 2), ("lease", 3)):
-            what = {"what": "acquire", "label": NAME}
-            call = Call(LEFT.base, "eve", 0, 0, number, seen, what)
-            reply = await bus.ask(LEFT.key(verb), call.pack(), timeout=1.0, urgency=Urgency.COMMAND)
-            assert reply is not None
-            unpack_answer(reply.payload).outcome(lambda stamp: stamp)
-        told = await session.ask("info", timeout=1.0)
-        assert told["holder"].isprintable(), "who shows it elsewhere may not look at it first"
-        with pytest.raises(ControlLostError) as refused:
-            await reader.acquire()
-        assert "eve" in str(refused.value)
-        assert str(refused.value).isprintable()
+@inside(lab)
+async def test_what_a_client_calls_itself(
+    here: Lab, reader: RemoteHand, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert reader._session is not None
+    seen = reader._session.mirror.stamp
+    for verb, number in (("lease", 1), ("halt", 2), ("lease", 3)):
+        call = Call(LEFT.base, "eve", 0, 0, number, seen, {"what": "acquire", "label": NAME})
+        (await here.answer(verb, call.pack())).outcome(instantly)
+    told = await reader._session.ask("info", timeout=1.0)
+    assert told["holder"].isprintable(), "who shows it elsewhere may not look at it first"
+    with pytest.raises(ControlLostError) as refused:
+        await reader.acquire()
+    assert "eve" in str(refused.value)
+    assert str(refused.value).isprintable()
     assert all(record.getMessage().isprintable() for record in caplog.records)
     assert "eve" in caplog.text
 
@@ -188,13 +161,13 @@ async def test_what_a_client_calls_itself(caplog: pytest.LogCaptureFixture) -> N
 @pytest.mark.parametrize("kind", ["ControlLostError", "ConnectFailedError", "of the future\n", "ValueError"])
 def test_what_an_agent_says_of_a_failure(kind: str) -> None:
     fields = {"kind": kind, "message": "a\nb\x1b", "reason": "\n", "address": "\r", "state": None}
-    error = read_error(fields, lambda stamp: stamp)
+    error = read_error(fields, instantly)
     for words in (str(error), *map(str, vars(error).values())):
         assert words.isprintable()
     assert "a\\nb\\x1b" in str(error)
 
 
-@virtual
+@inside(lab)
 @pytest.mark.parametrize(
     ("payload", "words"),
     [
@@ -206,24 +179,23 @@ def test_what_an_agent_says_of_a_failure(kind: str) -> None:
     ],
 )
 async def test_a_flood_of_messages_that_are_none_fills_no_log(
-    payload: bytes, words: str, caplog: pytest.LogCaptureFixture
+    here: Lab, hand: RemoteHand, payload: bytes, words: str, caplog: pytest.LogCaptureFixture
 ) -> None:
-    async with lab() as here, here.client() as hand:
-        publish = here.network.bus("stranger").publisher(LEFT.key("feed"), Urgency.TELEMETRY)
-        for _ in range(300):
-            publish(payload)
-            await asyncio.sleep(0.001)
-        assert caplog.text.count(words) == 1
-        await asyncio.sleep(EVERY_S)
+    publish = here.network.bus("stranger").publisher(LEFT.key("feed"), Urgency.TELEMETRY)
+    for _ in range(300):
         publish(payload)
-        await asyncio.sleep(0.01)
-        assert caplog.text.count(words) == 2
-        assert "300 similar" in caplog.text
-        about = {getattr(record, "hand", "") for record in caplog.records if words in record.getMessage()}
-        assert about == {hand.name}
-        await hand.move(30, 1)
+        await asyncio.sleep(0.001)
+    assert caplog.text.count(words) == 1
+    await asyncio.sleep(EVERY_S)
+    publish(payload)
+    await asyncio.sleep(0.01)
+    assert caplog.text.count(words) == 2
+    assert "300 similar" in caplog.text
+    about = {getattr(record, "hand", "") for record in caplog.records if words in record.getMessage()}
+    assert about == {hand.name}
+    await hand.move(30, 1)
 
 
 def test_words_that_are_none_are_refused() -> None:
-    assert "cannot be read" in str(read_error({"kind": "AgentError", "message": 3}, lambda stamp: stamp))
-    assert not isinstance(read_error({"kind": 3, "message": "?"}, lambda stamp: stamp), AgentError)
+    assert "cannot be read" in str(read_error({"kind": "AgentError", "message": 3}, instantly))
+    assert not isinstance(read_error({"kind": 3, "message": "?"}, instantly), AgentError)

@@ -213,6 +213,12 @@ class Client:
     async def do(self, work: Coroutine[Any, Any, T]) -> T:
         return await self.host.do(work)
 
+    async def command(self, axes: Finger, **changes: int) -> None:
+        async def ask() -> None:
+            self.hand.command(axes, **changes)
+
+        await self.do(ask())
+
     async def stop(self) -> None:
         if not self.host.is_dead:
             assert self._watching is not None
@@ -235,12 +241,9 @@ class Client:
 
     def _check_current(self, status: RobotiqStatus) -> None:
         """A status that is shown without a word is no older than the window and one look for silence."""
-        gripper, number = self.world.grippers[self.gripper], status.registers[7] & 0xFF
-        given = self.given_at(status)
         # One that says it is old may be: then the agent has not read a newer one.
-        said, age = self.world.now() - status.timestamp, self.world.now() - given
+        said, age = self.world.now() - status.timestamp, self.world.now() - self.given_at(status)
         assert age <= max(said, WINDOW_S * 1.2) + PROMPT_S, f"stale: {age:.2f} s, said {said:.2f} s"
-        assert gripper.stamps, number
 
     def given_at(self, status: RobotiqStatus) -> float:
         """When the gripper gave this status out, by the number it wrote into it: the last time before now."""
@@ -297,6 +300,3 @@ def motions(world: World, since: int) -> list[tuple[float, tuple[int, int]]]:
         if image.go:
             found.append((write.time, (image.axes[0].position, image.axes[0].speed)))
     return found
-
-
-__all__ = ["Client", "ServingAgent", "World", "motions", "world"]

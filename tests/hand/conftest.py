@@ -6,14 +6,6 @@ import pytest
 
 from robotiq_async.simulator import SimulatedGripper
 from tests.conftest import Clock
-from tests.contract.test_loops import CALLS
-
-REQUESTS = {
-    name: call
-    for name, call in CALLS.items()
-    if name not in ("wait_for_state", "stop", "statuses", "transitions", "requests", "grip_events")
-}
-"""Every call that asks something of the gripper."""
 
 
 @pytest.fixture

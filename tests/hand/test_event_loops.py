@@ -15,8 +15,7 @@ import pytest
 
 from robotiq_async import Finger, NotStartedError, RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.contract.test_loops import CALLS, called
-from tests.hand.conftest import REQUESTS
+from tests.contract.bench import COMMANDS, called
 
 ROOT = Path(__file__).parents[2]
 
@@ -222,9 +221,9 @@ class TestClosedLoop:
 
     def test_every_other_call_says_so(self, place: str) -> None:
         hand = abandoned(place)
-        for call in (*REQUESTS.values(), CALLS["wait_for_state"]):
+        for call in (*COMMANDS, "wait_for_state"):
             with pytest.raises(NotStartedError, match="closed"):
-                asyncio.run(called(call, hand))
+                asyncio.run(called(hand, call))
         with pytest.raises(NotStartedError, match="closed"):
             hand.is_moving  # noqa: B018
         asyncio.run(hand.stop())

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import anyio
 import pytest
@@ -14,11 +13,10 @@ from robotiq_async import Finger, NotStartedError, RobotiqHand, State
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
-from tests.contract.bench import until
-from tests.contract.test_loops import called
+from tests.contract.bench import COMMANDS, called
 from tests.fake_transport import Wire
 from tests.grippers import activate_beforehand
-from tests.hand.conftest import REQUESTS
+from tests.virtual import until
 from tests.virtual_line import VirtualLine
 
 pytestmark = pytest.mark.virtual_time
@@ -43,13 +41,13 @@ async def slow(server: SimulatorServer, turn: float) -> None:
 
 
 @TURNS
-@pytest.mark.parametrize("request_", REQUESTS.values(), ids=REQUESTS)
+@pytest.mark.parametrize("request_", COMMANDS)
 async def test_after_the_call_of_stop_every_request_is_refused(
     hand: RobotiqHand,
     server: SimulatorServer,
     gripper: SimulatedGripper,
     turn: float,
-    request_: Callable[[RobotiqHand], Any],
+    request_: str,
 ) -> None:
     """A command was taken, and an image with rGTO went out: 96 counts of motion."""
     await slow(server, turn)
@@ -57,7 +55,7 @@ async def test_after_the_call_of_stop_every_request_is_refused(
     stopping = asyncio.create_task(hand.stop())
     await asyncio.sleep(0)
     with pytest.raises(NotStartedError):
-        await called(request_, hand)
+        await called(hand, request_)
     await stopping
     assert not any(image.go or not image.activate for image in images_since(gripper, writes))
 

@@ -19,8 +19,7 @@ from robotiq_async import (
 )
 from robotiq_async.simulator import Trouble
 from tests.adversity.world import world
-from tests.contract.test_loops import called
-from tests.hand.conftest import REQUESTS
+from tests.contract.bench import COMMANDS, called
 
 pytestmark = pytest.mark.virtual_time
 
@@ -98,9 +97,9 @@ async def test_while_it_waits_it_owns_the_address_and_refuses_commands() -> None
     async with world() as here, here.server.fault_injector.making(Trouble("refuse")):
         starting = asyncio.create_task(here.hand.start(wait=3600))
         await asyncio.sleep(1)
-        for call in REQUESTS.values():
+        for call in COMMANDS:
             with pytest.raises(ConnectionLostError):
-                await called(call, here.hand)
+                await called(here.hand, call)
         with pytest.raises(NotStartedError):
             _ = here.hand.status
         with pytest.raises(InvalidStateError):

@@ -6,7 +6,7 @@ import asyncio
 import copy
 import logging
 import pickle
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from typing import Any
 
 import pytest
@@ -32,8 +32,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.tools.recording.payloads import reading_fields, state_fields, title
 from robotiq_async.values.request import AxisRequest, Request
 from tests.conftest import Clock, started
-from tests.contract.test_loops import CALLS, called
-from tests.hand.conftest import REQUESTS
+from tests.contract.bench import COMMANDS, called
 
 pytestmark = pytest.mark.virtual_time
 
@@ -91,15 +90,12 @@ async def test_what_is_told_of_it_has_its_name(named: RobotiqHand) -> None:
 # -- errors ------------------------------------------------------------------------------------------------
 
 
-PROPERTIES = {
-    name: lambda hand, name=name: getattr(hand, name)
-    for name in ("is_activated", "is_moving", "is_reset", "status")
-}
+PROPERTIES = ("is_activated", "is_moving", "is_reset", "status")
 
 
-async def error_of(call: Callable[[RobotiqHand], Any], hand: RobotiqHand) -> RobotiqError:
+async def error_of(hand: RobotiqHand, name: str) -> RobotiqError:
     with pytest.raises(RobotiqError) as caught:
-        await called(call, hand)
+        await called(hand, name)
     return caught.value
 
 
@@ -111,23 +107,22 @@ def assert_tells(error: BaseException | None, name: str = NAME) -> None:
     assert repr(str(error)) in repr(error)
 
 
-@pytest.mark.parametrize("name", REQUESTS | PROPERTIES | {"wait_for_state": CALLS["wait_for_state"]})
+@pytest.mark.parametrize("name", [*COMMANDS, *PROPERTIES, "wait_for_state"])
 async def test_a_refusal_tells_the_name_when_there_is_one(name: str) -> None:
-    call = (CALLS | PROPERTIES)[name]
-    assert_tells(await error_of(call, RobotiqHand(name=NAME)))
-    error = await error_of(call, RobotiqHand())
+    assert_tells(await error_of(RobotiqHand(name=NAME), name))
+    error = await error_of(RobotiqHand(), name)
     assert error.hand == ""
     assert str(error) == error.message == error.args[0]
 
 
 async def test_a_start_that_fails_tells_the_name(server: SimulatorServer, named: RobotiqHand) -> None:
     for each in (named, RobotiqHand(server.address, name=NAME)):
-        error = await error_of(lambda hand: hand.start(), each)
+        error = await error_of(each, "start")
         assert isinstance(error, InvalidStateError)
         assert_tells(error)
     server.refuse()
     await named.stop()
-    error = await error_of(lambda hand: hand.start(), named)
+    error = await error_of(named, "start")
     assert isinstance(error, ConnectFailedError)
     assert_tells(error)
     assert server.address in str(error)
@@ -155,7 +150,7 @@ async def test_what_waits_is_told_the_name(
     two = [await waiting(named), asyncio.create_task(named.reset())]
     assert_tells(await failed(two[0], MoveSupersededError))
     await two[1]
-    assert_tells(await error_of(lambda hand: hand.move(3), named))
+    assert_tells(await error_of(named, "move"))
     await named.activate()
     with pytest.raises(StateTimeoutError, match=NAME):
         await named.wait_for_state(State.FAULT, timeout=0.01)
@@ -186,7 +181,7 @@ async def test_what_waits_for_an_answer_is_told_the_name(
         await named.wait_for_state(State.FAULT)
     if call == "activate":
         await named.reset()
-    asking = asyncio.create_task(called(CALLS[call], named))
+    asking = asyncio.create_task(called(named, call))
     await asyncio.sleep(0)
     if ends == "stop":
         await named.stop()
@@ -194,7 +189,7 @@ async def test_what_waits_for_an_answer_is_told_the_name(
     else:
         async with server.fault_injector.making(Trouble("silence")):
             assert_tells(await failed(asking, ConnectionLostError))
-            assert_tells(await error_of(lambda hand: hand.is_moving, named))
+            assert_tells(await error_of(named, "is_moving"))
 
 
 async def test_a_stream_that_ends_for_good_tells_the_name(server: SimulatorServer) -> None:
@@ -206,7 +201,7 @@ async def test_a_stream_that_ends_for_good_tells_the_name(server: SimulatorServe
         async for _ in statuses:
             pass
     assert_tells(caught.value)
-    assert_tells(await error_of(lambda hand: hand.set_speed(3), hand))
+    assert_tells(await error_of(hand, "set_speed"))
     await hand.stop()
     await hand.start(activate=False)
     await anext(hand.statuses())
@@ -216,7 +211,7 @@ async def test_a_stream_that_ends_for_good_tells_the_name(server: SimulatorServe
 async def test_a_reset_gripper_refuses_by_name(server: SimulatorServer) -> None:
     hand = RobotiqHand(server.address, name=NAME)
     await hand.start(activate=False)
-    error = await error_of(lambda hand: hand.command(position=3), hand)
+    error = await error_of(hand, "command")
     assert isinstance(error, NotActivatedError)
     assert_tells(error)
     await hand.stop()

@@ -21,9 +21,8 @@ from robotiq_async import (
 from robotiq_async.runtime.clock import now
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
-from tests.contract.bench import until
 from tests.fake_transport import Wire
-from tests.virtual import VirtualLoop, run
+from tests.virtual import VirtualLoop, run, until
 
 pytestmark = pytest.mark.virtual_time
 

@@ -13,9 +13,9 @@ import pytest
 from robotiq_async import Fault, Finger, RobotiqHand, State
 from robotiq_async.simulator import Habits, SimulatedGripper, SimulatorServer
 from robotiq_async.values.request import Request
-from tests.contract.bench import until
 from tests.fake_transport import Wire
 from tests.grippers import activate_beforehand
+from tests.virtual import until
 
 pytestmark = pytest.mark.virtual_time
 
