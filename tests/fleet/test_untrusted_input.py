@@ -175,7 +175,7 @@ def test_what_an_agent_says_of_a_failure(kind: str) -> None:
         (b"?", "a message was dropped: not a status"),
         (b"{", "cannot be read"),
         (b"{" + b'"a":[' * 3000, "cannot be read"),
-        (OTHERS._replace(mark=LEFT.mark, stamp=float("inf")).pack(), "no time"),
+        (OTHERS._replace(mark=LEFT.mark, stamp=float("inf")).pack(), "impossible time"),
     ],
 )
 async def test_a_flood_of_messages_that_are_none_fills_no_log(
