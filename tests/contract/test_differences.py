@@ -156,7 +156,7 @@ async def back_again(here: Bench) -> str:
         return word
 
 
-async def lost_news(here: Bench) -> str:
+async def lost_messages(here: Bench) -> str:
     async with here.make() as hand:
         statuses, transitions = hand.statuses(buffer=10_000), hand.transitions()
         first = await anext(statuses)
@@ -208,7 +208,7 @@ PROBES: dict[str, Callable[[Bench], Awaitable[str]]] = {
     "the network is down for 3 s during `move()`": cut_move,
     "`state` while nothing is heard of the agent": silent_state,
     "when the network is back: `set_speed()`": back_again,
-    "`statuses()` while news are lost on the way": lost_news,
+    "`statuses()` when messages are lost": lost_messages,
     "`statistics.moves` right after a `move()`": fresh_figures,
     "`statistics` after another start": figures_of_another_start,
     "`acquire()`, `take()`, `release()`, `is_in_control`": names,
