@@ -31,8 +31,8 @@ from typing import Any, NamedTuple
 import pytest
 
 PARTS = ("control", "session", "link", "values", "hand", "simulator", "fleet", "runtime")
-FOLDERS = (*PARTS[:-1], "wire", "calibration", "grasping", "contract", "adversity")
-NEAR = {"values": "wire", "runtime": "session"}
+FOLDERS = (*PARTS[:-1], "contract", "adversity")
+NEAR = {"runtime": "session"}
 SLOW_S = 4.0
 """Slower tests are left out."""
 AT_MOST = 40

@@ -3,7 +3,7 @@
 The constraints are left out, so the environment has what a user gets who installs today, the tools of the
 tests included. It is thrown away; what is newer than in constraints.txt is named, whatever the tests say.
 
-    make canary TESTS="tests/cli tests/telemetry"
+    make canary TESTS="tests/cli tests/tools"
 """
 
 from __future__ import annotations

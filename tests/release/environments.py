@@ -15,7 +15,9 @@ BARE: Final = {"PATH": "/usr/local/bin:/usr/bin:/bin"}
 """Variables that lend a program no modules."""
 PATIENCE: Final = 600.0
 """Seconds after which a program counts as hanging."""
-LIBRARY: Final = "tests/wire tests/control tests/link tests/session tests/hand tests/simulator tests/contract"
+LIBRARY: Final = (
+    "tests/values tests/control tests/link tests/session tests/hand tests/simulator tests/contract"
+)
 """What is run unless the variable TESTS says otherwise."""
 LEFT_OUT: Final = ("tests/contract/test_loops.py::test_a_loop_that_was_closed_under_it",)
 """It leaves tasks in a closed loop. On Python 3.12 and 3.13 they outlive it, and fail the next test."""

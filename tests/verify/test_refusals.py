@@ -19,7 +19,7 @@ from robotiq_async.tools.verify.stages import first_motions
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.model import TWO_FINGER_85
 from robotiq_async.values.request import AxisRequest, Request
-from tests.test_doctor import answering, registers_in, reply
+from tests.tools.test_doctor import answering, registers_in, reply
 from tests.verify.people import SHORT, Helper, Roll, served, verified
 
 pytestmark = pytest.mark.virtual_time
