@@ -175,6 +175,7 @@ def test_grams_become_newton(tmp_path: Path) -> None:
         (((0, 1.0),), "at least two are needed, got 1"),
         (((0, 1.0), (256, 1.0)), "a value of points must be in 0..255"),
         (((0, 1.0), (0, 2.0)), "the values must rise"),
+        (((9, 1.0), (0, 2.0)), "the values must rise"),
         (((0, float("nan")), (255, 1.0)), "a figure of points must be a number"),
         (((0, -1.0), (255, 1.0)), "a figure of points must be a number"),
         (((0, 1e9), (255, 1.0)), "a figure of points must be a number"),

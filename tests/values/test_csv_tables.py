@@ -68,10 +68,13 @@ def test_the_thesis_tables_are_there() -> None:
     [
         ("", ": the file is empty"),
         ("speed_value\n0\n", ", line 1: expected the columns speed_value,run_1_ms, got speed_value"),
+        ("speed,run_1_ms\n0,1\n", ", line 1: expected the columns speed_value,run_1_ms"),
         ("speed_value,run_1_ms,run_3_ms\n", ", line 1: expected the columns"),
         ("force_value,run_1_g\n0,1\n", ", line 1: expected the columns"),
         (f"{HEADER}\n0,1\n", ", line 2: expected 3 columns, got 2"),
+        (f"{HEADER}\n0,1,2,3\n", ", line 2: expected 3 columns, got 4"),
         (f"{HEADER}\n0,1,2\n4,fast,2\n", ", line 3: run_1_ms must be an integer in 0..600000, got 'fast'"),
+        (f"{HEADER}\n0,1,\n", ", line 2: run_2_ms must be an integer in 0..600000, got ''"),
         (f"{HEADER}\n0,1,-2\n", ", line 2: run_2_ms must be an integer"),
         (f"{HEADER}\n0,1,600001\n", ", line 2: run_2_ms must be an integer in 0..600000, got '600001'"),
         (f"{HEADER}\n256,1,2\n", ", line 2: speed_value must be an integer in 0..255, got '256'"),
@@ -118,10 +121,12 @@ def test_a_failed_write_leaves_what_was_there_and_nothing_else(file: Path) -> No
 def test_a_new_file_has_the_mode_that_the_umask_leaves_and_keeps_another(file: Path) -> None:
     before = os.umask(0o027)
     try:
-        for mode in (0o640, 0o600):
-            write_table(file, SPEED, {0: (1,)})
+        write_table(file, SPEED, {0: (1,)})
+        assert stat.S_IMODE(file.stat().st_mode) == 0o640
+        for mode in (0o600, 0o660):
+            file.chmod(mode)
+            write_table(file, SPEED, {0: (2,)})
             assert stat.S_IMODE(file.stat().st_mode) == mode
-            file.chmod(0o600)
     finally:
         os.umask(before)
 
