@@ -267,8 +267,10 @@ def test_it_is_tried_for_ever_unless_said_otherwise() -> None:
     ("name", "value", "error"),
     [
         ("first_delay", -0.1, ValueError),
+        ("first_delay", 10.1, ValueError),
         ("max_delay", 0.0, ValueError),
         ("max_delay", 61.0, ValueError),
+        ("give_up_after", -1.0, ValueError),
         ("give_up_after", float("nan"), ValueError),
         ("activate", 1, TypeError),
         ("first_delay", "soon", TypeError),

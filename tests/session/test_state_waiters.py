@@ -53,6 +53,12 @@ async def test_who_has_been_told_is_not_told_again(waiters: StateWaiters) -> Non
         assert await reached is State.RESET
 
 
+async def test_several_callers_may_wait_for_the_same_state(waiters: StateWaiters) -> None:
+    with waiters.watching({State.RESET}, {}) as one, waiters.watching({State.RESET}, {}) as other:
+        waiters.reached(State.RESET)
+        assert [one.result(), other.result()] == [State.RESET, State.RESET]
+
+
 async def test_two_callers_with_the_same_wish_leave_one_by_one(waiters: StateWaiters) -> None:
     with waiters.watching({State.RESET}, {}) as stays:
         with waiters.watching({State.RESET}, {}):
