@@ -324,6 +324,15 @@ async def test_a_closed_transport_says_so_and_closes_twice() -> None:
             await transport.write(IMAGE)
 
 
+async def test_opening_again_leaves_no_old_connection() -> None:
+    async with linked() as (transport, scripted):
+        await transport.open()
+        async with asyncio.timeout(1.0):
+            await scripted.writers[0].wait_closed()
+        assert await transport.read() == REGISTERS
+        assert scripted.connections == 2
+
+
 # -- names -------------------------------------------------------------------------------------------------
 
 
