@@ -53,14 +53,23 @@ async def test_another_client_that_commands() -> None:
         assert "another client" in report.words
 
 
+ACTIVATING = Request(activate=True)
+
+
 @pytest.mark.parametrize(
-    ("active", "image", "words"),
-    [(True, CLOSING, "the fingers move"), (False, Request(activate=True), "")],
+    ("active", "image", "speedup", "words"),
+    [
+        (True, CLOSING, 1.0, "the fingers move"),
+        (False, ACTIVATING, 1.0, "the fingers move"),
+        (False, ACTIVATING, 0.005, "an activation or a change of mode is under way"),  # they hardly move
+    ],
 )
-async def test_a_motion_or_an_activation_under_way(active: bool, image: Request, words: str) -> None:
-    async with served(active=active) as server:
+async def test_a_motion_or_an_activation_under_way(
+    active: bool, image: Request, speedup: float, words: str
+) -> None:
+    async with served(active=active, speedup=speedup) as server:
         server.gripper.write(0, image.registers)
-        await asyncio.sleep(0.5 if active else 0.1)
+        await asyncio.sleep(0.5)
         report = await from_stage_2(server)
         assert report.why == "refused"
         assert words in report.words
