@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from robotiq_async.simulator import Habits
 from robotiq_async.values.enums import NO_AXES, Finger, Initialization, Mode, ObjectStatus
 from robotiq_async.values.model import THREE_FINGER
 from tests.simulator.conftest import Bench
@@ -42,17 +43,22 @@ def fingers(names: str) -> Finger:
     return axes
 
 
-def request(words: list[str], given: dict[str, int]) -> dict[str, Any]:
+def request(words: list[str], given: dict[str, float]) -> dict[str, Any]:
     """What a bench is asked for with 'go 255' or 'go A=200 B=30 force=100 rICF=1'."""
     asked = int(words[0]) if words else {AXES[name]: given[name] for name in given if name in AXES}
     how: dict[str, Any] = {name: given[name] for name in ("speed", "force") if name in given}
     return {"positions": asked, **how, **changes(given)}
 
 
-def changes(given: dict[str, int]) -> dict[str, Any]:
+def changes(given: dict[str, float]) -> dict[str, Any]:
     return {
         BITS[name]: value if name == "rMOD" else value == 1 for name, value in given.items() if name in BITS
     }
+
+
+def number(text: str) -> float:
+    """Also yes and no."""
+    return {"yes": True, "no": False}[text] if text.isalpha() else float(text) if "." in text else int(text)
 
 
 def tell(story: str) -> None:
@@ -63,7 +69,9 @@ def tell(story: str) -> None:
     for step in story.split(", "):
         what, *rest = step.split()
         words = [word for word in rest if "=" not in word]
-        given = {name: int(value) for name, _, value in (word.partition("=") for word in rest if "=" in word)}
+        given = {
+            name: number(value) for name, _, value in (word.partition("=") for word in rest if "=" in word)
+        }
         numbers = [float(word) for word in words if word.replace(".", "").isdigit()]
         match what:
             case "on":
@@ -97,8 +105,19 @@ def tell(story: str) -> None:
                 gripper.emergency_release()
             case "power-cycle":
                 gripper.power_cycle()
+            case "power-off":
+                gripper.power_off()
             case "fail-activation":
                 gripper.fail_activation = True
+            case "habits":
+                habits: dict[str, Any] = {**given}
+                gripper.habits = Habits(**habits)
+            case "stop":
+                gripper.emergency_stop(*map(int, words))
+            case "stop-ends":
+                gripper.end_emergency_stop()
+            case "sleep":
+                gripper.is_asleep = True
             case "note":
                 travelled = {name: gripper.travel(axis) for name, axis in AXES.items()}
                 shown = gripper.status_registers()
@@ -119,10 +138,18 @@ def tell(story: str) -> None:
                 assert bench.words == tuple(bytes.fromhex(step.removeprefix("words"))), step
             case "travel":
                 assert gripper.travel(AXES[words[0]]) == int(words[1]), step
+            case "target":
+                assert gripper.target(AXES[words[0]]) == int(words[1]), step
+            case "grips" | "holds":
+                assert (gripper.grips if what == "grips" else gripper.holds) == fingers("".join(words)), step
+            case "asleep" | "awake":
+                assert gripper.is_asleep is (what == "asleep"), step
             case "moves" | "rests":
                 assert gripper.is_moving is (what == "moves"), step
             case "all":
                 assert bench.outcomes == (SHOWN[words[0]],) * 4, step
-            case _:  # an axis and what it shows
+            case _ if words[0] == "echoes":
+                assert [bench.status.requested_position(AXES[what])] == numbers, step
+            case _:
                 assert bench.status.finger_status(AXES[what]) is SHOWN[words[0]], step
                 assert [gripper.position(AXES[what])] * len(numbers) == numbers, step

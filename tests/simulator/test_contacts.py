@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from robotiq_async.simulator import Habits
 from robotiq_async.simulator.physics.axis import PRESSING
-from robotiq_async.values.enums import NO_AXES, Finger, ObjectStatus
+from robotiq_async.values.enums import Finger, ObjectStatus
 from tests.simulator.conftest import CYCLE
 from tests.simulator.stories import tell
 
@@ -97,29 +96,6 @@ STORIES = {
 @pytest.mark.parametrize("name", STORIES)
 def test_a_story(name: str) -> None:
     tell(STORIES[name])
-
-
-@pytest.mark.parametrize("lets_go", [False, True])
-def test_an_axis_grips_while_it_is_driven_against_what_it_touches(individual: Bench, lets_go: bool) -> None:
-    """By the vendor a part stays held when rGTO is cleared; as no one measured it, it may be otherwise."""
-    individual.gripper.habits = Habits(lets_go_on_halt=lets_go)
-    individual.gripper.place_object(Finger.A, 150)
-    individual.gripper.place_object(Finger.B, 60, opening=True)
-    individual.reach({Finger.B: 255})
-    assert not individual.gripper.grips
-    individual.go({Finger.A: 200, Finger.B: 0})
-    assert not individual.gripper.grips, "they are on their way"
-    individual.settle()
-    assert individual.gripper.grips == Finger.A | Finger.B
-    individual.write(go=False)
-    assert not individual.gripper.grips
-    assert individual.gripper.holds == (NO_AXES if lets_go else Finger.A | Finger.B)
-    assert where(individual, Finger.A) == (150, CLOSING), "it stands where it was, and still tells of it"
-    individual.write_and_settle(go=True)
-    assert individual.gripper.grips == individual.gripper.holds == Finger.A | Finger.B
-    individual.go({Finger.A: 150})
-    assert individual.gripper.grips == individual.gripper.holds == Finger.B, "asked to be where it is: let go"
-    assert where(individual, Finger.A) == (150, ARRIVED)
 
 
 def test_an_object_that_goes_while_the_axis_presses_lets_it_go_on(individual: Bench) -> None:
