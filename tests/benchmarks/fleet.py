@@ -9,26 +9,24 @@ What is compared takes turns, round after round, and medians of the rounds are s
 from __future__ import annotations
 
 import json
-import socket
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from statistics import median
-from typing import Any
 
-from tests.benchmarks.native import build, grippers
-from tests.benchmarks.program import Row, main, say
+from tests.benchmarks import program
+from tests.benchmarks.program import ROOT, Figures, Row, build, grippers
+from tests.fleet.sessions import free_port
 
 PARTS = ("commands", "agents", "overview")
-ROOT = Path(__file__).parents[2]
 HANDS = (1, 8, 16, 32)
 READERS = (0, 1, 5)
 OVERVIEW = 1000
 WATCHED = 100
-Figures = dict[str, Any]
 
 
 class Role:
@@ -81,29 +79,21 @@ def role(*arguments: object) -> Iterator[Role]:
 
 def endpoint() -> str:
     """Where no server listens yet."""
-    with socket.socket() as reserved:
-        reserved.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{reserved.getsockname()[1]}"
+    return f"tcp/127.0.0.1:{free_port()}"
 
 
-class Benchmarks:
+class Benchmarks(program.Benchmarks):
     """One run of all that is asked for."""
 
     def __init__(self, folder: Path, rounds: int, seconds: float) -> None:
+        super().__init__(folder, rounds, seconds)
         self.gripper = build("gripper", folder)
-        self.rounds = rounds
-        self.seconds = seconds
-        self.results: dict[str, Any] = {}
 
     def commands(self) -> Iterator[Row]:
         """From a command to its acknowledgement, and from a halt to the status that shows it."""
         who = ("local", "remote", f"remote, beside {WATCHED} streams of 200 Hz")
-        rounds: dict[str, list[Figures]] = {each: [] for each in who}
-        for number in range(self.rounds):
-            for each in who:
-                say(f"commands, round {number + 1} of {self.rounds}: {each}")
-                rounds[each].append(self._commands(who.index(each)))
-        self.results["commands"] = rounds
+        turns = {each: partial(self._commands, kind) for kind, each in enumerate(who)}
+        rounds = self.in_turns("commands", turns)
         for what in ("set_speed", "halt"):
             for each in who:
                 figures = [it[what] for it in rounds[each]]
@@ -131,16 +121,10 @@ class Benchmarks:
     def agents(self) -> Iterator[Row]:
         """What serving costs, and what it does to the polls; each hand is polled 200 times a second."""
         cases = [(count, readers) for count in HANDS for readers in (None, *READERS)]
-        rounds: dict[str, list[Figures]] = {f"{count} {readers}": [] for count, readers in cases}
-        for number in range(self.rounds):
-            for count, readers in cases:
-                what = "without an agent" if readers is None else f"{readers} readers"
-                say(f"agents, round {number + 1} of {self.rounds}: {count} hands, {what}")
-                rounds[f"{count} {readers}"].append(self._agent(count, readers))
-        self.results["agents"] = rounds
+        turns = {f"{count} {readers}": partial(self._agent, count, readers) for count, readers in cases}
+        rounds = self.in_turns("agents", turns)
         for count, readers in cases:
-            own = rounds[f"{count} {readers}"]
-            bare = rounds[f"{count} None"]
+            own, bare = rounds[f"{count} {readers}"], rounds[f"{count} None"]
             ratio = median(it["period_p99"] / base["period_p99"] for it, base in zip(own, bare, strict=True))
             yield {
                 "hands": str(count),
@@ -166,23 +150,21 @@ class Benchmarks:
 
     def overview(self) -> Iterator[Row]:
         """Summaries of a thousand grippers, one a second each, in one client."""
-        rounds: list[Figures] = []
-        for number in range(self.rounds):
-            say(f"overview, round {number + 1} of {self.rounds}")
-            with ExitStack() as stack:
-                where = endpoint()
-                stack.enter_context(role("summaries", where, OVERVIEW))
-                client = stack.enter_context(role("overview", where))
-                time.sleep(2.5)
-                client.begin()
-                time.sleep(self.seconds)
-                rounds.append(client.end())
-                assert rounds[-1]["members"] == OVERVIEW, "the client could not read every summary"
-        self.results["overview"] = rounds
+        (rounds,) = self.in_turns("overview", {f"{OVERVIEW} grippers": self._overview}).values()
         yield {
             "grippers heard of": f"{median(it['members'] for it in rounds):.0f}",
             "CPU of the client": f"{100 * median(it['cpu'] for it in rounds):.1f} %",
         }
+
+    def _overview(self) -> Figures:
+        where = endpoint()
+        with role("summaries", where, OVERVIEW), role("overview", where) as client:
+            time.sleep(2.5)
+            client.begin()
+            time.sleep(self.seconds)
+            figures = client.end()
+        assert figures["members"] == OVERVIEW, "the client could not read every summary"
+        return figures
 
 
 def reader_cells(rounds: list[list[Figures]], count: int) -> Row:
@@ -201,4 +183,4 @@ def reader_cells(rounds: list[list[Figures]], count: int) -> Row:
 
 
 if __name__ == "__main__":
-    sys.exit(main(Benchmarks, __doc__ or "", PARTS, ["eclipse-zenoh", "pymodbus"], 10.0))
+    sys.exit(program.main(Benchmarks, __doc__ or "", PARTS, ["eclipse-zenoh", "pymodbus"], 10.0))

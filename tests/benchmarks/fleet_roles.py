@@ -9,6 +9,7 @@ A role says "ready" on standard output. For each line "begin" on standard input 
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
 import logging
 import random
@@ -16,7 +17,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable
-from typing import Any
+from contextlib import asynccontextmanager
 
 from robotiq_async import Finger, RobotiqHand, State
 from robotiq_async.fleet import Agent, Fleet, GripperName, RemoteHand, Route
@@ -27,17 +28,29 @@ from robotiq_async.fleet.wire.envelope import Answer, unpack_call
 from robotiq_async.fleet.wire.status_message import StatusMessage
 from robotiq_async.hand import Hand
 from robotiq_async.values.statistics import Counters, percentile
+from tests.benchmarks.program import Figures
 
 INTERVAL_S = 0.005
 SETTLE_S = 0.5
 WATCHED = 100
 """Streams beside which a halt is measured."""
-Figures = dict[str, Any]
 REGISTERS = (0xF900, 0xFF00, 0x0064, 0x6400, 0x0606, 0x0000, 0x0606, 0x0089)
 
 
 def name(number: int, host: str = "host") -> GripperName:
     return GripperName("bench", host, f"g{number}")
+
+
+async def measured(begin: Callable[[], object], more: Callable[[float], Figures]) -> None:
+    """Measure from each "begin" on; at each "end" tell the figures, with more about so many seconds."""
+    meter = Meter()
+    async for order in orders():
+        if order == "begin":
+            meter = Meter()
+            begin()
+        else:
+            figures = meter.figures()
+            tell({**figures, **more(figures["took"])})
 
 
 async def orders() -> AsyncIterator[str]:
@@ -102,19 +115,23 @@ async def active(hands: dict[str, RobotiqHand]) -> None:
 
 async def measured_polls(hands: dict[str, RobotiqHand]) -> None:
     """How many polls came in time, and how evenly; of the last ten seconds at most."""
-    meter, before = Meter(), [0]
-    async for order in orders():
-        polls = [each.statistics.polls for each in hands.values()]
-        if order == "begin":
-            meter, before = Meter(), polls
-            for each in hands.values():
-                periods_of(each).clear()
-            continue
-        figures = meter.figures()
-        kept = [(now - then) * INTERVAL_S / figures["took"] for now, then in zip(polls, before, strict=True)]
+    before: list[int] = []
+
+    def polls() -> list[int]:
+        return [each.statistics.polls for each in hands.values()]
+
+    def begin() -> None:
+        before[:] = polls()
+        for each in hands.values():
+            periods_of(each).clear()
+
+    def evenness(took: float) -> Figures:
+        kept = [(now - then) * INTERVAL_S / took for now, then in zip(polls(), before, strict=True)]
         p99 = sorted(1000 * percentile(sorted(periods_of(each)), 0.99) for each in hands.values())
         middle = p99[len(p99) // 2]
-        tell({**figures, "kept": sum(kept) / len(kept), "period_p99": middle, "worst_p99": p99[-1]})
+        return {"kept": sum(kept) / len(kept), "period_p99": middle, "worst_p99": p99[-1]}
+
+    await measured(begin, evenness)
 
 
 def periods_of(hand: RobotiqHand) -> deque[float]:
@@ -130,23 +147,26 @@ def periods_of(hand: RobotiqHand) -> deque[float]:
 async def reader(endpoint: str, count: str) -> None:
     """A client that reads the statuses of so many hands."""
     bus = await client(endpoint)
-    hands = [RemoteHand(str(name(n)), control=False, bus=bus) for n in range(int(count))]
+    async with watched(bus, [name(n) for n in range(int(count))]) as late:
+
+        def reading(took: float) -> Figures:
+            return {"rate": len(late) / int(count) / took, "latency": milliseconds(late)}
+
+        await measured(late.clear, reading)
+    await bus.close()
+
+
+@asynccontextmanager
+async def watched(bus: ZenohBus, names: list[GripperName]) -> AsyncIterator[list[float]]:
+    """Hands whose statuses are read; gives how late each was."""
+    hands = [RemoteHand(str(each), control=False, bus=bus, connect_timeout=20) for each in names]
     await asyncio.gather(*(each.start(activate=False) for each in hands))
     late: list[float] = []
     tasks = [asyncio.create_task(read(each, late)) for each in hands]
-    meter = Meter()
-    async for order in orders():
-        if order == "begin":
-            meter = Meter()
-            late.clear()
-        else:
-            figures = meter.figures()
-            rate = len(late) / len(hands) / figures["took"]
-            tell({**figures, "rate": rate, "latency": milliseconds(late)})
+    yield late
     for task in tasks:
         task.cancel()
     await asyncio.gather(*(each.stop() for each in hands))
-    await bus.close()
 
 
 async def read(hand: RemoteHand, late: list[float]) -> None:
@@ -176,18 +196,11 @@ async def local_commander(_endpoint: str, port: str) -> None:
 async def busy_commander(endpoint: str, other: str) -> None:
     """The same beside a hundred streams of statuses in the same process."""
     bus = await client(endpoint, other)
-    watched = [
-        RemoteHand(str(name(n, "generator")), control=False, bus=bus, connect_timeout=20)
-        for n in range(WATCHED)
-    ]
-    await asyncio.gather(*(each.start(activate=False) for each in watched))
-    late: list[float] = []
-    tasks = [asyncio.create_task(read(each, late)) for each in watched]
-    async with RemoteHand(str(name(0)), bus=bus) as hand:
+    async with (
+        watched(bus, [name(n, "generator") for n in range(WATCHED)]) as late,
+        RemoteHand(str(name(0)), bus=bus) as hand,
+    ):
         await commands(hand, lambda: {"streams": len(late)})
-    for task in tasks:
-        task.cancel()
-    await asyncio.gather(*(each.stop() for each in watched))
     await bus.close()
 
 
@@ -219,20 +232,14 @@ async def generator(endpoint: str, count: str) -> None:
     bus = await open_bus(agent_configuration("bench", "generator", [endpoint]), endpoint)
     names = [name(n, "generator") for n in range(int(count))]
     publishers = [bus.publisher(each.key("feed"), Urgency.TELEMETRY) for each in names]
-    bus.serve(f"{names[0].base.rpartition('/')[0]}/*/info", lambda question: describe(question))
-    sequence = 0
-
-    def publish(index: int) -> None:
-        publishers[index](message(names[index], sequence))
+    bus.serve(f"{names[0].base.rpartition('/')[0]}/*/info", describe)
 
     async def run() -> None:
-        nonlocal sequence
         due = time.monotonic()
-        while True:
-            sequence += 1
+        for sequence in itertools.count(1):
             for part in range(5):
                 for index in range(part, len(names), 5):
-                    publish(index)
+                    publishers[index](message(names[index], sequence))
                 due += INTERVAL_S / 5
                 await asyncio.sleep(max(0.0, due - time.monotonic()))
 
@@ -301,12 +308,7 @@ async def summaries(endpoint: str, count: str) -> None:
 
 async def generated(work: Awaitable[None], bus: ZenohBus) -> None:
     task = asyncio.ensure_future(work)
-    meter = Meter()
-    async for order in orders():
-        if order == "begin":
-            meter = Meter()
-        else:
-            tell(meter.figures())
+    await measured(lambda: None, lambda _: {})
     task.cancel()
     await bus.close()
 
@@ -315,29 +317,17 @@ async def overview(endpoint: str) -> None:
     """A client that has all summaries, and nothing else."""
     async with Fleet(route=Route((endpoint,))) as fleet:
         changes = fleet.changes()
-        meter = Meter()
-        async for order in orders():
-            if order == "begin":
-                meter = Meter()
-            else:
-                there = sum(each.state is not None for each in fleet)
-                tell({**meter.figures(), "members": there, "changes": len(list(changes.drain()))})
+
+        def heard(_: float) -> Figures:
+            there = sum(each.state is not None for each in fleet)
+            return {"members": there, "changes": len(list(changes.drain()))}
+
+        await measured(lambda: None, heard)
 
 
-ROLES: dict[str, Callable[..., Awaitable[None]]] = {
-    each.__name__: each
-    for each in (
-        agent,
-        local,
-        reader,
-        commander,
-        local_commander,
-        busy_commander,
-        generator,
-        summaries,
-        overview,
-    )
-}
+_AGENTS = (agent, local, generator, summaries)
+_CLIENTS = (reader, commander, local_commander, busy_commander, overview)
+ROLES: dict[str, Callable[..., Awaitable[None]]] = {each.__name__: each for each in (*_AGENTS, *_CLIENTS)}
 
 
 def main() -> None:

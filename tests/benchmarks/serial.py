@@ -18,23 +18,21 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from statistics import median
-from typing import Any
 
 from robotiq_async import Finger, RobotiqHand
 from robotiq_async.session.options import SERIAL_POLL_INTERVAL_S
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
 from robotiq_async.values.statistics import percentile
-from tests.benchmarks.program import Row, main, say
+from tests.benchmarks import program
+from tests.benchmarks.program import ROOT, Row, figures_of, median_of
 from tests.serial_line import SerialLine
 
-ROOT = Path(__file__).parents[2]
 PARTS = ("idle", "stream")
 INTERVALS = (0.005, 0.01, SERIAL_POLL_INTERVAL_S, 0.02)
 STREAM_S = 0.002
 """From one command of a stream to the next: more than any line can carry."""
-Figures = dict[str, float]
 
 
 # -- the gripper, in a process of its own ------------------------------------------------------------------
@@ -64,7 +62,7 @@ def served() -> Iterator[str]:
 # -- the hand ----------------------------------------------------------------------------------------------
 
 
-async def measured(port: str, interval: float, seconds: float, *, streams: bool) -> Figures:
+async def measured(port: str, interval: float, seconds: float, *, streams: bool) -> dict[str, float]:
     """What a hand does in so many seconds, with a stream of commands or without."""
     async with RobotiqHand(f"rtu://{port}", poll_interval=interval, write_spacing=0.0) as hand:
         await asyncio.sleep(0.3)
@@ -117,13 +115,8 @@ async def asked(hand: RobotiqHand, seconds: float) -> list[float]:
 # -- the tables --------------------------------------------------------------------------------------------
 
 
-class Benchmarks:
+class Benchmarks(program.Benchmarks):
     """One run of all that is asked for."""
-
-    def __init__(self, _folder: Path, rounds: int, seconds: float) -> None:
-        self.rounds = rounds
-        self.seconds = seconds
-        self.results: dict[str, Any] = {}
 
     def idle(self) -> Iterator[Row]:
         """A hand that polls, with a command now and then."""
@@ -134,16 +127,11 @@ class Benchmarks:
         yield from self._rows("stream")
 
     def _rows(self, what: str) -> Iterator[Row]:
-        rounds: dict[float, list[Figures]] = {interval: [] for interval in INTERVALS}
-        for number in range(self.rounds):
-            for interval in INTERVALS:
-                say(f"{what}, round {number + 1} of {self.rounds}: {1000 * interval:g} ms")
-                rounds[interval].append(self._one(interval, what))
-        self.results[what] = {str(interval): each for interval, each in rounds.items()}
-        for interval, figures in rounds.items():
-            it = {name: median(each[name] for each in figures) for name in figures[0]}
+        turns = {f"{1000 * interval:g}": partial(self._one, interval, what) for interval in INTERVALS}
+        for interval, figures in self.in_turns(what, turns).items():
+            it = median_of(figures)
             yield {
-                "interval, ms": f"{1000 * interval:g}",
+                "interval, ms": interval,
                 **{f"{name} a second": f"{it[name]:.1f}" for name in ("polls", "writes", "overruns")},
                 "round trip of a read p50, ms": f"{1000 * it['round_trip']:.1f}",
                 "command until acknowledged p50, ms": f"{1000 * it['p50']:.1f}",
@@ -152,18 +140,9 @@ class Benchmarks:
                 "CPU a poll, us": f"{1e6 * it['cpu']:.0f}",
             }
 
-    def _one(self, interval: float, what: str) -> Figures:
+    def _one(self, interval: float, what: str) -> dict[str, float]:
         with served() as port:
-            command = [sys.executable, "-m", "tests.benchmarks.serial", "--hand", port]
-            done = subprocess.run(
-                [*command, str(interval), str(self.seconds), what],
-                stdout=subprocess.PIPE,
-                text=True,
-                check=True,
-                cwd=ROOT,
-            )
-        figures: Figures = json.loads(done.stdout)
-        return figures
+            return figures_of("serial", "--hand", port, interval, self.seconds, what)
 
 
 def precise_loop() -> asyncio.AbstractEventLoop:
@@ -181,4 +160,5 @@ if __name__ == "__main__":
             figures = asyncio.run(measured(port, float(interval), float(seconds), streams=what == "stream"))
             print(json.dumps(figures))  # noqa: T201
         case _:
-            sys.exit(main(Benchmarks, __doc__ or "", PARTS, ["pymodbus", "pyserial", "anyio"], 20.0))
+            packages = ["pymodbus", "pyserial", "anyio"]
+            sys.exit(program.main(Benchmarks, __doc__ or "", PARTS, packages, 20.0))
