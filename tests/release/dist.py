@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Final
 
 from docs.site.versions import version
-from tests.release.environments import CONSTRAINTS, ROOT, FailedError, installed, make, run, uv
+from tests.release.environments import CONSTRAINTS, ROOT, FailedError, exit_code, installed, make, run, uv
 
 DIST: Final = ROOT / "dist"
 IN_THE_SDIST: Final = (
@@ -37,11 +37,7 @@ LAST_PART: Final = "What the hand went through"
 
 
 def build() -> list[Path]:
-    """Both, in a folder that is emptied before.
-
-    Raises:
-        FailedError: they cannot be built, or hold what they should not.
-    """
+    """Both, in a folder that is emptied before; they hold what they should."""
     shutil.rmtree(DIST, ignore_errors=True)
     uv("build", "--quiet", "--out-dir", str(DIST), str(ROOT))
     name = f"robotiq_async-{version()}"
@@ -69,15 +65,10 @@ def _need(archive: Path, files: set[str], wanted: tuple[str, ...]) -> None:
 
 
 def try_base(artifact: Path, folder: Path) -> list[str]:
-    """The base install: the library, and the demo as a module. Gives what it has installed.
-
-    Raises:
-        FailedError: it does not work.
-    """
+    """The base install: the library, and the demo as a module. Gives what it has installed."""
     python = make(folder / "base", *CONSTRAINTS, str(artifact))
-    said = run(
-        str(python), "-c", "import robotiq_async as it; print(it.__version__, it.__file__)", folder=folder
-    )
+    code = "import robotiq_async as it; print(it.__version__, it.__file__)"
+    said = run(str(python), "-c", code, folder=folder)
     if not said.startswith(f"{version()} {folder}"):
         raise FailedError(f"{artifact.name} installed {said}")
     _demo(str(python), "-m", "robotiq_async._demo", folder=folder)
@@ -88,11 +79,7 @@ def try_base(artifact: Path, folder: Path) -> list[str]:
 
 
 def try_command(artifact: Path, folder: Path) -> None:
-    """With the extra ``cli``: the command.
-
-    Raises:
-        FailedError: it does not work.
-    """
+    """With the extra ``cli``: the command."""
     python = make(folder / "cli", *CONSTRAINTS, f"robotiq-async[cli] @ {artifact.as_uri()}")
     command = str(python.parent / "robotiq-async")
     if run(command, "--version", folder=folder).strip() != version():
@@ -106,30 +93,19 @@ def _demo(*command: str, folder: Path) -> None:
         raise FailedError(f"{' '.join(command)} did not end well:\n{printed}")
 
 
-def main() -> int:
-    """Build, and try; gives the exit code."""
-    try:
-        with tempfile.TemporaryDirectory(prefix="robotiq_async_dist") as place, ThreadPoolExecutor(4) as pool:
-            tried = []
-            for artifact in build():
-                folder = Path(place).resolve() / artifact.name
-                folder.mkdir()
-                tried.append(
-                    (
-                        artifact,
-                        pool.submit(try_base, artifact, folder),
-                        pool.submit(try_command, artifact, folder),
-                    )
-                )
-            for artifact, base, command in tried:
-                holds = ", ".join(base.result())
-                command.result()
-                print(f"dist/{artifact.name}: {artifact.stat().st_size >> 10} KiB; installs {holds}")
-    except FailedError as error:
-        print(error, file=sys.stderr)
-        return 1
-    return 0
+def main() -> None:
+    """Build, and try."""
+    with tempfile.TemporaryDirectory(prefix="robotiq_async_dist") as place, ThreadPoolExecutor(4) as pool:
+        artifacts = build()
+        folders = [Path(place).resolve() / artifact.name for artifact in artifacts]
+        for folder in folders:
+            folder.mkdir()
+        commands = pool.map(try_command, artifacts, folders)
+        for artifact, installs in zip(artifacts, pool.map(try_base, artifacts, folders), strict=True):
+            size = artifact.stat().st_size >> 10
+            print(f"dist/{artifact.name}: {size} KiB; installs {', '.join(installs)}")
+        list(commands)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(exit_code(main))

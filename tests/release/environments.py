@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final
 
@@ -28,16 +28,7 @@ class FailedError(Exception):
 
 
 def make(folder: Path, *requirements: str, python: str = sys.executable) -> Path:
-    """A new environment; gives its interpreter.
-
-    Args:
-        folder: where it will be.
-        requirements: what is installed, and options of ``pip install``.
-        python: the interpreter that it is made of.
-
-    Raises:
-        FailedError: it cannot be made.
-    """
+    """A new environment with these requirements (and options of ``pip install``); gives its interpreter."""
     uv("venv", "--quiet", "--python", python, str(folder))
     interpreter = folder / "bin" / "python"
     uv("pip", "install", "--quiet", "--python", str(interpreter), *requirements)
@@ -45,30 +36,24 @@ def make(folder: Path, *requirements: str, python: str = sys.executable) -> Path
 
 
 def installed(interpreter: Path) -> list[str]:
-    """What an environment holds: ``name==version`` each.
-
-    Raises:
-        FailedError: it is none.
-    """
+    """What an environment holds: ``name==version`` each."""
     printed = uv("pip", "list", "--python", str(interpreter), "--format", "freeze", "--exclude-editable")
     return [line for line in printed.splitlines() if "==" in line]
 
 
 def uv(*arguments: str) -> str:
-    """What uv prints; how it reaches the package index may be in the variables.
-
-    Raises:
-        FailedError: it fails.
-    """
+    """What uv prints; how it reaches the package index may be in the variables."""
     return run(sys.executable, "-m", "uv", *arguments, variables=os.environ)
 
 
-def run(*command: str, folder: Path = ROOT, code: int = 0, variables: Mapping[str, str] = BARE) -> str:
-    """What a program prints that ends as it should.
-
-    Raises:
-        FailedError: it ends otherwise, or not at all.
-    """
+def run(
+    *command: str,
+    folder: Path = ROOT,
+    code: int = 0,
+    variables: Mapping[str, str] = BARE,
+    patience: float | None = PATIENCE,
+) -> str:
+    """What a program prints that ends as it should, and in time."""
     try:
         done = subprocess.run(
             command,
@@ -79,25 +64,28 @@ def run(*command: str, folder: Path = ROOT, code: int = 0, variables: Mapping[st
             stderr=subprocess.STDOUT,
             text=True,
             check=False,
-            timeout=PATIENCE,
+            timeout=patience,
         )
     except subprocess.TimeoutExpired as error:
-        raise FailedError(f"{' '.join(command)} still ran after {PATIENCE:g} s") from error
+        raise FailedError(f"{' '.join(command)} still ran after {patience:g} s") from error
     if done.returncode != code:
         raise FailedError(f"{' '.join(command)} ended with {done.returncode}:\n{done.stdout}")
     return done.stdout
 
 
 def run_suite(python: Path) -> str:
-    """Run the tests of the library; gives pytest's last line, and an empty one if something failed.
-
-    What pytest prints is shown if it fails.
-    """
+    """Run the tests of the library; gives pytest's last line."""
     tests = os.environ.get("TESTS", LIBRARY).split()
     command = [str(python), "-m", "pytest", "-p", "no:cacheprovider", "--numprocesses", "auto", "-q", *tests]
     command += [f"--deselect={each}" for each in LEFT_OUT]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    if done.returncode:
-        print(done.stdout, done.stderr, sep="\n")
-        return ""
-    return done.stdout.strip().rpartition("\n")[2].strip("= ")
+    return run(*command, variables=os.environ, patience=None).strip().rpartition("\n")[2].strip("= ")
+
+
+def exit_code(work: Callable[[], object]) -> int:
+    """1 if a part of the work fails, which is told."""
+    try:
+        work()
+    except FailedError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0

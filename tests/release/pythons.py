@@ -17,26 +17,14 @@ from typing import Final
 from tests.release.environments import CONSTRAINTS, ROOT, FailedError, make, run_suite, uv
 
 TOOLS: Final = (
-    "hypothesis",
-    "minimalmodbus",
-    "numpy",
-    "pyModbusTCP",
-    "pyrobotiqgripper",
-    "pyserial",
-    "pytest",
-    "pytest-asyncio",
-    "pytest-xdist",
-    "uvloop",
+    *("hypothesis", "minimalmodbus", "numpy", "pyModbusTCP", "pyrobotiqgripper", "pyserial", "uvloop"),
+    *("pytest", "pytest-asyncio", "pytest-xdist"),
 )
 """What the tests of the library need beside it."""
 
 
 def interpreter(version: str) -> str | None:
-    """A Python of this version, or None.
-
-    Args:
-        version: as in ``3.12``.
-    """
+    """A Python of this version, as in ``3.12``, or None."""
     command = shutil.which(f"python{version}")
     if command is not None and (found := _asked(command, version)):
         return found
@@ -60,11 +48,7 @@ def _asked(command: str, version: str) -> str:
 
 
 def tried(version: str) -> str:
-    """How the tests end on a Python; empty if something failed.
-
-    Raises:
-        FailedError: the library cannot be installed there.
-    """
+    """How the tests end on a Python."""
     python = interpreter(version)
     if python is None:
         return "left out: it is not here, and uv cannot get it"
@@ -74,16 +58,15 @@ def tried(version: str) -> str:
 
 def main() -> int:
     """Try each version of the command line; gives the exit code."""
-    failed = False
+    code = 0
     for version in sys.argv[1:]:
         try:
             outcome = tried(version)
         except FailedError as error:
             print(error, file=sys.stderr)
-            outcome = ""
-        failed = failed or not outcome
-        print(f"Python {version}: {outcome or 'FAILED'}", flush=True)
-    return failed
+            outcome, code = "FAILED", 1
+        print(f"Python {version}: {outcome}", flush=True)
+    return code
 
 
 if __name__ == "__main__":
