@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import signal
+import sys
 import threading
 import time
+from asyncio.subprocess import PIPE, STDOUT
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
 import pytest
 
-from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.sync import RobotiqHand, caller
 from robotiq_async.sync.loop_thread import NAME
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.errors import ConnectionLostError
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import AxisRequest, Request
+from tests.conftest import Clock
+from tests.docs.pages import ROOT
 
 T = TypeVar("T")
 PATIENCE = 5.0
@@ -81,6 +86,36 @@ class Wire:
     def writes(self) -> int:
         """How often the hand has written."""
         return self.look(lambda gripper: len(gripper.writes)) - 1
+
+
+def adopting(wire: Wire) -> RobotiqHand:
+    """A hand at a gripper that another client moves; it has only looked."""
+    wire.command(255)
+    hand = RobotiqHand(wire)
+    hand.start(activate=False)
+    until(wire.is_moving)
+    return hand
+
+
+async def run_to_its_end(program: str) -> tuple[SimulatedGripper, str]:
+    """Run a program at an active gripper, whose address is its argument; gives that and what it printed."""
+    clock = Clock()
+    gripper = SimulatedGripper(clock)
+    gripper.write(0, Request(activate=True).registers)
+    clock.ahead += 10
+    async with SimulatorServer(gripper) as server:
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-c", program, server.address), cwd=ROOT, stdout=PIPE, stderr=STDOUT
+        )
+        try:
+            async with asyncio.timeout(20):
+                printed, _ = await process.communicate()
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+        assert process.returncode == 0, printed.decode()
+        assert not gripper.is_moving, printed.decode()
+    return gripper, printed.decode()
 
 
 class Interrupt(KeyboardInterrupt):

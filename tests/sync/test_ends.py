@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import gc
 import os
 import signal
-import subprocess
 import sys
 import threading
 
 import pytest
 
 from robotiq_async import Finger, NotStartedError, State
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.sync import RobotiqHand, caller
-from robotiq_async.values.request import Request
-from tests.conftest import Clock
-from tests.docs.pages import ROOT
-from tests.sync.conftest import Wire, until
+from tests.sync.conftest import Wire, run_to_its_end, until
 
 SCRIPT = """
 import sys
@@ -35,21 +29,9 @@ for status in hand.statuses():
 
 
 async def test_a_program_that_ends_without_stopping_stops_the_fingers() -> None:
-    clock = Clock()
-    gripper = SimulatedGripper(clock)
-    gripper.write(0, Request(activate=True).registers)
-    clock.ahead += 10
-    async with SimulatorServer(gripper) as server:
-        program = (sys.executable, "-c", SCRIPT, server.address)
-        process = await asyncio.create_subprocess_exec(
-            *program, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
-        )
-        async with asyncio.timeout(30):
-            printed, _ = await process.communicate()
-        assert process.returncode == 0
-        assert b"still running at exit: stopping it" in printed
-        assert not gripper.is_moving
-        assert 10 < gripper.position(Finger.A) < 200
+    gripper, printed = await run_to_its_end(SCRIPT)
+    assert "still running at exit: stopping it" in printed
+    assert 10 < gripper.position(Finger.A) < 200
 
 
 def test_hands_that_were_not_stopped_are_stopped_together(caplog: pytest.LogCaptureFixture) -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from robotiq_async import Fault, Finger, State
 from robotiq_async.sync import RobotiqHand
-from tests.sync.conftest import PATIENCE, Interrupt, Striker, Wire, in_a_thread, until
+from tests.sync.conftest import PATIENCE, Interrupt, Striker, Wire, adopting, in_a_thread, until
 
 A, B = Finger.A, Finger.B
 
@@ -28,16 +28,23 @@ def when(condition: Callable[[], bool], strike: Striker) -> None:
     in_a_thread(watch)
 
 
-def when_it_waits(hand: RobotiqHand, strike: Striker) -> None:
+def polled(hand: RobotiqHand) -> None:
+    """Wait for some polls."""
+    polls = hand.statistics.polls
+    until(lambda: hand.statistics.polls > polls + 3)
+
+
+def wait_and_be_struck(hand: RobotiqHand, strike: Striker) -> None:
     """Strike while a call waits: some polls after it has begun."""
 
     def watch() -> None:
         until(lambda: bool(hand._caller._calls))
-        polls = hand.statistics.polls
-        until(lambda: hand.statistics.polls > polls + 3)
+        polled(hand)
         strike()
 
     in_a_thread(watch)
+    with pytest.raises(Interrupt):
+        hand.wait_for_state(State.FAULT)
 
 
 def test_a_move_is_held_and_the_hand_goes_on(hand: RobotiqHand, wire: Wire, interrupt: Striker) -> None:
@@ -55,9 +62,7 @@ def test_a_move_is_held_and_the_hand_goes_on(hand: RobotiqHand, wire: Wire, inte
 def test_what_moves_is_held_whatever_is_waited_for(hand: RobotiqHand, wire: Wire, interrupt: Striker) -> None:
     hand.set_speed(0)
     hand.set_position(255, B)
-    when_it_waits(hand, interrupt)
-    with pytest.raises(Interrupt):
-        hand.wait_for_state(State.FAULT)
+    wait_and_be_struck(hand, interrupt)
     until(lambda: not wire.is_moving())
     assert wire.targets()[1] < 100
 
@@ -84,8 +89,7 @@ def test_what_was_asked_and_not_sent_yet_begins_no_more(
         hand.wait_for_state(State.FAULT)
     is_caught.set()
     thread.join()
-    polls = hand.statistics.polls
-    until(lambda: hand.statistics.polls > polls + 3)
+    polled(hand)
     assert not wire.is_moving()
     assert wire.targets() == before
 
@@ -96,22 +100,15 @@ def test_a_grip_is_kept(hand: RobotiqHand, wire: Wire, interrupt: Striker) -> No
     until(wire.is_moving)
     wire.ahead += 5
     until(lambda: hand.status.contacts == A)
-    when_it_waits(hand, interrupt)
-    with pytest.raises(Interrupt):
-        hand.wait_for_state(State.FAULT)
+    wait_and_be_struck(hand, interrupt)
     assert hand.status.contacts == A
     assert hand.status.requested_position(A) == 255
 
 
 def test_who_only_looks_writes_nothing(wire: Wire, interrupt: Striker) -> None:
-    wire.command(255)
-    hand = RobotiqHand(wire)
-    hand.start(activate=False)
-    until(wire.is_moving)
+    hand = adopting(wire)
     before = wire.writes()
-    when_it_waits(hand, interrupt)
-    with pytest.raises(Interrupt):
-        hand.wait_for_state(State.FAULT)
+    wait_and_be_struck(hand, interrupt)
     hand.stop(halt=False)
     assert wire.writes() == before
     assert wire.is_moving()
@@ -206,6 +203,5 @@ def test_wherever_it_strikes_the_hand_is_watched_on(
             next(hand.statuses())
             interrupt.is_armed = False
     thread.join()
-    polls = hand.statistics.polls
-    until(lambda: hand.statistics.polls > polls + 3)
+    polled(hand)
     assert hand.state is State.RUNNING_IDLE

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
-import subprocess
-import sys
 from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from robotiq_async import Finger, RobotiqError, State
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.sync import RobotiqHand, caller
 from robotiq_async.sync.loop_thread import LOOP_THREAD
-from robotiq_async.values.request import Request
-from tests.conftest import Clock
-from tests.docs.pages import ROOT
-from tests.sync.conftest import Wire, in_a_thread, until
+from tests.sync.conftest import Wire, adopting, in_a_thread, run_to_its_end, until
 
 PROGRAM = """
 import atexit, contextlib, gc, sys, threading, weakref
@@ -107,26 +100,7 @@ async def test_a_call_while_the_interpreter_ends_ends_too_and_nothing_goes_on(
     ending: tuple[str, str],
 ) -> None:
     """On Python 3.11 it waited for ever for a thread that never began."""
-    clock = Clock()
-    gripper = SimulatedGripper(clock)
-    gripper.write(0, Request(activate=True).registers)
-    clock.ahead += 10
-    async with SimulatorServer(gripper) as server:
-        code = PROGRAM.format(before=ending[0], program=ending[1])
-        process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-c", code, server.address),
-            cwd=ROOT,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-        )
-        try:
-            async with asyncio.timeout(20):
-                printed, _ = await process.communicate()
-        finally:
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-        assert process.returncode == 0, printed.decode()
-        assert not gripper.is_moving, printed.decode()
+    await run_to_its_end(PROGRAM.format(before=ending[0], program=ending[1]))
 
 
 def test_stopping_a_hand_that_never_started_needs_no_thread(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -179,10 +153,7 @@ def test_a_call_that_is_refused_does_not_count_as_commanding(
     refused: Callable[[RobotiqHand], Any], wire: Wire
 ) -> None:
     """At the end of the program rGTO was cleared under the motion of another client."""
-    wire.command(255)
-    hand = RobotiqHand(wire)
-    hand.start(activate=False)
-    until(wire.is_moving)
+    hand = adopting(wire)
     with contextlib.suppress(ValueError, TypeError, RobotiqError):
         refused(hand)
     before = wire.writes()
@@ -192,10 +163,7 @@ def test_a_call_that_is_refused_does_not_count_as_commanding(
 
 
 def test_a_hold_of_what_another_client_moves_counts_as_commanding(wire: Wire) -> None:
-    wire.command(255)
-    hand = RobotiqHand(wire)
-    hand.start(activate=False)
-    until(wire.is_moving)
+    hand = adopting(wire)
     hand.hold()
     assert hand._caller.has_commanded
     hand.stop()
