@@ -115,21 +115,18 @@ def test_the_parameters_of_the_calls_are_those_of_the_contract() -> None:
     abc, every = robotiq_async.Finger.ABC, robotiq_async.Finger.ALL
     assert parameters("__init__")[0] == ("address", "sim://", False)
     assert all(keyword for _, _, keyword in parameters("__init__")[1:])
-    assert {"device_id": None, "poll_interval": 0.005, "speed": 128, "force": 64}.items() <= {
-        name: default for name, default, _ in parameters("__init__")
-    }.items()
-    assert {"response_timeout", "activation_timeout", "reconnect"} <= {
-        name for name, _, _ in parameters("__init__")
-    }
+    options = {name: default for name, default, _ in parameters("__init__")}
+    assert {"device_id": None, "poll_interval": 0.005, "speed": 128, "force": 64}.items() <= options.items()
+    assert {"response_timeout", "activation_timeout", "reconnect"} <= options.keys()
     assert parameters("start") == [("activate", True, False), ("wait", 0.0, True)]
     assert parameters("set_position") == [("value", empty, False), ("fingers", abc, False)]
     assert parameters("set_speed") == [("value", empty, False), ("fingers", every, False)]
     assert parameters("set_force") == [("value", empty, False), ("fingers", every, False)]
     changes = [(name, None, True) for name in ("position", "speed", "force")]
     assert parameters("command") == [("fingers", abc, False), *changes]
-    options = [(name, None, True) for name in ("speed", "force", "timeout")]
-    assert parameters("move") == [("position", empty, False), ("fingers", abc, False), *options]
-    assert parameters("open") == parameters("close") == [("fingers", abc, False), *options]
+    motion = [(name, None, True) for name in ("speed", "force", "timeout")]
+    assert parameters("move") == [("position", empty, False), ("fingers", abc, False), *motion]
+    assert parameters("open") == parameters("close") == [("fingers", abc, False), *motion]
     assert parameters("statuses") == [("buffer", 1, False)]
     assert parameters("transitions") == parameters("halt") == parameters("atr") == parameters("reset") == []
     assert parameters("wait_for_state")[-1] == ("timeout", None, True)

@@ -8,7 +8,7 @@ import pytest
 
 from robotiq_async.ros2.translation.description import prefixed, robot_description
 from robotiq_async.ros2.translation.joints import joint_names
-from robotiq_async.tools.description import HandModel, hand_model, urdf
+from robotiq_async.tools.description import HandModel, urdf
 
 URDF = (
     "<robot name='hand'><link name='palm' /><link name='tip' /><joint name='j' type='revolute'>"
@@ -16,19 +16,11 @@ URDF = (
 )
 
 
-@pytest.mark.parametrize("prefix", ["", "left_", "cell/3."])
-def test_without_a_file_it_is_the_packaged_one_behind_the_prefix(prefix: str) -> None:
-    """The same hand: every link where it was, and the joints are those of the joint states."""
-    model, plain = HandModel.parse(robot_description("", prefix)), hand_model()
-    assert {joint.name for joint in model.moving} == set(joint_names(prefix))
-    assert model.root == f"{prefix}{plain.root}"
-    angles = {joint.name: (joint.lower + joint.upper) / 3 for joint in plain.moving}
-    there = model.link_poses({prefix + name: angle for name, angle in angles.items()})
-    assert there == {prefix + name: pose for name, pose in plain.link_poses(angles).items()}
-
-
 def test_a_prefix_stands_before_links_and_joints() -> None:
     assert robot_description("", "") == urdf()
+    assert {joint.name for joint in HandModel.parse(robot_description("", "cell/3.")).moving} == set(
+        joint_names("cell/3.")
+    )
     assert prefixed(URDF, "") == URDF
     text = prefixed(URDF, "left_").replace('"', "'")
     expected = URDF

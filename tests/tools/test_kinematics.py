@@ -38,12 +38,6 @@ def test_the_phases_of_a_finger(position: int, base: float, middle: float, tip: 
     assert [degrees(angle) for angle in finger_angles(position)] == pytest.approx([base, middle, tip])
 
 
-def test_the_tip_stays_parallel_until_its_stop() -> None:
-    for position in range(111):
-        base, middle, tip = finger_angles(position)
-        assert base + middle + tip == pytest.approx(0)
-
-
 def test_no_joint_jumps() -> None:
     for position in range(255):
         for before, after in zip(finger_angles(position), finger_angles(position + 1), strict=True):

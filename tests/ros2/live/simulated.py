@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import asyncio
 import multiprocessing
-from collections.abc import Awaitable, Callable
+from inspect import isawaitable
 from multiprocessing.connection import Connection
+from operator import attrgetter
 from typing import Any, Final, Self
 
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
@@ -47,20 +48,22 @@ class Simulator:
 
     def do(self, method: str, *arguments: Any, **named: Any) -> Any:
         """Call a method of the gripper."""
-        return self._ask(_call, method, arguments, named)
+        return self._ask(f"gripper.{method}", arguments, named)
 
     def read(self, attribute: str) -> Any:
         """What an attribute of the gripper is now."""
-        return self._ask(_read, attribute)
+        return self._ask(f"gripper.{attribute}")
 
     def lose_link(self) -> None:
-        self._ask(_lose_link)
+        self._ask("refuse", ())
+        self._ask("cut", ())
 
     def find_link(self) -> None:
-        self._ask(_find_link)
+        self._ask("accept", ())
 
-    def _ask(self, work: Callable[..., Awaitable[Any]], *arguments: object) -> Any:
-        self._pipe.send((work, arguments))
+    def _ask(self, what: str, arguments: Any = None, named: Any = None) -> Any:
+        """An attribute of the server, and with arguments what a call of it gives."""
+        self._pipe.send((what, arguments, named or {}))
         return self._answer()
 
     def _answer(self) -> Any:
@@ -82,24 +85,10 @@ async def _serve(pipe: Connection, speedup: float, model: Model) -> None:
         pipe.send(server.address)
         while True:
             try:
-                work, arguments = await asyncio.to_thread(pipe.recv)
+                what, arguments, named = await asyncio.to_thread(pipe.recv)
             except EOFError:
                 return
-            pipe.send(await work(server, *arguments))
-
-
-async def _call(server: SimulatorServer, method: str, arguments: Any, named: Any) -> Any:
-    return getattr(server.gripper, method)(*arguments, **named)
-
-
-async def _read(server: SimulatorServer, attribute: str) -> Any:
-    return getattr(server.gripper, attribute)
-
-
-async def _lose_link(server: SimulatorServer) -> None:
-    server.refuse()
-    server.cut()
-
-
-async def _find_link(server: SimulatorServer) -> None:
-    await server.accept()
+            found = attrgetter(what)(server)
+            if arguments is not None:
+                found = found(*arguments, **named)
+            pipe.send(await found if isawaitable(found) else found)
