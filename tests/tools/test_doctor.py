@@ -85,14 +85,15 @@ def registers_in(request: bytes, block: bytes) -> bytes:
     return reply(request, bytes((request[7], size)) + block[:size])
 
 
-async def test_a_healthy_connection() -> None:
+@pytest.mark.parametrize(("server_of", "unit"), [(SimulatorServer, "2"), (RtuOverTcpSimulatorServer, "9")])
+async def test_a_healthy_connection(server_of: type[SimulatorServer], unit: str) -> None:
     gripper = SimulatedGripper()
-    async with SimulatorServer(gripper) as server:
+    async with server_of(gripper) as server:
         found = await findings(server.address)
         assert not gripper.writes
     assert list(found) == [*HEALTHY, "other clients"]
     assert {finding.level for finding in found.values()} == {Level.GOOD}
-    assert found["activation"].found == "not active"
+    assert (found["unit id"].found, found["activation"].found) == (unit, "not active")
     assert "no other client seen" in found["other clients"].found
 
 
@@ -149,11 +150,20 @@ async def test_nobody_listens() -> None:
     assert "right address and port" in found["port"].advice
 
 
-async def test_somebody_who_speaks_no_modbus() -> None:
-    async with answering(lambda _: b"HTTP/1.1 400 Bad Request\r\n\r\n") as address:
-        found = await findings(address)
-    assert found["Modbus"].level is Level.BAD
-    assert "not this gripper" in found["Modbus"].advice
+STRANGERS: dict[str, tuple[Callable[[bytes], bytes], str, Level, str]] = {
+    "no Modbus": (lambda _: b"HTTP/1.1 400 Bad\r\n\r\n", "Modbus", Level.BAD, "not this gripper"),
+    "zeros": (lambda request: registers_in(request, bytes(16)), "gripper", Level.DOUBT, "without power"),
+    "ones": (lambda request: registers_in(request, b"\xff" * 16), "gripper", Level.BAD, "Command nothing"),
+}
+
+
+@pytest.mark.parametrize("who", STRANGERS)
+async def test_a_device_that_is_no_gripper(who: str) -> None:
+    answer, what, level, advice = STRANGERS[who]
+    async with answering(answer) as address:
+        found = (await findings(address))[what]
+    assert found.level is level
+    assert advice in found.advice
 
 
 def other_unit(request: bytes, unit: int) -> bytes:
@@ -201,35 +211,40 @@ async def test_registers_elsewhere(where: bytes, options: dict[str, int]) -> Non
     assert ("may read the requests" in found.advice) is ("read_function" in options)
 
 
-async def test_a_gateway_that_is_slower_than_was_waited_for() -> None:
+@pytest.mark.parametrize(
+    ("late", "what", "advice", "timeout"),
+    [
+        (0.02, "rate", r"poll_interval=0\.03", 0.4),
+        (0.45, "round trip", r"^Pass response_timeout=", 1.0),
+        (0.6, "Modbus", r"^Pass response_timeout=1\.", 1.2),
+        (0.6, "rate", r"No poll_interval is that long \(at most 0\.1 s\)", 1.2),
+        (1.3, "Modbus", r"response_timeout=2\.[67];", 2.6),
+    ],
+)
+async def test_replies_that_come_late(late: float, what: str, advice: str, timeout: float) -> None:
     async with SimulatorServer() as server:
-        server.policy = lambda frame: [(1.3, frame)]
+        server.policy = lambda frame: [(late, frame)]
         found = await findings(server.address, seconds=60)
-        await helps(server.address, response_timeout=2.6)
-    assert found["Modbus"].level is Level.DOUBT
-    assert re.search(r"response_timeout=2\.[67];", found["Modbus"].advice)
+        await helps(server.address, response_timeout=timeout)
+    assert re.search(advice, found[what].advice)
+    assert "cable" not in found["Modbus"].advice, "slow replies are no lost ones"
+    assert "link" not in found
+    assert found["round trip"].level is found["rate"].level is found[what].level is Level.DOUBT
+    assert found["Modbus"].found == (f"answers, after {late} s" if late > 0.5 else "answers")
+    assert "unit id" in found, "of a slow one there is as much to say"
 
 
 # -- serial lines ------------------------------------------------------------------------------------------
 
 
-async def test_a_serial_server() -> None:
-    async with RtuOverTcpSimulatorServer() as server:
-        found = await findings(server.address)
-    assert list(found) == [*HEALTHY, "other clients"]
-    assert all(finding.level is Level.GOOD for finding in found.values()), found
-    assert found["unit id"].found == "9"
-
-
-async def test_the_other_kind_of_frames() -> None:
-    async with RtuOverTcpSimulatorServer() as server:
-        found = await findings(server.address.removeprefix("rtu+"), seconds=60)
-        assert found["Modbus"].level is Level.BAD
-        assert server.address in found["Modbus"].advice
-    async with SimulatorServer() as tcp:
-        found = await findings(f"rtu+{tcp.address}", seconds=60)
-        assert found["Modbus"].level is Level.BAD
-        assert f"write the address as {tcp.address}" in found["Modbus"].advice
+@pytest.mark.parametrize("server_of", [SimulatorServer, RtuOverTcpSimulatorServer])
+async def test_the_other_kind_of_frames(server_of: type[SimulatorServer]) -> None:
+    async with server_of() as server:
+        is_rtu = server.address.startswith("rtu+")
+        other = server.address.removeprefix("rtu+") if is_rtu else f"rtu+{server.address}"
+        found = (await findings(other, seconds=60))["Modbus"]
+    assert found.level is Level.BAD
+    assert f"write the address as {server.address}." in found.advice
 
 
 async def test_a_line_that_loses_bytes() -> None:
@@ -264,13 +279,6 @@ async def test_one_lost_reply_does_not_make_it_another_unit(words: str) -> None:
         found = await findings(server.address)
     assert found["unit id"] == Finding(Level.GOOD, "unit id", "2")
     assert found["Modbus"].found == "answers when asked 2 times"
-
-
-@pytest.mark.parametrize(("byte", "level"), [(b"\0", Level.DOUBT), (b"\xff", Level.BAD)])
-async def test_a_device_that_is_no_gripper(byte: bytes, level: Level) -> None:
-    async with answering(lambda request: registers_in(request, 16 * byte)) as address:
-        found = await findings(address)
-    assert found["gripper"].level is level
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -358,42 +366,9 @@ async def test_a_gateway_for_one_client_is_no_bad_cable_unless_another_client_ha
     assert ("It closed the connection without an answer" in found["Modbus"].advice) is not waits
 
 
-async def test_slow_replies_are_no_lost_ones() -> None:
-    async with SimulatorServer() as server:
-        server.policy = lambda frame: [(0.6, frame)]
-        found = await findings(server.address)
-    assert found["Modbus"].level is Level.DOUBT
-    assert found["Modbus"].found == "answers, after 0.6 s"
-    assert found["Modbus"].advice.startswith("Pass response_timeout=1.")
-    assert "cable" not in found["Modbus"].advice
-    assert "unit id" in found, "of a slow one there is as much to say"
-    assert found["rate"].level is Level.DOUBT
-    assert "No poll_interval is that long (at most 0.1 s)" in found["rate"].advice
-    assert "link" not in found
-
-
-async def test_replies_that_take_a_longer_timeout() -> None:
-    async with SimulatorServer() as server:
-        server.policy = lambda frame: [(0.45, frame)]
-        found = await findings(server.address)
-        await helps(server.address, response_timeout=1.0)
-    assert found["Modbus"].level is Level.GOOD
-    assert found["round trip"].advice.startswith("Pass response_timeout=")
-
-
 def test_an_extra_that_is_missing_is_no_question_of_cables() -> None:
-    assert _advice_for_opening(
-        parse_address("rtu:///dev/x"), "pip install 'pyserial>=3.5' (the extra serial)"
-    ) == ("Install it, and run doctor again.")
-
-
-async def test_a_slow_gripper() -> None:
-    async with SimulatorServer() as server:
-        server.policy = lambda frame: [(0.02, frame)]
-        found = await findings(server.address)
-    assert found["round trip"].level is Level.DOUBT
-    assert found["rate"].level is Level.DOUBT
-    assert "poll_interval=0.03" in found["rate"].advice
+    why = "pip install 'pyserial>=3.5' (the extra serial)"
+    assert _advice_for_opening(parse_address("rtu:///dev/x"), why) == "Install it, and run doctor again."
 
 
 @pytest.mark.parametrize(
