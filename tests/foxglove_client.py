@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import json
 import struct
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 from websockets.asyncio.client import ClientConnection, connect
@@ -48,8 +48,8 @@ class Client:
             if topic not in ("/joint_states", "/robot_description"):
                 self._objects.setdefault(topic, []).append(json.loads(frame[13:]))
 
-    async def meet(self) -> None:
-        while len(self.channels) < 7:
+    async def until(self, condition: Callable[[], bool]) -> None:
+        while not condition():
             await self.read()
 
     async def subscribe(self, *topics: str) -> None:
@@ -72,5 +72,5 @@ async def client(viewer: Viewer) -> AsyncIterator[Client]:
     # A queue that is full would keep the client from hearing that the connection closes.
     async with connect(viewer.url, subprotocols=subprotocols, max_queue=None) as socket:
         client = Client(socket)
-        await client.meet()
+        await client.until(lambda: len(client.channels) >= 7)
         yield client

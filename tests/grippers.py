@@ -1,12 +1,14 @@
-"""Simulated grippers: active and open, as a client before has left them; and one that never rests."""
+"""Simulated grippers, active and open as a client before has left them; waiting for what a gripper does."""
 
 from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Callable
 from typing import Any, Final
 
-from robotiq_async import RobotiqHand
+from robotiq_async import RobotiqHand, RobotiqStatus, State
+from robotiq_async.hand import Hand
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
 from robotiq_async.values import registers as reg
 from robotiq_async.values.enums import ObjectStatus
@@ -38,6 +40,29 @@ async def activate_beforehand(gripper: SimulatedGripper) -> None:
     for go in (False, True):
         gripper.write(0, Request(activate=True, go=go, axes=axes, model=gripper.model).registers)
         await asyncio.sleep(_ACTIVATION_S)
+
+
+async def until(condition: Callable[[], bool], within: float = 20.0) -> None:
+    """Look again and again: a gripper, a file and another process send no events."""
+    async with asyncio.timeout(within):
+        while not condition():  # noqa: ASYNC110
+            await asyncio.sleep(0.005)
+
+
+async def shows(hand: Hand, wanted: Callable[[RobotiqStatus], bool]) -> RobotiqStatus:
+    """Wait for a status."""
+    async with asyncio.timeout(60):
+        async for status in hand.statuses():
+            if wanted(status):
+                return status
+    raise AssertionError("the hand has ended")
+
+
+async def lose_link(server: SimulatorServer, hand: Hand) -> None:
+    """Lose a gripper that takes no connection until it is told to."""
+    server.refuse()
+    server.cut()
+    await hand.wait_for_state(State.DISCONNECTED)
 
 
 async def until_moving(server: SimulatorServer | SerialSimulatorServer, hand: RobotiqHand) -> None:

@@ -11,6 +11,7 @@ import contextlib
 import logging
 import os
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -35,9 +36,8 @@ from tests.cli.terminal import ROOT, Terminal
 from tests.virtual import VirtualLoop
 
 WITHOUT = """
-import importlib.util, sys
-find = importlib.util.find_spec
-importlib.util.find_spec = lambda name, *rest: None if name == "{}" else find(name, *rest)
+import sys
+sys.modules["{}"] = None
 from robotiq_async.cli import main
 sys.exit(main({}))
 """
@@ -137,6 +137,14 @@ def without(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
         monkeypatch.setitem(sys.modules, module, None)
 
     return miss
+
+
+@pytest.fixture
+def refusing() -> Iterator[str]:
+    """Where connections are refused: bound and not listening, so that no other program gets the port."""
+    with socket.socket() as reserved:
+        reserved.bind(("127.0.0.1", 0))
+        yield f"127.0.0.1:{reserved.getsockname()[1]}"
 
 
 @contextmanager

@@ -114,31 +114,19 @@ async def test_the_question_names_the_axes_of_the_model(
     assert b"this MOVES %b to 30." % axes in terminal.out
 
 
-@pytest.mark.parametrize("answer", ["y", " YES "])
-async def test_after_a_yes_it_moves(server: SimulatorServer, answer: str) -> None:
+@pytest.mark.parametrize(
+    ("before", "answer", "code"), [("", "y\n", 0), ("", " YES \n", 0), ("y\n", "n\n", 1), ("", "\x03", 130)]
+)
+async def test_only_a_yes_to_the_question_moves(
+    server: SimulatorServer, before: str, answer: str, code: int
+) -> None:
+    """What was typed before it is no answer, and Ctrl-C is no yes."""
     terminal = Terminal(*COMMAND_LINE, "move", "30", server.address)
+    terminal.press(before)
     await terminal.shows(b"Continue? [y/N]")
-    terminal.press(f"{answer}\n")
-    await terminal.shows(b"AT_POSITION")
-    assert await terminal.end() == 0
-    assert server.gripper.writes
-
-
-async def test_what_was_typed_before_the_question_is_no_answer(server: SimulatorServer) -> None:
-    terminal = Terminal(*COMMAND_LINE, "move", "30", server.address)
-    terminal.press("y\n")
-    await terminal.shows(b"Continue? [y/N]")
-    terminal.press("n\n")
-    assert await terminal.end() == 1
-    assert not server.gripper.writes
-
-
-async def test_ctrl_c_is_no_yes(server: SimulatorServer) -> None:
-    terminal = Terminal(*COMMAND_LINE, "move", "30", server.address)
-    await terminal.shows(b"Continue? [y/N]")
-    terminal.press("\x03")
-    assert await terminal.end() == 130
-    assert not server.gripper.writes
+    terminal.press(answer)
+    assert await terminal.end() == code
+    assert (b"AT_POSITION" in terminal.out, bool(server.gripper.writes)) == (code == 0, code == 0)
 
 
 @pytest.mark.parametrize("elsewhere", [1, 2])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import os
 import signal
 from asyncio.subprocess import Process
@@ -14,6 +13,7 @@ import pytest
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.request import Request
 from tests import conftest
+from tests.grippers import until
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Shell
@@ -79,9 +79,7 @@ async def test_the_demo(shell: Shell, lines: int) -> None:
 async def test_a_move_in_its_activation(shell: Shell) -> None:
     async with SimulatorServer(SimulatedGripper(speedup=2)) as server:
         process = await shell.start("move", "255", "--yes", server.address)
-        async with asyncio.timeout(30):
-            while not server.gripper.is_moving:  # noqa: ASYNC110  # there is no event to wait for
-                await asyncio.sleep(0.005)
+        await until(lambda: server.gripper.is_moving, within=30)
         await interrupted(shell, process)
         assert not server.gripper.is_moving
         assert not Request.from_registers(server.gripper.request_registers).activate

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import signal
 from asyncio.subprocess import PIPE
 from pathlib import Path
@@ -14,6 +13,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.measure.campaigns import read_currents
 from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, read_table, thesis_table
 from tests.cli.conftest import served
+from tests.grippers import until
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Call, Shell
@@ -96,9 +96,7 @@ async def test_ctrl_c_keeps_the_rows_and_stops_the_fingers(shell: Shell, tmp_pat
             *("measure", "speed", "--yes", server.address),
             *("--output", str(table), "--runs", "1", "--no-plot"),
         )
-        async with asyncio.timeout(20):
-            while not table.exists() or not gripper.is_moving:  # noqa: ASYNC110  # another process writes it
-                await asyncio.sleep(0.01)
+        await until(lambda: table.exists() and gripper.is_moving)
         process.send_signal(signal.SIGINT)
         outcome = await shell.finish(process)
         assert outcome.code == 130

@@ -31,7 +31,7 @@ from robotiq_async.tools.actions import Operator
 from robotiq_async.tools.wording import refusal_words
 from robotiq_async.values.enums import Trigger
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85
-from tests.grippers import active_gripper
+from tests.grippers import active_gripper, shows
 
 if TYPE_CHECKING:
     Screen = Pilot[None]
@@ -77,6 +77,11 @@ def text(pilot: Screen, where: str) -> str:
     return str(pilot.app.query_one(where, Static).render())
 
 
+async def sees(pilot: Screen, where: str, words: str) -> None:
+    """Wait until these words are in a part of the screen."""
+    await until(pilot, lambda: words in (log(pilot) if where == "#log" else text(pilot, where)))
+
+
 def asked(pilot: Screen) -> Question | None:
     """The question that waits for a key."""
     assert isinstance(pilot.app, Monitor)
@@ -99,7 +104,7 @@ async def test_it_shows_the_gripper_before_anything_happens(operator: Operator) 
         assert "no fault" in text(pilot, "#state")
         assert [line.split()[0] for line in axes(pilot)] == ["A", "B", "C", "SCISSOR"]
         assert "6 → 0" in axes(pilot)[0]
-        await until(pilot, lambda: "reconnects 0" in text(pilot, "#link"))
+        await sees(pilot, "#link", "reconnects 0")
         await until(pilot, lambda: 15 < float(text(pilot, "#link").split()[0]) < 25)
         assert "speed 128  force 64" in text(pilot, "#link")
     assert not operator.has_moved
@@ -124,10 +129,10 @@ async def test_a_fault_is_told_in_words_and_stays_in_the_log(
 ) -> None:
     async with shown(active) as pilot:
         gripper.inject_fault(Fault.SCISSOR_BLOCKED)
-        await until(pilot, lambda: "major fault 0x0E: interference on the scissor" in text(pilot, "#state"))
+        await sees(pilot, "#state", "major fault 0x0E: interference on the scissor")
         gripper.clear_faults()
-        await until(pilot, lambda: "no fault" in text(pilot, "#state"))
-        await until(pilot, lambda: "fault (gripper reports a fault)" in log(pilot))
+        await sees(pilot, "#state", "no fault")
+        await sees(pilot, "#log", "fault (gripper reports a fault)")
         assert "SCISSOR_BLOCKED" in log(pilot)
         assert "0x00 NONE" in log(pilot)
 
@@ -136,15 +141,15 @@ async def test_a_lost_gripper_is_a_state_and_comes_back(active: Operator, server
     async with shown(active) as pilot:
         server.refuse()
         server.cut()
-        await until(pilot, lambda: "LOST" in text(pilot, "#state"))
+        await sees(pilot, "#state", "LOST")
         old = re.compile(r"no gripper answers: what you see is \d+\.\d s old")
         await until(pilot, lambda: old.search(text(pilot, "#state")) is not None)
         assert all(span.style == "dim" for span in pilot.app.query_one(Axes).render().spans[-1:])
         await pilot.press("o")
-        await until(pilot, lambda: "open: the link is down" in log(pilot))
+        await sees(pilot, "#log", "open: the link is down")
         await server.accept()
-        await until(pilot, lambda: "READY" in text(pilot, "#state"))
-        await until(pilot, lambda: "reconnects 1" in text(pilot, "#link"))
+        await sees(pilot, "#state", "READY")
+        await sees(pilot, "#link", "reconnects 1")
         assert pilot.app.is_running
 
 
@@ -154,9 +159,9 @@ async def test_an_activation_is_shown_as_a_motion() -> None:
         await hand.start(activate=False)
         async with shown(Operator(hand)) as pilot:
             await confirmed(pilot, "a")
-            await until(pilot, lambda: "the fingers MOVE" in text(pilot, "#state"))
+            await sees(pilot, "#state", "the fingers MOVE")
             await until(pilot, lambda: " moving " in axes(pilot)[0])
-            await until(pilot, lambda: "active, not moving" in text(pilot, "#state"))
+            await sees(pilot, "#state", "active, not moving")
             await until(pilot, lambda: " moving " not in axes(pilot)[0])
         await hand.stop()
 
@@ -179,7 +184,7 @@ async def test_another_client_is_told(active: Operator, gripper: SimulatedGrippe
         request = list(gripper.request_registers)
         request[1] = 77
         gripper.write(0, request)
-        await until(pilot, lambda: "ANOTHER CLIENT" in text(pilot, "#link"))
+        await sees(pilot, "#link", "ANOTHER CLIENT")
 
 
 async def test_it_paints_a_dozen_times_a_second_and_not_at_every_poll(server: SimulatorServer) -> None:
@@ -215,20 +220,17 @@ async def test_keys_open_close_and_spread(active: Operator) -> None:
         ):
             await pilot.press(key)
             await until(pilot, lambda: hand.status.requested_position(axis) == target)  # noqa: B023
-        await until(pilot, lambda: "normal: SCISSOR at" in log(pilot))
+        await sees(pilot, "#log", "normal: SCISSOR at")
     assert active.has_moved
 
 
 async def test_speed_and_force_by_keys(active: Operator) -> None:
+    bracket = "square_bracket"
     async with shown(active) as pilot:
-        await pilot.press("plus")
-        await until(pilot, lambda: "speed 144  force 64" in text(pilot, "#link"))
-        await pilot.press("minus")
-        await until(pilot, lambda: "speed 128  force 64" in text(pilot, "#link"))
-        await pilot.press("left_square_bracket")
-        await until(pilot, lambda: "speed 128  force 48" in text(pilot, "#link"))
-        await pilot.press("right_square_bracket")
-        await until(pilot, lambda: "speed 128  force 64" in text(pilot, "#link"))
+        keys = ("plus", "minus", f"left_{bracket}", f"right_{bracket}")
+        for key, speed, force in zip(keys, (144, 128, 128, 128), (64, 64, 48, 64), strict=True):
+            await pilot.press(key)
+            await sees(pilot, "#link", f"speed {speed}  force {force}")
 
 
 @pytest.mark.parametrize(
@@ -261,7 +263,7 @@ async def test_a_yes_resets_and_activates(active: Operator) -> None:
         await confirmed(pilot, "r")
         await until(pilot, lambda: active.hand.state is State.RESET)
         await confirmed(pilot, "a")
-        await until(pilot, lambda: "activate: the gripper is active" in log(pilot))
+        await sees(pilot, "#log", "activate: the gripper is active")
 
 
 async def test_a_question_lies_on_the_same_screen(operator: Operator) -> None:
@@ -284,11 +286,11 @@ async def test_any_axes_are_sent_to_any_position(active: Operator) -> None:
         assert "position 137" in text(pilot, "#question")
         assert not active.has_moved
         await pilot.press("enter")
-        await until(pilot, lambda: "B to 137: B at 137" in log(pilot))
+        await sees(pilot, "#log", "B to 137: B at 137")
         await pilot.press("p", "s", "a", "a", "9", "9", "9", "backspace", "enter")
-        await until(pilot, lambda: "SCISSOR to 9: SCISSOR at" in log(pilot))
+        await sees(pilot, "#log", "SCISSOR to 9: SCISSOR at")
         await pilot.press("p", "a", "c", "6", "0", "enter")
-        await until(pilot, lambda: "A|C to 60: A at 60, C at 60" in log(pilot))
+        await sees(pilot, "#log", "A|C to 60: A at 60, C at 60")
         positions = [hand.status.requested_position(axis) for axis in THREE_FINGER.axes]
         assert positions == [60, 137, 60, 9]
 
@@ -299,9 +301,9 @@ async def test_of_a_jaw_the_one_axis_is_chosen_and_no_other_can_be() -> None:
         hand = RobotiqHand(server.address, poll_interval=SLOWLY)
         async with hand, shown(Operator(hand)) as pilot:
             await pilot.press("p", "b", "s", "6", "0", "enter")
-            await until(pilot, lambda: "A to 60: A at" in log(pilot))
+            await sees(pilot, "#log", "A to 60: A at")
             await pilot.press("1")
-            await until(pilot, lambda: "a 2F-85 has no scissor" in log(pilot))
+            await sees(pilot, "#log", "a 2F-85 has no scissor")
 
 
 @pytest.mark.parametrize("key", sorted(NO))
@@ -329,11 +331,11 @@ def test_a_position_is_in_its_range() -> None:
 async def test_it_speaks_of_keys_and_not_of_methods_and_states(active: Operator) -> None:
     async with shown(active) as pilot:
         await pilot.press("c")
-        await until(pilot, lambda: "close: A at" in log(pilot))
+        await sees(pilot, "#log", "close: A at")
         await confirmed(pilot, "l")
-        await until(pilot, lambda: "release: not now, as it is 'ready'; only when 'fault'" in log(pilot))
+        await sees(pilot, "#log", "release: not now, as it is 'ready'; only when 'fault'")
         await confirmed(pilot, "r")
-        await until(pilot, lambda: "reset: not active (gripper is reset)" in log(pilot))
+        await sees(pilot, "#log", "reset: not active (gripper is reset)")
         shows = log(pilot) + text(pilot, "#state")
     for name in (*State.__members__, *(f"{each}()" for each in ("reset", "atr", "activate"))):
         assert name == "RESET" or name not in shows, name
@@ -390,11 +392,11 @@ async def test_halt_is_one_key_also_during_a_question(
 ) -> None:
     hand, pilot = closing
     await pilot.press(*open_question, key)
-    await until(pilot, lambda: "halt: every axis has stopped" in log(pilot))
+    await sees(pilot, "#log", "halt: every axis has stopped")
     assert not hand.is_moving
     assert isinstance(pilot.app, Monitor)
     assert (pilot.app.asking is not None) is bool(open_question)
-    await until(pilot, lambda: "close: " in log(pilot))
+    await sees(pilot, "#log", "close: ")
 
 
 @pytest.mark.parametrize("key", ["q", "ctrl+c"])
@@ -402,10 +404,7 @@ async def test_quitting_in_a_motion_holds_it(key: str, closing: tuple[RobotiqHan
     hand, pilot = closing
     await pilot.press(key)
     await until(pilot, lambda: not pilot.app.is_running)
-    async with asyncio.timeout(5):
-        async for status in hand.statuses():
-            if not status.is_moving:
-                break
+    status = await shows(hand, lambda status: not status.is_moving)
     assert status.position(Finger.A) < 200
 
 

@@ -16,6 +16,7 @@ from robotiq_async import Fault, Finger, RobotiqHand
 from robotiq_async.cli.output.lines import print_objects
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.terminal import ROOT
+from tests.grippers import shows
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Shell
@@ -103,10 +104,7 @@ async def test_a_reader_that_stops_reading_does_not_hold_up_the_polling(
     with os.fdopen(writing, "w") as full, os.fdopen(reading) as reader:
         monkeypatch.setattr(sys, "stdout", full)
         printing = asyncio.create_task(print_objects(hand, buffer=50))
-        async with asyncio.timeout(20):
-            async for status in hand.statuses():
-                if status.sequence > 1000:  # half a megabyte, and a pipe holds 64 KiB
-                    break
+        await shows(hand, lambda it: it.sequence > 1000)  # half a megabyte, and a pipe holds 64 KiB
 
         def read_until_missed() -> list[dict[str, Any]]:
             objects = []
@@ -140,9 +138,7 @@ async def test_a_signal_ends_it_although_nobody_reads(
         )
         os.close(writing)
         started = asyncio.get_running_loop().time()
-        async for status in hand.statuses():
-            if status.timestamp > started + 3:  # three times what fills the pipe
-                break
+        await shows(hand, lambda status: status.timestamp > started + 3)  # three times what fills the pipe
         process.send_signal(signal.SIGTERM)
         async with asyncio.timeout(10):
             assert await process.wait() == 0

@@ -13,14 +13,7 @@ from robotiq_async import RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.conftest import WITHOUT
 from tests.cli.terminal import Terminal
-from tests.grippers import active_gripper
-
-
-async def told_to_go(gripper: SimulatedGripper) -> None:
-    """Wait for a command of another process."""
-    async with asyncio.timeout(20):
-        while not gripper.request_registers[0] & 0x0800:  # noqa: ASYNC110
-            await asyncio.sleep(0.01)
+from tests.grippers import active_gripper, until
 
 
 @asynccontextmanager
@@ -32,7 +25,7 @@ async def closing(
         terminal = Terminal("-m", "robotiq_async", "monitor", *options, server.address)
         await terminal.shows(b"READY")
         terminal.press("c")
-        await told_to_go(gripper)
+        await until(lambda: bool(gripper.request_registers[0] & 0x0800))
         yield terminal, gripper
 
 
@@ -87,9 +80,8 @@ async def test_a_terminal_that_stops_reading_holds_nothing_up() -> None:
             terminal.press("+-")
             await asyncio.sleep(0.2)  # the speed of a person's hands
         terminal.press(" ")
-        async with asyncio.timeout(5):
-            while gripper.request_registers[0] & 0x0800 or gripper.is_moving:  # noqa: ASYNC110
-                await asyncio.sleep(0.01)  # by itself the close takes ten seconds
+        # By itself the close takes ten seconds.
+        await until(lambda: not (gripper.request_registers[0] & 0x0800 or gripper.is_moving), within=5)
         terminal.kill(signal.SIGTERM)
         terminal.read_on()
         assert await terminal.end() == 0

@@ -6,7 +6,6 @@ import asyncio
 import json
 import os
 import signal
-import socket
 import time
 from asyncio.subprocess import Process
 from collections.abc import AsyncIterator, Callable
@@ -20,13 +19,14 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.conftest import PATIENCE, Beside, Call, Shell
 
 pytest.importorskip("zenoh")
+from tests.fleet.sessions import free_port
+from tests.grippers import until
 
 ADDRESS = "zenoh://lab/cell/left"
 
 
 def free_endpoint() -> str:
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        return f"tcp/127.0.0.1:{free.getsockname()[1]}"
+    return f"tcp/127.0.0.1:{free_port()}"
 
 
 @pytest.fixture
@@ -61,9 +61,7 @@ class Served:
 
     async def moves(self) -> None:
         """Wait until finger A is on its way, and let it take long."""
-        async with asyncio.timeout(20):
-            while self.gripper.position(Finger.A) < 20:  # noqa: ASYNC110  # there is no event to wait for
-                await asyncio.sleep(0.01)
+        await until(lambda: self.gripper.position(Finger.A) >= 20)
         self.brake.slow_down()
 
 
@@ -74,12 +72,20 @@ async def gripper() -> AsyncIterator[Served]:
         yield Served(server.gripper, server.address, brake)
 
 
-def fleet_file(folder: Path, endpoint: str, gripper: str) -> Path:
-    file = folder / "FLEET.toml"
+def fleet_file(folder: Path, endpoint: str, gripper: str, way: str = "listen") -> Path:
+    file = folder / f"{way}.toml"
     file.write_text(
-        f'site = "lab"\nhost = "cell"\nlisten = ["{endpoint}"]\n[grippers.left]\naddress = "{gripper}"\n'
+        f'site = "lab"\nhost = "cell"\n{way} = ["{endpoint}"]\n[grippers.left]\naddress = "{gripper}"\n'
     )
     return file
+
+
+@pytest.fixture
+def serving(
+    beside: Callable[..., Beside], endpoint: str, there: SimulatorServer, tmp_path: Path
+) -> Callable[..., Beside]:
+    """Starts an agent of a gripper, that of the fixture unless another one is named."""
+    return lambda gripper=there.address: beside("agent", str(fleet_file(tmp_path, endpoint, gripper)))
 
 
 @pytest.fixture
@@ -89,10 +95,8 @@ async def agent(shell: Shell, endpoint: str, gripper: Served, tmp_path: Path) ->
     return process
 
 
-def test_status_move_and_the_demo(
-    call: Call, beside: Callable[..., Beside], endpoint: str, there: SimulatorServer, tmp_path: Path
-) -> None:
-    agent = beside("agent", str(fleet_file(tmp_path, endpoint, there.address)))
+def test_status_move_and_the_demo(call: Call, serving: Callable[..., Beside]) -> None:
+    agent = serving()
     assert agent.read_line() == ADDRESS
     call("move", "100", "--yes", "--fingers", "A", "--speed", "255", ADDRESS).assert_succeeded()
     outcome = call("status", "--json", ADDRESS)
@@ -104,31 +108,26 @@ def test_status_move_and_the_demo(
     agent.finish(signal.SIGINT).assert_succeeded()
 
 
-def test_an_agent_says_which_gripper_is_simulated(
-    beside: Callable[..., Beside], endpoint: str, tmp_path: Path
-) -> None:
-    agent = beside("agent", str(fleet_file(tmp_path, endpoint, "sim://")))
+def test_an_agent_says_which_gripper_is_simulated(serving: Callable[..., Beside]) -> None:
+    agent = serving("sim://")
     assert agent.read_line() == ADDRESS
     assert agent.read_error() == "robotiq-async: left: Simulated gripper sim://"
     agent.finish(signal.SIGINT).assert_succeeded()
 
 
 def test_the_log_of_an_agent_calls_each_gripper_by_its_name(
-    beside: Callable[..., Beside], endpoint: str, tmp_path: Path
+    serving: Callable[..., Beside], refusing: str
 ) -> None:
-    with socket.socket() as reserved:  # and no server listens there
-        reserved.bind(("127.0.0.1", 0))
-        address = f"tcp://127.0.0.1:{reserved.getsockname()[1]}"
-        agent = beside("agent", str(fleet_file(tmp_path, endpoint, address)))
-        assert agent.read_error().startswith(f"robotiq-async: left: cannot connect to {address}: ")
-        agent.finish(signal.SIGINT)
+    agent = serving(f"tcp://{refusing}")
+    assert agent.read_error().startswith(f"robotiq-async: left: cannot connect to tcp://{refusing}: ")
+    agent.finish(signal.SIGINT)
 
 
 def test_an_agent_whose_list_nobody_reads_serves_all_the_same(
-    call: Call, beside: Callable[..., Beside], endpoint: str, there: SimulatorServer, tmp_path: Path
+    call: Call, serving: Callable[..., Beside]
 ) -> None:
     """``robotiq-async agent FLEET.toml | true``: it ended, and stopped the fingers."""
-    process = beside("agent", str(fleet_file(tmp_path, endpoint, there.address))).process
+    process = serving().process
     assert process.stdout is not None
     assert process.stderr is not None
     process.stdout.close()
@@ -189,15 +188,11 @@ async def test_an_agent_that_is_told_to_end_stops_the_fingers(
 
 
 def test_a_second_agent_is_refused(
-    call: Call, beside: Callable[..., Beside], endpoint: str, there: SimulatorServer, tmp_path: Path
+    call: Call, serving: Callable[..., Beside], endpoint: str, tmp_path: Path
 ) -> None:
-    first = beside("agent", str(fleet_file(tmp_path, endpoint, there.address)))
-    assert first.read_line() == ADDRESS
-    file = tmp_path / "second.toml"
-    file.write_text(
-        f'site = "lab"\nhost = "cell"\nconnect = ["{endpoint}"]\n[grippers.left]\naddress = "sim://"\n'
-    )
-    call("agent", str(file)).assert_failed(1, "another agent serves zenoh://lab/cell/left")
+    assert serving().read_line() == ADDRESS
+    second = fleet_file(tmp_path, endpoint, "sim://", "connect")
+    call("agent", str(second)).assert_failed(1, f"another agent serves {ADDRESS}")
 
 
 def test_an_agent_that_waits_for_its_router_says_so_and_can_be_told_to_end(

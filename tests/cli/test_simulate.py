@@ -16,6 +16,7 @@ from robotiq_async import RobotiqHand
 from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values.model import THREE_FINGER
 from tests.cli.conftest import Outcome
+from tests.grippers import shows
 from tests.serial_line import SerialLine
 
 if TYPE_CHECKING:
@@ -97,11 +98,9 @@ async def test_the_habits_of_real_grippers_unless_it_is_plain(
     writer.close()
 
 
-@pytest.mark.parametrize(
-    ("device", "why"), [("/dev/ttyNOWHERE", "no such device"), ("/dev/null", "it is not a serial port")]
-)
-def test_a_line_that_cannot_be_opened(call: Call, device: str, why: str) -> None:
-    call("simulate", "--serial", device).assert_failed(1, f"cannot listen on {device}: ", why)
+def test_a_line_that_cannot_be_opened(call: Call) -> None:
+    for device, why in (("/dev/ttyNOWHERE", "no such device"), ("/dev/null", "it is not a serial port")):
+        call("simulate", "--serial", device).assert_failed(1, f"cannot listen on {device}: ", why)
 
 
 def test_a_port_in_use(call: Call) -> None:
@@ -139,13 +138,19 @@ def test_rtu_over_tcp(call: Call, beside: Callable[..., Beside]) -> None:
     call("status", address.removeprefix("rtu+")).assert_failed(1, "no device answers")
 
 
-def test_other_than_loopback_is_warned_about(call: Call) -> None:
+@pytest.mark.parametrize(
+    ("command", "can", "why"),
+    [
+        ("simulate", "command this gripper", "cannot listen on 192.0.2.1:0"),
+        ("view", "see this gripper: there is no password", "ws://192.0.2.1:0: "),
+    ],
+)
+def test_other_than_loopback_is_warned_about(call: Call, command: str, can: str, why: str) -> None:
     # An address for documentation (RFC 5737): no machine has it, so nothing is opened to a network.
-    outcome = call("simulate", "--host", "192.0.2.1", "--port", "0")
+    outcome = call(command, "--host", "192.0.2.1", "--port", "0")
     assert outcome.code == 1
-    warning, failure = outcome.err.splitlines()
-    assert "anyone who reaches 192.0.2.1 can command this gripper" in warning
-    assert "cannot listen on 192.0.2.1:0" in failure
+    assert f"anyone who reaches 192.0.2.1 can {can}" in outcome.err.splitlines()[0]
+    assert why in outcome.err.splitlines()[-1]
 
 
 # Troubles.
@@ -159,10 +164,7 @@ async def test_troubles_of_several_options(shell: Shell) -> None:
     assert lines == [f"robotiq-async: trouble: {each}" for each in ("delay 0.01", "release", "foreign 200")]
     hand = RobotiqHand(address)
     await hand.start(activate=False)
-    async with asyncio.timeout(30):
-        async for status in hand.statuses():
-            if [status.requested_position(axis) for axis in THREE_FINGER.axes] == [200] * 4:
-                break
+    await shows(hand, lambda it: [*map(it.requested_position, THREE_FINGER.axes)] == [200] * 4)
     await hand.stop()
 
 

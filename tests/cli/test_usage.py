@@ -19,16 +19,11 @@ from robotiq_async.cli.commands.fleet import fleet, halt, keys
 from robotiq_async.cli.commands.measure import speed
 from robotiq_async.cli.commands.measure_force import force
 from robotiq_async.simulator import SimulatorServer
+from tests.cli.conftest import WITHOUT
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Beside, Call, Shell
 
-WITHOUT = """
-import sys
-sys.modules["{}"] = None
-from robotiq_async.cli import main
-sys.exit(main([]))
-"""
 COMMANDS = ("demo", "simulate", "status", "move", "monitor", "view", "doctor")
 EVERY = {each.__name__: each for each in FUNCTIONS} | {
     "fleet": fleet,
@@ -190,12 +185,12 @@ def test_wrong_usage_is_one_line_and_opens_nothing(
 
 
 async def test_without_the_extra_one_line_names_it(shell: Shell) -> None:
-    outcome = await shell.finish(await shell.python("-c", WITHOUT.format("cyclopts")))
+    outcome = await shell.finish(await shell.python("-c", WITHOUT.format("cyclopts", [])))
     outcome.assert_failed(1, "cyclopts", "pip install 'cyclopts")
 
 
 async def test_another_missing_module_is_not_taken_for_the_extra(shell: Shell) -> None:
-    outcome = await shell.finish(await shell.python("-c", WITHOUT.format("json")))
+    outcome = await shell.finish(await shell.python("-c", WITHOUT.format("json", [])))
     assert outcome.code == 1
     assert "pip install" not in outcome.err
 

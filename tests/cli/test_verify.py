@@ -15,6 +15,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.verify.stages import STAGES
 from robotiq_async.values.registers import rACT, rGTO
 from tests.cli.terminal import Terminal
+from tests.grippers import until
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Call
@@ -102,17 +103,18 @@ def at_terminal(server: SimulatorServer, folder: Path, *arguments: str) -> Termi
     return Terminal("-m", "robotiq_async", "verify", server.address, *arguments, *where)
 
 
-async def moving(server: SimulatorServer) -> None:
-    async with asyncio.timeout(20):
-        while not server.gripper.is_moving:  # noqa: ASYNC110  # a gripper has no event for it
-            await asyncio.sleep(0.02)
+async def moves(server: SimulatorServer, folder: Path) -> Terminal:
+    """The terminal of a command whose third stage moves the fingers."""
+    terminal = at_terminal(server, folder, "--from", "3", "--up-to", "3")
+    await asks(terminal, b"Stage 3")
+    terminal.press("\n")
+    await until(lambda: server.gripper.is_moving)
+    return terminal
 
 
 async def stood(server: SimulatorServer) -> None:
     """The fingers stand, in a moment, and what was written last stops them."""
-    async with asyncio.timeout(2):
-        while server.gripper.is_moving:  # noqa: ASYNC110  # a gripper has no event for it
-            await asyncio.sleep(0.02)
+    await until(lambda: not server.gripper.is_moving, within=2)
     image = server.gripper.writes[-1].registers
     assert not rGTO.read(image)
     assert not rACT.read(image)
@@ -160,10 +162,7 @@ KEYS: dict[str, Callable[[Terminal], object]] = {
 async def test_whatever_the_person_does_stops_the_fingers(
     served: SimulatorServer, tmp_path: Path, key: str
 ) -> None:
-    terminal = at_terminal(served, tmp_path, "--from", "3", "--up-to", "3")
-    await asks(terminal, b"Stage 3")
-    terminal.press("\n")
-    await moving(served)
+    terminal = await moves(served, tmp_path)
     KEYS[key](terminal)
     await stood(served)
     assert await terminal.end() != 0
@@ -175,10 +174,7 @@ async def test_a_terminal_that_shows_nothing_does_not_keep_the_fingers_moving(
     served: SimulatorServer, tmp_path: Path
 ) -> None:
     """As after Ctrl-S somewhere on the way, or over a network that stands still."""
-    terminal = at_terminal(served, tmp_path, "--from", "3", "--up-to", "3")
-    await asks(terminal, b"Stage 3")
-    terminal.press("\n")
-    await moving(served)
+    terminal = await moves(served, tmp_path)
     terminal.stop_reading()
     terminal.press("x")
     await stood(served)

@@ -39,13 +39,6 @@ async def test_a_lost_gripper_is_told_at_once(shell: Shell, server: SimulatorSer
             assert line
 
 
-def test_another_interface_is_warned_about(call: Call) -> None:
-    # An address for documentation (RFC 5737): no machine has it, so nothing is opened to a network.
-    outcome = call("view", "--host", "192.0.2.1", "--port", "0")
-    assert outcome.code == 1
-    assert "anyone who reaches 192.0.2.1 can see this gripper: there is no password" in outcome.err
-
-
 def test_the_layout_is_handed_out(call: Call, tmp_path: Path) -> None:
     file = tmp_path / "gripper.json"
     outcome = call("view", "--layout", str(file))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import re
 import struct
@@ -29,6 +28,7 @@ from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 from tests.docs.pages import DOCS, blocks
 from tests.fleet.network import Network
+from tests.grippers import until
 
 PROTOCOL: Final = (DOCS / "fleet-protocol.md").read_text(encoding="utf-8")
 HOW_TO: Final = (DOCS / "how-to" / "fleet.md").read_text(encoding="utf-8")
@@ -132,8 +132,7 @@ async def test_an_event_is_told_as_the_page_has_it() -> None:
     network.bus("client").subscribe(NAME.key("*"), lambda _, payload: heard.append(payload))
     news = HandPublisher(NAME, RobotiqHand("sim://"), network.bus("agent"), EPOCH, Lease())
     news.add({"kind": "conflict", "key": NAME.key("alive", "77")})
-    while not heard:  # noqa: ASYNC110
-        await asyncio.sleep(0.001)
+    await until(lambda: bool(heard))
     (first,) = [json.loads(each) for each in heard]
     example = json.loads(shown("json", PROTOCOL)[0])
     assert first.keys() == example.keys()

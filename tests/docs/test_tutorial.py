@@ -7,6 +7,7 @@ import asyncio
 import contextlib
 import io
 import sys
+from asyncio.subprocess import PIPE, STDOUT
 from collections.abc import Iterator
 from doctest import ELLIPSIS, OutputChecker
 from itertools import pairwise
@@ -75,22 +76,15 @@ async def test_the_program_at_its_end(tmp_path: Path) -> None:
     program = tmp_path / "grasp.py"
     program.write_text(code.text, encoding="utf-8")
     async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
-        printed = await run(str(program), server.address)
-    assert agree(output.text, printed), printed
-
-
-async def run(*arguments: str) -> str:
-    """What Python prints when it is called with these arguments."""
-    process = await asyncio.create_subprocess_exec(
-        sys.executable,
-        *arguments,
-        env={"PYTHONPATH": str(ROOT)},
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.STDOUT,
-    )
-    printed, _ = await asyncio.wait_for(process.communicate(), 30)
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, str(program), server.address),
+            env={"PYTHONPATH": str(ROOT)},
+            stdout=PIPE,
+            stderr=STDOUT,
+        )
+        printed, _ = await asyncio.wait_for(process.communicate(), 30)
     assert process.returncode == 0, printed.decode()
-    return printed.decode()
+    assert agree(output.text, printed.decode()), printed.decode()
 
 
 def test_blocks_can_be_pasted() -> None:

@@ -17,8 +17,7 @@ import pytest
 
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.docs.pages import DOCS, blocks
-from tests.grippers import active_gripper
-from tests.virtual import until
+from tests.grippers import active_gripper, until
 
 PAGE = DOCS / "how-to" / "web-service.md"
 (PROGRAM,) = (each.text for each in blocks(PAGE.read_text(encoding="utf-8")) if each.language == "python")

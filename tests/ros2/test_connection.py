@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable
 
 import pytest
 
@@ -19,7 +19,7 @@ from robotiq_async.runtime.clock import now
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.fake_hand import FakeHand
 from tests.fleet.lab import lab
-from tests.grippers import activate_beforehand
+from tests.grippers import activate_beforehand, lose_link, shows
 from tests.virtual import LATENCY_S
 
 pytestmark = pytest.mark.virtual_time
@@ -61,16 +61,14 @@ def begin(connection: Connection, key: bytes = b"1") -> asyncio.Task[Outcome]:
 async def moving(connection: Connection) -> asyncio.Task[Outcome]:
     """A goal whose fingers have begun to move."""
     goal = begin(connection)
-    async for status in connection.hand.statuses():
-        if status.position(Finger.A) > 40:
-            break
+    await shows(connection.hand, lambda status: status.position(Finger.A) > 40)
     return goal
 
 
-async def lose_link(connection: Connection, server: SimulatorServer) -> None:
-    server.refuse()
-    server.cut()
-    await connection.hand.wait_for_state(State.DISCONNECTED)
+async def refuses(words: str, *requests: Awaitable[object]) -> None:
+    for request in requests:
+        with pytest.raises(RefusedError, match=words):
+            await request
 
 
 async def settled(gripper: SimulatedGripper) -> int:
@@ -82,11 +80,8 @@ async def settled(gripper: SimulatedGripper) -> int:
 async def test_an_inactive_node_takes_a_halt_and_nothing_else(
     inactive: Connection, gripper: SimulatedGripper
 ) -> None:
-    for name in set(COMMANDS) - {"halt"}:
-        with pytest.raises(RefusedError, match="the node is not active"):
-            await inactive.command(name)
-    with pytest.raises(RefusedError, match="the node is not active"):
-        await begin(inactive)
+    others = set(COMMANDS) - {"halt"}
+    await refuses("the node is not active", *map(inactive.command, others), begin(inactive))
     assert not gripper.writes
     assert await inactive.command("halt")
 
@@ -106,9 +101,7 @@ async def test_a_node_that_was_never_active_leaves_the_fingers_alone(
     await inactive.close("the end")
     await inactive.close("twice")
     assert not gripper.writes
-    for again in (inactive.open, inactive.permit):
-        with pytest.raises(RefusedError, match="the connection has been closed"):
-            await again()
+    await refuses("the connection has been closed", inactive.open(), inactive.permit())
     assert not inactive.takes_commands
 
 
@@ -148,8 +141,7 @@ async def test_a_halt_is_never_one_command_too_many(connection: Connection) -> N
     await connection.command("reset")
     activations = [asyncio.create_task(connection.command("activate")) for _ in range(MOST_CALLS)]
     await connection.hand.wait_for_state(State.WF_ACTIVATION)
-    with pytest.raises(RefusedError, match="16 commands are under way"):
-        await connection.command("activate")
+    await refuses("16 commands are under way", connection.command("activate"))
     assert "the gripper is reset" in await connection.command("halt")
     ended = await asyncio.gather(*activations, return_exceptions=True)
     assert all(isinstance(each, RobotiqError) for each in ended)
@@ -173,8 +165,8 @@ async def test_a_goal_that_was_accepted_before_a_halt_is_not_begun_after_it(
     accepted_at = connection.stops
     await connection.command("halt")
     writes = len(gripper.writes)
-    with pytest.raises(RefusedError, match="a stop took over before it began"):
-        await connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None, accepted_at)
+    goal = connection.run_goal(b"1", CLOSE, SETTINGS, lambda: None, accepted_at)
+    await refuses("a stop took over before it began", goal)
     assert len(gripper.writes) == writes
 
 
@@ -184,11 +176,8 @@ async def test_while_a_halt_is_under_way_nothing_else_is_taken(
     goal = await moving(connection)
     halting = asyncio.create_task(connection.command("halt"))
     await asyncio.sleep(0)
-    for name in ("activate", "recover", "reset"):
-        with pytest.raises(RefusedError, match="a halt is under way"):
-            await connection.command(name)
-    with pytest.raises(RefusedError, match="a halt is under way"):
-        await begin(connection, b"2")
+    calls = map(connection.command, ("activate", "recover", "reset"))
+    await refuses("a halt is under way", *calls, begin(connection, b"2"))
     await halting
     assert (await goal).reason == "a halt took over"
     assert connection.hand.state is State.RUNNING_IDLE
@@ -201,8 +190,7 @@ async def test_a_halt_ends_what_a_service_has_begun(connection: Connection, name
     call = asyncio.create_task(connection.command(name))
     await connection.hand.wait_for_state(State.WF_ACTIVATION)
     assert "the gripper is reset" in await connection.command("halt")
-    with pytest.raises(RefusedError, match=f"a stop took over: {name} was aborted"):
-        await call
+    await refuses(f"a stop took over: {name} was aborted", call)
 
 
 @pytest.mark.parametrize("turns", [1, 2])
@@ -215,8 +203,7 @@ async def test_an_activation_that_waits_for_its_lease_does_not_begin_after_a_sto
         for _ in range(turns):
             await asyncio.sleep(0)
         await connection.forbid("the node was deactivated")
-        with pytest.raises(RefusedError, match="a stop took over"):
-            await call
+        await refuses("a stop took over", call)
         await asyncio.sleep(1)
         assert connection.hand.state is State.RESET
         await connection.close("the end")
@@ -238,13 +225,8 @@ async def test_a_connection_that_is_ending_takes_no_command_while_the_rest_ends(
     """The publishers were stopped first, and commands were taken until that was done."""
     goal = await moving(connection)
     connection.refuse("the node is shutting down")
-    for name in ("activate", "reset", "recover", "release"):
-        with pytest.raises(RefusedError):
-            await connection.command(name)
-    with pytest.raises(RefusedError):
-        await begin(connection, b"2")
-    with pytest.raises(RefusedError):
-        await connection.permit()
+    calls = map(connection.command, ("activate", "reset", "recover", "release"))
+    await refuses("not active|been closed", *calls, begin(connection, b"2"), connection.permit())
     await connection.close("the node is shutting down")
     assert (await goal).ending is Ending.ABORTED
     assert await settled(gripper) < FAR
@@ -257,16 +239,14 @@ async def test_the_fingers_of_a_goal_that_a_lost_link_ended_are_held_when_it_is_
     connection: Connection, gripper: SimulatedGripper, server: SimulatorServer
 ) -> None:
     goal = await moving(connection)
-    await lose_link(connection, server)
+    await lose_link(server, connection.hand)
     assert (await goal).ending is Ending.ABORTED
-    with pytest.raises(RefusedError, match="the link to the gripper is down"):
-        await begin(connection, b"2")
+    await refuses("the link to the gripper is down", begin(connection, b"2"))
     await asyncio.sleep(0.2)
     assert gripper.is_moving, "nothing can stop them meanwhile"
     await server.accept()
     await connection.hand.wait_for_state(State.RUNNING_IDLE)
-    with pytest.raises(RefusedError, match="the fingers are not stopped yet"):
-        await begin(connection, b"2")
+    await refuses("the fingers are not stopped yet", begin(connection, b"2"))
     assert await settled(gripper) < FAR
     assert (await begin(connection, b"2")).ending is Ending.SUCCEEDED
 
@@ -277,7 +257,7 @@ async def test_a_deactivation_without_a_link_halts_when_it_is_back(
     await connection.command("reset")
     call = asyncio.create_task(connection.command("activate"))
     await connection.hand.wait_for_state(State.WF_ACTIVATION)
-    await lose_link(connection, server)
+    await lose_link(server, connection.hand)
     with caplog.at_level(logging.WARNING, "robotiq_async"):
         assert not await connection.forbid("the node was deactivated")
         await asyncio.gather(call, return_exceptions=True)
@@ -294,7 +274,7 @@ async def test_a_deactivation_without_a_link_halts_when_it_is_back(
 async def test_a_stop_that_would_come_too_late_for_anything_is_not_sent(
     connection: Connection, gripper: SimulatedGripper, server: SimulatorServer
 ) -> None:
-    await lose_link(connection, server)
+    await lose_link(server, connection.hand)
     await connection.forbid("the node was deactivated")
     await asyncio.sleep(PENDING_S + 1)
     writes = len(gripper.writes)
@@ -306,7 +286,7 @@ async def test_a_stop_that_would_come_too_late_for_anything_is_not_sent(
 
 async def test_the_end_of_the_node_owes_nothing(connection: Connection, server: SimulatorServer) -> None:
     goal = await moving(connection)
-    await lose_link(connection, server)
+    await lose_link(server, connection.hand)
     await goal
     await connection.close("the end")  # no task is left: the fixtures look
 
@@ -341,7 +321,7 @@ async def test_diagnoses_of_a_fault(
 
 
 async def test_without_a_link_nothing_is_known(connection: Connection, server: SimulatorServer) -> None:
-    await lose_link(connection, server)
+    await lose_link(server, connection.hand)
     link, gripper = diagnose(connection.hand, now())
     assert link.level is Level.ERROR
     assert (gripper.level, gripper.message, gripper.values) == (Level.STALE, "unknown: the link is down", {})

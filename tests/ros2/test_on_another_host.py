@@ -9,12 +9,13 @@ from dataclasses import replace
 import pytest
 
 from robotiq_async import Finger, State
-from robotiq_async.ros2.gripper.connection import Connection, RefusedError
+from robotiq_async.ros2.gripper.connection import Connection
 from robotiq_async.ros2.gripper.goals import Ending, Outcome
 from robotiq_async.ros2.translation.diagnosis import Level, diagnose
 from robotiq_async.ros2.translation.joints import Targets
 from robotiq_async.runtime.clock import now
 from tests.fleet.lab import Lab, lab
+from tests.grippers import shows
 from tests.ros2.test_connection import CLOSE, SETTINGS, moving
 
 pytestmark = pytest.mark.virtual_time
@@ -58,30 +59,12 @@ async def test_a_goal_and_its_cancellation(here: Lab, connection: Connection) ->
     assert not connection.hand.is_in_control  # type: ignore[attr-defined]
 
 
-async def test_a_new_goal_holds_the_other_axes(here: Lab, connection: Connection) -> None:
-    first = await moving(connection)
-    second = await run(connection, b"2", Targets(((20, Finger.A),)))
-    assert ((await first).ending, second.ending) == (Ending.ABORTED, Ending.SUCCEEDED)
-    assert here.gripper.position(Finger.B) < 200
-    assert not here.gripper.is_moving
-
-
-async def test_a_silent_agent_is_a_link_that_is_down(here: Lab, connection: Connection) -> None:
-    await here.end_agent()
-    await connection.hand.wait_for_state(State.DISCONNECTED, timeout=10)
-    assert diagnose(connection.hand, now())[0].level is Level.ERROR
-    with pytest.raises(RefusedError, match="the link to the gripper is down"):
-        await connection.check_goal()
-
-
 async def test_what_a_goal_moved_is_held_when_the_agent_has_its_gripper_back(
     here: Lab, connection: Connection
 ) -> None:
     slow = replace(SETTINGS, speed=0)
     goal = asyncio.create_task(connection.run_goal(b"1", CLOSE, slow, lambda: None, 0))
-    async for status in connection.hand.statuses():
-        if status.position(Finger.A) > 40:
-            break
+    await shows(connection.hand, lambda status: status.position(Finger.A) > 40)
     here.server.refuse()
     here.server.cut()
     assert (await goal).ending is Ending.ABORTED

@@ -25,6 +25,7 @@ from robotiq_async import (
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import ACTIONS, Operator
 from robotiq_async.values.enums import DEFAULT_SPEED
+from tests.grippers import lose_link, shows
 
 pytestmark = pytest.mark.virtual_time
 LEFT, STOPPED, MOVING = "left as they are", "were stopped", "may STILL MOVE"
@@ -44,6 +45,11 @@ async def active(operator: Operator) -> Operator:
     """Of a gripper that was activated, and not by this operator."""
     await operator.hand.activate()
     return operator
+
+
+async def fail(operator: Operator, gripper: SimulatedGripper) -> None:
+    gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    await operator.hand.wait_for_state(State.FAULT)
 
 
 async def test_open_close_and_widths(operator: Operator, gripper: SimulatedGripper) -> None:
@@ -66,8 +72,7 @@ async def test_halt_reset_release_and_recover(operator: Operator, gripper: Simul
     assert not operator.hand.status.go_echo
     with pytest.raises(Exception, match="halt"):
         await moving
-    gripper.inject_fault(0x0E)
-    await operator.hand.wait_for_state(State.FAULT)
+    await fail(operator, gripper)
     assert "only a reset" in await operator.act(ACTIONS["release"])
     assert await operator.act(ACTIONS["recover"]) == "the gripper is active"
     assert await operator.act(ACTIONS["reset"]) == "the gripper is reset"
@@ -101,8 +106,7 @@ async def test_speed_alone_and_what_is_refused_move_nothing(
 ) -> None:
     await active.set_speed(10)
     assert not active.has_moved
-    gripper.inject_fault(0x0E)
-    await active.hand.wait_for_state(State.FAULT)
+    await fail(active, gripper)
     with pytest.raises(GripperFaultError):
         await active.move(30, Finger.A)
     assert not active.has_moved
@@ -128,16 +132,13 @@ async def test_leaving_leaves_alone_what_was_not(active: Operator, gripper: Simu
 
 async def test_a_gripper_that_is_gone_was_not_stopped(active: Operator, server: SimulatorServer) -> None:
     await active.move(100, Finger.A)
-    server.refuse()
-    server.cut()
-    await active.hand.wait_for_state(State.DISCONNECTED)
+    await lose_link(server, active.hand)
     assert MOVING in await active.leave()
 
 
 async def test_a_release_is_not_stopped_by_leaving(active: Operator, gripper: SimulatedGripper) -> None:
     await active.move(200, Finger.ABC)
-    gripper.inject_fault(0x0E)
-    await active.hand.wait_for_state(State.FAULT)
+    await fail(active, gripper)
     releasing = asyncio.create_task(active.act(ACTIONS["release"]))
     await active.hand.wait_for_state(State.WF_ATR)
     assert MOVING in await active.leave()
@@ -219,9 +220,7 @@ async def test_a_halt_ends_an_activation_and_says_how(operator: Operator, grippe
 async def test_fingers_that_a_halt_has_stopped_stand_still(active: Operator, pause: float) -> None:
     """Nothing is left to write then, and nothing was read: that was taken for a gripper that is not seen."""
     moving = asyncio.create_task(active.move(255, Finger.ABC))
-    async for status in active.hand.statuses():
-        if status.is_moving:
-            break
+    await shows(active.hand, lambda status: status.is_moving)
     await active.hand.halt()
     with pytest.raises(MoveSupersededError):
         await moving
@@ -238,15 +237,12 @@ async def test_an_old_halt_is_no_stop(
     image = list(gripper.request_registers)
     image[0] |= 0x0800
     gripper.write(0, image)
-    server.refuse()
-    server.cut()
-    await active.hand.wait_for_state(State.DISCONNECTED)
+    await lose_link(server, active.hand)
     assert MOVING in await active.leave()
 
 
 async def test_a_release_that_is_done_is_at_rest(active: Operator, gripper: SimulatedGripper) -> None:
-    gripper.inject_fault(0x0E)
-    await active.hand.wait_for_state(State.FAULT)
+    await fail(active, gripper)
     await active.act(ACTIONS["release"])
     assert STOPPED in await active.leave()
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import xml.etree.ElementTree as ET
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -14,16 +13,15 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 
 from docs import make_layout
-from robotiq_async import Fault, Finger, RobotiqHand, RobotiqStatus, State
+from robotiq_async import Fault, Finger, RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.tools.description import HandModel, urdf
+from robotiq_async.tools.description import HandModel, hand_model
 from robotiq_async.tools.description.kinematics import JOINTS
-from robotiq_async.tools.description.robot_description import transforms
 from robotiq_async.tools.recording.payloads import SCHEMAS
 from robotiq_async.tools.viewer import SHOWN, Viewer
 from robotiq_async.values.errors import ViewerError
 from tests.foxglove_client import Client, client
-from tests.grippers import active_gripper
+from tests.grippers import active_gripper, lose_link, shows, until
 
 SOCKETS = Path("/proc/net/tcp")
 LINUX = SOCKETS.exists()
@@ -63,8 +61,7 @@ def listening() -> set[tuple[str, int]]:
 async def test_every_poll_arrives(hand: RobotiqHand) -> None:
     async with viewed(hand) as client:
         await client.subscribe("/gripper/status")
-        while len(client.received) < 200:
-            await client.read()
+        await client.until(lambda: len(client.received) >= 200)
     sequences = [each["sequence"] for each in client.objects("/gripper/status")]
     assert sequences == list(range(sequences[0], sequences[0] + 200))
 
@@ -72,12 +69,11 @@ async def test_every_poll_arrives(hand: RobotiqHand) -> None:
 async def test_the_messages_have_what_their_schema_says(hand: RobotiqHand) -> None:
     async with viewed(hand) as one:
         await one.subscribe("/gripper/status", "/gripper/command", "/gripper/event", "/gripper/state")
-        while not one.received:
-            await one.read()
+        await one.until(lambda: bool(one.received))
         await hand.move(100, Finger.A)
-        while not all(one.objects(f"/gripper/{name}") for name in ("status", "command", "event", "state")):
-            await one.read()
-    for name in ("status", "command", "event", "state"):
+        names = ("status", "command", "event", "state")
+        await one.until(lambda: all(one.objects(f"/gripper/{name}") for name in names))
+    for name in names:
         channel = one.channels[f"/gripper/{name}"]
         assert (channel["encoding"], channel["schemaEncoding"]) == ("json", "jsonschema")
         assert json.loads(channel["schema"]) == SCHEMAS[name]
@@ -89,8 +85,7 @@ async def test_the_messages_have_what_their_schema_says(hand: RobotiqHand) -> No
 async def test_joint_states_are_read_by_another_implementation(hand: RobotiqHand) -> None:
     async with viewed(hand) as one:
         await one.subscribe("/joint_states")
-        while not one.received:
-            await one.read()
+        await one.until(lambda: bool(one.received))
     channel = one.channels["/joint_states"]
     assert (channel["encoding"], channel["schemaEncoding"]) == ("cdr", "ros2msg")
     _, nanoseconds, data = one.received[0]
@@ -101,20 +96,16 @@ async def test_joint_states_are_read_by_another_implementation(hand: RobotiqHand
 
 async def test_whoever_comes_late_is_told_the_state(hand: RobotiqHand, server: SimulatorServer) -> None:
     """A gripper that is lost tells nothing more; its state is published once a second all the same."""
-    server.refuse()
-    server.cut()
-    await hand.wait_for_state(State.DISCONNECTED)
+    await lose_link(server, hand)
     async with viewed(hand) as client:
         await client.subscribe("/gripper/state")
-        while not client.received:
-            await client.read()
+        await client.until(lambda: bool(client.received))
         state = client.objects("/gripper/state")[0]
         assert state["state"] == "DISCONNECTED"
         assert "fault" not in state, "what is not known is not told"
         assert state["polls"] == hand.statistics.polls
         await server.accept()
-        while client.objects("/gripper/state")[-1]["state"] != "RUNNING_IDLE":
-            await client.read()
+        await client.until(lambda: client.objects("/gripper/state")[-1]["state"] == "RUNNING_IDLE")
 
 
 async def test_the_hand_can_be_drawn(hand: RobotiqHand) -> None:
@@ -122,10 +113,7 @@ async def test_the_hand_can_be_drawn(hand: RobotiqHand) -> None:
     store = get_typestore(Stores.ROS2_HUMBLE)
     async with viewed(hand) as one:
         await one.subscribe("/robot_description", "/tf")
-        while not one.objects("/tf") or not any(
-            topic == "/robot_description" for topic, _, _ in one.received
-        ):
-            await one.read()
+        await one.until(lambda: {topic for topic, *_ in one.received} == {"/robot_description", "/tf"})
     data = next(data for topic, _, data in one.received if topic == "/robot_description")
     message: Any = store.deserialize_cdr(data, "std_msgs/msg/String")
     model = HandModel.parse(message.data)
@@ -143,8 +131,7 @@ async def test_the_hand_can_be_drawn(hand: RobotiqHand) -> None:
 async def test_viewers_are_offered_nothing_to_call(hand: RobotiqHand) -> None:
     async with Viewer(hand, port=0) as viewer, client(viewer) as one:
         await one.subscribe("/gripper/status")
-        while len(one.received) < 20:
-            await one.read()
+        await one.until(lambda: len(one.received) >= 20)
         assert one.services == {}
         assert one.told[0]["capabilities"] == []
 
@@ -157,9 +144,7 @@ async def test_nothing_that_concerns_viewers_delays_the_stop() -> None:
         async with viewer, hand, client(viewer):
             _, silent = await asyncio.open_connection("127.0.0.1", viewer.port)
             await hand.set_position(255)
-            async for status in hand.statuses():
-                if status.is_moving:
-                    break
+            await shows(hand, lambda status: status.is_moving)
             ends = asyncio.get_running_loop().time() + 5
         assert asyncio.get_running_loop().time() < ends, "nor does a client that says nothing, as a scanner"
         assert not gripper.request_registers[0] & 0x0800
@@ -182,37 +167,31 @@ async def test_cancelled_at_any_moment_it_leaves_nothing(hand: RobotiqHand, step
         await asyncio.sleep(0)
     using.cancel()
     await asyncio.gather(using, return_exceptions=True)
-    async with asyncio.timeout(5):
-        while listening() != before:  # noqa: ASYNC110
-            await asyncio.sleep(0.01)
+    await until(lambda: listening() == before, within=5)
 
 
 async def test_a_hand_that_is_started_again_is_shown_again(server: SimulatorServer) -> None:
     hand = RobotiqHand(server.address)
     async with Viewer(hand, port=0) as viewer, client(viewer) as one:
         await one.subscribe("/gripper/status", "/gripper/state")
-        while not one.objects("/gripper/state"):
-            await one.read()
+        await one.until(lambda: bool(one.objects("/gripper/state")))
         assert one.objects("/gripper/state")[0]["state"] == "DISCONNECTED", "it is not started yet"
         for _ in range(2):
             async with hand:
                 sequence = hand.status.sequence + 5
                 while not any(each["sequence"] > sequence for each in one.objects("/gripper/status")):
                     await one.read()
-        while one.objects("/gripper/state")[-1]["state"] != "SHUTDOWN":
-            await one.read()
+        await one.until(lambda: one.objects("/gripper/state")[-1]["state"] == "SHUTDOWN")
 
 
 async def test_the_state_is_told_when_it_changes(hand: RobotiqHand, gripper: SimulatedGripper) -> None:
     async with viewed(hand) as one:
         await one.subscribe("/gripper/state")
-        while not one.received:
-            await one.read()
+        await one.until(lambda: bool(one.received))
         gripper.inject_fault(Fault.SCISSOR_BLOCKED)
         await hand.wait_for_state(State.FAULT)
         told = asyncio.get_running_loop().time()
-        while one.objects("/gripper/state")[-1].get("fault_code") != 14:
-            await one.read()
+        await one.until(lambda: one.objects("/gripper/state")[-1].get("fault_code") == 14)
         assert asyncio.get_running_loop().time() - told < 0.5
         assert one.objects("/gripper/state")[-1]["description"] == Fault.SCISSOR_BLOCKED.description
 
@@ -222,8 +201,7 @@ async def test_a_control_loop_does_not_make_the_state_the_talk_of_the_town(hand:
         await one.subscribe("/gripper/state", "/gripper/event")
         for position in range(100):
             await hand.set_position(position)
-        while len(one.objects("/gripper/event")) < 200:
-            await one.read()
+        await one.until(lambda: len(one.objects("/gripper/event")) >= 200)
         assert len(one.objects("/gripper/state")) < 20
 
 
@@ -241,23 +219,12 @@ async def test_a_port_that_is_taken_and_ports_that_cannot_be(hand: RobotiqHand) 
 # -- the layout --------------------------------------------------------------------------------------------
 
 
-def test_the_layout_the_transforms_and_the_description_mean_the_same_hand() -> None:
+def test_the_layout_and_the_description_mean_the_same_hand() -> None:
     """A viewer finds the parts by the names of frames and joints, and by nothing else."""
-    panel = make_layout.panels()["3D!hand"]
-    robot = ET.fromstring(urdf())
-    links = {each.attrib["name"] for each in robot.findall("link")}
-    joints = {
-        each.attrib["name"]: (each[0].attrib["link"], each[1].attrib["link"])  # parent and child
-        for each in robot.findall("joint")
-    }
-    status = RobotiqStatus.from_registers([0] * 8, timestamp=0.0, sequence=0)
-    told = transforms(status, 0)["transforms"]
-    assert {(each["parent_frame_id"], each["child_frame_id"]) for each in told} == set(joints.values())
-    assert {panel["followTf"]} == links - {child for _, child in joints.values()}
-    assert set(panel["transforms"]) == {f"frame:{link}" for link in links}
+    panel, model = make_layout.panels()["3D!hand"], hand_model()
+    assert panel["followTf"] == model.root
+    assert set(panel["transforms"]) == {f"frame:{link}" for link in model.links}
     assert set(panel["topics"]) == {"/robot_description"}
-    moving = {each.attrib["name"] for each in robot.findall("joint") if each.attrib["type"] == "revolute"}
-    assert moving == set(JOINTS)
 
 
 def test_the_layout_shows_what_there_is() -> None:

@@ -24,7 +24,7 @@ from robotiq_async.tools.web.settings import PageSettings
 from robotiq_async.tools.wording import refusal_words
 from robotiq_async.values.enums import Trigger
 from tests.fake_hand import FakeHand
-from tests.grippers import active_gripper
+from tests.grippers import active_gripper, shows
 
 # -- commands ----------------------------------------------------------------------------------------------
 
@@ -152,9 +152,7 @@ async def test_a_page_that_is_gone_has_its_motion_held_and_no_other() -> None:
         pages = Pages(hand)
         pages.do("move", page="one", position=CLOSED, fingers="A")
         pages.do("move", page="two", position=100, fingers="B")
-        async for status in hand.statuses():
-            if status.moving & Finger.A and status.moving & Finger.B:
-                break
+        await shows(hand, lambda status: Finger.A | Finger.B in status.moving)
         pages.commands.gone("one")
         answers = [await pages.answer(), await pages.answer()]
         assert [each["page"] for each in answers] == ["one", "two"]
@@ -277,16 +275,12 @@ async def test_a_process_that_dies_is_noticed_and_its_motions_are_held() -> None
         async with PageServer([hand], settings, operators=[Operator(hand)]) as page:
             asked = {"page": "p", "number": 1, "at": monotonic(), "hand": 0, "name": "close"}
             page._hear({"do": {**asked, "arguments": {}}})
-            async for status in hand.statuses():
-                if status.is_moving:
-                    break
+            await shows(hand, lambda status: status.is_moving)
             page._process.kill()
             async with asyncio.timeout(20):
                 await page.ended()
-            async for status in hand.statuses():
-                if not status.is_moving:
-                    break
-            assert hand.status.position(Finger.A) < 200
+            stood = await shows(hand, lambda status: not status.is_moving)
+            assert stood.position(Finger.A) < 200
 
 
 # -- in touch ----------------------------------------------------------------------------------------------
