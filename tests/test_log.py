@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from robotiq_async.cli.output.messages import collected_warnings, forwarded_warnings
+from robotiq_async.cli.output.messages import forwarded_warnings
 from robotiq_async.runtime.log import Log, log, printable
 
 FORMAT = logging.Formatter("[%(hand)s] %(message)s")
@@ -58,8 +58,9 @@ def test_what_is_not_wanted_is_not_made(caplog: pytest.LogCaptureFixture) -> Non
 
 
 def test_where_one_hand_is_shown_its_name_is_left_out() -> None:
+    outside: list[str] = []
     told: list[str] = []
-    with collected_warnings() as outside, forwarded_warnings(told.append, of="left"):
+    with forwarded_warnings(outside.append), forwarded_warnings(told.append, of="left"):
         Log("left").warning("link lost")
         Log("right").warning("link lost")
     assert told == ["link lost", "right: link lost"]

@@ -26,8 +26,7 @@ def make_hand(
 ) -> Hand:
     """A hand that is not started. On the command line only this function knows which class an address needs.
 
-    Args:
-        control: on another host, whether to take control; None for with the first command.
+    On another host it takes control, or not, or with the first command (None).
     """
     if is_remote(address):
         need("zenoh", "fleet")
@@ -38,13 +37,7 @@ def make_hand(
         with usage():
             return RemoteHand(address, control=control)
     with usage():
-        return RobotiqHand(
-            address,
-            **link.options(),
-            poll_interval=poll_interval,
-            speed=speed,
-            force=force,
-        )
+        return RobotiqHand(address, **link.options(), poll_interval=poll_interval, speed=speed, force=force)
 
 
 def make_operator(address: str, link: Link, *, speed: int, force: int) -> Operator:
@@ -59,11 +52,8 @@ async def connected(
 ) -> AsyncIterator[Hand]:
     """A started hand; nothing has been written to the gripper.
 
-    Args:
-        address: the gripper.
-        link: options of the link.
-        halt: whether leaving stops the fingers; False for a command that only reads.
-        keep_grip: whether a grip stays in force then.
+    ``halt`` tells whether leaving stops the fingers (False for a command that only reads), ``keep_grip``
+    whether a grip stays in force then.
     """
     hand = make_hand(address, link, control=halt)
     try:

@@ -19,11 +19,6 @@ NOTE = "Nothing here has run on real hardware yet: keep a hand on the emergency 
 def consent(address: str, what: str, *, yes: bool) -> None:
     """Return when the user has agreed that a gripper moves; nothing has been sent before.
 
-    Args:
-        address: the gripper.
-        what: what will happen to it.
-        yes: ``--yes`` was given.
-
     Raises:
         UsageError: there is no terminal to ask at, or the address is malformed.
         CommandError: the answer is not yes.

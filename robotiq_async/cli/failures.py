@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
 
 class UsageError(Exception):
@@ -21,3 +23,17 @@ def usage() -> Iterator[None]:
         yield
     except (ValueError, TypeError) as error:
         raise UsageError(str(error)) from error
+
+
+@contextmanager
+def file_errors(file: Path) -> Iterator[None]:
+    """Turn OSError into CommandError, which names the file."""
+    try:
+        yield
+    except OSError as error:
+        raise CommandError(f"{file}: {error.strerror}") from error
+
+
+def normal_end() -> suppress:
+    """For commands that run until Ctrl-C, which cancels them."""
+    return suppress(asyncio.CancelledError)

@@ -14,7 +14,6 @@ import sys
 import textwrap
 from collections.abc import Mapping
 from contextlib import suppress
-from types import TracebackType
 from typing import Any, Final, Self
 
 from ..runtime.concurrency import in_a_thread
@@ -74,9 +73,7 @@ class Keyboard:
         self._loop.add_reader(self._file, self._read)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         import termios
 
         self._loop.remove_reader(self._file)

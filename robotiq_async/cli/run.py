@@ -19,7 +19,7 @@ from cyclopts import CycloptsError
 from ..values.errors import RobotiqError
 from .app import build
 from .failures import CommandError, UsageError
-from .output.messages import collected_warnings, forget, tell
+from .output.messages import forget, forwarded_warnings, tell
 
 _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 SUCCESS, FAILURE, WRONG_USAGE, SIGNALLED = 0, 1, 2, 128
@@ -28,7 +28,8 @@ SUCCESS, FAILURE, WRONG_USAGE, SIGNALLED = 0, 1, 2, 128
 def run(arguments: Sequence[str]) -> int:
     """Run the sub-command that the arguments name and return the exit code."""
     _mend_streams()
-    with collected_warnings() as warnings, _Signals() as signals:
+    warnings: list[str] = []
+    with forwarded_warnings(warnings.append), _Signals() as signals:
         code, problem = _outcome(arguments, signals)
     # A failure is always one line, for logs and scripts.
     lines = warnings if problem is None else ["; ".join((problem, *warnings))]

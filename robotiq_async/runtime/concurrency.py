@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import threading
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -60,6 +61,19 @@ def in_a_thread(work: Callable[[], T]) -> asyncio.Future[T]:
 
     threading.Thread(target=run, name="robotiq_async", daemon=True).start()
     return future
+
+
+def write_all(descriptor: int, data: bytes) -> None:
+    """Write all of the data. Blocks until the other side has taken it: call it in a thread.
+
+    It bypasses Python's buffers: at exit the interpreter would wait for a thread that uses one.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    left = memoryview(data)
+    while left:
+        left = left[os.write(descriptor, left) :]
 
 
 def running_loop() -> asyncio.AbstractEventLoop:

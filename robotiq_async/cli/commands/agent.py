@@ -81,13 +81,9 @@ async def _serve(settings: AgentSettings) -> None:
     from ...fleet.agent.records import file_records
     from ...fleet.network.configuration import agent_configuration
 
+    site, host = settings.site, settings.host
     configuration = agent_configuration(
-        settings.site,
-        settings.host,
-        settings.listen,
-        settings.connect,
-        keys=settings.keys,
-        insecure=settings.insecure,
+        site, host, settings.listen, settings.connect, keys=settings.keys, insecure=settings.insecure
     )
     if settings.insecure:
         tell("anyone who reaches this host can command its grippers: there are no keys")
@@ -96,14 +92,7 @@ async def _serve(settings: AgentSettings) -> None:
         bus = await _open(configuration, ", ".join(settings.listen or settings.connect))
         try:
             with forwarded_warnings(tell):
-                served = Agent(
-                    settings.site,
-                    settings.host,
-                    hands,
-                    bus,
-                    window=settings.window,
-                    records=file_records(),
-                )
+                served = Agent(site, host, hands, bus, window=settings.window, records=file_records())
                 await served.run(lambda: _announce(served, settings))
         finally:
             await bus.close()

@@ -14,7 +14,7 @@ from cyclopts import Parameter
 from ...runtime.clock import now
 from ...runtime.log import printable
 from ..arguments import Flag, need
-from ..failures import CommandError, UsageError, usage
+from ..failures import CommandError, UsageError, normal_end, usage
 
 if TYPE_CHECKING:
     from ...fleet.fleet import Fleet, Member
@@ -100,20 +100,19 @@ async def halt(site: Site = None, /) -> None:
 
 async def _watch(seen: Fleet, show: Callable[[Member], None]) -> None:
     changes = seen.changes()
-    try:
+    with normal_end():
         for member in seen:
             show(member)
         async for member in changes:
             show(member)
-    except asyncio.CancelledError:
-        pass  # Ctrl-C is the normal end of this command.
 
 
 def _print_row(member: Member) -> None:
     state = "gone" if not member.is_there else "?" if member.state is None else member.state.name
     fault = "-" if not member.fault else member.fault.name
     problem = f"{member.agents} AGENTS  " * (member.agents > 1) + member.problem
-    words = f"{_age(member)} {problem}".rstrip()
+    age = "-" if member.seen_at is None else f"{now() - member.seen_at:.1f} s"
+    words = f"{age} {problem}".rstrip()
     row = _ROW.format(str(member.name), state, fault, member.holder or "-", words)
     print(printable(row.rstrip()), flush=True)
 
@@ -133,10 +132,6 @@ def _print_object(member: Member) -> None:
         "age": None if member.seen_at is None else round(now() - member.seen_at, 3),
     }
     print(json.dumps(fields), flush=True)
-
-
-def _age(member: Member) -> str:
-    return "-" if member.seen_at is None else f"{now() - member.seen_at:.1f} s"
 
 
 _MAY: Final = {"read": "watch", "halt": "watch and halt", "operate": "watch, halt and command"}
@@ -234,21 +229,13 @@ def _make(folder: Path, subjects: list[Subject], days: int) -> None:
         print(f"{make_authority(folder)}: the authority. {AUTHORITY_KEY} beside it never leaves this folder.")
     for subject in subjects:
         path = issue(folder, subject.name, subject.role, hosts=subject.hosts, days=days)
-        print(f"{path}: {_destination(subject)}")
+        if subject.role is Role.AGENT:
+            use = f"the agent on {subject.name}; clients connect to it by {', '.join(subject.hosts)}"
+        else:
+            use = f"{subject.name}, who may {_MAY[subject.role.value]}"
+        print(f"{path}: for {use}")
     if any(subject.role is not Role.AGENT for subject in subjects):
-        _tell_lists(access_lists(folder))
-
-
-def _destination(subject: Subject) -> str:
-    from ...fleet.keys.access import Role
-
-    if subject.role is Role.AGENT:
-        return f"for the agent on {subject.name}; clients connect to it by {', '.join(subject.hosts)}"
-    return f"for {subject.name}, who may {_MAY[subject.role.value]}"
-
-
-def _tell_lists(lists: list[Path]) -> None:
-    own, *copies = lists
-    print(f"{own}: who may do what")
-    for copy in copies:
-        print(f"{copy}: a copy; agents use it from their next start on")
+        own, *copies = access_lists(folder)
+        print(f"{own}: who may do what")
+        for copy in copies:
+            print(f"{copy}: a copy; agents use it from their next start on")

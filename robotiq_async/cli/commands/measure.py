@@ -58,8 +58,8 @@ def check(address: str, output: Path, speedup: float | None, runs: int, step: in
 
 
 @asynccontextmanager
-async def gripper(
-    address: str, speedup: float, prepare: Callable[[SimulatedGripper], None] = lambda _: None
+async def _gripper(
+    address: str, speedup: float, prepare: Callable[[SimulatedGripper], None]
 ) -> AsyncIterator[Hand]:
     """An active hand; sim:// runs in its own, faster time."""
     from ..connect import make_hand
@@ -80,30 +80,47 @@ async def gripper(
         yield hand
 
 
-def load_rich() -> None:
-    import rich.progress  # noqa: F401  # now: that takes 0.1 s, in which a hand could not poll
-
-
-async def carry_out(
+async def measure_left(
+    address: str,
+    speedup: float,
     campaign: Campaign,
-    measure_run: Callable[[int, int], Awaitable[int]],
+    measure_run: Callable[[Hand, int, int], Awaitable[int]],
     seconds_of: Callable[[int], float],
     what: str,
     *,
+    prepare: Callable[[SimulatedGripper], None] = lambda _: None,
     bar: bool = True,
 ) -> None:
     """Measure the remaining values, with a progress bar that knows the duration of each row.
 
     Without ``bar`` there is no bar: it would overwrite the user's input.
     """
+    if not campaign.left:
+        print(f"{campaign.path} is complete: nothing is measured again.")
+        return
+    print(gripper_words(address), flush=True)
+    import rich.progress  # noqa: F401  # now: that takes 0.1 s, in which a hand could not poll
+
+    async with _gripper(address, speedup, prepare) as hand:
+        await _carry_out(hand, campaign, measure_run, seconds_of, what, bar=bar)
+
+
+async def _carry_out(
+    hand: Hand,
+    campaign: Campaign,
+    measure_run: Callable[[Hand, int, int], Awaitable[int]],
+    seconds_of: Callable[[int], float],
+    what: str,
+    *,
+    bar: bool,
+) -> None:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     from ...values.calibration.csv_tables import TableError
 
-    done, left = len(campaign.table), campaign.left
-    if done and left:
-        print(f"Continuing {campaign.path}: {done} rows are there, {len(left)} remain.", flush=True)
+    if done := len(campaign.table):
+        print(f"Continuing {campaign.path}: {done} rows are there, {len(campaign.left)} remain.", flush=True)
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -115,13 +132,13 @@ async def carry_out(
     with Progress(
         *columns, console=Console(stderr=True), disable=not (bar and sys.stderr.isatty())
     ) as progress:
-        task = progress.add_task(what, total=campaign.runs * sum(seconds_of(value) for value in left))
+        task = progress.add_task(what, total=campaign.runs * sum(map(seconds_of, campaign.left)))
 
         readings: list[str] = []
 
         async def run(value: int, number: int) -> int:
             progress.update(task, description=f"{what} {value}, run {number}")
-            reading = await measure_run(value, number)
+            reading = await measure_run(hand, value, number)
             progress.advance(task, seconds_of(value))
             readings.append(str(reading))
             if number == campaign.runs:
@@ -211,19 +228,14 @@ def speed(
 async def _measure(address: str, campaign: Campaign, fingers: Finger, speedup: float, plot: bool) -> None:
     from ...tools.measure.campaigns import expected_seconds, time_closing
 
+    async def run(hand: Hand, value: int, _: int) -> int:
+        return round(1000 * await time_closing(hand, value, fingers, speedup))
+
     output = campaign.path
-    if not campaign.left:
-        print(f"{output} is complete: nothing is measured again.")
-    if campaign.left:
-        print(gripper_words(address), flush=True)
-        load_rich()
-        async with gripper(address, speedup) as hand:
-
-            async def run(value: int, _: int) -> int:
-                return round(1000 * await time_closing(hand, value, fingers, speedup))
-
-            await carry_out(campaign, run, lambda value: expected_seconds(value) / speedup, "speed")
-    print_files([output])
+    await measure_left(
+        address, speedup, campaign, run, lambda value: expected_seconds(value) / speedup, "speed"
+    )
+    print(output)
     if plot:
         from ...tools.measure.plots import plot_speed
 

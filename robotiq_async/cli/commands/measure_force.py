@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import asyncio
 import re
-import threading
 from collections.abc import Awaitable, Callable, Coroutine
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
+from ...runtime.concurrency import in_a_thread
 from ...values.enums import DEFAULT_SPEED, Finger
 from ...values.model import THREE_FINGER
-from ..addresses import full_address, gripper_words, is_simulated, named_model
+from ..addresses import full_address, is_simulated, named_model
 from ..arguments import Address, Byte, Yes
 from ..consent import consent, read_line
 from ..failures import CommandError, UsageError
-from .measure import NoPlot, Runs, Speedup, carry_out, check, file_errors, gripper, load_rich, print_files
+from .measure import NoPlot, Runs, Speedup, check, file_errors, measure_left, print_files
 
 if TYPE_CHECKING:
+    from ...hand import Hand
     from ...simulator import SimulatedGripper
     from ...tools.measure.campaigns import Campaign, Currents
     from ...values.calibration.csv_tables import Table
@@ -109,24 +109,23 @@ async def _measure(
 
     output = campaign.path
     currents_file = currents_beside(output)
-    if not campaign.left:
-        print(f"{output} is complete: nothing is measured again.")
-    if campaign.left:
-        print(gripper_words(address), flush=True)
-        load_rich()
-        async with gripper(address, speedup, lambda simulated: _place_scale(simulated, surface)) as hand:
+    seconds = (closing_time(speed) + closing_time(255) + GRASP_S) / speedup
 
-            async def run(value: int, number: int) -> int:
-                samples = await grasp(hand, value, speed, speedup)
-                reading = await read_scale(value, number)
-                currents[value] = [*(currents.get(value, []) if number > 1 else []), samples]
-                if number == campaign.runs:
-                    # Before the row, so that every row has its currents.
-                    await asyncio.to_thread(write_currents, currents_file, currents)
-                return reading
+    def place_scale(simulated: SimulatedGripper) -> None:
+        simulated.place_object(Finger.ABC, position=150, soft=40 if surface == "foam" else 0)
 
-            seconds = (closing_time(speed) + closing_time(255) + GRASP_S) / speedup
-            await carry_out(campaign, run, lambda _: seconds, "force", bar=bar)
+    async def run(hand: Hand, value: int, number: int) -> int:
+        samples = await grasp(hand, value, speed, speedup)
+        reading = await read_scale(value, number)
+        currents[value] = [*(currents.get(value, []) if number > 1 else []), samples]
+        if number == campaign.runs:
+            # Before the row, so that every row has its currents.
+            await asyncio.to_thread(write_currents, currents_file, currents)
+        return reading
+
+    await measure_left(
+        address, speedup, campaign, run, lambda _: seconds, "force", prepare=place_scale, bar=bar
+    )
     print_files([output, currents_file])
     if plot:
         _plot(output, surface, campaign.table, "simulated" if is_simulated(address) else "measured")
@@ -149,10 +148,6 @@ def _currents_of(campaign: Campaign) -> Currents:
     return currents
 
 
-def _place_scale(simulated: SimulatedGripper, surface: str) -> None:
-    simulated.place_object(Finger.ABC, position=150, soft=40 if surface == "foam" else 0)
-
-
 def _scale(
     address: str, surface: Literal["foam", "rigid"], readings: Table | None, values: list[int], runs: int
 ) -> Callable[[int, int], Awaitable[int]]:
@@ -162,21 +157,12 @@ def _scale(
         if missing:
             raise CommandError(f"the table of readings has no {runs} runs for the force values {missing}")
 
-    async def from_table(value: int, run: int) -> int:
-        assert readings is not None
-        return readings[value][run - 1]
+        async def from_table(value: int, run: int) -> int:
+            return readings[value][run - 1]
 
-    async def typed(value: int, run: int) -> int:
-        while True:
-            text = await _prompt(f"Force {value}, run {run}: what does the scale show, in grams?")
-            if re.fullmatch("[0-9]{1,6}", text) and int(text) <= MOST_GRAMS:
-                return int(text)
-            print(f"An integer in 0..{MOST_GRAMS}, please.")
-
-    if readings is not None:
         return from_table
     if not is_simulated(address):
-        return typed
+        return _typed
     from ...simulator.physics.scale import SimulatedScale
 
     simulated = SimulatedScale(surface)
@@ -187,24 +173,18 @@ def _scale(
     return shown
 
 
+async def _typed(value: int, run: int) -> int:
+    while True:
+        text = await _prompt(f"Force {value}, run {run}: what does the scale show, in grams?")
+        if re.fullmatch("[0-9]{1,6}", text) and int(text) <= MOST_GRAMS:
+            return int(text)
+        print(f"An integer in 0..{MOST_GRAMS}, please.")
+
+
 async def _prompt(question: str) -> str:
     """A line that the user types; the event loop keeps running."""
-    loop = asyncio.get_running_loop()
-    answer: asyncio.Future[str] = loop.create_future()
     print(question, end=" ", flush=True)
-
-    def read() -> None:
-        line = read_line()
-        with suppress(RuntimeError):  # the loop has been closed meanwhile
-            loop.call_soon_threadsafe(take, line)
-
-    def take(line: str) -> None:
-        if not answer.done():
-            answer.set_result(line)
-
-    # A daemon thread: an interrupted program does not wait for the line.
-    threading.Thread(target=read, daemon=True).start()
-    line = await answer
+    line = await in_a_thread(read_line)
     if not line:
         raise CommandError("no answer: the input ended")
     return line.strip()
@@ -226,8 +206,5 @@ def _plot(output: Path, surface: str, table: Table, label: str) -> None:
     with file_errors():
         print_files(plot_force(stem, table, surface, label))
         print_files(plot_peak_currents(base.with_name(f"{base.name}_peak"), currents, surface, label))
-        print_files(
-            plot_current_over_time(
-                base.with_name(f"{base.name}_over_time"), dict(sorted(over_time.items())), label
-            )
-        )
+        by_surface = dict(sorted(over_time.items()))
+        print_files(plot_current_over_time(base.with_name(f"{base.name}_over_time"), by_surface, label))

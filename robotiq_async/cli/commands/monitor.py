@@ -6,16 +6,19 @@ import asyncio
 import json
 import os
 import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from typing import Annotated, Final
 
 from cyclopts import Parameter
 
+from ...hand import Hand
 from ...tools.recording.payloads import reading_fields
 from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Byte, Flag, Link, need
 from ..consent import forget_keys
-from ..failures import CommandError, UsageError
+from ..failures import CommandError, UsageError, normal_end
 from ..output.messages import forget, forwarded_warnings, tell
 
 SCREEN_S: Final = 1.0
@@ -67,14 +70,12 @@ async def monitor(
     """
     if watch and as_json:
         raise UsageError("--watch and --json cannot be combined")
-    try:
+    with normal_end():
         if watch or as_json or not _is_terminal():
             await _look(address, link, as_json=not watch)
-            return
-        need("textual", "monitor", ", or pass --watch")
-        await _screen(address, link, speed, force)
-    except asyncio.CancelledError:
-        pass  # Ctrl-C is the normal end of this command.
+        else:
+            need("textual", "monitor", ", or pass --watch")
+            await _screen(address, link, speed, force)
 
 
 def _is_terminal() -> bool:
@@ -84,16 +85,24 @@ def _is_terminal() -> bool:
 
 
 async def _look(address: str, link: Link, *, as_json: bool) -> None:
-    from ..connect import connected
     from ..output.lines import print_objects, watch
+
+    async with _named(address, link, as_json=as_json) as hand:
+        await (print_objects if as_json else watch)(hand)
+    raise CommandError("the hand has failed; the reason is above")
+
+
+@asynccontextmanager
+async def _named(address: str, link: Link, *, as_json: bool) -> AsyncIterator[Hand]:
+    """A hand to look at; the line that names the gripper is not among the JSON."""
+    from ..connect import connected
 
     if not as_json:
         print(gripper_words(address), flush=True)
     async with connected(address, link, halt=False) as hand:
         if as_json:
             tell(gripper_words(address))
-        await (print_objects if as_json else watch)(hand)
-    raise CommandError("the hand has failed; the reason is above")
+        yield hand
 
 
 async def _screen(address: str, link: Link, speed: int, force: int) -> None:
@@ -115,16 +124,12 @@ async def _screen(address: str, link: Link, speed: int, force: int) -> None:
         if screen is not None:
             showing.cancel()
             await asyncio.wait({showing}, timeout=SCREEN_S)
-        _say(words)
+        try:
+            print(words, flush=True)
+        except OSError:  # the terminal is gone
+            forget(sys.stdout)
     if screen.return_code:
         raise CommandError("the screen failed; its message is above")
-
-
-def _say(words: str) -> None:
-    try:
-        print(words, flush=True)
-    except OSError:  # the terminal is gone
-        forget(sys.stdout)
 
 
 async def status(
@@ -144,14 +149,10 @@ async def status(
     Args:
         as_json: Print one JSON object instead of the table.
     """
-    from ..connect import connected
     from ..output.tables import print_status
 
-    if not as_json:
-        print(gripper_words(address), flush=True)
-    async with connected(address, link, halt=False) as hand:
+    async with _named(address, link, as_json=as_json) as hand:
         if as_json:
-            tell(gripper_words(address))
             print(json.dumps(reading_fields(hand), indent=2))
         else:
             print_status(hand)

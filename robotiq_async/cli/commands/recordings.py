@@ -14,7 +14,7 @@ from cyclopts import Parameter
 from ...runtime.log import printable
 from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Flag, Link, need
-from ..failures import CommandError, UsageError
+from ..failures import CommandError, UsageError, file_errors, normal_end
 from ..output.lines import FORMATTERS, brief_line, clock
 
 if TYPE_CHECKING:
@@ -53,7 +53,10 @@ def replay(
     if as_picture:
         plot(file, overwrite=overwrite)
         return
-    lines = (_brief if brief else _lines)(_in_order(file))
+    entries = _entries(file)
+    from ...tools.recording.table import in_order
+
+    lines = (_brief if brief else _lines)(in_order(entries))
     is_empty = True
     for line in lines:
         print(line)
@@ -62,12 +65,11 @@ def replay(
         raise CommandError(f"{file}: it contains nothing for this command")
 
 
-def _in_order(file: Path) -> Iterator[Entry]:
+def _entries(file: Path) -> Iterator[Entry]:
     need("mcap", "record")
     from ...tools.recording.recordings import read_recording
-    from ...tools.recording.table import in_order
 
-    return in_order(entry for entry in read_recording(file) if entry.is_json)
+    return (entry for entry in read_recording(file) if entry.is_json)
 
 
 def _lines(entries: Iterable[Entry]) -> Iterator[str]:
@@ -125,8 +127,7 @@ def export(
         target: The table, named .csv (default: named as the recording).
         of: What has a row.
     """
-    need("mcap", "record")
-    from ...tools.recording.recordings import read_recording
+    entries = _entries(file)
     from ...tools.recording.table import export as write
 
     table = target or file.with_suffix(".csv")
@@ -135,11 +136,8 @@ def export(
     if table.resolve() == file.resolve():
         raise UsageError(f"{file} is the table itself: name the recording")
     _keep(table, overwrite=overwrite)
-    entries = (entry for entry in read_recording(file) if entry.is_json)
-    try:
+    with file_errors(table):
         rows = write(entries, KINDS[of], table)
-    except OSError as error:
-        raise CommandError(f"{table}: {error.strerror}") from error
     if not rows:
         raise CommandError(f"{file}: it contains no {of}")
     print(f"{rows} {of} in {table}")
@@ -163,19 +161,16 @@ def plot(file: Path, picture: Path | None = None, /, *, overwrite: Overwrite = F
         file: The recording.
         picture: Name of the plot without suffix (default: that of the recording).
     """
-    need("mcap", "record")
+    entries = _entries(file)
     need("matplotlib", "plot")
     from ...tools.measure.plots import plot_recording
-    from ...tools.recording.recordings import read_recording
 
     target = picture or file
     if target.suffix in (".mcap", ".png", ".svg"):
         target = target.with_suffix("")
     _keep(*(target.with_name(f"{target.name}.{suffix}") for suffix in ("png", "svg")), overwrite=overwrite)
-    try:
-        pictures = plot_recording(target, (entry for entry in read_recording(file) if entry.is_json))
-    except OSError as error:
-        raise CommandError(f"{target}: {error.strerror}") from error
+    with file_errors(target):
+        pictures = plot_recording(target, entries)
     if not pictures:
         raise CommandError(f"{file}: it contains no status")
     for written in pictures:
@@ -251,7 +246,7 @@ async def record(
     if not is_table(file):
         need("mcap", "record", ", or record a table, .csv")
     print(gripper_words(address), flush=True)
-    try:
+    with normal_end():
         async with connected(address, link, halt=False) as hand:
             recorder = Recorder(hand, file, ros2=ros2)
             try:
@@ -263,8 +258,6 @@ async def record(
             finally:
                 if recorder.recorded:
                     _tell_figures(recorder, hand)
-    except asyncio.CancelledError:
-        pass  # Ctrl-C is the normal end of this command.
 
 
 def _tell_figures(recorder: Recorder, hand: Hand) -> None:

@@ -14,11 +14,11 @@ from ...values.errors import RobotiqError
 from ...values.model import model_of
 from ...values.registers import RTU_REGISTERS
 from ..arguments import Byte, Flag, Host, Port, Unit
-from ..failures import usage
+from ..failures import normal_end, usage
 from ..output.messages import tell
 
 if TYPE_CHECKING:
-    from ...simulator import SimulatedGripper, Trouble
+    from ...simulator import SimulatedGripper
 
 
 async def simulate(
@@ -124,14 +124,13 @@ async def simulate(
     if serial is None and not is_loopback(host):
         tell(f"anyone who reaches {host} can command this gripper")
     try:
-        async with server:
-            for habit in LIKE_HARDWARE if like_hardware else ():
-                await server.fault_injector.begin(habit)
-            print(server.address, flush=True)
-            await server.fault_injector.run(plan, _tell)
-            await asyncio.Event().wait()
-    except asyncio.CancelledError:
-        pass  # Ctrl-C is the normal end of this command.
+        with normal_end():
+            async with server:
+                for habit in LIKE_HARDWARE if like_hardware else ():
+                    await server.fault_injector.begin(habit)
+                print(server.address, flush=True)
+                await server.fault_injector.run(plan, lambda trouble: tell(f"trouble: {trouble}"))
+                await asyncio.Event().wait()
     except ImportError as error:
         raise RobotiqError(str(error)) from error
     except BrokenPipeError:
@@ -147,10 +146,6 @@ def _place(gripper: SimulatedGripper, position: int | None, *, fixed: bool) -> N
         gripper.place_object(Finger.ABC, position, fixed=fixed)
     elif fixed:
         raise ValueError("--fixed is about an object: give it with --object")
-
-
-def _tell(trouble: Trouble) -> None:
-    tell(f"trouble: {trouble}")
 
 
 def _list_troubles() -> None:

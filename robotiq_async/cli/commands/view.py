@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from ...runtime.sockets import is_loopback
 from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Host, Link, Port, need
-from ..failures import CommandError
+from ..failures import file_errors, normal_end
 from ..output.messages import tell
 
 
@@ -53,24 +53,18 @@ async def view(
 
     if not is_loopback(host):
         tell(f"anyone who reaches {host} can see this gripper: there is no password")
-    try:
-        with forwarded_warnings(tell):
-            async with (
-                connected(address, link, halt=False) as hand,
-                Viewer(hand, host=host, port=port) as viewer,
-            ):
-                tell(gripper_words(address))
-                print(viewer.url, flush=True)
-                await asyncio.Event().wait()
-    except asyncio.CancelledError:
-        pass  # Ctrl-C is the normal end of this command.
+    with normal_end(), forwarded_warnings(tell):
+        async with (
+            connected(address, link, halt=False) as hand,
+            Viewer(hand, host=host, port=port) as viewer,
+        ):
+            tell(gripper_words(address))
+            print(viewer.url, flush=True)
+            await asyncio.Event().wait()
 
 
 def _write(layout: Path) -> None:
     text = (files("robotiq_async") / "data" / "foxglove_layout.json").read_text(encoding="utf-8")
-    try:
-        with open(layout, "x", encoding="utf-8") as file:
-            file.write(text)
-    except OSError as error:
-        raise CommandError(f"{layout}: {error.strerror}") from error
+    with file_errors(layout), open(layout, "x", encoding="utf-8") as file:
+        file.write(text)
     print(layout)

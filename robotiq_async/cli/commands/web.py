@@ -18,7 +18,7 @@ from ...values.errors import RobotiqError
 from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Byte, Flag, Host, Link, Port, need
 from ..browser import opened
-from ..failures import CommandError, UsageError, usage
+from ..failures import CommandError, UsageError, file_errors, normal_end, usage
 from ..output.messages import tell
 
 if TYPE_CHECKING:
@@ -93,11 +93,8 @@ async def web(
     page = PageServer(
         [operator.hand for operator in operators], settings, operators=operators if control else ()
     )
-    try:
-        with forwarded_warnings(tell):
-            await _show(page, operators, settings, shown, open_browser=open_browser)
-    except asyncio.CancelledError:
-        pass  # Ctrl-C is the normal end of this command.
+    with normal_end(), forwarded_warnings(tell):
+        await _show(page, operators, settings, shown, open_browser=open_browser)
 
 
 async def _show(
@@ -110,34 +107,22 @@ async def _show(
 ) -> None:
     async with page, AsyncExitStack() as stack:
         try:
-            await _serve(page, operators, settings, shown, stack, open_browser=open_browser)
+            for index, operator in enumerate(operators):
+                await _start(page, index, operator, alone=len(operators) == 1, stack=stack)
+            if all(updates.problem for updates in page.updates):
+                raise CommandError("; ".join(updates.problem for updates in page.updates))
+            for address in shown:
+                tell(gripper_words(address))
+            if not settings.loopback and not settings.certificate:
+                tell("without a certificate everyone on the network can read the password")
+            print(page.url, flush=True)
+            if open_browser and not await stack.enter_async_context(opened(page.url)):
+                tell("no browser could be opened here: open the address above yourself")
+            await page.ended()
+            raise CommandError("the process of the page has ended; its message is above")
         finally:
             # First, so that neither the page nor an unreachable gripper delays it.
             await _leave_all(operators, page)
-
-
-async def _serve(
-    page: PageServer,
-    operators: Sequence[Operator],
-    settings: PageSettings,
-    shown: Sequence[str],
-    stack: AsyncExitStack,
-    *,
-    open_browser: bool,
-) -> None:
-    for index, operator in enumerate(operators):
-        await _start(page, index, operator, alone=len(operators) == 1, stack=stack)
-    if all(updates.problem for updates in page.updates):
-        raise CommandError("; ".join(updates.problem for updates in page.updates))
-    for address in shown:
-        tell(gripper_words(address))
-    if not settings.loopback and not settings.certificate:
-        tell("without a certificate everyone on the network can read the password")
-    print(page.url, flush=True)
-    if open_browser and not await stack.enter_async_context(opened(page.url)):
-        tell("no browser could be opened here: open the address above yourself")
-    await page.ended()
-    raise CommandError("the process of the page has ended; its message is above")
 
 
 async def _start(
@@ -205,9 +190,8 @@ def _readable(file: Path | None) -> str:
 
 def _text(file: Path) -> str:
     try:
-        return file.read_text(encoding="utf-8")
-    except OSError as error:
-        raise CommandError(f"{file}: {error.strerror}") from error
+        with file_errors(file):
+            return file.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         raise UsageError(f"{file} is not a text file") from error
 

@@ -10,10 +10,9 @@ from collections.abc import Callable, Iterator
 from datetime import datetime
 from typing import TYPE_CHECKING, Any, Final
 
-from ...runtime.concurrency import in_a_thread
+from ...runtime.concurrency import in_a_thread, write_all
 from ...tools.recording.feed import Timeline, compact
 from ...tools.recording.payloads import Fields, is_command
-from ...tools.recording.raw_output import write_all
 from ...values.enums import Finger, State, Trigger
 from ...values.status import NO_REQUEST, RobotiqStatus
 from .messages import forwarded_warnings
@@ -110,7 +109,7 @@ async def print_objects(hand: Hand, buffer: int = BUFFER) -> None:
 
 async def watch(hand: Hand) -> None:
     """Print the state; then every transition and fault, and the newest status if its line has changed."""
-    await in_a_thread(lambda: _write(f"{clock(time.time())} state    {hand.state.name}\n".encode()))
+    await _write(f"{clock(time.time())} state    {hand.state.name}\n".encode())
     await _print(_History(hand, BUFFER), _TextLines(), WATCH_INTERVAL_S)
 
 
@@ -121,13 +120,13 @@ async def _print(history: _History, formatter: Formatter, interval: float) -> No
             ended = history.hand.state is State.SHUTDOWN  # and once more for the last events
             if lines := formatter(list(history.new())):
                 data = "".join(f"{line}\n" for line in lines).encode()
-                # The reader may be slow: a full pipe must not block the event loop that polls, nor the stop.
-                await in_a_thread(lambda: _write(data))  # noqa: B023  # awaited before it changes
+                await _write(data)
             await asyncio.sleep(interval)
 
 
-def _write(data: bytes) -> None:
-    write_all(sys.stdout.fileno(), data)
+async def _write(data: bytes) -> None:
+    # The reader may be slow: a full pipe must not block the event loop that polls, nor the stop.
+    await in_a_thread(lambda: write_all(sys.stdout.fileno(), data))
 
 
 class _History:

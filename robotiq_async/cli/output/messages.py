@@ -31,20 +31,10 @@ class _Forwarder(logging.Handler):
 
 
 @contextmanager
-def collected_warnings() -> Iterator[list[str]]:
-    """Collect the library's warnings, to print them after the command."""
-    messages: list[str] = []
-    with forwarded_warnings(messages.append):
-        yield messages
-
-
-@contextmanager
 def forwarded_warnings(to: Callable[[str], object], *, of: str = "") -> Iterator[None]:
     """Forward warnings of the library and of foxglove-sdk to a function, and not to outer ones.
 
-    Args:
-        to: the function.
-        of: name of the only hand there, which is then left out of the warnings.
+    ``of`` is the name of the only hand there, which is then left out of the warnings.
     """
     foxglove = logging.getLogger("foxglove")
     log, forwarder = logging.getLogger("robotiq_async"), _Forwarder(to, of)

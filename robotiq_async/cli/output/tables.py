@@ -23,16 +23,15 @@ def print_status(hand: Hand) -> None:
     print(f"{hand.state.name}: {_activation(last)}, {'moving' if last.is_moving else 'not moving'}")
     if last.fault is not Fault.NONE:
         print(f"{last.fault.severity.value} fault 0x{int(last.fault):02X}: {last.fault.description}")
-    rows = [
-        (
-            last.position(axis),
-            last.requested_position(axis),
-            axis_words(last.axis_state(axis)),
-            last.current_ma(axis),
-        )
-        for axis in last.model.axes
-    ]
-    _print_table(("position", "requested", "state", "mA"), last.model.axes, rows)
+    axes = last.model.axes
+    states = [axis_words(last.axis_state(axis)) for axis in axes]
+    columns = (
+        map(last.position, axes),
+        map(last.requested_position, axes),
+        states,
+        map(last.current_ma, axes),
+    )
+    _print_table(("position", "requested", "state", "mA"), axes, [*zip(*columns, strict=True)])
 
 
 def _activation(status: RobotiqStatus) -> str:
@@ -45,7 +44,7 @@ def print_outcomes(result: MoveResult) -> None:
     """Print a row for every axis of the move, then its duration."""
     axes = list(result.outcomes)
     rows = [
-        (result.positions[axis], result.outcomes[axis].name, result.peak_current_ma[axis]) for axis in axes
+        (result.positions[each], result.outcomes[each].name, result.peak_current_ma[each]) for each in axes
     ]
     _print_table(("position", "outcome", "peak mA"), axes, rows)
     print(f"{result.duration:.2f} s, {'an object is in the way' if result.object_detected else 'no contact'}")

@@ -7,7 +7,7 @@ the one that polls.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, Protocol
+from typing import Final
 
 from rich.text import Text
 
@@ -23,25 +23,8 @@ _ERASE: Final = frozenset({"backspace", "delete", "ctrl+h"})
 _LETTERS: Final = {"a": Finger.A, "b": Finger.B, "c": Finger.C, "s": Finger.SCISSOR}
 
 
-class Asking(Protocol):
-    """A question that takes the keys, except those that halt."""
-
-    @property
-    def text(self) -> Text:
-        """The text of the question, with the keys so far."""
-
-    def press(self, key: str) -> bool:
-        """Take a key by textual's name for it; returns whether it was the last."""
-
-
 class Question:
-    """Asks before a dangerous action.
-
-    Args:
-        question: what it is about.
-        warning: the consequences.
-        yes: called after a yes.
-    """
+    """Asks before a dangerous action; ``yes`` is called after a yes."""
 
     def __init__(self, question: str, warning: str, yes: Callable[[], None]) -> None:
         self._question, self._warning, self._yes = question, warning, yes
@@ -60,7 +43,7 @@ class Question:
         return text
 
     def press(self, key: str) -> bool:
-        """Only yes and no count, and a yes not too early."""
+        """Take a key by textual's name; returns whether it was the last. A yes does not count too early."""
         if key == "y" and self.is_open:
             self._yes()
             return True
@@ -104,3 +87,6 @@ class Target:
         elif len(key) == 1 and key in "0123456789" and int(self._digits + key) <= CLOSED:
             self._digits = str(int(self._digits + key))
         return False
+
+
+Asking = Question | Target  # takes the keys, except those that halt

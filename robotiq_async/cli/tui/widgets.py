@@ -138,20 +138,12 @@ def sparkline(values: Sequence[int], width: int) -> str:
     count, top = len(values), max(SMALL_MA, *values)
     columns = min(width, count)
     peaks = (max(values[n * count // columns : (n + 1) * count // columns]) for n in range(columns))
-    return "".join(LEVELS[peak * (len(LEVELS) - 1) // top] if peak >= 0 else " " for peak in peaks).rjust(
-        width
-    )
+    bars = (LEVELS[peak * (len(LEVELS) - 1) // top] if peak >= 0 else " " for peak in peaks)
+    return "".join(bars).rjust(width)
 
 
 def state_text(address: str, state: State, status: RobotiqStatus, age: float) -> Text:
-    """Two lines: the state of the hand, and the fault of the gripper.
-
-    Args:
-        address: of the gripper.
-        state: of the hand.
-        status: the newest.
-        age: of the status, in seconds.
-    """
+    """Two lines: the state of the hand, and the fault of the gripper; ``age`` is in seconds."""
     lost = state is State.DISCONNECTED
     colours = "white on red" if lost else "black on green" if state in _CALM else "black on yellow"
     text = Text.assemble((f" {_short(state)} ", f"bold {colours}"))
@@ -186,25 +178,18 @@ def _doing(state: State, status: RobotiqStatus) -> str:
 def link_text(figures: Statistics, rate: float, held_up: bool, speed: int, force: int) -> Text:
     """Two lines: polling statistics, and the speed and force of the next motion.
 
-    Args:
-        figures: of the hand.
-        rate: polls per second, lately.
-        held_up: whether there were overruns since the last update.
-        speed: of the next motion.
-        force: of the next motion.
+    ``rate`` is in polls a second; ``held_up`` tells of overruns since the last update.
     """
     jitter = 1000 * (figures.period_p99 - figures.period_p50)
     text = Text(f"{rate:.1f} Hz  jitter {jitter:.2f} ms  ", "dim")
-    text.append(
-        f"round trip {1000 * figures.round_trip_p50:.2f}/{1000 * figures.round_trip_p99:.2f} ms  ", "dim"
-    )
+    p50, p99 = 1000 * figures.round_trip_p50, 1000 * figures.round_trip_p99
+    text.append(f"round trip {p50:.2f}/{p99:.2f} ms  ", "dim")
     text.append(f"overruns {figures.overruns}  ", "yellow" if held_up else "dim")
     text.append(f"reconnects {figures.reconnects}", "yellow" if figures.reconnects else "dim")
     text.append(f"\nspeed {speed:<3}  force {force:<3}", "bold")
     if figures.foreign_commands:
-        text.append(
-            f"  ANOTHER CLIENT commands this gripper ({figures.foreign_commands} times)", "bold yellow"
-        )
+        times = figures.foreign_commands
+        text.append(f"  ANOTHER CLIENT commands this gripper ({times} times)", "bold yellow")
     return text
 
 

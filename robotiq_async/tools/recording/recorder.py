@@ -25,10 +25,9 @@ from types import TracebackType
 from typing import Final, Protocol, Self
 
 from ...hand import Hand
-from ...runtime.concurrency import in_a_thread, wait_shielded
+from ...runtime.concurrency import in_a_thread, wait_shielded, write_all
 from ...values.errors import RecordingError
 from .feed import JOINTS, Feed, Message
-from .raw_output import write_all
 from .table import CsvFile
 
 _missing = ""

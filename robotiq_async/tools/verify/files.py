@@ -17,14 +17,13 @@ from pathlib import Path
 from typing import Final, TypeVar, cast
 
 from ...link.address import Address
-from ...runtime.concurrency import in_a_thread
+from ...runtime.concurrency import in_a_thread, write_all
 from ...values.events import SentRequest
 from ...values.model import Model, model_of
 from ...values.request import Request
 from ...values.status import RobotiqStatus
 from ..recording.feed import COMMAND, EVENT, STATUS, Message, Topic, compact
 from ..recording.payloads import Fields
-from ..recording.raw_output import write_all
 from ..recording.recordings import McapFile
 from .catalogue import STAGE
 from .recorded_link import Frame
