@@ -7,18 +7,17 @@ import atexit
 import contextlib
 import os
 import sys
-from collections.abc import Callable, Coroutine
-from typing import Any, Final, TypeVar
+from collections.abc import Callable
+from typing import Final, TypeVar
 
 from ..hand.robotiq_hand import RobotiqHand as AsyncRobotiqHand
 from ..runtime.concurrency import LateError
 from ..runtime.log import Log, log
 from ..values.enums import State
 from ..values.errors import NotStartedError, RobotiqError
-from .loop_thread import LOOP_THREAD
+from .loop_thread import LOOP_THREAD, Function
 
 T = TypeVar("T")
-Function = Callable[[], Coroutine[Any, Any, T]]
 
 EXIT_S: Final = 4.0  # the end of the program waits so long for running hands: stop() takes up to 2 s
 

@@ -167,8 +167,7 @@ class LoopThread:
 class _Server:
     """One event loop, from its first call to the end of its last. All its methods run in the loop.
 
-    Args:
-        ended: called when no task is left.
+    ``ended`` is called when no task is left.
 
     Raises:
         OSError: no file descriptors are left.

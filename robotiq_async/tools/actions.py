@@ -34,21 +34,13 @@ CANCELS_RECOVERY: Final = frozenset({"halt", "reset", "release"})
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """An action without arguments.
+    """An action without arguments."""
 
-    Attributes:
-        name: one word.
-        what: a short description.
-        run: carries it out; returns a short description of the outcome.
-        moves: whether fingers move, or may let go.
-        warning: a consequence that may surprise; a person must confirm it first. Empty for none.
-    """
-
-    name: str
-    what: str
-    run: Callable[[Hand], Awaitable[str]]
-    moves: bool = True
-    warning: str = ""
+    name: str  # one word
+    what: str  # a short description
+    run: Callable[[Hand], Awaitable[str]]  # carries it out; returns a short description of the outcome
+    moves: bool = True  # whether fingers move, or may let go
+    warning: str = ""  # a consequence that may surprise; a person must confirm it first
 
 
 class Operator:
@@ -227,6 +219,14 @@ async def _close(hand: Hand) -> str:
     return describe(await hand.close())
 
 
+def _done(call: Callable[[Hand], Awaitable[None]], outcome: str) -> Callable[[Hand], Awaitable[str]]:
+    async def run(hand: Hand) -> str:
+        await call(hand)
+        return outcome
+
+    return run
+
+
 def _width(position: int) -> Callable[[Hand], Awaitable[str]]:
     async def run(hand: Hand) -> str:
         if Finger.SCISSOR not in hand.model.all_axes:
@@ -241,26 +241,6 @@ async def _halt(hand: Hand) -> str:
     return "every axis has stopped" + (": the gripper is reset" if hand.state is State.RESET else "")
 
 
-async def _activate(hand: Hand) -> str:
-    await hand.activate()
-    return "the gripper is active"
-
-
-async def _reset(hand: Hand) -> str:
-    await hand.reset()
-    return "the gripper is reset"
-
-
-async def _release(hand: Hand) -> str:
-    await hand.atr()
-    return "released; only a reset helps now"
-
-
-async def _recover(hand: Hand) -> str:
-    await hand.recover()
-    return "the gripper is active"
-
-
 _ALL: Final = (
     Action("open", "open the fingers", _open),
     Action("close", "close the fingers", _close),
@@ -271,20 +251,25 @@ _ALL: Final = (
     Action(
         "activate",
         "activate the gripper",
-        _activate,
+        _done(lambda hand: hand.activate(), "the gripper is active"),
         warning="The fingers MOVE: they open and close to their stops.",
     ),
-    Action("reset", "reset the gripper", _reset, warning="The gripper lets go: what it holds DROPS."),
+    Action(
+        "reset",
+        "reset the gripper",
+        _done(lambda hand: hand.reset(), "the gripper is reset"),
+        warning="The gripper lets go: what it holds DROPS.",
+    ),
     Action(
         "release",
         "release in a fault",
-        _release,
+        _done(lambda hand: hand.atr(), "released; only a reset helps now"),
         warning="All fingers OPEN slowly, whatever the fault: what they hold DROPS.",
     ),
     Action(
         "recover",
         "do what the fault needs",
-        _recover,
+        _done(lambda hand: hand.recover(), "the gripper is active"),
         warning="A major fault needs a reset and an activation: what it holds DROPS, the fingers MOVE.",
     ),
 )

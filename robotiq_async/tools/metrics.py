@@ -77,16 +77,15 @@ class HandCollector(Collector):
         """Collect in the event loop; called in a thread of the server."""
         asking = asyncio.run_coroutine_threadsafe(self._figures(), self._loop)
         figures = asking.result(TIMEOUT_S)
-        for name, meaning in _COUNTERS.items():
-            counter = CounterMetricFamily(f"robotiq_{name}", meaning, labels=["hand"])
-            for hand, (_, statistics) in figures.items():
-                counter.add_metric([hand], getattr(statistics, name))
-            yield counter
-        for name, meaning in _GAUGES.items():
-            gauge = GaugeMetricFamily(f"robotiq_{name}_seconds", meaning, labels=["hand"])
-            for hand, (_, statistics) in figures.items():
-                gauge.add_metric([hand], getattr(statistics, name))
-            yield gauge
+        for family, unit, names in (
+            (CounterMetricFamily, "", _COUNTERS),
+            (GaugeMetricFamily, "_seconds", _GAUGES),
+        ):
+            for name, meaning in names.items():
+                metric = family(f"robotiq_{name}{unit}", meaning, labels=["hand"])
+                for hand, (_, statistics) in figures.items():
+                    metric.add_metric([hand], getattr(statistics, name))
+                yield metric
         moves = CounterMetricFamily("robotiq_moves", "Moves by outcome.", labels=["hand", "outcome"])
         state = GaugeMetricFamily("robotiq_state", "1 for the present state.", labels=["hand", "state"])
         for hand, (present, statistics) in figures.items():

@@ -16,8 +16,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Callable
-from types import TracebackType
-from typing import Final, Self
+from typing import Any, Final, Self
 
 try:
     import foxglove
@@ -35,24 +34,31 @@ from ..values.checks import check_int
 from ..values.enums import State
 from ..values.errors import ViewerError
 from ..values.model import THREE_FINGER
-from .description.robot_description import (
-    SCHEMA,
-    SCHEMA_NAME,
-    TRANSFORMS_NAME,
-    TRANSFORMS_SCHEMA,
-    description_message,
-    transforms,
-)
+from ..values.status import RobotiqStatus
+from .description import hand_model, urdf
+from .description.joint_states import ENCAPSULATION, add_string
+from .description.kinematics import JOINTS as JOINT_NAMES
+from .description.kinematics import joint_angles
 from .recording.feed import EVENT, JOINTS, TOPICS, Feed, Message, Topic, compact, json_topic
-from .recording.payloads import SCHEMAS, state_fields, title
+from .recording.payloads import INTEGER, NUMBER, SCHEMAS, STRING, object_schema, state_fields, title
 
 LOOPBACK: Final = "127.0.0.1"
 PORT: Final = 8765
 """The default of Foxglove's own dialog."""
 STATE: Final = json_topic("state", SCHEMAS["state"])
-DESCRIPTION: Final = Topic("/robot_description", "cdr", SCHEMA_NAME, "ros2msg", SCHEMA.encode())
-_TRANSFORMS_SCHEMA: Final = json.dumps(TRANSFORMS_SCHEMA).encode()
-TRANSFORMS: Final = Topic("/tf", "json", TRANSFORMS_NAME, "jsonschema", _TRANSFORMS_SCHEMA)
+DESCRIPTION: Final = Topic("/robot_description", "cdr", "std_msgs/msg/String", "ros2msg", b"string data\n")
+_TRANSFORM: Final = object_schema(
+    timestamp={"title": "time", **object_schema(sec=INTEGER, nsec=INTEGER)},
+    parent_frame_id=STRING,
+    child_frame_id=STRING,
+    translation=object_schema(**dict.fromkeys("xyz", NUMBER)),
+    rotation=object_schema(**dict.fromkeys("xyzw", NUMBER)),
+)
+_TRANSFORMS_SCHEMA: Final = json.dumps(
+    object_schema(transforms={"type": "array", "items": _TRANSFORM})
+).encode()
+TRANSFORMS: Final = Topic("/tf", "json", "foxglove.FrameTransforms", "jsonschema", _TRANSFORMS_SCHEMA)
+"""Viewers expect a schema of this name."""
 SHOWN: Final = (*TOPICS, STATE, DESCRIPTION, TRANSFORMS)
 TRANSFORMS_S: Final = 0.05
 """Interval of ``/tf``: smooth to the eye, a tenth of the polls."""
@@ -120,9 +126,7 @@ class Viewer:
         self._publisher = loop.create_task(self._publish_periodically(), name="robotiq_async viewer")
         return self
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    async def __aexit__(self, *_: object) -> None:
         await wait_shielded(asyncio.ensure_future(self._close()))
 
     async def _close(self) -> None:
@@ -160,7 +164,7 @@ class Viewer:
     def _describe(self) -> None:
         if self._hand.model is not THREE_FINGER:
             return  # the description is that of the 3-Finger
-        self._channels[DESCRIPTION].log(description_message())
+        self._channels[DESCRIPTION].log(_description_message())
 
     def _publish_state(self) -> None:
         self._published_state = self._hand.state
@@ -183,6 +187,31 @@ class _Listener(ServerListener):
     def on_subscribe(self, client: Client, channel: ChannelView) -> None:  # noqa: ARG002
         if channel.topic == DESCRIPTION.name:
             self._describe()
+
+
+def _description_message() -> bytes:
+    body = bytearray(ENCAPSULATION)
+    add_string(body, urdf())
+    return bytes(body)
+
+
+def transforms(status: RobotiqStatus, nanoseconds: int) -> dict[str, Any]:
+    """The transform of every joint, from parent to child, at the time of the status since 1970."""
+    seconds, rest = divmod(nanoseconds, 1_000_000_000)
+    angles = dict(zip(JOINT_NAMES, joint_angles(status), strict=True))
+    found = []
+    for joint in hand_model().joints:
+        pose = joint.pose(angles.get(joint.name, 0.0))
+        found.append(
+            {
+                "timestamp": {"sec": seconds, "nsec": rest},
+                "parent_frame_id": joint.parent,
+                "child_frame_id": joint.child,
+                "translation": dict(zip("xyz", pose.position, strict=True)),
+                "rotation": dict(zip("xyzw", pose.quaternion, strict=True)),
+            }
+        )
+    return {"transforms": found}
 
 
 def _channel(topic: Topic, context: Context) -> Channel:

@@ -59,11 +59,7 @@ def from_rpy(position: Vector, rpy: Vector) -> Pose:
 
 
 def turned(axis: Vector, angle: float) -> Pose:
-    """A rotation about an axis through the origin, by the right-hand rule.
-
-    Args:
-        axis: of any length.
-        angle: radians.
+    """A rotation in radians about an axis of any length through the origin, by the right-hand rule.
 
     Raises:
         ValueError: the axis has no length.

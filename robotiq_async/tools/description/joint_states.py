@@ -29,7 +29,7 @@ uint32 nanosec
 """
 """The message definition and the definitions it refers to, in MCAP's format ros2msg."""
 
-_ENCAPSULATION: Final = b"\x00\x01\x00\x00"
+ENCAPSULATION: Final = b"\x00\x01\x00\x00"
 _STAMP: Final = Struct("<iI")
 
 
@@ -37,19 +37,14 @@ class JointStateEncoder:
     """Encodes joint states of the eleven joints of the hand."""
 
     def __init__(self, frame_id: str = "palm", names: Sequence[str] = JOINTS) -> None:
-        """Encode everything but the stamp and the numbers.
-
-        Args:
-            frame_id: of the header.
-            names: of the joints, in the order of their numbers.
-        """
+        """Encode everything but the stamp and the numbers, which are in the order of the names."""
         body = bytearray(_STAMP.size)
-        _add_string(body, frame_id)
+        add_string(body, frame_id)
         _align(body, 4)
         body += pack("<I", len(names))
         for name in names:
             _align(body, 4)
-            _add_string(body, name)
+            add_string(body, name)
         self._count = len(names)
         self._constant = bytes(body[_STAMP.size :])
         # Three sequences of doubles. CDR aligns each count to 4 bytes and the numbers to 8.
@@ -68,24 +63,21 @@ class JointStateEncoder:
         velocities: Sequence[float],
         efforts: Sequence[float],
     ) -> bytes:
-        """Encode one message.
+        """Encode one message. The stamp is in nanoseconds since 1970.
 
-        Args:
-            nanoseconds: stamp, since 1970.
-            positions: radians, one for each joint.
-            velocities: radians per second, one for each joint.
-            efforts: motor currents in ampere, one for each joint.
+        There is a number for each joint: radians, radians per second, motor currents in ampere.
         """
         stamp = _STAMP.pack(*divmod(nanoseconds, 1_000_000_000))
         count = self._count
         numbers = self._numbers.pack(count, *positions, count, *velocities, count, *efforts)
-        return _ENCAPSULATION + stamp + self._constant + numbers
+        return ENCAPSULATION + stamp + self._constant + numbers
 
 
 def _align(body: bytearray, size: int) -> None:
     body += bytes(-len(body) % size)
 
 
-def _add_string(body: bytearray, text: str) -> None:
+def add_string(body: bytearray, text: str) -> None:
+    """Append a string whose length is aligned."""
     encoded = text.encode() + b"\0"
     body += pack("<I", len(encoded)) + encoded

@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import ssl
 import stat
+from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Final
@@ -29,10 +30,7 @@ ROUND_S: Final = 0.3  # duration of one look
 async def examine_remote(address: str, report: Report, *, bus: Bus | None = None) -> None:
     """Examine the way to a gripper on another host; reports each finding at once.
 
-    Args:
-        address: ``zenoh://SITE/HOST/GRIPPER``, with the route.
-        report: called with each finding.
-        bus: an open session, which stays open and is not examined; None opens one.
+    An open session is given as ``bus``: it stays open and is not examined.
 
     Raises:
         TypeError, ValueError: a malformed address.
@@ -40,13 +38,11 @@ async def examine_remote(address: str, report: Report, *, bus: Bus | None = None
     name, route = parse_remote_address(address)
     way = "a session that is open" if bus is not None else ", ".join(route.endpoints)
     report(Finding(Level.GOOD, "address", f"{name} by {way}"))
-    try:
+    with suppress(GiveUpError):
         if bus is not None:
             await _examine(name, bus, report)
         else:
             await _examine_way_and_agent(name, route, report)
-    except GiveUpError:
-        pass
 
 
 async def _examine_way_and_agent(name: GripperName, route: Route, report: Report) -> None:
@@ -120,13 +116,7 @@ _NEW: Final = "The owner of the authority can make a new one: robotiq-async flee
 
 
 def examine_keys(folder: Path, report: Report, *, now: datetime) -> None:
-    """Examine a folder of keys.
-
-    Args:
-        folder: of a client.
-        report: called with each finding.
-        now: the current time.
-    """
+    """Examine a client's folder of keys."""
     # Needs the extra fleet. The folder of keys may come from another machine.
     from ...fleet.keys.credentials import read_credentials  # noqa: PLC0415
 
@@ -226,26 +216,21 @@ async def _is_open(endpoint: Endpoint, report: Report) -> bool:
 
 
 async def _shake_hands(endpoint: Endpoint, keys: Path, report: Report) -> bool:
-    own = _context(keys, shows=True)
+    stays, found = False, "the agent does not trust this certificate"
+    advice = "Is it from the same authority? Check the clock of the agent's host, too."
     try:
-        stays = await _connect(endpoint, own)
+        stays = await _connect(endpoint, _context(keys, shows=True))
     except ssl.SSLCertVerificationError as error:
-        found = f"{endpoint.text}: its certificate is not trusted: {error.verify_message}"
+        found = f"its certificate is not trusted: {error.verify_message}"
         advice = (
             "It must be from the same authority, still valid, and name what you connect to "
             "(fleet keys --agent NAME=HOST,...)."
         )
-        report(Finding(Level.BAD, "certificates", found, advice))
-        return False
     except OSError as error:
-        found = f"{endpoint.text}: no encrypted connection: {str(error) or 'no answer'}"
+        found = f"no encrypted connection: {str(error) or 'no answer'}"
         advice = "Is it the port of an agent with keys? One without keys listens at tcp/."
-        report(Finding(Level.BAD, "certificates", found, advice))
-        return False
     if not stays:
-        found = f"{endpoint.text}: the agent does not trust this certificate"
-        advice = "Is it from the same authority? Check the clock of the agent's host, too."
-        report(Finding(Level.BAD, "certificates", found, advice))
+        report(Finding(Level.BAD, "certificates", f"{endpoint.text}: {found}", advice))
         return False
     report(Finding(Level.GOOD, "certificates", f"{endpoint.text}: both sides trust each other"))
     await _try_without(endpoint, keys, report)

@@ -16,11 +16,7 @@ from ...link.modbus import ModbusTransport
 from ...link.serial_ports import USB_SERIAL, latency_file, latency_timer
 from ...link.transport import Link
 from ...session.gripper_link import registers_of
-from ...session.options import (
-    POLL_INTERVAL_S,
-    RESPONSE_TIMEOUT_S,
-    SERIAL_POLL_INTERVAL_S,
-)
+from ...session.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S, SERIAL_POLL_INTERVAL_S
 from ...values.enums import Severity
 from ...values.errors import ConnectionLostError, RobotiqConnectionError
 from ...values.model import MODELS, Model, model_of, names_that_fit
@@ -38,13 +34,8 @@ LONGEST_PERIOD_S: Final = 0.1  # the longest poll_interval of a hand
 async def examine(address: Address, report: Report, *, device_id: int | None = None) -> None:
     """Examine a connection; reports each finding at once, and never raises for a bad one.
 
-    Args:
-        address: the gripper.
-        report: called with each finding.
-        device_id: Modbus unit id; None for the usual one.
-
     Raises:
-        ValueError: a unit id that is not valid on such a link.
+        ValueError: a unit id that is not valid on such a link; None is the usual one.
     """
     registers, model = registers_of(address, device_id=device_id), model_of(address.model)
     try:
@@ -178,13 +169,7 @@ LATENCY_MS: Final = 2  # an adapter that keeps bytes for longer delays every rea
 
 
 def report_adapter(address: Address, report: Report, folder: Path = USB_SERIAL) -> None:
-    """Report the latency timer of the USB adapter, if it has one. The port is open.
-
-    Args:
-        address: of the port.
-        report: called with the finding.
-        folder: of the system's USB serial devices.
-    """
+    """Report the latency timer of the USB adapter, if it has one. The port is open."""
     kept = latency_timer(address.host, folder)
     if kept is None:
         return

@@ -70,14 +70,8 @@ async def time_closing(hand: Hand, speed: int, fingers: Finger, speedup: float =
 
     Repeats a run in which the event loop was blocked. Cancelling stops the fingers.
 
-    Args:
-        hand: the gripper.
-        speed: speed value, 0..255.
-        fingers: some of A, B and C; the scissor has a different stroke.
-        speedup: how much faster the gripper's clock is.
-
     Raises:
-        ValueError: the scissor is among the fingers.
+        ValueError: the scissor, which has a different stroke, is among the fingers.
         MeasuringError: the fingers met something or did not close fully, or the loop is too busy.
         RobotiqError: as :meth:`Hand.move`.
     """
@@ -119,12 +113,6 @@ async def grasp(hand: Hand, force: int, speed: int, speedup: float = 1.0) -> lis
 
     The fingers stay closed so that the scale can be read. Cancelling stops them.
 
-    Args:
-        hand: the gripper.
-        force: force value, 0..255.
-        speed: speed value, 0..255.
-        speedup: how much faster the gripper's clock is.
-
     Raises:
         MeasuringError: the fingers met nothing.
         RobotiqError: as :meth:`Hand.move`.
@@ -133,9 +121,7 @@ async def grasp(hand: Hand, force: int, speed: int, speedup: float = 1.0) -> lis
     if opened.object_detected:
         raise MeasuringError(f"something blocks the opening ({opened.contacts!r})")
     await asyncio.sleep(REST_S / speedup)
-    samples: list[Sample] = []
-    began = now()
-    with _sampling(hand, lambda time, *milliampere: samples.append((time, *milliampere)), began, speedup):
+    with _sampling(hand, speedup) as samples:
         result = await hand.close(speed=speed, force=force)
         await asyncio.sleep(GRASP_S / speedup)
     if not result.object_detected:
@@ -144,11 +130,9 @@ async def grasp(hand: Hand, force: int, speed: int, speedup: float = 1.0) -> lis
 
 
 @contextlib.contextmanager
-def _sampling(
-    hand: Hand, take: Callable[[int, int, int, int], None], began: float, speedup: float
-) -> Iterator[None]:
-    statuses = hand.statuses(buffer=10_000)
-
+def _sampling(hand: Hand, speedup: float) -> Iterator[list[Sample]]:
+    samples: list[Sample] = []
+    began, statuses = now(), hand.statuses(buffer=10_000)
     if hand.model is not THREE_FINGER:
         raise MeasuringError(f"this measures three fingers; a {hand.model.title} has one axis")
 
@@ -156,11 +140,11 @@ def _sampling(
         async for status in statuses:
             time = max(0, round(1000 * (status.timestamp - began) * speedup))
             a, b, c = (status.current_ma(finger) for finger in FINGERS)
-            take(time, a, b, c)
+            samples.append((time, a, b, c))
 
     watcher = asyncio.get_running_loop().create_task(watch())
     try:
-        yield
+        yield samples
     finally:
         watcher.cancel()
 
@@ -177,23 +161,15 @@ def peak_currents(runs: list[list[Sample]]) -> tuple[int, int, int]:
 
 @dataclass
 class Campaign:
-    """A table in a file that is filled row by row, and resumed if the file exists.
+    """A table in a file that is filled row by row, and resumed if the file exists."""
 
-    Attributes:
-        path: the file; read if it exists.
-        layout: of the table.
-        origin: what was measured, and how; kept beside the table. Only the same origin can resume it.
-        values: the rows, in the order of measurement.
-        runs: number of columns.
-        table: the measurements so far.
-    """
-
-    path: Path
-    layout: Layout
-    values: list[int]
-    runs: int
+    path: Path  # the file; read if it exists
+    layout: Layout  # of the table
+    values: list[int]  # the rows, in the order of measurement
+    runs: int  # number of columns
     origin: dict[str, str] = field(default_factory=dict)
-    table: Table = field(default_factory=dict)
+    """What was measured, and how; kept beside the table. Only the same origin can resume it."""
+    table: Table = field(default_factory=dict)  # the measurements so far
 
     def __post_init__(self) -> None:
         """Resume the table if the file exists.
@@ -244,7 +220,7 @@ class Campaign:
                 readings.append(reading)
             table = {**self.table, value: tuple(readings)}
             if not origin_beside(self.path).exists():
-                await asyncio.to_thread(write_origin, self.path, self.origin)
+                await asyncio.to_thread(write_rows, origin_beside(self.path), sorted(self.origin.items()))
             # In a thread: a slow disk must not hold up polling.
             await asyncio.to_thread(write_table, self.path, self.layout, table)
             self.table = table
@@ -271,11 +247,6 @@ def read_origin(path: Path) -> dict[str, str]:
     if not beside.exists():
         return {}
     return {cells[0]: cells[1] for _, cells in read_rows(beside) if len(cells) == 2}
-
-
-def write_origin(path: Path, origin: dict[str, str]) -> None:
-    """Write the origin of a table into the file beside it."""
-    write_rows(origin_beside(path), sorted(origin.items()))
 
 
 # -- currents in a file ------------------------------------------------------------------------------------

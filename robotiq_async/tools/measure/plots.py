@@ -44,13 +44,7 @@ Event = tuple[float, str, bool]  # when, what, and whether it is about a fault
 def plot_speed(path: Path, table: Table, label: str) -> list[Path]:
     """Plot closing time against speed value beside the thesis's curve, and the difference between the two.
 
-    Args:
-        path: where to, without suffix.
-        table: closing times in milliseconds.
-        label: what the table is, for the legend.
-
-    Returns:
-        The files written.
+    The path has no suffix; the label says what the table is. Returns the files written, as all plots do.
     """
     thesis = SpeedCalibration.thesis()
     values = sorted(table)
@@ -135,14 +129,9 @@ def plot_current_over_time(path: Path, by_surface: Mapping[str, Currents], label
 
 
 def plot_recording(path: Path, entries: Iterable[Entry]) -> list[Path]:
-    """Plot positions, currents and events of a recording over time.
+    """Plot positions, currents and events of a recording, its JSON messages, over time.
 
-    Args:
-        path: where to, without suffix.
-        entries: its JSON messages; only the plotted values are kept in memory.
-
-    Returns:
-        The files; none when there is no status to draw.
+    Only the plotted values are kept in memory. Writes no files when there is no status to draw.
     """
     seconds, began = array("d"), 0
     events: list[Event] = []

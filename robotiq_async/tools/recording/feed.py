@@ -23,7 +23,7 @@ from ...values.model import THREE_FINGER
 from ...values.status import RobotiqStatus
 from ..description.joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
 from ..description.kinematics import joint_angles, joint_names, joint_velocities
-from .payloads import SCHEMAS, Fields, efforts, fault_event, initial_state_fields, transition_fields
+from .payloads import SCHEMAS, Fields, efforts, fault_event, transition_fields
 
 BUFFER: Final = 100_000
 """Statuses kept while the event loop is busy with something else: minutes."""
@@ -35,20 +35,12 @@ VELOCITY_S: Final = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """A topic and its message type, as MCAP and Foxglove describe them.
-
-    Attributes:
-        name: the topic.
-        encoding: of the messages.
-        schema_name: the message type.
-        schema_encoding: the language of the schema.
-        schema: the schema of the message type.
-    """
+    """A topic and its message type, as MCAP and Foxglove describe them."""
 
     name: str
-    encoding: str
-    schema_name: str
-    schema_encoding: str
+    encoding: str  # of the messages
+    schema_name: str  # the message type
+    schema_encoding: str  # the language of the schema
     schema: bytes
 
 
@@ -71,19 +63,12 @@ TOPICS: Final = (STATUS, COMMAND, EVENT, JOINTS)
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """One message.
-
-    Attributes:
-        topic: of the message.
-        nanoseconds: time since 1970.
-        data: encoded as the topic says.
-        sequence: the number of its status; commands and events are counted from 1.
-    """
+    """One message."""
 
     topic: Topic
-    nanoseconds: int
-    data: bytes
-    sequence: int = 0
+    nanoseconds: int  # since 1970
+    data: bytes  # encoded as the topic says
+    sequence: int = 0  # the number of its status; commands and events are counted from 1
 
 
 class _Source:
@@ -121,11 +106,9 @@ class Feed:
     """Publishes statuses, requests, transitions and faults of a hand as messages. It only listens."""
 
     def __init__(self, hand: Hand, publish: Callable[[Message], None]) -> None:
-        """Prepare; subscribes to nothing.
+        """Prepare; subscribes to nothing. ``publish`` is called with every message, in the event loop.
 
-        Args:
-            hand: may be stopped and started again while the feed runs.
-            publish: called with every message, in the event loop.
+        The hand may be stopped and started again while the feed runs.
         """
         self._hand = hand
         self._publish = publish
@@ -152,7 +135,8 @@ class Feed:
         # Statuses carry monotonic time, messages wall-clock time.
         began = now()
         self._epoch = time.time() - began
-        self._publish_json(EVENT, began, initial_state_fields(self._hand.state, began))
+        state = {"kind": "state", "timestamp": began, "target": self._hand.state.name}
+        self._publish_json(EVENT, began, state)
         for source in self._sources:
             source.open()
         self._tasks = [

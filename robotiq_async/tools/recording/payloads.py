@@ -17,86 +17,80 @@ from ..description.kinematics import FINGER_NAMES
 
 Fields = dict[str, Any]
 
-_INTEGER: Final = {"type": "integer"}
-_NUMBER: Final = {"type": "number"}
-_STRING: Final = {"type": "string"}
+INTEGER: Final = {"type": "integer"}
+NUMBER: Final = {"type": "number"}
+STRING: Final = {"type": "string"}
 _BOOLEAN: Final = {"type": "boolean"}
-_REGISTERS: Final = {"type": "array", "items": _INTEGER}
+_REGISTERS: Final = {"type": "array", "items": INTEGER}
 
 
-def _object(**properties: object) -> dict[str, object]:
+def object_schema(**properties: object) -> dict[str, object]:
+    """The JSON Schema of an object."""
     return {"type": "object", "properties": properties}
 
 
 def _for_each_axis(**properties: object) -> dict[str, object]:
-    return {str(axis.name): _object(**properties) for axis in Finger.ALL}
+    return {str(axis.name): object_schema(**properties) for axis in Finger.ALL}
 
 
-_FAULT: Final = {
-    "fault": _STRING,
-    "fault_code": _INTEGER,
-    "severity": _STRING,
-    "description": _STRING,
-}
+_FAULT: Final = {"fault": STRING, "fault_code": INTEGER, "severity": STRING, "description": STRING}
 SCHEMAS: Final = {
-    "status": _object(
+    "status": object_schema(
         registers=_REGISTERS,
-        timestamp=_NUMBER,
-        sequence=_INTEGER,
-        fault=_STRING,
-        fault_code=_INTEGER,
+        timestamp=NUMBER,
+        sequence=INTEGER,
+        fault=STRING,
+        fault_code=INTEGER,
         is_activated=_BOOLEAN,
         is_reset=_BOOLEAN,
         is_moving=_BOOLEAN,
-        initialization=_STRING,
-        mode=_STRING,
+        initialization=STRING,
+        mode=STRING,
         activation_echo=_BOOLEAN,
         go_echo=_BOOLEAN,
-        contacts={"type": "array", "items": _STRING},
-        **_for_each_axis(
-            position=_INTEGER, requested_position=_INTEGER, current_ma=_INTEGER, axis_state=_STRING
-        ),
+        contacts={"type": "array", "items": STRING},
+        **_for_each_axis(position=INTEGER, requested_position=INTEGER, current_ma=INTEGER, axis_state=STRING),
     ),
-    "command": _object(
-        timestamp=_NUMBER,
+    "command": object_schema(
+        timestamp=NUMBER,
         acknowledged=_BOOLEAN,
         registers=_REGISTERS,
         activate=_BOOLEAN,
         go=_BOOLEAN,
         release=_BOOLEAN,
-        mode=_STRING,
+        mode=STRING,
         individual_fingers=_BOOLEAN,
         individual_scissor=_BOOLEAN,
-        **_for_each_axis(position=_INTEGER, speed=_INTEGER, force=_INTEGER),
+        **_for_each_axis(position=INTEGER, speed=INTEGER, force=INTEGER),
     ),
-    "event": _object(
+    "event": object_schema(
         kind={"type": "string", "enum": ["state", "transition", "fault"]},
-        timestamp=_NUMBER,
-        source=_STRING,
-        target=_STRING,
-        trigger=_STRING,
+        timestamp=NUMBER,
+        source=STRING,
+        target=STRING,
+        trigger=STRING,
         **_FAULT,
     ),
-    "state": _object(
-        name=_STRING,
-        address=_STRING,
-        state=_STRING,
-        age=_NUMBER,
+    "state": object_schema(
+        name=STRING,
+        address=STRING,
+        state=STRING,
+        age=NUMBER,
         **_FAULT,
-        polls=_INTEGER,
-        writes=_INTEGER,
-        overruns=_INTEGER,
-        period_p50=_NUMBER,
-        period_p99=_NUMBER,
-        round_trip_p50=_NUMBER,
-        round_trip_p99=_NUMBER,
-        longest_stall=_NUMBER,
-        reconnects=_INTEGER,
-        foreign_commands=_INTEGER,
-        tick=_STRING,
-        faults=_INTEGER,
-        moves={"type": "object", "additionalProperties": _INTEGER},
-        passing_faults=_INTEGER,
+        polls=INTEGER,
+        writes=INTEGER,
+        overruns=INTEGER,
+        period_p50=NUMBER,
+        period_p99=NUMBER,
+        round_trip_p50=NUMBER,
+        round_trip_p99=NUMBER,
+        longest_stall=NUMBER,
+        reconnects=INTEGER,
+        foreign_commands=INTEGER,
+        tick=STRING,
+        faults=INTEGER,
+        moves={"type": "object", "additionalProperties": INTEGER},
+        passing_faults=INTEGER,
     ),
 }
 """A JSON Schema for each kind of object."""
@@ -109,11 +103,6 @@ def title(hand: Hand) -> str:
     """
     words = hand.address if hand.name == hand.address else f"{hand.name} ({hand.address})"
     return f"{words}, simulated" if hand.address.startswith("sim:") else words
-
-
-def initial_state_fields(state: State, now: float) -> Fields:
-    """The first event of a feed: the current state."""
-    return {"kind": "state", "timestamp": now, "target": state.name}
 
 
 def transition_fields(transition: Transition) -> Fields:
@@ -161,9 +150,7 @@ def reading_fields(hand: Hand) -> Fields:
 def state_fields(hand: Hand, now: float) -> Fields:
     """State and statistics of a hand; fault and age of the newest status only while they are known.
 
-    Args:
-        hand: the hand.
-        now: monotonic seconds.
+    ``now`` is in monotonic seconds.
     """
     fields: Fields = {
         "name": hand.name,

@@ -50,14 +50,11 @@ T = TypeVar("T")
 class Output(Protocol):
     """The part of a file that the MCAP writer needs."""
 
-    def write(self, data: bytes) -> int:
-        """Take bytes."""
+    def write(self, data: bytes) -> int: ...
 
-    def tell(self) -> int:
-        """Number of bytes so far."""
+    def tell(self) -> int: ...
 
-    def flush(self) -> None:
-        """May do nothing."""
+    def flush(self) -> None: ...
 
 
 class McapFile:
@@ -96,23 +93,14 @@ class McapFile:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One message of a recording.
+    """One message of a recording."""
 
-    Attributes:
-        topic: the channel's name.
-        nanoseconds: since 1970.
-        sequence: the number of the status; commands and events are counted from 1.
-        data: the bytes.
-        is_json: whether the channel says that it is JSON.
-        path: the file.
-    """
-
-    topic: str
-    nanoseconds: int
-    sequence: int
+    topic: str  # the channel's name
+    nanoseconds: int  # since 1970
+    sequence: int  # the number of the status; commands and events are counted from 1
     data: bytes
-    is_json: bool
-    path: str = field(default="", compare=False)
+    is_json: bool  # whether the channel says that it is JSON
+    path: str = field(default="", compare=False)  # the file
 
     @property
     def fields(self) -> dict[str, Any]:

@@ -125,13 +125,7 @@ class CsvFile:
 def export(entries: Iterable[Entry], kind: str, target: Path | str) -> int:
     """Write the messages of one kind into a CSV file, all or none; an existing file is replaced.
 
-    Args:
-        entries: of a recording, JSON.
-        kind: "status", "command" or "event".
-        target: the file.
-
-    Returns:
-        The number of rows; 0 writes no file.
+    Returns the number of rows; 0 writes no file.
 
     Raises:
         RecordingError: a message does not have a recorder's format.
@@ -139,15 +133,14 @@ def export(entries: Iterable[Entry], kind: str, target: Path | str) -> int:
     """
     count = 0
 
-    def counted(rows: Iterator[list[object]]) -> Iterator[list[object]]:
+    def counted() -> Iterator[list[object]]:
         nonlocal count
-        for row in rows:
+        for row in _rows(entries, kind):
             count += 1
             yield row
 
-    rows = counted(_rows(entries, kind))
-    first = next(rows, None)
-    if first is not None:
+    rows = counted()
+    if (first := next(rows, None)) is not None:
         write_rows(target, chain([COLUMNS[kind], first], rows))
     return count
 

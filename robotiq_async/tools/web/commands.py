@@ -42,19 +42,12 @@ RESPONSE: Final = {"type": "object", "properties": {"outcome": {"type": "string"
 
 @dataclass(frozen=True, slots=True)
 class Service:
-    """A command that other programs can call.
+    """A command that other programs can call."""
 
-    Attributes:
-        name: for example ``/gripper/move``.
-        arguments: each with its JSON Schema.
-        required: names of the required arguments.
-        run: carries it out; returns a description of the outcome.
-    """
-
-    name: str
-    arguments: Mapping[str, object]
-    required: tuple[str, ...]
-    run: Callable[[Operator, Arguments], Awaitable[str]]
+    name: str  # for example /gripper/move
+    arguments: Mapping[str, object]  # each with its JSON Schema
+    required: tuple[str, ...]  # names of the required arguments
+    run: Callable[[Operator, Arguments], Awaitable[str]]  # returns a description of the outcome
 
     @property
     def schema(self) -> dict[str, object]:
@@ -67,11 +60,7 @@ class Service:
         }
 
     async def call(self, operator: Operator, payload: bytes) -> str:
-        """Carry out a request; returns a description of the outcome.
-
-        Args:
-            operator: carries it out.
-            payload: a JSON object with the arguments; empty for none.
+        """Carry out a request, a JSON object with the arguments; returns a description of the outcome.
 
         Raises:
             ValueError: malformed, or an argument that is missing, unknown or outside its range.
@@ -147,12 +136,8 @@ class PageCommands:
     When a page has gone, its commands are cancelled, which holds the axes that still move. An activation, a
     release and a reset continue, as they do whenever they are cancelled.
 
-    Attributes:
-        is_ending: whether all commands but halts are refused.
-
-    Args:
-        operators: one for each hand; without any, every command is refused.
-        answer: called with the outcome of each command.
+    There is an operator for each hand; without any, every command is refused. ``answer`` is called with the
+    outcome of each command.
     """
 
     def __init__(self, operators: Sequence[Operator], answer: Callable[[Fields], None]) -> None:
@@ -160,7 +145,7 @@ class PageCommands:
         self._answer = answer
         self._tasks: dict[str, set[asyncio.Task[str]]] = {}
         self._halts: set[asyncio.Task[str]] = set()
-        self.is_ending = False
+        self.is_ending = False  # whether all commands but halts are refused
 
     @property
     def under_way(self) -> bool:
@@ -170,9 +155,8 @@ class PageCommands:
     def do(self, request: Fields) -> None:
         """Start a command; its answer comes later.
 
-        Args:
-            request: ``page``, ``number``, ``hand``, ``name`` and ``arguments`` of a service, and ``at``, when
-                the user gave it: ``time.monotonic()`` of this machine, which is the same in every process.
+        A request has ``page``, ``number``, ``hand``, ``name`` and ``arguments`` of a service, and ``at``: the
+        moment when the user gave it, in ``time.monotonic()`` of this machine, the same in every process.
         """
         page, name = str(request["page"]), str(request["name"])
         tasks = self._halts if name == HALT else self._tasks.setdefault(page, set())

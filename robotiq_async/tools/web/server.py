@@ -18,7 +18,6 @@ from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from itertools import zip_longest
 from pathlib import Path
-from types import TracebackType
 from typing import Final, Self
 
 from ...hand import Hand
@@ -55,16 +54,11 @@ STATISTICS_S: Final = 1.0
 
 
 class HandUpdates:
-    """Collects what happens to a hand. It only listens.
-
-    Attributes:
-        hand: may be started later.
-        problem: why the hand could not be started; empty if it was.
-    """
+    """Collects what happens to a hand, which may be started later. It only listens."""
 
     def __init__(self, hand: Hand) -> None:
         self.hand = hand
-        self.problem = ""
+        self.problem = ""  # why the hand could not be started; empty if it was
         self._timeline = Timeline(hand, BUFFER)
         self._events: deque[Fields] = deque(maxlen=EVENTS)
         self._peaks = [0] * len(hand.model.axes)
@@ -183,9 +177,7 @@ class PageServer:
         ]
         return self
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    async def __aexit__(self, *_: object) -> None:
         await wait_shielded(asyncio.ensure_future(self._close()))
 
     async def seen(self) -> None:

@@ -38,27 +38,16 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """The parts of a request that the decision needs.
+    """The parts of a request that the decision needs."""
 
-    Attributes:
-        method: of HTTP; empty for a websocket.
-        path: without the query.
-        query: as it was sent.
-        headers: with lower-case names.
-    """
-
-    method: str
-    path: str
-    query: str = ""
-    headers: Mapping[str, str] = field(default_factory=dict)
+    method: str  # of HTTP; empty for a websocket
+    path: str  # without the query
+    query: str = ""  # as it was sent
+    headers: Mapping[str, str] = field(default_factory=dict)  # with lower-case names
 
 
 class Access:
-    """The rules of one server, and its secret cookie.
-
-    Attributes:
-        settings: how the page is served.
-    """
+    """The rules of one server, and its secret cookie."""
 
     def __init__(self, settings: PageSettings, port: int) -> None:
         self.settings = settings
@@ -105,9 +94,8 @@ class Access:
         if self.settings.password:
             return Verdict.ASK
         token = parse_qs(head.query).get("token", [""])[0]
-        return (
-            Verdict.LET_IN if head.method == "GET" and _same(token, self.settings.token) else Verdict.NO_TOKEN
-        )
+        is_right = head.method == "GET" and _same(token, self.settings.token)
+        return Verdict.LET_IN if is_right else Verdict.NO_TOKEN
 
     def _is_ours(self, origin: str | None, host: str) -> bool:
         return origin is None or origin.lower() == f"{self.settings.scheme}://{host}"

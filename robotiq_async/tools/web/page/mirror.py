@@ -24,48 +24,28 @@ QUIET_S: Final = 1.5
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """A point of the curves.
+    """A point of the curves."""
 
-    Attributes:
-        at: monotonic seconds of this process.
-        positions: in counts, of A, B, C and the scissor; None while they are unknown.
-        currents: the peaks since the sample before, in mA.
-    """
-
-    at: float
-    positions: tuple[int, ...] | None
-    currents: tuple[int, ...]
+    at: float  # monotonic seconds of this process
+    positions: tuple[int, ...] | None  # in counts, of A, B, C and the scissor; None while they are unknown
+    currents: tuple[int, ...]  # the peaks since the sample before, in mA
 
 
 @dataclass(slots=True)
 class HandMirror:
-    """The state of a hand in the process of the page.
+    """The state of a hand in the process of the page."""
 
-    Attributes:
-        index: number of the hand.
-        address: of the gripper.
-        state: of the hand.
-        status: the newest; None before the first.
-        age: seconds since the status was read, at the last update.
-        problem: why the hand could not be started; empty if it was.
-        statistics: the newest.
-        samples: of the last 30 s.
-        events: the newest, numbered.
-        peaks: of the currents since the last sample.
-        changes: number of updates.
-    """
-
-    index: int
+    index: int  # number of the hand
     address: str
     state: State = State.DISCONNECTED
-    status: RobotiqStatus | None = None
-    age: float = 0.0
-    problem: str = ""
-    statistics: dict[str, Any] = field(default_factory=dict)
-    samples: deque[Sample] = field(default_factory=deque)
+    status: RobotiqStatus | None = None  # the newest; None before the first
+    age: float = 0.0  # seconds since the status was read, at the last update
+    problem: str = ""  # why the hand could not be started; empty if it was
+    statistics: dict[str, Any] = field(default_factory=dict)  # the newest
+    samples: deque[Sample] = field(default_factory=deque)  # of the last 30 s
     events: deque[tuple[int, dict[str, Any]]] = field(default_factory=lambda: deque(maxlen=EVENTS))
-    peaks: list[int] = field(default_factory=list)
-    changes: int = 0
+    peaks: list[int] = field(default_factory=list)  # of the currents since the last sample
+    changes: int = 0  # number of updates
     event_count: int = 0
 
     @property
@@ -112,17 +92,9 @@ class HandMirror:
 
 
 class Mirror:
-    """The state of all hands, and the way to the process that has them.
+    """The state of all hands, in the order of their addresses, and the way to the process that has them.
 
-    Attributes:
-        hands: in the order of their addresses.
-        control: whether the pages may command.
-        speed: initial value of the sliders.
-        force: initial value of the sliders.
-
-    Args:
-        addresses: of the hands.
-        say: sends a message to the other process.
+    ``speed`` and ``force`` are the initial values of the sliders; ``say`` sends to the other process.
     """
 
     def __init__(
@@ -171,13 +143,7 @@ class Mirror:
     ) -> None:
         """Send a command; ``answered`` is called with success and a description of the outcome.
 
-        Args:
-            page: id of the page.
-            hand: number of the hand.
-            name: of the command.
-            arguments: of the command.
-            answered: called later.
-            at: the time of this process that the browser had received.
+        ``at`` is the time of this process that the browser had received.
         """
         number = next(self._numbers)
         self._answers[number] = answered

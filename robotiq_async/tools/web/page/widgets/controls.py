@@ -37,9 +37,8 @@ class Slider(ui.slider):
 class Positions:
     """A row for each axis: its target, and the button that moves it there. A slider alone moves nothing.
 
-    Args:
-        hand: the hand; an untouched slider shows the position of its axis.
-        pressed: called with name and arguments of the command, and the time that the browser sent back.
+    An untouched slider shows the position of its axis. ``pressed`` is called with name and arguments of the
+    command, and the time that the browser sent back.
     """
 
     def __init__(self, hand: HandMirror, pressed: Callable[[str, dict[str, Any], object], None]) -> None:
@@ -103,15 +102,7 @@ class Positions:
 
 
 class Controls:
-    """The controls; only a page that may command has them.
-
-    Args:
-        mirror: sends the commands.
-        hand: the hand.
-        page: id of the page.
-        heartbeat: of the page and its browser.
-        report: called with the outcome of each command.
-    """
+    """The controls; only a page that may command has them. ``report`` gets the outcome of each command."""
 
     def __init__(
         self, mirror: Mirror, hand: HandMirror, page: str, heartbeat: Heartbeat, report: Callable[[str], None]
@@ -191,13 +182,10 @@ class Controls:
         self._outcome.set_text(f"{name} ...")
 
         def answered(ok: bool, words: str) -> None:
-            self._show(name, ok, words)
+            if self._outcome.is_deleted:
+                return
+            self._outcome.set_text(f"{name}: {words}")
+            self._outcome.classes(add="" if ok else "rq-red", remove="rq-red" if ok else "")
+            self._report(f"{name}: {words}")
 
         self._mirror.ask(self._page, self._hand.index, name, arguments, answered, at=at)
-
-    def _show(self, name: str, ok: bool, words: str) -> None:
-        if self._outcome.is_deleted:
-            return
-        self._outcome.set_text(f"{name}: {words}")
-        self._outcome.classes(add="" if ok else "rq-red", remove="rq-red" if ok else "")
-        self._report(f"{name}: {words}")

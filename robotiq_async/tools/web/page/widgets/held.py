@@ -59,17 +59,11 @@ _HIGHEST_M: Final = 0.075
 
 @dataclass(frozen=True, slots=True)
 class Thing:
-    """An object between the fingers, in the frame of the palm.
-
-    Attributes:
-        middle: of the object, in metres.
-        radius: in metres.
-        length: of a bar along z, in metres; 0 for a ball.
-    """
+    """An object between the fingers, in the frame of the palm, in metres."""
 
     middle: Vector
     radius: float
-    length: float = 0.0
+    length: float = 0.0  # of a bar along z; 0 for a ball
 
 
 def grasp(model: HandModel, status: RobotiqStatus) -> tuple[dict[str, float], Thing | None]:
@@ -115,10 +109,9 @@ def _met_something_closing(status: RobotiqStatus) -> Finger:
 
 def _held_from_one_side(faces: Mapping[Finger, Pose], fingers: list[Finger], closing: Finger) -> Thing | None:
     if fingers:
-        reach = _middle([faces[finger].apply((0.0, ALONE_M, 0.0)) for finger in fingers])
-        return Thing(
-            reach, ALONE_M, _length([faces[finger] for finger in fingers])[1] if fingers[1:] else 0.0
-        )
+        touching = [faces[finger] for finger in fingers]
+        reach = _middle([face.apply((0.0, ALONE_M, 0.0)) for face in touching])
+        return Thing(reach, ALONE_M, _length(touching)[1] if len(touching) > 1 else 0.0)
     if closing & Finger.SCISSOR:
         one, other = faces[Finger.B].position, faces[Finger.C].position
         return Thing(_middle([one, other]), max(dist(one, other) / 2 - HALF_TIP_M, THIN_M))

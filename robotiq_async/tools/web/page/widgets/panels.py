@@ -37,8 +37,7 @@ class StatePanel:
 class AxesPanel:
     """For each axis its position, its requested position, what it does, and its current.
 
-    Args:
-        wide: one line for each axis if there is room, instead of two.
+    If wide, it has one line for each axis where there is room, instead of two.
     """
 
     def __init__(self, *, wide: bool = False) -> None:
@@ -91,9 +90,8 @@ class Curves:
             places = [None if each.positions is None else each.positions[index] for each in hand.samples]
             peaks = [None if each.positions is None else each.currents[index] for each in hand.samples]
             for chart, values in ((self._positions, places), (self._currents, peaks)):
-                chart.options["series"][index]["data"] = [
-                    list(point) for point in zip(ages, values, strict=True)
-                ]
+                points = [list(point) for point in zip(ages, values, strict=True)]
+                chart.options["series"][index]["data"] = points
         for chart in (self._positions, self._currents):
             chart.options["legend"]["data"] = NAMES[: len(hand.model.axes)]
         highest = max((max(each.currents) for each in hand.samples), default=0)

@@ -45,9 +45,7 @@ Calls = list[list[Any]]
 class Figure:
     """The links of a hand as nested groups: turning a joint moves all links beyond it.
 
-    Args:
-        model: the hand.
-        ghost: whether to draw a ghost, which cannot be found by the names of the links.
+    A ghost cannot be found by the names of the links.
     """
 
     def __init__(self, model: HandModel, *, ghost: bool) -> None:
@@ -116,11 +114,7 @@ class Figure:
 
 
 class HandScene:
-    """A scene with a hand, its request, and the object that it holds.
-
-    Args:
-        compact: for a tile, without the request.
-    """
+    """A scene with a hand, its request, and the object that it holds; for a tile without the request."""
 
     def __init__(self, *, compact: bool = False) -> None:
         model = hand_model()
