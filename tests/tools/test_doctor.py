@@ -152,8 +152,13 @@ async def test_nobody_listens() -> None:
 
 STRANGERS: dict[str, tuple[Callable[[bytes], bytes], str, Level, str]] = {
     "no Modbus": (lambda _: b"HTTP/1.1 400 Bad\r\n\r\n", "Modbus", Level.BAD, "not this gripper"),
-    "zeros": (lambda request: registers_in(request, bytes(16)), "gripper", Level.DOUBT, "without power"),
-    "ones": (lambda request: registers_in(request, b"\xff" * 16), "gripper", Level.BAD, "Command nothing"),
+    "zeros": (lambda request: registers_in(request, bytes(16)), "gripper", Level.DOUBT, "have no power"),
+    "ones": (
+        lambda request: registers_in(request, b"\xff" * 16),
+        "gripper",
+        Level.BAD,
+        "Send it no commands",
+    ),
 }
 
 
