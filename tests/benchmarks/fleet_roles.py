@@ -31,7 +31,6 @@ from robotiq_async.values.statistics import Counters, percentile
 from tests.benchmarks.program import Figures
 
 INTERVAL_S = 0.005
-SETTLE_S = 0.5
 WATCHED = 100
 """Streams beside which a halt is measured."""
 REGISTERS = (0xF900, 0xFF00, 0x0064, 0x6400, 0x0606, 0x0000, 0x0606, 0x0089)
