@@ -122,8 +122,8 @@ def test_power_cycle_loses_everything_but_the_position(individual: Bench) -> Non
     individual.go(255)
     individual.wait(0.5)
     individual.gripper.write(0, [0x0100])
-    individual.gripper.power_cycle()
     stopped_at = individual.positions
+    individual.gripper.power_cycle()
     individual.wait(5)
     assert individual.positions == stopped_at
     assert individual.words == (0, 0)

@@ -200,6 +200,14 @@ async def test_many_requests_in_one_segment_are_answered_in_order(client: RawCli
     assert [answer for _, _, answer in answers] == [struct.pack(">BHH", 6, 1, n) for n in range(100)]
 
 
+async def test_a_request_in_single_bytes(client: RawClient) -> None:
+    for byte in client.frame(b"\x04\x00\x00\x00\x01"):
+        client.writer.write(bytes([byte]))
+        await client.writer.drain()
+        await asyncio.sleep(0)
+    assert (await client.reply())[2][0] == 4
+
+
 @pytest.mark.parametrize("junk", ["0001 0001 0006 02 04 0000 0008", "0001 0000 0000 02", "0001 0000 ffff 02"])
 async def test_what_is_no_modbus_ends_the_connection(client: RawClient, junk: str) -> None:
     client.writer.write(bytes.fromhex(junk))

@@ -118,10 +118,11 @@ def test_several_on_lines_and_between_semicolons_in_their_order() -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ("dorp at 5", "unknown trouble 'dorp'; known are: delay, late, drop, "),
+        ("dorp now", "unknown trouble 'dorp'; known are: delay, late, drop, "),
         ("drop 1", "drop takes no value, got 1.0"),
         ("delay much", "delay must be followed by a number, got 'much'"),
         ("delay 10.5", "the value of delay must be seconds in 0..10, got 10.5"),
+        ("delay nan", "the value of delay must be seconds in 0..10, got nan"),
         ("foreign 256", "the value of foreign must be a whole number in 0..255, got 256.0"),
         ("foreign 1.5", "the value of foreign must be a whole number in 0..255, got 1.5"),
         ("fault 0", "the value of fault must be a whole number in 1..15, got 0.0"),
@@ -206,12 +207,15 @@ VALUES = {
     "write-spacing": (0.01, 0, 1),
 }
 """The usual value of each kind that has one, the least and the greatest."""
+WHOLE = {"exception", "foreign", "fault", "e-stop"}
+"""Kinds whose value is a whole number; others have seconds, or none."""
 
 
 def test_the_values() -> None:
     for name, kind in KINDS.items():
         assert Trouble(name).amount == VALUES.get(name, (0, 0, 0))[0], name
         assert (kind.low, kind.high) == VALUES.get(name, (0, 0, 0))[1:], name
+        assert isinstance(kind.value, int) == (name in WHOLE), name
 
 
 def test_conditions_last_for_ever_and_events_happen_once() -> None:
