@@ -75,6 +75,9 @@ def test_under_a_lease_that_has_ended_says_why(reason: str) -> None:
     one.acquire(Call(BASE, "ben", EPOCH, 0, 1, NOW), "ben@cell")
     with pytest.raises(ControlLostError, match="ben@cell commands the gripper now"):
         one.admit(call, NOW)
+    with pytest.raises(ControlLostError, match=r"^ben@cell commands the gripper$") as caught:
+        one.acquire(call, "anna@cell")
+    assert caught.value.reason == "held"
 
 
 @pytest.mark.parametrize("seen", [NOW - 1.001, NOW + 0.001, 0.0])
@@ -86,6 +89,12 @@ def test_too_long_on_its_way_or_from_the_future(seen: float) -> None:
         assert caught.value.reason == "late"
     assert one.lease.expires == NOW + 1.0, "it prolongs nothing"
     one.admit(replace(call, seen=NOW - 0.999), NOW)
+
+
+def test_a_renewal_overtakes_no_command() -> None:
+    one, call = admission()
+    one.renew(replace(call, number=9), NOW)
+    one.admit(call, NOW)
 
 
 def test_a_repeated_request_for_the_lease() -> None:
@@ -137,13 +146,15 @@ def test_never_two_holders_and_never_an_old_lease(steps: list[tuple[str, str, in
         number += 1
         lease = model.given.get(client, 0) - leases_old
         call = Call(BASE, client, EPOCH, max(0, lease), number - old, now + heard)
-        if one.lease.has_expired(now):
+        has_expired = model.holder is not None and now > model.proven + 1.0
+        assert one.lease.has_expired(now) == has_expired
+        if has_expired:
             one.lease.end("expired")
             model.holder = None
         is_holders = model.holder == client and call.lease == model.given.get(client)
         is_fresh = -1.0 <= heard <= 0.0
         if what == "wait":
-            now += 0.4
+            now += 0.5
         elif what in ("acquire", "take") and is_fresh:
             if what == "take" and model.holder not in (None, client):
                 one.lease.end("taken")

@@ -80,6 +80,7 @@ async def test_a_canceled_goal_holds_its_axes_where_they_are(hand: RobotiqHand) 
     runner, goal = await moving(hand)
     runner.cancel(b"2")  # another goal's key
     await asyncio.sleep(0.1)
+    assert not goal.done()
     runner.cancel(b"1")
     assert (await goal).ending is Ending.CANCELED
     there = hand.status.position(A)
