@@ -65,6 +65,21 @@ def test_for_another_run_of_the_agent() -> None:
             one.check_meant(replace(call, epoch=epoch))
 
 
+def test_of_somebody_else_or_under_another_lease() -> None:
+    one, call = admission()
+    for other in (
+        replace(call, client="ben"),
+        replace(call, lease=call.lease - 1),
+        replace(call, lease=call.lease + 1),
+    ):
+        for ask in (one.admit, one.renew):
+            with pytest.raises(ControlLostError):
+                ask(other, NOW)
+        assert not one.is_of_holder(other)
+    assert one.is_of_holder(call)
+    one.admit(call, NOW)
+
+
 @pytest.mark.parametrize("reason", ["taken", "halted", "expired", "released", "closed"])
 def test_under_a_lease_that_has_ended_says_why(reason: str) -> None:
     one, call = admission()
@@ -95,6 +110,17 @@ def test_a_renewal_overtakes_no_command() -> None:
     one, call = admission()
     one.renew(replace(call, number=9), NOW)
     one.admit(call, NOW)
+
+
+def test_a_bar() -> None:
+    one, call = admission()
+    one.bar(replace(call, number=20))
+    with pytest.raises(AgentError, match="overtook"):
+        one.admit(replace(call, number=20), NOW)
+    one.bar(replace(call, number=3))
+    with pytest.raises(AgentError, match="overtook"):
+        one.admit(replace(call, number=19), NOW)
+    one.admit(replace(call, number=21), NOW)
 
 
 def test_a_repeated_request_for_the_lease() -> None:
