@@ -210,7 +210,7 @@ class Doing:
     goes_on: bool = True
 
     def begin(self, work: Coroutine[Any, Any, Any]) -> None:
-        self.call = self.world.holder.host.start(told(work))
+        self.call = self.world.holder.host.create_task(told(work))
 
     async def loop(self) -> None:
         """A control loop: each of its commands has a position and a speed of its own."""

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Coroutine, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Coroutine
 from contextvars import Context
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -75,19 +74,10 @@ class Host(_Loop):
         while not all(task.done() for task in left):  # noqa: ASYNC110  # tasks of another loop
             await asyncio.sleep(0.01)
 
-    def start(self, work: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
-        """Run a program on it; the task may be awaited from outside."""
-        return self.create_task(work)
-
     async def do(self, work: Coroutine[Any, Any, T]) -> T:
         """Run something on it, from outside, and wait for it."""
-        task, done = self.start(work), self._outer.create_future()
-
-        def end(_: asyncio.Task[T]) -> None:
-            if not done.done():
-                done.set_result(None)
-
-        task.add_done_callback(end)
+        task, done = self.create_task(work), self._outer.create_future()
+        task.add_done_callback(lambda _: done.done() or done.set_result(None))
         try:
             await done
         except asyncio.CancelledError:
@@ -97,24 +87,13 @@ class Host(_Loop):
 
     # -- the gate --------------------------------------------------------------------------------------
 
-    @contextmanager
-    def _entered(self, loop: asyncio.AbstractEventLoop) -> Iterator[None]:
-        before = asyncio._get_running_loop()
-        asyncio._set_running_loop(loop)
-        try:
-            yield
-        finally:
-            asyncio._set_running_loop(before)
-
     def _run(self, handle: asyncio.Handle) -> None:
         if self.is_frozen:
             self._due.append(handle)
         elif isinstance(handle, asyncio.TimerHandle) and handle.when() > self.time() + EARLY_S:
-            self._outer.call_at(
-                handle.when() + self.slept, self._run, handle
-            )  # by its clock it is not due yet
+            # By its clock it is not due yet.
+            self._outer.call_at(handle.when() + self.slept, self._run, handle)
         elif not handle.cancelled():
-            # What _entered does, without a context manager: a program's every step passes here.
             before = asyncio._get_running_loop()
             asyncio._set_running_loop(self)
             try:
@@ -162,8 +141,11 @@ class Host(_Loop):
         if self.is_dead:
             raise ConnectionRefusedError(111, "this host is dead")
         protocol = factory()
-        with self._entered(self._outer):
+        asyncio._set_running_loop(self._outer)
+        try:
             transport = self._outer.connect(lambda: _Gate(self, protocol), port)
+        finally:
+            asyncio._set_running_loop(self)
         self._transports.append(transport)
         protocol.connection_made(transport)
         return transport, protocol

@@ -91,9 +91,9 @@ class Network:
         """Let nothing arrive from now on; each way is a source and a target."""
         for source, target in ways:
             self.stream(source, target).is_cut = True
-            self.loop.call_later(LINK_LEASE_S, self._look, source, target)
+            self.loop.call_later(LINK_LEASE_S, self._part_if_cut, source, target)
 
-    def _look(self, source: str, target: str) -> None:
+    def _part_if_cut(self, source: str, target: str) -> None:
         if self.stream(source, target).is_cut and not self.keeps_links:
             self.part(source, target)
 

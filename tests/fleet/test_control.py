@@ -159,7 +159,7 @@ async def test_a_client_that_was_cut_off_does_not_come_back_after_an_interventio
             await told(hand.move(200, Finger.A, speed=0))
             await asyncio.sleep(0.05)
 
-    looping = here.holder.host.start(loop())
+    looping = here.holder.host.create_task(loop())
     await here.until(lambda: here.gripper.is_moving)
     here.cut(here.holder)
     await asyncio.sleep(after)

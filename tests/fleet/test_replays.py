@@ -86,7 +86,7 @@ async def test_a_suspended_laptop_commands_nothing_from_before(
             number += 1
             await asyncio.sleep(0.01)
 
-    looping = host.start(told(loop()))
+    looping = host.create_task(told(loop()))
     await asyncio.sleep(0.5)
     (host.freeze if keeps_links else lambda: here.freeze(host))()
     await asyncio.sleep(seconds)

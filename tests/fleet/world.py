@@ -113,16 +113,16 @@ class World:
                 if bus.name != host.name:
                     self.network.part(host.name, bus.name)
 
-    def travels(self, name: str = "left") -> dict[Finger, float]:
-        return {axis: self.grippers[name].travel(axis) for axis in THREE_FINGER.axes}
-
     def moved(self, axis: Finger, name: str = "left") -> float:
         """How far an axis has moved since :meth:`settle`."""
         return self.grippers[name].travel(axis) - self._before[name][axis]
 
     async def settle(self) -> None:
         """Note where everything is before the trouble begins."""
-        self._before = {name: self.travels(name) for name in NAMES}
+        self._before = {
+            name: {axis: gripper.travel(axis) for axis in THREE_FINGER.axes}
+            for name, gripper in self.grippers.items()
+        }
 
     def check(self) -> None:
         """What is promised whatever happens."""
@@ -176,7 +176,7 @@ class ServingAgent:
             finally:
                 await self.bus.close()
 
-        self.serving = self.host.start(serve())
+        self.serving = self.host.create_task(serve())
         async with asyncio.timeout(5):
             await ready.wait()
 
@@ -208,7 +208,7 @@ class Client:
             self.hand_statuses = self.hand.statuses(100_000)
 
         await self.do(begin())
-        self._watching = self.host.start(self._watch())
+        self._watching = self.host.create_task(self._watch())
 
     async def do(self, work: Coroutine[Any, Any, T]) -> T:
         return await self.host.do(work)
