@@ -34,12 +34,7 @@ class Admission:
             raise AgentError("the agent was restarted since this request was made; nothing was done")
 
     def admit(self, call: Call, now: float) -> None:
-        """Accept a command and count it. The caller has ended an expired lease first.
-
-        Raises:
-            ControlLostError: not from the holder; or late; or the preceding command is missing.
-            AgentError: a later command came first.
-        """
+        """Accept a command and count it, or raise. The caller has ended an expired lease first."""
         self._check_holder(call, now)
         if call.number <= self._newest:
             raise AgentError("a later request overtook this one; nothing was done")
@@ -51,8 +46,7 @@ class Admission:
     def is_repeated(self, call: Call) -> bool:
         """Whether a request for the lease is a repetition of the one that gave its sender the present lease.
 
-        Raises:
-            AgentError: a repetition, but its sender does not hold the lease now.
+        AgentError: a repetition, but its sender does not hold the lease now.
         """
         before = self._asked.pop(call.client, -1)
         self._asked[call.client] = max(before, call.number)

@@ -109,13 +109,7 @@ class LeaseKeeper:
         self._may_reacquire = False
 
     async def acquire(self, *, take: bool = False) -> None:
-        """Get the lease, with ``take`` also from another client.
-
-        Raises:
-            ControlLostError: another client holds it.
-            AgentError: two agents serve the gripper.
-            RobotiqError: the agent did not answer.
-        """
+        """Get the lease, with ``take`` also from another client; errors as of :meth:`RemoteHand.acquire`."""
         async with self._acquiring:
             if self.is_in_control:
                 await self._renew()  # it may have been lost unnoticed
@@ -147,11 +141,7 @@ class LeaseKeeper:
             self._log.warning("a stop that is under way is stronger: the fingers are %s", self._ending.done)
 
     async def released(self) -> None:
-        """Wait until the release is acknowledged.
-
-        Raises:
-            RobotiqError: the agent did not answer, or the fingers were not seen to stop.
-        """
+        """Wait until the release is acknowledged; errors as of :meth:`RemoteHand.release`."""
         awaited = None
         while self._releasing is not awaited:
             awaited = self._releasing

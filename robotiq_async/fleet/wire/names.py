@@ -15,12 +15,7 @@ _NAME: Final = re.compile(r"[A-Za-z0-9_.-]{1,64}")
 
 
 def check_name(what: str, name: object) -> str:
-    """Check the name of a site, a host or a gripper: 1..64 of ``A-Z a-z 0-9 _ . -``, so never a wildcard.
-
-    Raises:
-        TypeError: not a string.
-        ValueError: empty, too long, or with another character.
-    """
+    """Check the name of a site, a host or a gripper: 1..64 of ``A-Z a-z 0-9 _ . -``, so never a wildcard."""
     if not isinstance(name, str):
         raise TypeError(f"{what} must be a string, got {name!r}")
     if not _NAME.fullmatch(name):

@@ -243,9 +243,7 @@ def make_hand(settings: Settings) -> Hand:
 
     A hand on another host acquires its lease with the first command: connecting only reads.
 
-    Raises:
-        ValueError: an option that the hand refuses.
-        RobotiqError: the extra that this address needs is not installed.
+    ValueError: an option that the hand refuses. RobotiqError: an extra is not installed.
     """
     if is_remote(settings.address):
         if find_spec("zenoh") is None:

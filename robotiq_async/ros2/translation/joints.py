@@ -73,13 +73,9 @@ class GoalError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Targets:
-    """Target positions of axes.
+    """Target positions of axes."""
 
-    Attributes:
-        counts: each position, 0..255, with the axes that move there; no axis twice.
-    """
-
-    counts: tuple[tuple[int, Finger], ...]
+    counts: tuple[tuple[int, Finger], ...]  # each position, 0..255, with the axes that move there; none twice
 
     @property
     def axes(self) -> Finger:
@@ -129,16 +125,10 @@ class Motion:
 def targets(
     names: Sequence[str], angles: Sequence[float], prefix: str = "", model: Model = THREE_FINGER
 ) -> Targets:
-    """The targets of a goal.
+    """The targets of a goal; GoalError if it is invalid, for angles are never adjusted to fit.
 
-    Args:
-        names: of joints, with the prefix; empty with one angle for all fingers, or for the jaw.
-        angles: radians, or metres for a Hand-E; one for each name.
-        prefix: of the joints of this hand.
-        model: of the gripper.
-
-    Raises:
-        GoalError: the goal is invalid; angles are never adjusted to fit.
+    The names of joints have the prefix; without names there is one angle for all fingers, or for the jaw.
+    Angles are in radians, or in metres for a Hand-E.
     """
     if model is not THREE_FINGER:
         return _jaw_targets(names, angles, prefix, model)
