@@ -76,10 +76,11 @@ class Host(_Loop):
 
     async def do(self, work: Coroutine[Any, Any, T]) -> T:
         """Run something on it, from outside, and wait for it."""
-        task, done = self.create_task(work), self._outer.create_future()
-        task.add_done_callback(lambda _: done.done() or done.set_result(None))
+        task: asyncio.Task[T] = self.create_task(work)
+        done = asyncio.Event()
+        task.add_done_callback(lambda _: done.set())
         try:
-            await done
+            await done.wait()
         except asyncio.CancelledError:
             task.cancel()
             raise
