@@ -23,32 +23,19 @@ import pytest
 
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.docs.agents import ROOM, agent_of_the_pages
-from tests.docs.pages import DOCS, PAGES, ROOT, Block, blocks, requirements
+from tests.docs.pages import DOCS, PAGES, ROOT, TUTORIAL, Block, blocks, named, read, requirements
 from tests.docs.test_tutorial import PROGRAM, TYPED, agree
 from tests.docs.test_web_service import PAGE as WEB_SERVICE
 from tests.docs.test_web_service import service, stops
 from tests.grippers import active_gripper
 
 PATIENCE = 60.0
-TUTORIAL = DOCS / "tutorial.md"
 README = ROOT / "README.md"
-
-
-def text_of(page: Path) -> str:
-    return page.read_text(encoding="utf-8")
-
-
-def named(page: Path) -> str:
-    return str(page.relative_to(ROOT))
-
-
-def code_of(page: Path) -> list[Block]:
-    return [block for block in blocks(text_of(page)) if block.language == "python"]
 
 
 ELSEWHERE = (TUTORIAL, WEB_SERVICE)
 """Pages whose code is no matter of the prompt: each has tests of its own."""
-CODE = {page: code_of(page) for page in PAGES if page not in ELSEWHERE and code_of(page)}
+CODE = {page: code for page in PAGES if page not in ELSEWHERE and (code := blocks(read(page), "python"))}
 WITH_TESTS = [page for page, code in CODE.items() if any("def test_" in block.text for block in code)]
 
 
@@ -110,11 +97,11 @@ async def at_the_prompt(python: str, code: str, folder: Path) -> str:
 @pytest.mark.parametrize(
     ("page", "block"),
     [(page, each) for page, code in CODE.items() for each in code if "def test_" not in each.text],
-    ids=lambda value: named(value) if isinstance(value, Path) else f"line {value.line}",
+    ids=lambda value: named(value) or f"line {value.line}",
 )
 async def test_what_is_for_the_prompt(page: Path, block: Block) -> None:
     # Some name files of the clone.
-    await at_the_prompt(environment(requirements(text_of(page))), block.text, ROOT)
+    await at_the_prompt(environment(requirements(read(page))), block.text, ROOT)
 
 
 @pytest.mark.parametrize("page", WITH_TESTS, ids=named)
@@ -122,23 +109,23 @@ async def test_what_is_for_pytest(page: Path, tmp_path: Path) -> None:
     tests = [block for block in CODE[page] if "def test_" in block.text]
     for number, block in enumerate(tests):
         (tmp_path / f"test_{number}.py").write_text(block.text, encoding="utf-8")
-    (settings,) = [block for block in blocks(text_of(page)) if block.language == "toml"]
+    (settings,) = blocks(read(page), "toml")
     (tmp_path / "pyproject.toml").write_text(settings.text, encoding="utf-8")
-    printed = await run(environment(requirements(text_of(page))), "-m", "pytest", folder=tmp_path)
+    printed = await run(environment(requirements(read(page))), "-m", "pytest", folder=tmp_path)
     count = sum(block.text.count("def test_") for block in tests)
     assert re.search(rf"\b{count} passed in ", printed), printed
 
 
 async def test_the_notebook(tmp_path: Path) -> None:
     """Executed by a kernel of Jupyter, it shows what it shows."""
-    python = environment(f"{requirements(text_of(DOCS / 'how-to' / 'notebooks.md'))} ipykernel nbclient")
+    python = environment(f"{requirements(read(DOCS / 'how-to' / 'notebooks.md'))} ipykernel nbclient")
     command = (python, str(DOCS / "make_notebook.py"), "--check")
     # Jupyter keeps things at home.
     await run(*command, folder=tmp_path, variables={"HOME": str(tmp_path)})
 
 
 async def test_the_readme(tmp_path: Path) -> None:
-    (example,) = code_of(README)
+    (example,) = blocks(read(README), "python")
     program = tmp_path / "example.py"
     async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
         server.gripper.place_object(7, position=150)
@@ -149,7 +136,7 @@ async def test_the_readme(tmp_path: Path) -> None:
 
 async def test_the_web_service(tmp_path: Path) -> None:
     """In an environment that holds what the page has its reader install."""
-    python = environment(requirements(text_of(WEB_SERVICE)))
+    python = environment(requirements(read(WEB_SERVICE)))
     async with service(active_gripper(1.0), tmp_path, python) as here:
         await stops(here, signal.SIGINT)
 
@@ -159,7 +146,7 @@ async def test_the_web_service(tmp_path: Path) -> None:
 
 @pytest.fixture
 def clone() -> str:
-    return environment(requirements(text_of(TUTORIAL)))
+    return environment(requirements(read(TUTORIAL)))
 
 
 async def test_the_tutorial_is_typed(clone: str) -> None:

@@ -14,27 +14,33 @@ ROOT: Final = Path(__file__).parents[2]
 DOCS: Final = ROOT / "docs"
 PAGES: Final = sorted(DOCS.rglob("*.md"))
 """Everything under docs/."""
+TUTORIAL: Final = DOCS / "tutorial.md"
+
+
+def read(page: Path | str) -> str:
+    """The text of a page; a name is one of docs/."""
+    return (DOCS / page).read_text(encoding="utf-8")
+
+
+def named(page: object) -> str:
+    """How tests name a page; nothing else has a name."""
+    return str(page.relative_to(ROOT)) if isinstance(page, Path) else ""
 
 
 class Block(NamedTuple):
-    """A fenced block of a page.
+    """A fenced block of a page."""
 
-    Attributes:
-        language: the word after the fence.
-        text: what it holds.
-        line: the first line of the text, counted from 1.
-    """
-
-    language: str
+    language: str  # the word after the fence
     text: str
-    line: int
+    line: int  # the first of the text, counted from 1
 
 
-def blocks(text: str) -> list[Block]:
-    """The fenced blocks of a page, in their order."""
+def blocks(text: str, language: str | None = None) -> list[Block]:
+    """The fenced blocks of a page, in their order: all, or those of one language."""
     return [
         Block(found[1], found[2], text[: found.start(2)].count("\n") + 1)
         for found in re.finditer(r"^```(\w*)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+        if language in (None, found[1])
     ]
 
 

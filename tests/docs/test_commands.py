@@ -15,15 +15,13 @@ from pathlib import Path
 import pytest
 
 from robotiq_async.cli.app import build
-from tests.docs.pages import PAGES, ROOT, blocks
+from tests.docs.pages import PAGES, ROOT, blocks, named, read
 
 READ = [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
 OTHERS = {"cp", "curl", "export", "ls", "python3", "ros2", "source", "sudo"}
 """Programs that are not ours: ``python3 -m venv``, and what ROS and the shell have."""
-TARGETS = set(re.findall(r"^([a-z0-9-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
-EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
-    "optional-dependencies"
-]
+TARGETS = set(re.findall(r"^([a-z0-9-]+):", read(ROOT / "Makefile"), re.MULTILINE))
+EXTRAS = tomllib.loads(read(ROOT / "pyproject.toml"))["project"]["optional-dependencies"]
 
 
 def words_of(line: str) -> list[str]:
@@ -37,14 +35,13 @@ def words_of(line: str) -> list[str]:
 
 def lines(page: Path) -> Iterator[tuple[int, str]]:
     """What a page has typed, with the numbers of its lines."""
-    for block in blocks(page.read_text(encoding="utf-8")):
-        if block.language == "sh":
-            for number, line in enumerate(block.text.replace("\\\n", " ").splitlines(), block.line):
-                if line.strip() and not line.startswith("#"):
-                    yield number, line.strip()
+    for block in blocks(read(page), "sh"):
+        for number, line in enumerate(block.text.replace("\\\n", " ").splitlines(), block.line):
+            if line.strip() and not line.startswith("#"):
+                yield number, line.strip()
 
 
-@pytest.mark.parametrize("page", READ, ids=lambda page: str(page.relative_to(ROOT)))
+@pytest.mark.parametrize("page", READ, ids=named)
 def test_it_can_be_typed(page: Path) -> None:
     for number, line in lines(page):
         try:
@@ -67,11 +64,11 @@ def check(line: str) -> None:
     elif program == "pip" and words[1] == "wheel":
         assert words[-1] == ".", "of the clone"
     elif program == "python":
-        named = [
+        files = [
             word for word in words[1:] if word.endswith(".py") and "/" in word and not word.startswith("..")
         ]
         modules = [words[number + 1] for number, word in enumerate(words) if word == "-m"]
-        assert all((ROOT / each).is_file() for each in named)
+        assert all((ROOT / each).is_file() for each in files)
         assert all(has(each) for each in modules)
     else:
         assert program in OTHERS, f"what is {program}?"

@@ -26,12 +26,12 @@ from robotiq_async.values.errors import ControlLostError
 from robotiq_async.values.events import SentRequest
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
-from tests.docs.pages import DOCS, blocks
+from tests.docs.pages import blocks, read
 from tests.fleet.network import Network
 from tests.grippers import until
 
-PROTOCOL: Final = (DOCS / "fleet-protocol.md").read_text(encoding="utf-8")
-HOW_TO: Final = (DOCS / "how-to" / "fleet.md").read_text(encoding="utf-8")
+PROTOCOL: Final = read("fleet-protocol.md")
+HOW_TO: Final = read("how-to/fleet.md")
 NAME: Final = GripperName("lab", "cell-1", "left")
 EPOCH: Final = 4503599627370497
 CLIENT: Final = "5f0c3a9e1b7d2468"
@@ -93,7 +93,7 @@ EXAMPLES: Final = [
 
 
 def shown(language: str, page: str) -> list[str]:
-    return [block.text for block in blocks(page) if block.language == language]
+    return [block.text for block in blocks(page, language)]
 
 
 def test_the_objects_are_those_of_the_code() -> None:

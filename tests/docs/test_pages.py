@@ -25,28 +25,21 @@ from tests.docs.pages import (
     DOCS,
     PAGES,
     ROOT,
+    TUTORIAL,
     Block,
     blocks,
     compiled_prompt,
+    named,
     outputs,
+    read,
     requirements,
     run_prompt,
 )
 from tests.docs.test_tutorial import agree
 
 FRONT = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")]
-TUTORIAL = DOCS / "tutorial.md"
-"""Has a test of its own: its blocks belong together."""
 FIXTURES = DOCS / "how-to" / "testing.md"
 """Is for pytest, which runs it in tests/testing/."""
-
-
-def name(page: object) -> str:
-    return str(page.relative_to(ROOT)) if isinstance(page, Path) else ""
-
-
-def read(page: Path) -> str:
-    return page.read_text(encoding="utf-8")
 
 
 # -- where code runs ------------------------------------------------------------------------------------
@@ -54,14 +47,12 @@ def read(page: Path) -> str:
 
 def awaits_at_the_top(block: Block) -> bool:
     """Whether it is for a prompt or a notebook; in a program it would be a syntax error."""
-    if block.language != "python":
-        return False
     return bool(compiled_prompt(block.text, "page").co_flags & inspect.CO_COROUTINE)
 
 
 def test_a_page_says_where_code_runs_that_awaits_at_the_top() -> None:
     for page in [*PAGES, *FRONT]:
-        found = [block.text for block in blocks(read(page)) if awaits_at_the_top(block)]
+        found = [block.text for block in blocks(read(page), "python") if awaits_at_the_top(block)]
         said = read(page).partition(found[0])[0] if found else ""
         assert not found or "python -m asyncio" in said, page
 
@@ -69,7 +60,7 @@ def test_a_page_says_where_code_runs_that_awaits_at_the_top() -> None:
 def test_a_page_with_code_names_its_environment() -> None:
     for page in {*(page for page, _ in CODE), FIXTURES}:
         assert requirements(read(page)).startswith((".", "'.[")), page
-        is_for_the_prompt = any(map(awaits_at_the_top, blocks(read(page))))
+        is_for_the_prompt = any(map(awaits_at_the_top, blocks(read(page), "python")))
         assert ("`python -m asyncio`" in read(page)) == is_for_the_prompt, page
 
 
@@ -89,7 +80,7 @@ def test_a_stale_page_is_named_and_made_again(
     assert capsys.readouterr().out == "layout.json is stale: run docs/make_pages.py\n"
     assert not layout.exists()
     assert make_pages.main([]) == 0
-    assert layout.read_text(encoding="utf-8") == make_layout.draw()
+    assert read(layout) == make_layout.draw()
     assert make_pages.main(["--check"]) == 0
 
 
@@ -99,9 +90,8 @@ def test_a_stale_page_is_named_and_made_again(
 CODE = [
     (page, block)
     for page in PAGES
-    if page not in (TUTORIAL, FIXTURES)
-    for block in blocks(read(page))
-    if block.language == "python"
+    if page not in (TUTORIAL, FIXTURES)  # the blocks of the tutorial belong together: test_tutorial
+    for block in blocks(read(page), "python")
 ]
 OUTPUTS = {
     (page, block): shown for page in PAGES if page != TUTORIAL for block, shown in outputs(read(page)).items()
@@ -125,7 +115,7 @@ def compiled(page: Path, block: Block, address: str) -> CodeType:
     return compiled_prompt(source, str(page))
 
 
-@pytest.mark.parametrize(("page", "block"), CODE, ids=lambda value: name(value) or f"line {value.line}")
+@pytest.mark.parametrize(("page", "block"), CODE, ids=lambda value: named(value) or f"line {value.line}")
 async def test_code_runs(
     page: Path, block: Block, restored_logging: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -161,10 +151,9 @@ async def test_the_first_move_of_a_real_gripper_ends_wherever_its_fingers_are(cl
 
 def test_the_code_for_typed_projects_passes_mypy_strict(tmp_path: Path) -> None:
     files: list[str] = []
-    for block in blocks(read(FIXTURES)):
-        if block.language == "python":
-            files.append(f"line_{block.line}.py")
-            (tmp_path / files[-1]).write_text(block.text, encoding="utf-8")
+    for block in blocks(read(FIXTURES), "python"):
+        files.append(f"line_{block.line}.py")
+        (tmp_path / files[-1]).write_text(block.text, encoding="utf-8")
     assert files
     command = [sys.executable, "-m", "mypy", "--strict", "--no-incremental", "--config-file=", *files]
     checked = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
@@ -190,7 +179,7 @@ def is_from(words: str, known: str) -> bool:
 def test_quoted_messages_are_the_librarys() -> None:
     known = source()
     page = read(DOCS / "how-to" / "troubleshooting.md")
-    quoted = [line for block in blocks(page) if block.language == "text" for line in block.text.splitlines()]
+    quoted = [line for block in blocks(page, "text") for line in block.text.splitlines()]
     quoted += re.findall(r"^\| `([^|]+)` \|", page, re.MULTILINE)
     pieces = [
         piece.strip(" `,:()")

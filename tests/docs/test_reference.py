@@ -7,26 +7,26 @@ import re
 import robotiq_async
 from robotiq_async import Fault, ObjectStatus, State
 from robotiq_async.cli.app import COMMANDS
-from tests.docs.pages import DOCS, ROOT
+from tests.docs.pages import ROOT, read
 
-REFERENCE = (DOCS / "reference.md").read_text(encoding="utf-8")
+REFERENCE = read("reference.md")
 
 
 def test_every_state_has_its_row() -> None:
-    text = (DOCS / "state-machine.md").read_text(encoding="utf-8")
+    text = read("state-machine.md")
     for state in State:
         assert re.search(rf"^\|.*\b{state.name}\b", text, re.MULTILINE), state
 
 
 def test_every_fault_has_its_row() -> None:
-    text = (DOCS / "registers.md").read_text(encoding="utf-8")
+    text = read("registers.md")
     for fault in Fault:
         (row,) = re.findall(rf"^\| 0x{int(fault):02X} \| `{fault.name}` \|.*$", text, re.MULTILINE)
         assert f"| {fault.severity.value} |" in row
 
 
 def test_the_contact_codes_are_those_of_the_library() -> None:
-    text = (DOCS / "decisions" / "thesis-map.md").read_text(encoding="utf-8")
+    text = read("decisions/thesis-map.md")
     for code in ObjectStatus:
         assert re.search(rf"^\| {int(code)} \|[^|]*\| `ObjectStatus\.{code.name}` \|", text, re.MULTILINE), (
             code
@@ -51,7 +51,5 @@ def _line_of(text: str, name: str) -> int:
 
 
 def test_the_readme_names_every_command() -> None:
-    named = set(
-        re.findall(r"^robotiq-async (\w+)", (ROOT / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
-    )
+    named = set(re.findall(r"^robotiq-async (\w+)", read(ROOT / "README.md"), re.MULTILINE))
     assert {command.__name__ for command in COMMANDS} | {"fleet", "measure"} <= named

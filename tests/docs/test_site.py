@@ -14,9 +14,9 @@ from docs.site import check, versions
 from docs.site.docstrings import in_markdown
 from docs.site.pages import EXTRAS, PROJECT, described, places, stage, staged
 from robotiq_async import fleet, simulator, sync
-from tests.docs.pages import DOCS, PAGES, ROOT, prose
+from tests.docs.pages import DOCS, PAGES, ROOT, prose, read
 
-CONFIGURATION = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+CONFIGURATION = read(ROOT / "mkdocs.yml")
 NAVIGATION = re.findall(r"^ +- (?:.*: )?(\S+\.md)$", CONFIGURATION.partition("\nnav:\n")[2], re.MULTILINE)
 
 
@@ -31,7 +31,7 @@ def test_every_page_is_in_the_navigation_once() -> None:
 
 
 def test_every_picture_is_on_a_page() -> None:
-    shown = "".join(page.read_text(encoding="utf-8") for page in [*PAGES, ROOT / "README.md"])
+    shown = "".join(map(read, [*PAGES, ROOT / "README.md"]))
     pictures = [path for path in DOCS.rglob("*") if path.suffix in (".svg", ".webp")]
     assert pictures
     assert [path.name for path in pictures if f"{path.parent.name}/{path.name}" not in shown] == []
@@ -45,7 +45,7 @@ def test_what_makes_the_site_is_not_on_it() -> None:
 def test_a_page_is_the_same_in_every_dialect() -> None:
     """The site's Markdown is stricter: a list or a table after a line of prose is prose to it."""
     for page in [*PAGES, *(ROOT / name for name in PROJECT)]:
-        text = page.read_text(encoding="utf-8")
+        text = read(page)
         for fence in re.findall(r"^( *)```\w*$", text, re.MULTILINE):
             assert len(fence) % 4 == 0, f"{page}: code within a list is indented by four"
         before = ""
@@ -237,12 +237,12 @@ def test_a_version_takes_the_place_of_its_last_build_and_leaves_the_others(
         (built / "index.html").write_text(words, encoding="utf-8")
         monkeypatch.setattr(versions, "version", lambda version=version: version)
         assert versions.collect(built, site) == site / version.rpartition(".")[0]
-    assert [path.read_text(encoding="utf-8") for path in sorted(site.glob("*/index.html"))] == ["c", "a"]
-    assert json.loads((site / "versions.json").read_text(encoding="utf-8")) == [
+    assert [read(path) for path in sorted(site.glob("*/index.html"))] == ["c", "a"]
+    assert json.loads(read(site / "versions.json")) == [
         {"version": "0.10", "title": "0.10.1 (unreleased)", "aliases": ["latest"]},
         {"version": "0.9", "title": "0.9.3 (unreleased)", "aliases": []},
     ]
-    assert "url=0.10/index.html" in (site / "index.html").read_text(encoding="utf-8")
+    assert "url=0.10/index.html" in read(site / "index.html")
 
 
 def test_the_version_of_the_site_is_the_librarys() -> None:
@@ -250,7 +250,7 @@ def test_the_version_of_the_site_is_the_librarys() -> None:
 
 
 def test_the_environment_of_the_site_is_pinned_and_names_no_place() -> None:
-    lines = (DOCS / "site" / "requirements.txt").read_text(encoding="utf-8").splitlines()
+    lines = read("site/requirements.txt").splitlines()
     assert {"zensical", "mkdocstrings", "mkdocstrings-python"} <= {line.partition("==")[0] for line in lines}
     for line in lines:
         assert re.fullmatch(r"[a-z0-9.-]+==[0-9][a-z0-9.]*( ; .*)?", line), line

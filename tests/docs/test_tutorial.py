@@ -18,9 +18,9 @@ from typing import Any
 import pytest
 
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.docs.pages import DOCS, ROOT, Block, blocks, compiled_prompt, run_prompt
+from tests.docs.pages import ROOT, TUTORIAL, Block, blocks, compiled_prompt, read, run_prompt
 
-BLOCKS = blocks((DOCS / "tutorial.md").read_text(encoding="utf-8"))
+BLOCKS = blocks(read(TUTORIAL))
 TYPED = [
     (code, output)
     for code, output in pairwise(BLOCKS)

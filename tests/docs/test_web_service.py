@@ -16,11 +16,11 @@ from pathlib import Path
 import pytest
 
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.docs.pages import DOCS, blocks
+from tests.docs.pages import DOCS, blocks, read
 from tests.grippers import active_gripper, until
 
 PAGE = DOCS / "how-to" / "web-service.md"
-(PROGRAM,) = (each.text for each in blocks(PAGE.read_text(encoding="utf-8")) if each.language == "python")
+(PROGRAM,) = (each.text for each in blocks(read(PAGE), "python"))
 STOP_S = 0.5
 """Between the signal and fingers that stand still: a poll or two, on a busy machine."""
 

@@ -8,7 +8,7 @@ from importlib.metadata import entry_points
 
 import pytest
 
-from tests.docs.pages import DOCS, ROOT, blocks
+from tests.docs.pages import ROOT, blocks, read
 
 pytest_plugins = ["pytester"]
 
@@ -80,10 +80,10 @@ def test_the_fixtures_live_in_the_loop_of_the_test(run: Run, marks: str, ini: st
 
 
 def test_the_page_about_it(run: Run, pytester: pytest.Pytester) -> None:
-    page = blocks((DOCS / "how-to" / "testing.md").read_text(encoding="utf-8"))
-    (settings,) = [block for block in page if block.language == "toml"]
+    page = read("how-to/testing.md")
+    (settings,) = blocks(page, "toml")
     options = tomllib.loads(settings.text)["tool"]["pytest"]["ini_options"]
-    tests = [block.text for block in page if block.language == "python"]
+    tests = [block.text for block in blocks(page, "python")]
     others = {f"test_{number}": text for number, text in enumerate(tests[1:])}
     pytester.makepyfile(**others)
     result = run(tests[0], ini=f"asyncio_mode = {options['asyncio_mode']}")

@@ -26,6 +26,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import ACTIONS, Operator
 from robotiq_async.values.enums import DEFAULT_SPEED
 from tests.grippers import lose_link, shows
+from tests.virtual import until
 
 pytestmark = pytest.mark.virtual_time
 LEFT, STOPPED, MOVING = "left as they are", "were stopped", "may STILL MOVE"
@@ -253,9 +254,7 @@ async def test_a_motion_that_is_on_its_way_counts(
     """Its request has arrived, and its acknowledgement has not."""
     server.policy = lambda frame: [(0.05, frame)]
     closing = asyncio.create_task(active.act(ACTIONS["close"]))
-    async with asyncio.timeout(20):
-        while not gripper.request_registers[0] & 0x0800:  # noqa: ASYNC110
-            await asyncio.sleep(0.0001)
+    await until(lambda: bool(gripper.request_registers[0] & 0x0800))
     assert active.has_moved
     assert STOPPED in await active.leave()
     assert not gripper.is_moving

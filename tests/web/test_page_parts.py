@@ -24,7 +24,7 @@ from robotiq_async.tools.web.settings import PageSettings
 from robotiq_async.tools.wording import refusal_words
 from robotiq_async.values.enums import Trigger
 from tests.fake_hand import FakeHand
-from tests.grippers import active_gripper, shows
+from tests.grippers import active_gripper, shows, until
 
 # -- commands ----------------------------------------------------------------------------------------------
 
@@ -41,9 +41,7 @@ class Pages:
         self.commands.do({**asked, "arguments": arguments})
 
     async def answer(self) -> dict[str, Any]:
-        async with asyncio.timeout(20):
-            while not self.answers:  # noqa: ASYNC110
-                await asyncio.sleep(0)
+        await until(lambda: bool(self.answers))
         return self.answers.pop(0)
 
 
