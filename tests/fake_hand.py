@@ -34,15 +34,11 @@ from robotiq_async.values.request import AxisRequest, Request
 
 
 class FakeHand(Hand):
-    """An active gripper whose axes are where they are sent as soon as they are sent there.
-
-    Attributes:
-        obstacle: what closing fingers meet, in counts; 256 for nothing.
-    """
+    """An active gripper whose axes are where they are sent as soon as they are sent there."""
 
     def __init__(self, name: str = "") -> None:
         super().__init__("fake://hand", name=name, units=lambda _: Units())
-        self.obstacle = 256
+        self.obstacle = 256  # what closing fingers meet, in counts; 256 for nothing
         self._state = State.DISCONNECTED
         self._request = Request(activate=True, go=True, axes=(AxisRequest(speed=128, force=64),) * 4)
         self._fault = Fault.NONE

@@ -50,21 +50,13 @@ NEAR: Final = {f"gPO{name}": field for name, field in zip("ABCS", reg.gPO, stric
 
 
 class Difference(NamedTuple):
-    """A field of a frame that differs.
+    """A field of a frame that differs."""
 
-    Attributes:
-        stage: in which it was recorded.
-        seconds: since the stage began.
-        field: its name; "decoder" for a status that is understood otherwise now.
-        recorded: what the gripper showed.
-        simulated: what the simulator shows about then.
-    """
-
-    stage: int
-    seconds: float
-    field: str
+    stage: int  # in which it was recorded
+    seconds: float  # since the stage began
+    field: str  # its name; "decoder" for a status that is understood otherwise now
     recorded: object
-    simulated: object
+    simulated: object  # what the simulator shows about then
 
 
 @dataclass

@@ -23,14 +23,10 @@ EXIT_S: Final = 4.0  # the end of the program waits so long for running hands: s
 
 
 class Caller:
-    """Makes the calls of one hand, from any thread.
-
-    Attributes:
-        hand: the hand, in its event loop.
-    """
+    """Makes the calls of one hand, from any thread."""
 
     def __init__(self, hand: AsyncRobotiqHand) -> None:
-        self.hand: Final = hand
+        self.hand: Final = hand  # in its event loop
         self._calls: set[object] = set()  # those under way: the hand may be about to run
         self._is_left_behind = False
         self._has_warned = False

@@ -31,9 +31,6 @@ class LoopThread:
     """Makes calls in an event loop of its own, for any number of other threads.
 
     The thread starts with the first call and ends when no call and no hand is left in it.
-
-    Attributes:
-        is_closing: whether the program ends: see :meth:`check_open`.
     """
 
     def __init__(self) -> None:
@@ -41,7 +38,7 @@ class LoopThread:
 
     def forget(self) -> None:
         """Start without a thread; also after a fork, because the parent's thread is not in this process."""
-        self.is_closing = False
+        self.is_closing = False  # whether the program ends
         self._starting = threading.Lock()  # taken only by loop threads, which Ctrl-C cannot interrupt
         self._server: _Server | None = None
 

@@ -29,15 +29,10 @@ class MissingToolError(RuntimeError):
 
 
 class Benchmarks:
-    """One run of all that is asked for; each part is a method of that name.
-
-    Args:
-        folder: for programs that are built.
-        rounds: how often each takes its turn.
-        seconds: how long each turn is.
-    """
+    """One run of all that is asked for; each part is a method of that name."""
 
     def __init__(self, folder: Path, rounds: int, seconds: float) -> None:
+        """Programs are built in the folder; each takes a turn of so many seconds in each round."""
         self.folder, self.rounds, self.seconds = folder, rounds, seconds
         self.results: dict[str, Any] = {}
 

@@ -27,13 +27,7 @@ STOP_S = 0.5
 
 @dataclass
 class Service:
-    """The program of the page, running.
-
-    Attributes:
-        gripper: what it drives.
-        process: the program.
-        port: where it listens.
-    """
+    """The program of the page, running."""
 
     gripper: SimulatedGripper
     process: asyncio.subprocess.Process

@@ -23,11 +23,7 @@ CLOSING_S: Final = 0.5
 
 
 class NonblockingDriver(LinuxDriver):
-    """Drops output that the terminal does not take.
-
-    Attributes:
-        is_behind: whether output was dropped; repaint the screen when it :meth:`has_caught_up`.
-    """
+    """Drops output that the terminal does not take."""
 
     def __init__(
         self,
@@ -38,7 +34,7 @@ class NonblockingDriver(LinuxDriver):
         size: tuple[int, int] | None = None,
     ) -> None:
         super().__init__(app, debug=debug, mouse=mouse, size=size)
-        self.is_behind = False
+        self.is_behind = False  # output was dropped; repaint the screen when it has_caught_up()
         self._waiting: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._run, name="robotiq_async screen", daemon=True)
 

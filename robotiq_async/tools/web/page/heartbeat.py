@@ -45,14 +45,10 @@ PRESS_WITH_VALUE: Final = "(value) => emit(window.robotiqTime, value)"
 
 
 class Heartbeat:
-    """The time that one browser has sent back.
-
-    Attributes:
-        is_lost: whether the browser counts as out of touch.
-    """
+    """The time that one browser has sent back."""
 
     def __init__(self) -> None:
-        self.is_lost = False
+        self.is_lost = False  # whether the browser counts as out of touch
         self._newest = monotonic()
         self._has_been_here = False
         self._came_back_at: float | None = None
