@@ -147,20 +147,14 @@ def _expected_over_tcp(request: bytes) -> Expected:
 
 def _expected(request: bytes, checksum: int) -> Expected:
     """The same for a frame that begins with the unit and ends with a checksum of this size."""
-    at = 1
-    function = request[at]
-    if function == 16:
-        # The echo of address and count.
-        pdu, payload = request[at : at + 5], 0
+    unit, function, payload = request[:1], request[1], 0
+    if function == _WRITE:
+        pdu = request[1:6]  # the echo of address and count
     else:
-        payload = 2 * int.from_bytes(request[at + 3 : at + 5], "big")
+        payload = 2 * int.from_bytes(request[4:6], "big")
         pdu = bytes((function, payload))
-    return Expected(
-        start=request[:at] + pdu,
-        size=at + len(pdu) + payload + checksum,
-        refusal=request[:at] + bytes((function | 0x80,)),
-        refusal_size=at + 2 + checksum,
-    )
+    refusal = unit + bytes((function | 0x80,))
+    return Expected(unit + pdu, 1 + len(pdu) + payload + checksum, refusal, 3 + checksum)
 
 
 def _refused(function: int, code: int) -> str:

@@ -78,7 +78,7 @@ class Opener:
         delay: float | None = None,
     ) -> bool:
         """Try; ``failed`` is called with the error of each try but the last, which is raised."""
-        backoff = Backoff(policy, self._loop.time())
+        since, doubled = self._loop.time(), policy.first_delay
         while not self._has_ended:
             try:
                 with anyio.CancelScope() as self._scope:
@@ -87,35 +87,12 @@ class Opener:
                     await self._connect()
                     return True
             except RobotiqConnectionError as error:
-                if backoff.gives_up(self._loop.time()):
-                    raise
+                delay = doubled = min(max(2 * doubled, SHORTEST_S), policy.max_delay)
+                if policy.give_up_after is not None:
+                    # The last try begins when that is over, and no later.
+                    left = since + policy.give_up_after - self._loop.time()
+                    if left <= 0:
+                        raise
+                    delay = doubled = min(delay, left)
                 failed(error)
-                delay = backoff.delay
         return False
-
-
-class Backoff:
-    """The delays of one attempt to get a link back.
-
-    Attributes:
-        since: when the link was lost, in seconds of the caller's clock.
-        delay: seconds until the next try.
-    """
-
-    def __init__(self, policy: ReconnectPolicy, since: float) -> None:
-        self._policy = policy
-        self.since = since
-        self.delay = policy.first_delay
-
-    def gives_up(self, now: float) -> bool:
-        """Whether the try that has just failed was the last one. If not, lengthen the delay.
-
-        The last try begins when ``give_up_after`` is over, and no later.
-        """
-        limit = self._policy.give_up_after
-        self.delay = min(max(2 * self.delay, SHORTEST_S), self._policy.max_delay)
-        if limit is None:
-            return False
-        left = self.since + limit - now
-        self.delay = min(self.delay, max(left, 0.0))
-        return left <= 0

@@ -8,8 +8,8 @@ from itertools import pairwise
 import pytest
 
 from robotiq_async.control.requests.pending import Command
-from robotiq_async.session.opening import SHORTEST_S, Backoff
-from robotiq_async.session.options import ReconnectPolicy
+from robotiq_async.session.opening import SHORTEST_S, Opener
+from robotiq_async.session.options import HandOptions, ReconnectPolicy
 from robotiq_async.session.poller import READS, STOP_S
 from robotiq_async.values.enums import Finger, State
 from robotiq_async.values.errors import (
@@ -237,30 +237,37 @@ async def test_the_policy_may_give_up_and_says_why() -> None:
         assert here.poller.failure is why
 
 
-def delays(policy: ReconnectPolicy, tries: int) -> list[float]:
-    backoff, found = Backoff(policy, 0.0), []
-    for _ in range(tries):
-        found.append(backoff.delay)
-        backoff.gives_up(0.0)
-    return found
+@pytest.mark.parametrize(
+    ("policy", "tries", "gives_up"),
+    [
+        # A first try at once is not followed by others at once.
+        (ReconnectPolicy(0.0, 1.0), [0, SHORTEST_S, 3 * SHORTEST_S, 7 * SHORTEST_S], False),
+        # No delay but the first is above the limit.
+        (ReconnectPolicy(5.0, 0.3), [5, 5.3, 5.6], False),
+        (ReconnectPolicy(0.1, 60), [0.1, 0.3, 0.7, 1.5, 3.1, 6.3, 12.7, 25.5, 51.1, 102.3, 162.3], False),
+        # The last try begins when the time is over.
+        (ReconnectPolicy(0.1, 60, give_up_after=1), [0.1, 0.3, 0.7, 1], True),
+        (ReconnectPolicy(0.1, 60, give_up_after=0), [0.1], True),
+    ],
+)
+async def test_when_it_is_tried_and_given_up(
+    policy: ReconnectPolicy, tries: list[float], gives_up: bool
+) -> None:
+    loop = asyncio.get_running_loop()
+    began, tried = loop.time(), list[float]()
 
+    async def connect() -> None:
+        tried.append(loop.time() - began)
+        if len(tried) < len(tries) or gives_up:
+            raise LOST
 
-def test_a_first_try_at_once_is_not_followed_by_others_at_once() -> None:
-    assert delays(ReconnectPolicy(0.0, 1.0), 4) == [0.0, SHORTEST_S, 2 * SHORTEST_S, 4 * SHORTEST_S]
-
-
-def test_the_delay_is_never_above_its_limit_however_large_the_first_one_was() -> None:
-    assert delays(ReconnectPolicy(5.0, 0.3), 3) == [5.0, 0.3, 0.3]
-
-
-def test_it_is_given_up_after_a_try_that_fails_when_the_time_is_over() -> None:
-    backoff = Backoff(ReconnectPolicy(give_up_after=10.0), since=100.0)
-    assert not backoff.gives_up(109.9)
-    assert backoff.gives_up(110.0)
-
-
-def test_it_is_tried_for_ever_unless_said_otherwise() -> None:
-    assert not Backoff(ReconnectPolicy(), since=0.0).gives_up(1e9)
+    opener = Opener(connect, HandOptions())
+    if gives_up:
+        with pytest.raises(ConnectionLostError):
+            await opener.again(policy)
+    else:
+        assert await opener.again(policy)
+    assert tried == pytest.approx(tries)
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ from robotiq_async.values.request import Request
 
 from . import control_modes as control
 from .axis import MOTORS, Axis, Motor
-from .faults import EmergencyStop, PresentFaults
+from .faults import PresentFaults
 from .spread import Spread
 
 if TYPE_CHECKING:
@@ -108,7 +108,10 @@ class Controller:
         self.faults = PresentFaults()
         self.fail_activation = False
         self.is_asleep = False
-        self._stop = EmergencyStop()
+        self._is_stopped = False
+        """Whether the emergency stop is pressed."""
+        self._resets_needed = 0
+        """After its end: one person reports, of a two-finger gripper, that a reset helps only sometimes."""
         self._release = Fault.NONE
         self._mode: Mode | None = None
         self._steps: deque[control.Goals] = deque()
@@ -150,12 +153,13 @@ class Controller:
         """Forget the request and everything that came of it; the axes stay where they are."""
         self.request = self._obeyed = self._at_rest
         self.is_asleep = False
-        self._stop.forget()
+        self._resets_needed = 0
         self.reset(time)
 
     def reset(self, time: float) -> None:
         """Stop at once; forget faults, sequences and contacts."""
-        self._stop.reset()
+        if not self._is_stopped and self._resets_needed:
+            self._resets_needed -= 1
         self.faults.clear()
         self._release = Fault.NONE
         self._begin(time, Initialization.RESET, ())
@@ -169,12 +173,16 @@ class Controller:
 
     def stop(self, time: float, resets: int) -> None:
         """Begin an emergency stop, after whose end so many resets are needed."""
-        self._stop.press(resets)
+        self._is_stopped, self._resets_needed = True, resets
         if self.request.activate:
             self._begin(time, Initialization.ACTIVATING, ())
 
     def end_stop(self) -> None:
-        self._stop.end()
+        self._is_stopped = False
+
+    @property
+    def _is_in_emergency(self) -> bool:
+        return self._is_stopped or self._resets_needed > 0
 
     @property
     def echoes(self) -> tuple[int, ...]:
@@ -229,7 +237,7 @@ class Controller:
 
     @property
     def _waiting(self) -> Fault:
-        if self.request.activate and self._stop.is_in_force:
+        if self.request.activate and self._is_in_emergency:
             return Fault.ACTIVATION_PENDING
         if not self.request.go:
             return Fault.NONE
@@ -318,14 +326,14 @@ class Controller:
 
     def _command(self, time: float, goals: control.Goals) -> None:
         for name, axis, goal in zip(self.model.axes, self.axes, goals, strict=True):
-            if goal is None or self._is_stopped(name):
+            if goal is None or self._is_blocked(name):
                 axis.hold(time, locks=not self.habits.lets_go_on_halt)
             else:
                 axis.command(time, goal)
 
-    def _is_stopped(self, name: Finger) -> bool:
+    def _is_blocked(self, name: Finger) -> bool:
         """Whether a fault keeps the axis from moving; nothing but the power stops the automatic release."""
-        if self._stop.is_in_force:
+        if self._is_in_emergency:
             return True
         if self._release is not Fault.NONE:
             return False
@@ -334,7 +342,7 @@ class Controller:
     def _is_done(self, step: control.Goals) -> bool:
         """Whether every axis of the step has arrived or touched something, and may go on."""
         return all(
-            goal is None or (axis.status is not ObjectStatus.IN_MOTION and not self._is_stopped(name))
+            goal is None or (axis.status is not ObjectStatus.IN_MOTION and not self._is_blocked(name))
             for name, axis, goal in zip(self.model.axes, self.axes, step, strict=True)
         )
 

@@ -1,4 +1,4 @@
-"""The faults that are present, and when they end; an emergency stop."""
+"""The faults that are present, and when they end."""
 
 from __future__ import annotations
 
@@ -60,33 +60,3 @@ class PresentFaults:
         Interference on the scissor leaves the fingers alone as long as it is minor.
         """
         return any(fault.is_serious and fault is not Fault.SCISSOR_INTERFERENCE for fault in self._ends)
-
-
-class EmergencyStop:
-    """Whether an emergency stop keeps the axes from moving.
-
-    One person reports it, of a two-finger gripper: gFLT is 0x05 afterwards, and a reset helps only sometimes.
-    """
-
-    def __init__(self) -> None:
-        self._is_pressed = False
-        self._resets_needed = 0
-
-    @property
-    def is_in_force(self) -> bool:
-        return self._is_pressed or self._resets_needed > 0
-
-    def press(self, resets: int) -> None:
-        self._is_pressed, self._resets_needed = True, resets
-
-    def end(self) -> None:
-        self._is_pressed = False
-
-    def reset(self) -> None:
-        """A reset, which helps only after the end."""
-        if not self._is_pressed and self._resets_needed:
-            self._resets_needed -= 1
-
-    def forget(self) -> None:
-        """The gripper was without power: no reset is needed any longer."""
-        self._resets_needed = 0
