@@ -256,7 +256,8 @@ class Axis:
         far_side = max(sign * obstacle.position, sign * surface) + obstacle.soft + self._spread.tolerance
         if sign * here > far_side:  # the axis has passed the obstacle
             return _Path(end, ObjectStatus.AT_POSITION)
-        stopped = sign * max(sign * here, sign * surface + _dent(obstacle, goal.force))
+        dent = round(obstacle.soft * goal.force / 255)
+        stopped = sign * max(sign * here, sign * surface + dent)
         if sign * stopped < sign * target:
             contact = ObjectStatus.CONTACT_CLOSING if sign > 0 else ObjectStatus.CONTACT_OPENING
             return _Path(stopped, contact, surface)
@@ -299,7 +300,3 @@ class Axis:
         self._origin = position
         self._since = time
         self.ends_at = math.inf
-
-
-def _dent(obstacle: Obstacle, force: int) -> int:
-    return round(obstacle.soft * force / 255)

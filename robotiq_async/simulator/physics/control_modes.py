@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from robotiq_async.values.calibration.scales import SpeedCalibration
-    from robotiq_async.values.request import AxisRequest, Request
+    from robotiq_async.values.request import Request
 
 
 Goals = tuple[Goal | None, ...]
@@ -62,7 +62,7 @@ def requested(request: Request, readings: Sequence[int]) -> Goals:
     Simple control (rICF = 0, rICS = 0) lets A's registers drive all fingers, or in the scissor mode the
     scissor alone while the fingers stay at their readings, rICF = 1 or not (manual).
     """
-    own = tuple(_asked(axis) for axis in request.axes)
+    own = tuple(Goal(axis.position, axis.speed, axis.force) for axis in request.axes)
     if not request.model.has_modes:
         return own
     grip = own[0]
@@ -101,10 +101,6 @@ def release(request: Request) -> tuple[Goals, ...]:
     """Every axis opens slowly; a jaw closes if it is asked to."""
     finger = Goal(OPEN if request.release_opens else CLOSED, _RELEASE_SPEED, _SEQUENCE_FORCE)
     return ((finger, finger, finger, Goal(WIDTH_WIDE, _RELEASE_SPEED, _SEQUENCE_FORCE)),)
-
-
-def _asked(request: AxisRequest) -> Goal:
-    return Goal(request.position, request.speed, request.force)
 
 
 def _on_its_own(position: int) -> Goal:
