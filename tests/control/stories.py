@@ -20,26 +20,17 @@ from robotiq_async import (
     State,
 )
 from robotiq_async.control.motion import Move
-from robotiq_async.values.enums import NO_AXES
-from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
 from tests.control.other_client import going_to, image, moved_by_another
 from tests.control.scan import POLL_S, Outcome, Scan, started
+from tests.grippers import AXES, fingers
 
-AXES = dict(zip("ABCS", THREE_FINGER.axes, strict=True))
 ERRORS: dict[str, type[RobotiqError]] = {
     "superseded": MoveSupersededError,
     "lost": ConnectionLostError,
     "inactive": NotActivatedError,
     "faulty": GripperFaultError,
 }
-
-
-def fingers(names: str) -> Finger:
-    axes = NO_AXES
-    for name in names:
-        axes |= AXES[name]
-    return axes
 
 
 def tell(story: str) -> None:

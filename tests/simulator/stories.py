@@ -9,11 +9,10 @@ from __future__ import annotations
 from typing import Any
 
 from robotiq_async.simulator import Habits
-from robotiq_async.values.enums import NO_AXES, Finger, Initialization, Mode, ObjectStatus
-from robotiq_async.values.model import THREE_FINGER
+from robotiq_async.values.enums import Initialization, Mode, ObjectStatus
+from tests.grippers import AXES, fingers
 from tests.simulator.conftest import Bench
 
-AXES = dict(zip("ABCS", THREE_FINGER.axes, strict=True))
 BITS = {
     "rACT": "activate",
     "rMOD": "mode",
@@ -34,13 +33,6 @@ SHOWN = {
     "closing": ObjectStatus.CONTACT_CLOSING,
     "arrived": ObjectStatus.AT_POSITION,
 }
-
-
-def fingers(names: str) -> Finger:
-    axes = NO_AXES
-    for name in names:
-        axes |= AXES[name]
-    return axes
 
 
 def request(words: list[str], given: dict[str, float]) -> dict[str, Any]:
