@@ -11,8 +11,7 @@ from robotiq_async import RobotiqHand, RobotiqStatus, State
 from robotiq_async.hand import Hand
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
 from robotiq_async.values import registers as reg
-from robotiq_async.values.enums import NO_AXES, Finger, ObjectStatus
-from robotiq_async.values.model import THREE_FINGER
+from robotiq_async.values.enums import ObjectStatus
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import AxisRequest, Request
 
@@ -21,16 +20,6 @@ ACTIVATION: Final = Request(activate=True, axes=_OPEN).registers
 OPENING: Final = Request(activate=True, go=True, axes=_OPEN).registers
 _ACTIVATION_S: Final = 10.0
 """Simulated seconds that are more than enough for one."""
-AXES: Final = dict(zip("ABCS", THREE_FINGER.axes, strict=True))
-"""By their letters; S is the scissor."""
-
-
-def fingers(names: str) -> Finger:
-    """The axes of some letters."""
-    axes = NO_AXES
-    for name in names:
-        axes |= AXES[name]
-    return axes
 
 
 def active_gripper(speedup: float = 4.0, **options: Any) -> SimulatedGripper:

@@ -4,57 +4,112 @@ from __future__ import annotations
 
 import pytest
 
-from robotiq_async import Fault, Finger, State
+from robotiq_async import Fault, Finger, GripperFaultError, NotActivatedError, State
 from robotiq_async.control.passing_fault import LASTS_READS
-from tests.control.scan import POLL_S, started
-from tests.control.stories import tell
+from robotiq_async.values.request import Request
+from tests.control.other_client import moved_by_another
+from tests.control.scan import POLL_S, Scan, started
 
 UNKNOWN = Fault(0x0C)
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 
-STORIES = {
-    **{
-        f"{code} ends a move at once": f"started, move ABC 255, run 0.3, inject {code}, "
-        f"run {(LASTS_READS + 1) * POLL_S if code == 9 else POLL_S}, state FAULT, 1 faulty {code}, "
-        "refused faulty"
-        for code in (9, 10, 12, 13, 14, 1)
-    },
-    **{
-        f"{code} is no fault": f"started, move ABC 255, run 0.3, inject {code}, until told 1, "
-        "state RUNNING_IDLE, A at 241"
-        for code in (5, 6, 7)
-    },
-    "a gripper found in one is left there": "new, inject 14, connect activate, run 0.5, state FAULT, "
-    "written 0, foreign 0",
-    # Nothing resumes when it clears.
-    "a move": "started, move ABC 255, run 0.5, inject 9 1, run 0.5, note, until state RUNNING_IDLE, run 2, "
-    "rests, A went 2",
-    "a motion nobody awaits": "started, command A 255, run 0.5, inject 9 0.5, run 0.1, note, run 3, "
-    "state RUNNING_IDLE, A went 2",
-    "a command sent just before": "started 0.2, note, command A 149, inject 9 1, run 3, state RUNNING_IDLE, "
-    "A went 1",
-    "a write lost before": "started 0.2, note, command A 149, step unanswered, connect, step, inject 9 1, "
-    "run 3, state RUNNING_IDLE, A went 1",
-    "one that began while the link was down": "started, move A 200 speed=0, run 0.5, lose, inject 9 2, "
-    "back 0.1, state FAULT, refused faulty, note, run 10, A went 4",
-    "an axis that it keeps from starting": "started 0, moved ABC 6, note, command A 107, inject 9 1, run 3, "
-    "A went 1",
-    # A is still ours, and what the other client asked of B goes on.
-    "another client has moved another axis": "started, move A 200, run 0.3, beside B=60, run 0.5, 1 open, "
-    "inject 9 0.5, run 0.1, 1 faulty, note, run 5, A went 2, B at 60",
-    "the motion of another client does, also after a blink": "adopted, blink, run 0.3, inject 9 0.1, run 15, "
-    "written 0, A at 200",
-    # A hold or a halt carries rACT = 1: written after a power cycle it would activate.
-    "one at the loss of the activation does not activate": "started, move A 200, run 0.3, note, power-cycle, "
-    "inject 9 0.5, run 3, ABCS went 1, state RESET, written 0",
-    "a halt that waits in one does not activate": "started, move ABC 255, run 0.5, inject 12, step, "
-    "state FAULT, halt, note, power-cycle, see, 2 inactive, run 0.5, state RESET, written 0, rests",
-}
+
+@pytest.mark.parametrize("code", [0x09, 0x0A, 0x0C, 0x0D, 0x0E, 0x01])
+def test_a_serious_or_unknown_fault_ends_a_move_at_once(scan: Scan, code: int) -> None:
+    _, outcome = scan.move(255)
+    scan.run(0.3)
+    scan.gripper.inject_fault(code)
+    scan.run((LASTS_READS + 1) * POLL_S if code == 0x09 else POLL_S)
+    assert scan.state is State.FAULT
+    assert isinstance(outcome.error, GripperFaultError)
+    assert outcome.error.fault == code
+    with pytest.raises(GripperFaultError):
+        scan.command(A, position=0)
 
 
-@pytest.mark.parametrize("name", STORIES)
-def test_a_story(name: str) -> None:
-    tell(STORIES[name])
+@pytest.mark.parametrize("code", [0x05, 0x06, 0x07])
+def test_priority_codes_neither_raise_nor_lead_to_fault(scan: Scan, code: int) -> None:
+    _, outcome = scan.move(255)
+    scan.run(0.3)
+    scan.gripper.inject_fault(code)
+    scan.until(lambda: outcome.is_told)
+    assert scan.state is State.RUNNING_IDLE
+    assert outcome.result.positions[A] >= 240
+
+
+def test_a_gripper_found_in_fault_is_left_there() -> None:
+    scan = Scan()
+    scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    scan.connect()
+    scan.run(0.5)
+    assert scan.state is State.FAULT
+    assert not scan.written
+    assert scan.controller.foreign_commands == 0
+
+
+def test_nothing_resumes_when_a_minor_fault_clears(scan: Scan) -> None:
+    scan.move(255)
+    scan.run(0.5)
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
+    scan.run(0.5)
+    at = scan.gripper.position(A)
+    scan.until(lambda: scan.state is State.RUNNING_IDLE)
+    scan.run(2.0)
+    assert not scan.gripper.is_moving
+    assert scan.gripper.position(A) == pytest.approx(at, abs=2)
+
+
+def test_a_motion_nobody_awaits_does_not_resume_either(scan: Scan) -> None:
+    scan.command(A, position=255)
+    scan.run(0.5)
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.5)
+    scan.run(3.0)
+    assert scan.state is State.RUNNING_IDLE
+    assert scan.gripper.position(A) < 200
+
+
+def test_a_command_sent_just_before_the_fault_does_not_begin_to_act_when_it_clears() -> None:
+    scan = started(0.2)
+    scan.command(A, position=149)
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
+    scan.run(3.0)
+    assert scan.state is State.RUNNING_IDLE
+    assert scan.gripper.position(A) <= 7
+
+
+def test_a_write_lost_before_the_fault_does_not_begin_to_act_when_it_clears() -> None:
+    scan = started(0.2)
+    scan.command(A, position=149)
+    scan.step(answer=False)
+    scan.connect(activate=False)
+    scan.step()
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
+    scan.run(3.0)
+    assert scan.state is State.RUNNING_IDLE
+    assert scan.gripper.position(A) <= 7
+
+
+def test_nothing_resumes_when_a_fault_clears_that_began_while_the_link_was_down(scan: Scan) -> None:
+    scan.move(200, A, speed=0)
+    scan.run(0.5)
+    scan.controller.lost(None)
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 2)
+    scan.come_back(0.1)
+    assert scan.state is State.FAULT
+    with pytest.raises(GripperFaultError):
+        scan.command(B, position=3)
+    at = scan.positions()[A]
+    scan.run(10)
+    assert scan.positions()[A] <= at + 4
+
+
+def test_an_axis_that_the_fault_keeps_from_starting_is_held() -> None:
+    scan = started(0.0)
+    scan.moved(6)
+    scan.command(A, position=107)
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
+    scan.run(3.0)
+    assert scan.gripper.position(A) <= 7
 
 
 @pytest.mark.parametrize("device_cycle", [0.0, 0.005, 0.03, 0.2])
@@ -74,3 +129,62 @@ def test_an_axis_that_the_fault_keeps_from_its_last_two_counts_is_held(device_cy
         scan.run(2.0)
         assert scan.state is State.RUNNING_IDLE
         assert scan.gripper.travel(A) == at, f"it went on, {steps} steps after the command"
+
+
+def test_a_motion_of_ours_does_not_resume_after_a_fault_because_another_client_moved_another_axis(
+    scan: Scan,
+) -> None:
+    _, told = scan.move(200, A)
+    scan.run(0.3)
+    image = Request.from_registers(scan.gripper.request_registers)
+    scan.gripper.write(0, image.with_positions({B: 60}).registers)
+    scan.run(0.5)
+    assert not told.is_told, "A is still ours"
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.5)
+    scan.run(0.1)
+    assert isinstance(told.error, GripperFaultError)
+    at = scan.positions()[A]
+    scan.run(5)
+    assert scan.positions()[A] <= at + 2
+    assert scan.positions()[B] == 60, "what the other client asked goes on"
+
+
+def test_a_fault_does_not_stop_the_motion_of_another_client_after_a_blink_of_the_link() -> None:
+    scan = moved_by_another()
+    scan.blink()
+    scan.run(0.3)
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.1)
+    scan.run(15)
+    assert not scan.written
+    assert scan.positions()[A] == 200
+
+
+def test_a_fault_at_the_loss_of_the_activation_does_not_activate(scan: Scan) -> None:
+    scan.move(200, A)
+    scan.run(0.3)
+    written = len(scan.written)
+    scan.gripper.power_cycle()
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.5)
+    at = scan.positions()
+    scan.run(3)
+    assert scan.positions() == at
+    assert scan.state is State.RESET
+    assert len(scan.written) == written
+
+
+def test_what_waits_in_fault_is_not_written_to_a_gripper_that_lost_its_activation(scan: Scan) -> None:
+    """A hold or a halt carries rACT = 1: written after a power cycle it would activate."""
+    scan.move(255)
+    scan.run(0.5)
+    scan.gripper.inject_fault(UNKNOWN)
+    scan.step()
+    assert scan.state is State.FAULT
+    halted = scan.halt()
+    writes = len(scan.written)
+    scan.gripper.power_cycle()
+    scan.controller.see(scan.status())
+    assert isinstance(halted.error, NotActivatedError)
+    scan.run(0.5)
+    assert scan.state is State.RESET
+    assert len(scan.written) == writes
+    assert not scan.gripper.is_moving

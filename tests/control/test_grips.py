@@ -4,26 +4,42 @@ from __future__ import annotations
 
 import pytest
 
-from robotiq_async import Finger
+from robotiq_async import Fault, Finger, ObjectStatus, State
 from tests.control.other_client import reset_and_activated_by_another
 from tests.control.scan import Scan, started
-from tests.control.stories import tell
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 
-STORIES = {
-    "a halt and a command to another axis": "started, place B 60, moved B 255, halt, run 0.1, moved A 100, "
-    "B asked 255, B closing",
-    "a minor fault": "started, place A 60, moved A 255, note, inject 9 0.5, run 1, state RUNNING_IDLE, "
-    "A echoes 255, written 0",
-    "a halt and a blink of the link": "started, place B 150, moved B 255, halt, until told 2, blink, "
-    "run 0.1, moved A 60, B echoes 255",
-}
+
+def test_a_grip_survives_a_halt_and_a_command_to_another_axis(scan: Scan) -> None:
+    scan.gripper.place_object(B, 60)
+    scan.moved(255, B)
+    scan.halt()
+    scan.run(0.1)
+    scan.moved(100, A)
+    assert scan.last_image.position(B) == 255
+    assert scan.latest.finger_status(B) is ObjectStatus.CONTACT_CLOSING
 
 
-@pytest.mark.parametrize("name", STORIES)
-def test_a_story(name: str) -> None:
-    tell(STORIES[name])
+def test_a_grip_is_kept_over_a_minor_fault(scan: Scan) -> None:
+    scan.gripper.place_object(A, 60)
+    scan.moved(255, A)
+    writes = len(scan.written)
+    scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.5)
+    scan.run(1.0)
+    assert scan.state is State.RUNNING_IDLE
+    assert scan.latest.requested_position(A) == 255
+    assert len(scan.written) == writes
+
+
+def test_a_halted_grip_survives_a_blink_of_the_link(scan: Scan) -> None:
+    scan.gripper.place_object(B, 150)
+    scan.moved(255, B)
+    scan.halted()
+    scan.blink()
+    scan.run(0.1)
+    scan.moved(60, A)
+    assert scan.latest.requested_position(B) == 255
 
 
 def test_a_grip_that_is_not_taken_up_again_is_told(caplog: pytest.LogCaptureFixture) -> None:

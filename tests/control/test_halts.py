@@ -4,36 +4,67 @@ from __future__ import annotations
 
 import pytest
 
-from robotiq_async import Finger
+from robotiq_async import Fault, Finger, MoveSupersededError, State
 from robotiq_async.values.model import THREE_FINGER
-from tests.control.other_client import image, used_by_another
-from tests.control.stories import tell
+from tests.control.other_client import image, moved_by_another, used_by_another
+from tests.control.scan import Scan, started
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 
-STORIES = {
-    "it stops everything and ends moves": "started, move ABC 255, run 0.5, halt, 1 superseded, until told 2, "
-    "2 told, rests, no go",
-    "a command after it moves only its own axes": "started, move ABC 255, run 0.5, halt, move A 100, "
-    "run 0.01, note, until told 3, run 1, BCS went 1, A at 100",
-    "a command waits until a slow gripper has stopped": "started 0.1, move ABC 255 speed=255, run 0.5, halt, "
-    "move A 0, until no go, note, until told 3, BC went 1",
-    "what was not sent yet is dropped": "started, note, command A 200, halt, 1 superseded, run 0.5, A went 1",
-    "in reset it has nothing to do": "new, connect, halt, 1 told, run 0.05, written 0",
-    **{
-        f"in fault {code} it is told while that lasts, {begun}": f"{begun}, inject {code}, run 0.1, "
-        f"state FAULT, halt, until told {number} 0.7, {number} told, no go"
-        for code in (9, 10, 14)
-        for begun, number in (("started", 1), ("started, move ABC 255, run 0.5", 2))
-    },
-    "it outlives a fault in the same poll": "adopted, halt, inject 12 0.1, see, state FAULT, note, run 10, "
-    "1 told, A went 4",
-}
+
+def test_halt_stops_everything_and_ends_moves(scan: Scan) -> None:
+    _, outcome = scan.move(255)
+    scan.run(0.5)
+    halted = scan.halt()
+    assert isinstance(outcome.error, MoveSupersededError)
+    scan.until(lambda: halted.is_told)
+    assert halted.told == [None]
+    assert not scan.gripper.is_moving
+    assert not scan.latest.go_echo
 
 
-@pytest.mark.parametrize("name", STORIES)
-def test_a_story(name: str) -> None:
-    tell(STORIES[name])
+def test_a_command_after_a_halt_moves_only_its_own_axes(scan: Scan) -> None:
+    scan.move(255)
+    scan.run(0.5)
+    scan.halt()
+    _, outcome = scan.move(100, A)
+    scan.step()
+    scan.step()
+    travel = {axis: scan.gripper.travel(axis) for axis in (B, C, S)}
+    scan.until(lambda: outcome.is_told)
+    scan.run(1.0)
+    for axis in (B, C, S):
+        assert scan.gripper.travel(axis) - travel[axis] <= 1, axis
+    assert scan.gripper.position(A) == pytest.approx(100, abs=2)
+
+
+def test_a_command_after_a_halt_waits_until_a_slow_gripper_has_stopped() -> None:
+    scan = started(0.1)
+    scan.move(255, speed=255)
+    scan.run(0.5)
+    scan.halt()
+    _, outcome = scan.move(0, A)
+    scan.until(lambda: not scan.latest.go_echo)
+    travel = {axis: scan.gripper.travel(axis) for axis in (B, C)}
+    scan.until(lambda: outcome.is_told)
+    for axis in (B, C):
+        assert scan.gripper.travel(axis) - travel[axis] <= 1, axis
+
+
+def test_halt_drops_what_was_not_sent_yet(scan: Scan) -> None:
+    asked = scan.command(A, position=200)
+    scan.halt()
+    assert isinstance(asked.error, MoveSupersededError)
+    scan.run(0.5)
+    assert scan.gripper.position(A) <= 7
+
+
+def test_halt_in_reset_has_nothing_to_do() -> None:
+    scan = Scan()
+    scan.connect(activate=False)
+    assert scan.halt().told == [None]
+    scan.run(0.05)
+    assert not scan.written
 
 
 def test_a_halt_does_not_wait_for_an_axis_to_show_its_direction() -> None:
@@ -47,3 +78,30 @@ def test_a_halt_does_not_wait_for_an_axis_to_show_its_direction() -> None:
     scan.until(lambda: halted.is_told, 0.05)
     assert halted.told == [None]
     assert not scan.gripper.is_moving
+
+
+@pytest.mark.parametrize("moving", [True, False])
+@pytest.mark.parametrize("code", [0x09, 0x0A, 0x0E])
+def test_halt_in_fault_is_told_while_the_fault_lasts(scan: Scan, code: int, moving: bool) -> None:
+    if moving:
+        scan.move(255)
+        scan.run(0.5)
+    scan.gripper.inject_fault(code)
+    scan.run(0.1)
+    assert scan.state is State.FAULT
+    halted = scan.halt()
+    scan.until(lambda: halted.is_told, 0.7)
+    assert halted.told == [None]
+    assert not scan.latest.go_echo
+
+
+def test_a_halt_outlives_a_fault_in_the_same_poll() -> None:
+    scan = moved_by_another()
+    halted = scan.halt()
+    scan.gripper.inject_fault(Fault(0x0C), 0.1)
+    scan.controller.see(scan.status())
+    assert scan.state is State.FAULT
+    at = scan.positions()[A]
+    scan.run(10)
+    assert halted.told == [None]
+    assert scan.positions()[A] <= at + 4

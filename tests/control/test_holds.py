@@ -2,57 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
-from robotiq_async import Finger, MoveSupersededError, ObjectStatus, State
+from robotiq_async import (
+    ConnectionLostError,
+    Fault,
+    Finger,
+    MoveSupersededError,
+    NotActivatedError,
+    ObjectStatus,
+    State,
+)
+from tests.control.other_client import going_to, moved_by_another
 from tests.control.scan import Scan, started
-from tests.control.stories import tell
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
-
-STORIES = {
-    "it is told when it is acknowledged": "started, move A 200, run 0.5, note, hold, state RUNNING_CC, step, "
-    "written 1, 2 told, state RUNNING_IDLE, run 1, written 1",
-    "where nothing moves nothing is written": "started, moved ABC 100, run 0.5, note, hold, step, written 0, "
-    "2 told, state RUNNING_IDLE",
-    "a motion that was written and does not act yet": "started 0.2, note, command A 200, step, hold A, "
-    "run 2, 2 told, A went 4",
-    "what was not sent yet is dropped": "started, note, command A 200, command B 100, hold A, 1 superseded, "
-    "until told 3, run 2, 2 told, A went 1, B at 100",
-    "a command after it moves again": "started, move A 200, run 0.5, hold A, moved A 220, 2 told, A at 220",
-    "a halt does for whoever waits for a hold": "started, move A 200, run 0.5, hold A, halt, "
-    "until told 3 0.6, 2 told, rests",
-    "after a halt it is told too": "started, move A 200, run 0.5, halt, hold A, until told 3 0.6, "
-    "until told 2 0.6, rests",
-    "what another client moves is held too": "adopted, hold A, until told 1 0.6, note, run 2, A went 1, "
-    "B goes",
-    "it survives that another client takes over": "started, move A 255 speed=0, run 0.5, hold A, theirs 200, "
-    "run 0.02, until told 2 0.6, note, run 2, A went 1",
-    **{
-        f"in an activation it does nothing: {begun}": f"new, connect, note, {begun}, hold, 1 told, "
-        "until state RUNNING_IDLE, written 1"
-        for begun in ("activate", "activate, run 0.025")
-    },
-    "in a release it does nothing": "started, moved ABC 200, inject 14, step, release, step, note, hold, "
-    "2 told, until state ATR_DONE 60, hold, 3 told, run 0.1, written 0",
-    "it is told in a fault": "started, move A 200, run 0.5, inject 12 1, see, state FAULT, hold A, "
-    "until told 2 0.6, 2 told, note, run 3, A went 2",
-    "also when it was asked for before": "started, move A 200, run 0.5, hold A, inject 12 1, see, "
-    "state FAULT, until told 2 0.6, 2 told, note, run 3, A went 2",
-    **{
-        f"it is made good after {how}": f"started, move A 255 speed=0, run 0.5, hold A, {how}, 2 lost, "
-        "back 0.5, run 0.5, note, run 2, A went 1"
-        for how in ("lose", "step unanswered")
-    },
-    "a reset takes over": "started, move A 255, run 0.5, hold A, reset, 2 superseded",
-    "a gripper that lost its activation is not written to": "started, move A 255, run 0.5, note, hold A, "
-    "power-cycle, run 0.5, 2 inactive, written 0",
-}
-
-
-@pytest.mark.parametrize("name", STORIES)
-def test_a_story(name: str) -> None:
-    tell(STORIES[name])
 
 
 @pytest.mark.parametrize("device_cycle", [0.0, 0.005, 0.03, 0.2])
@@ -72,6 +38,18 @@ def test_axes_that_move_are_held_and_their_moves_end(device_cycle: float) -> Non
     assert scan.state is State.RUNNING_IDLE
 
 
+def test_a_hold_is_told_when_it_is_acknowledged(scan: Scan) -> None:
+    scan.move(200, A)
+    scan.run(0.5)
+    written = len(scan.written)
+    asked = scan.hold()
+    assert scan.state is State.RUNNING_CC
+    scan.step()
+    assert (len(scan.written), asked.told, scan.state) == (written + 1, [None], State.RUNNING_IDLE)
+    scan.run(1.0)
+    assert len(scan.written) == written + 1
+
+
 def test_a_grip_is_kept_and_an_axis_at_rest_is_left_alone(scan: Scan) -> None:
     scan.gripper.place_object(A, 60)
     scan.moved(255, A)
@@ -85,3 +63,177 @@ def test_a_grip_is_kept_and_an_axis_at_rest_is_left_alone(scan: Scan) -> None:
     assert held == before.with_positions({C: held.position(C)})
     assert held.position(C) < 200
     assert scan.latest.finger_status(A) is ObjectStatus.CONTACT_CLOSING
+
+
+def test_where_nothing_moves_nothing_is_written(scan: Scan) -> None:
+    scan.moved(100)
+    scan.run(0.5)
+    written = len(scan.written)
+    asked = scan.hold()
+    scan.step()
+    assert (len(scan.written), asked.told, scan.state) == (written, [None], State.RUNNING_IDLE)
+
+
+def test_a_motion_that_was_written_and_does_not_act_yet_is_held() -> None:
+    scan = started(device_cycle=0.2)
+    scan.command(A, position=200)
+    scan.step()
+    asked = scan.hold(A)
+    scan.run(2.0)
+    assert asked.told == [None]
+    assert scan.positions()[A] <= 10
+
+
+def test_what_was_not_sent_yet_is_dropped(scan: Scan) -> None:
+    dropped, other = scan.command(A, position=200), scan.command(B, position=100)
+    asked = scan.hold(A)
+    assert isinstance(dropped.error, MoveSupersededError)
+    scan.until(lambda: asked.is_told)
+    scan.run(2.0)
+    assert other.told == [None]
+    assert scan.positions()[A] <= 7
+    assert scan.positions()[B] == 100
+
+
+def test_a_command_after_a_hold_moves_again(scan: Scan) -> None:
+    scan.move(200, A)
+    scan.run(0.5)
+    asked = scan.hold(A)
+    again = scan.moved(220, A)
+    assert asked.told == [None]
+    assert again.positions[A] == 220
+
+
+def test_a_halt_does_for_whoever_waits_for_a_hold(scan: Scan) -> None:
+    scan.move(200, A)
+    scan.run(0.5)
+    asked, halted = scan.hold(A), scan.halt()
+    scan.until(lambda: halted.is_told, 0.6)
+    assert asked.told == [None]
+    assert not scan.gripper.is_moving
+
+
+def test_a_hold_after_a_halt_is_told_too(scan: Scan) -> None:
+    scan.move(200, A)
+    scan.run(0.5)
+    halted, asked = scan.halt(), scan.hold(A)
+    scan.until(lambda: asked.is_told, 0.6)
+    scan.until(lambda: halted.is_told, 0.6)
+    assert not scan.gripper.is_moving
+
+
+# -- what another client moves -----------------------------------------------------------------------------
+
+
+def test_what_another_client_moves_is_held_too() -> None:
+    scan = moved_by_another()
+    asked = scan.hold(A)
+    scan.until(lambda: asked.is_told, 0.6)
+    at = scan.positions()
+    scan.run(2.0)
+    assert scan.positions()[A] <= at[A] + 1
+    assert scan.positions()[B] > at[B] + 5
+
+
+def test_a_hold_survives_that_another_client_takes_over_before_it_is_written(scan: Scan) -> None:
+    scan.move(255, A, speed=0)
+    scan.run(0.5)
+    asked = scan.hold(A)
+    scan.gripper.write(0, going_to(200, speed=0))
+    scan.run(0.02)
+    scan.until(lambda: asked.is_told, 0.6)
+    at = scan.positions()[A]
+    scan.run(2.0)
+    assert scan.positions()[A] <= at + 1
+
+
+# -- states ------------------------------------------------------------------------------------------------
+
+
+def begun(begin: Callable[[Scan], None]) -> Scan:
+    scan = Scan()
+    scan.connect(activate=False)
+    begin(scan)
+    return scan
+
+
+@pytest.mark.parametrize("steps", [0, 5])
+def test_in_an_activation_a_hold_does_nothing(steps: int) -> None:
+    scan = begun(lambda scan: scan.controller.activate())
+    for _ in range(steps):
+        scan.step()
+    written = len(scan.written)
+    assert scan.hold().told == [None]
+    scan.until(lambda: scan.state is State.RUNNING_IDLE)
+    assert len(scan.written) == max(written, 1)
+
+
+def test_in_a_release_a_hold_does_nothing(scan: Scan) -> None:
+    scan.moved(200)
+    scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    scan.step()
+    scan.controller.release()
+    scan.step()
+    written = len(scan.written)
+    assert scan.hold().told == [None]
+    scan.until(lambda: scan.state is State.ATR_DONE, 60)
+    assert scan.hold().told == [None]
+    scan.run(0.1)
+    assert len(scan.written) == written
+
+
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_a_hold_is_told_in_a_fault(scan: Scan, when: str) -> None:
+    scan.move(200, A)
+    scan.run(0.5)
+    asked = scan.hold(A) if when == "before" else None
+    scan.gripper.inject_fault(Fault(0x0C), 1.0)
+    scan.controller.see(scan.status())
+    assert scan.state is State.FAULT
+    asked = asked or scan.hold(A)
+    scan.until(lambda: asked.is_told, 0.6)
+    assert asked.told == [None]
+    at = scan.positions()[A]
+    scan.run(3.0)
+    assert scan.positions()[A] <= at + 2
+
+
+# -- how it may fail ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sent", [False, True])
+def test_a_hold_that_was_not_acknowledged_before_the_link_was_lost_is_made_good(
+    scan: Scan, sent: bool
+) -> None:
+    scan.move(255, A, speed=0)
+    scan.run(0.5)
+    asked = scan.hold(A)
+    if sent:
+        scan.step(answer=False)
+    else:
+        scan.controller.lost(None)
+    assert isinstance(asked.error, ConnectionLostError)
+    scan.come_back(0.5)
+    scan.run(0.5)
+    at = scan.positions()[A]
+    scan.run(2.0)
+    assert scan.positions()[A] <= at + 1
+
+
+def test_a_reset_takes_over(scan: Scan) -> None:
+    scan.move(255, A)
+    scan.run(0.5)
+    asked = scan.hold(A)
+    scan.controller.reset()
+    assert isinstance(asked.error, MoveSupersededError)
+
+
+def test_a_gripper_that_lost_its_activation_is_not_written_to(scan: Scan) -> None:
+    scan.move(255, A)
+    scan.run(0.5)
+    written = len(scan.written)
+    asked = scan.hold(A)
+    scan.gripper.power_cycle()
+    scan.run(0.5)
+    assert isinstance(asked.error, NotActivatedError)
+    assert len(scan.written) == written

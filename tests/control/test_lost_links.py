@@ -6,55 +6,68 @@ from dataclasses import replace
 
 import pytest
 
-from robotiq_async import Finger, State
+from robotiq_async import ConnectionLostError, Finger, State
 from robotiq_async.control.requests.pending import Command
 from robotiq_async.values.request import AxisRequest, Request
 from tests.control.other_client import activated_by_another
 from tests.control.scan import POLL_S, Scan, started
-from tests.control.stories import tell
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 
-MOVING = "started, move A 200 speed=0, run 0.5"
-GIVEN_UP = f"{MOVING}, abandon 1"
-STORIES = {
-    "what was not acknowledged is dropped": "started, note, command A 200, move B 100, lose, 1 lost, 2 lost, "
-    "state DISCONNECTED, refused lost, connect, run 2, written 0, state RUNNING_IDLE",
-    # The link is back before the gripper acts on it, and the command to B keeps what A was asked.
-    "a write that arrived is ours when it shows": "started, command A 200, step unanswered, 1 lost, "
-    "back 0.001, run 0.1, foreign 0, A echoes 200, note, moved B 50, until still, A at 200, written 1",
-    "a motion goes on and is adopted": "started, move A 255, run 0.5, lose, back 0.3, state RUNNING_IDLE, "
-    "moved B 100, until still, A at 241, foreign 0",
-    "a gripper that lost its power is not activated": "started, move ABC 255, run 0.5, lose, power-cycle, "
-    "back 0.1, run 1, state RESET, rests",
-    # A hold is a stop: unlike a motion it is not dropped.
-    "a hold survives": f"{GIVEN_UP}, lose, note, back 0.05, state RUNNING_IDLE, run 5, A went 4, "
-    "state RUNNING_IDLE",
-    # Whether it arrived is known after a device cycle: a quarter of a second, six counts.
-    "a hold that was written survives": f"{GIVEN_UP}, undelivered, lose, note, back 0.05, "
-    "state RUNNING_IDLE, run 5, A went 8, state RUNNING_IDLE",
-    **{
-        f"a hold outlives what has replaced it and was lost: {what}": f"{GIVEN_UP}, {what}, note, blink, "
-        "run 10, A went 4"
-        for what in ("halt", "command A 10")
-    },
-    "a hold is dropped when somebody else commands": f"{GIVEN_UP}, lose, beside A=90, later 0.5, note, "
-    "connect, run 5, written 0",
-    # A policy may say that it is activated.
-    "a hold does not outlive an activation": f"{GIVEN_UP}, lose, power-cycle, later 0.1, connect activate, "
-    "until state RUNNING_IDLE, command A 200, run 0.5, blink, run 10, A at 200",
-    # Its caller never saw the error, and knows nothing of a motion that goes on.
-    "cancelled as the link was lost": f"{MOVING}, lose, 1 lost, abandon 1 unseen, note, back 0.05, run 10, "
-    "A went 4",
-    "cancelled then, and the link is back": f"{MOVING}, lose, 1 lost, back 0.05, abandon 1 unseen, note, "
-    "run 10, A went 4",
-    "given up after the error was seen": f"{MOVING}, lose, abandon 1, back 0.05, run 10, A at 200",
-}
+
+def test_a_lost_link_drops_what_was_not_acknowledged(scan: Scan) -> None:
+    pending = scan.command(A, position=200)
+    _, move = scan.move(100, B)
+    scan.controller.lost(None)
+    assert isinstance(pending.error, ConnectionLostError)
+    assert isinstance(move.error, ConnectionLostError)
+    assert scan.state is State.DISCONNECTED
+    with pytest.raises(ConnectionLostError):
+        scan.command(A, position=1)
+    writes = len(scan.written)
+    scan.connect(activate=False)
+    scan.run(2.0)
+    assert len(scan.written) == writes
+    assert scan.state is State.RUNNING_IDLE
 
 
-@pytest.mark.parametrize("name", STORIES)
-def test_a_story(name: str) -> None:
-    tell(STORIES[name])
+def test_a_write_that_arrived_unacknowledged_is_ours_when_it_shows(scan: Scan) -> None:
+    lost = scan.command(A, position=200)
+    scan.step(answer=False)
+    assert isinstance(lost.error, ConnectionLostError)
+    scan.now += 0.001  # back before the gripper acts on it
+    scan.connect(activate=False)
+    scan.run(0.1)
+    assert scan.controller.foreign_commands == 0
+    assert scan.latest.requested_position(A) == 200
+    writes = len(scan.written)
+    scan.moved(50, B)
+    scan.until(lambda: not scan.controller.is_moving)
+    assert scan.gripper.position(A) == pytest.approx(200, abs=2), "B's command keeps what A was asked"
+    assert len(scan.written) == writes + 1
+
+
+def test_a_motion_goes_on_over_a_lost_link_and_is_adopted(scan: Scan) -> None:
+    scan.move(255, A)
+    scan.run(0.5)
+    scan.controller.lost(None)
+    scan.come_back(0.3)
+    assert scan.state is State.RUNNING_IDLE
+    scan.moved(100, B)
+    scan.until(lambda: not scan.controller.is_moving)
+    assert scan.gripper.position(A) >= 240
+    assert scan.controller.foreign_commands == 0
+
+
+def test_a_gripper_that_lost_its_power_is_not_activated_by_a_reconnect(scan: Scan) -> None:
+    scan.move(255)
+    scan.run(0.5)
+    scan.controller.lost(None)
+    scan.gripper.power_cycle()
+    scan.come_back(0.1)
+    scan.run(1.0)
+    assert scan.state is State.RESET
+    assert not scan.gripper.is_moving
 
 
 @pytest.mark.parametrize("device_cycle", [0.005, 0.03, 0.1, 0.2])
@@ -116,6 +129,74 @@ def test_what_was_adopted_is_not_ours_after_a_blink_of_the_link() -> None:
     assert scan.positions()[B] == 150, "B still holds"
 
 
+# -- holds: unlike motions they are not dropped ----------------------------------------------------------
+
+
+def test_a_hold_survives_a_lost_link() -> None:
+    # A hold is a stop: unlike a motion it is not dropped.
+    for written in (False, True):
+        scan = started()
+        move, _ = scan.move(200, A, speed=0)
+        scan.run(0.5)
+        scan.controller.abandon(move)
+        if written:
+            scan.now += POLL_S
+            assert scan.controller.decide(scan.now) is not None  # and it is lost
+        scan.controller.lost(None)
+        at = scan.positions()[A]
+        scan.come_back(0.05)
+        assert scan.state is State.RUNNING_IDLE, "nothing was asked for"
+        scan.run(5)
+        # Whether a lost hold arrived is known after a device cycle: a quarter of a second, six counts.
+        assert scan.positions()[A] <= at + (8 if written else 4)
+        assert scan.state is State.RUNNING_IDLE
+
+
+@pytest.mark.parametrize("how", ["halt", "command"])
+def test_a_hold_outlives_what_has_replaced_it_and_was_lost(scan: Scan, how: str) -> None:
+    move, _ = scan.move(200, A, speed=0)
+    scan.run(0.5)
+    scan.controller.abandon(move)
+    if how == "halt":
+        scan.halt()
+    else:
+        scan.command(A, position=10)
+    at = scan.positions()[A]
+    scan.blink()
+    scan.run(10)
+    assert abs(scan.positions()[A] - at) <= 4
+
+
+def test_a_hold_is_dropped_when_somebody_else_commands_after_the_lost_link(scan: Scan) -> None:
+    move, _ = scan.move(200, A, speed=0)
+    scan.run(0.5)
+    scan.controller.abandon(move)
+    scan.controller.lost(None)
+    image = Request.from_registers(scan.gripper.request_registers)
+    scan.gripper.write(0, image.with_positions({A: 90}).registers)
+    scan.now += 0.5
+    written = len(scan.written)
+    scan.connect(activate=False)
+    scan.run(5)
+    assert len(scan.written) == written
+
+
+def test_a_lost_hold_does_not_outlive_an_activation(scan: Scan) -> None:
+    move, _ = scan.move(200, A, speed=0)
+    scan.run(0.3)
+    scan.controller.abandon(move)
+    scan.controller.lost(None)
+    scan.gripper.power_cycle()
+    scan.now += 0.1
+    scan.connect(activate=True)  # as a policy may say
+    scan.until(lambda: scan.state is State.RUNNING_IDLE)
+    scan.command(A, position=200)
+    scan.run(0.5)
+    scan.blink()
+    scan.run(10)
+    assert scan.positions()[A] >= 198
+
+
 # -- what has no echo ------------------------------------------------------------------------------------
 
 
@@ -144,3 +225,31 @@ def test_a_speed_that_was_not_acknowledged_is_not_taken_for_the_axis_s_own(scan:
     scan.run(0.6)
     image = Request.from_registers(scan.written[-1])
     assert (image.axes[1].speed, image.axes[1].force) == (128, 64)
+
+
+@pytest.mark.parametrize("link_is_back", [False, True])
+def test_a_move_cancelled_as_its_link_was_lost_is_held_though_it_had_ended(link_is_back: bool) -> None:
+    """Its caller never saw the error, and knows nothing of a motion that goes on."""
+    scan = started()
+    move, told = scan.move(200, A, speed=0)
+    scan.run(0.5)
+    scan.controller.lost(None)
+    assert isinstance(told.error, ConnectionLostError)
+    if link_is_back:
+        scan.come_back(0.05)
+    scan.controller.abandon(move, unseen=True)
+    at = scan.positions()[A]
+    if not link_is_back:
+        scan.come_back(0.05)
+    scan.run(10)
+    assert abs(scan.positions()[A] - at) <= 4
+
+
+def test_a_move_that_was_given_up_after_its_error_was_seen_goes_on(scan: Scan) -> None:
+    move, _ = scan.move(200, A, speed=0)
+    scan.run(0.5)
+    scan.controller.lost(None)
+    scan.controller.abandon(move)
+    scan.come_back(0.05)
+    scan.run(10)
+    assert scan.positions()[A] >= 198

@@ -4,30 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from robotiq_async import Finger, RobotiqStatus
+from robotiq_async import Finger, MoveSupersededError, NotActivatedError, RobotiqStatus, State
 from robotiq_async.values.model import THREE_FINGER
+from robotiq_async.values.request import Request
 from tests.control.other_client import image, used_by_another
 from tests.control.scan import POLL_S, Scan, started
-from tests.control.stories import tell
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
-
-STORIES = {
-    "it is counted and its requests are taken over": "started, moved ABC 100, theirs A=50 B=200 C=30 S=180, "
-    "run 5, foreign 1, note, moved A 80, BCS went 1",
-    "a move that it takes over": "started, move A 255, run 0.3, theirs A=10, run 0.1, 1 superseded",
-    "a move that it leaves alone": "started, move A 255, run 0.3, theirs A=255 B=100 S=137, until told 1, "
-    "A at 241, foreign 1",
-    "a hold that waits does not stop who has taken over": "started, move A 200 speed=0, run 0.5, "
-    "beside A=90, later 0.02, abandon 1, see, foreign 1, run 10, A at 90",
-    "a power cycle": "started, move ABC 255, run 0.3, note, power-cycle, run 1, state RESET, 1 inactive, "
-    "written 0, rests",
-}
-
-
-@pytest.mark.parametrize("name", STORIES)
-def test_a_story(name: str) -> None:
-    tell(STORIES[name])
 
 
 @pytest.mark.parametrize("individual", [True, False])
@@ -106,6 +89,35 @@ def test_an_old_reply_that_was_looked_at_late_does_not_make_our_write_anothers(s
     assert abs(told.result.positions[A] - 200) <= 2
 
 
+def test_another_client_is_counted_and_its_requests_are_taken_over(scan: Scan) -> None:
+    scan.moved(100)
+    scan.gripper.write(0, image({A: 50, B: 200, C: 30, S: 180}))
+    scan.run(5.0)
+    assert scan.controller.foreign_commands == 1
+    before = scan.travels()
+    scan.moved(80, A)
+    assert {axis: scan.gripper.travel(axis) - before[axis] for axis in (B, C, S)} == {
+        axis: pytest.approx(0, abs=1) for axis in (B, C, S)
+    }
+
+
+def test_a_move_that_another_client_takes_over_is_superseded(scan: Scan) -> None:
+    _, taken = scan.move(255, A)
+    scan.run(0.3)
+    scan.gripper.write(0, image({A: 10}))
+    scan.run(0.1)
+    assert isinstance(taken.error, MoveSupersededError)
+
+
+def test_a_move_that_another_client_leaves_alone_goes_on(scan: Scan) -> None:
+    _, ours = scan.move(255, A)
+    scan.run(0.3)
+    scan.gripper.write(0, image({A: 255, B: 100, S: 137}))
+    scan.until(lambda: ours.is_told)
+    assert ours.result.positions[A] >= 240
+    assert scan.controller.foreign_commands == 1
+
+
 def test_our_write_that_shows_after_another_clients_is_what_counts() -> None:
     # Another client's write and ours are on their way together; ours acts last and sends B and C back.
     scan = used_by_another(device_cycle=0.03)
@@ -122,3 +134,28 @@ def test_our_write_that_shows_after_another_clients_is_what_counts() -> None:
     scan.moved(60, B)
     moved = {axis for axis, travel in scan.travels().items() if travel != before[axis]}
     assert moved == {B}
+
+
+def test_a_pending_hold_does_not_stop_who_has_taken_over(scan: Scan) -> None:
+    move, _ = scan.move(200, A, speed=0)
+    scan.run(0.5)
+    image = Request.from_registers(scan.gripper.request_registers)
+    scan.gripper.write(0, image.with_positions({A: 90}).registers)
+    scan.now += 0.02
+    scan.controller.abandon(move)
+    scan.controller.see(scan.status())
+    assert scan.controller.foreign_commands == 1
+    scan.run(10)
+    assert scan.positions()[A] == 90
+
+
+def test_a_power_cycle_leaves_the_hand_in_reset_and_writes_nothing(scan: Scan) -> None:
+    _, outcome = scan.move(255)
+    scan.run(0.3)
+    writes = len(scan.written)
+    scan.gripper.power_cycle()
+    scan.run(1.0)
+    assert scan.state is State.RESET
+    assert isinstance(outcome.error, NotActivatedError)
+    assert len(scan.written) == writes
+    assert not scan.gripper.is_moving

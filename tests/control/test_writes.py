@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import gc
-import re
 import sys
 from collections.abc import Callable
 from types import FrameType
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from hypothesis import given, settings
@@ -38,96 +37,244 @@ class History(WriteHistory):
 
 # -- what happens one after another ------------------------------------------------------------------------
 
-STORIES = {
-    "what shows at the start is ours": "30: 0 ours 30",
+Event = Callable[[History, float], object]
+
+
+def writes(position: int, **options: Any) -> Event:
+    return lambda history, at: history.write(image(position, **options), at)
+
+
+def sends(position: int) -> Event:
+    """A write that is not acknowledged yet."""
+    return lambda history, at: history.writing(image(position), at)
+
+
+def acknowledged(history: History, at: float) -> None:
+    history.acknowledged(at)
+
+
+def link_lost(history: History, _: float) -> None:
+    history.lost()
+
+
+def time_passes(_history: History, _at: float) -> None:
+    pass
+
+
+def ours(position: int, *, go: bool = True, **options: Any) -> Event:
+    """A status that shows an image of ours."""
+
+    def look(history: History, at: float) -> None:
+        assert history.look(shows(position, at, go=go)) == image(position, go=go, **options), at
+
+    return look
+
+
+def foreign(position: int) -> Event:
+    """A status that shows what another client wrote."""
+
+    def look(history: History, at: float) -> None:
+        assert history.look(shows(position, at)) is None, at
+
+    return look
+
+
+def adopts(position: int) -> Event:
+    return lambda history, at: history.adopt(image(position), image(position).echo, at)
+
+
+def restarts(position: int) -> Event:
+    return lambda history, at: history.restart(image(position), image(position).echo, at)
+
+
+class At(NamedTuple):
+    """What happens at a time, how many images do not act yet then, and whether one of them may never act."""
+
+    time: float
+    event: Event
+    waiting: int = 0
+    in_doubt: bool = False
+
+
+LOST = [At(1.0, sends(200), 1), At(1.0, link_lost, 1, in_doubt=True)]
+STORIES: dict[str, tuple[int, list[At]]] = {
+    "what shows at the start": (30, [At(0.0, ours(30))]),
     # One write acts when its echo is seen, or some time after its acknowledgement.
-    "an echo": "0: 1 writes 100 (1), 1.005 ours 0 (1), 1.01 ours 100",
-    "an echo before the acknowledgement": "0: 1 sends 100 (1), 1.005 ours 100",
-    "no acknowledgement": "0: 1 sends 100 (1), 100 passes (1), 101 ours 100",
-    "no echo": "0: 1 writes 100 (1), 1+W-e passes (1), 1+W passes",
-    "a late acknowledgement": "0: 1 sends 100 (1), 1.3 acknowledged (1), 1.3+W-e passes (1), 1.3+W passes",
-    "a cleared rGTO": "0: 1 writes 0 without go (1), 1.005 ours 0 (1), 1.01 ours 0 without go",
+    "an echo": (0, [At(1.0, writes(100), 1), At(1.005, ours(0), 1), At(1.01, ours(100))]),
+    "an echo before the acknowledgement": (0, [At(1.0, sends(100), 1), At(1.005, ours(100))]),
+    "no acknowledgement": (0, [At(1.0, sends(100), 1), At(100.0, time_passes, 1), At(101.0, ours(100))]),
+    "no echo": (
+        0,
+        [
+            At(1.0, writes(100), 1),
+            At(1.0 + WINDOW_S - EPSILON, time_passes, 1),
+            At(1.0 + WINDOW_S, time_passes),
+        ],
+    ),
+    "no echo after a late acknowledgement": (
+        0,
+        [
+            *(At(1.0, sends(100), 1), At(1.3, acknowledged, 1)),
+            *(At(1.3 + WINDOW_S - EPSILON, time_passes, 1), At(1.3 + WINDOW_S, time_passes)),
+        ],
+    ),
+    "a cleared rGTO": (
+        0,
+        [At(1.0, writes(0, go=False), 1), At(1.005, ours(0), 1), At(1.01, ours(0, go=False))],
+    ),
     # Several writes act in their order.
-    "there and back": "100: 1 writes 200 (1), 1.01 writes 100 (2), "
-    "1.015 ours 100 (2), 1.02 ours 200 (1), 1.025 ours 100",
-    "there and back from elsewhere": "0: 1 writes 100 (1), 1.01 writes 200 (2), 1.02 writes 100 (3), "
-    "1.04 ours 0 (3), 1.05 ours 100 (2), 1.06 ours 100 (2), 1.07 ours 200 (1), 1.08 ours 100",
-    "there and back, never shown": "100: 1 writes 200 (1), 1.01 writes 100 (2), 1+W-e ours 100 (2), "
-    "1.01+W passes",
-    "a slow gripper": "0: 1 writes 10 (1), 1.1 writes 20 (2), 1.2 writes 30 (3), "
-    "1.21 ours 10 (2), 1.22 ours 10 (2), 1.31 ours 20 (1), 1.41 ours 30",
-    "a skipped image": "0: 1 writes 10 (1), 1.01 writes 20 (2), 1.02 ours 0 (2), 1.03 ours 20",
+    "there and back": (
+        100,
+        [
+            *(At(1.0, writes(200), 1), At(1.01, writes(100), 2)),
+            *(At(1.015, ours(100), 2), At(1.02, ours(200), 1), At(1.025, ours(100))),
+        ],
+    ),
+    "there and back from elsewhere": (
+        0,
+        [
+            *(
+                At(1.0, writes(100), 1),
+                At(1.01, writes(200), 2),
+                At(1.02, writes(100), 3),
+                At(1.04, ours(0), 3),
+            ),
+            *(At(1.05, ours(100), 2), At(1.06, ours(100), 2), At(1.07, ours(200), 1), At(1.08, ours(100))),
+        ],
+    ),
+    "there and back that never shows": (
+        100,
+        [
+            *(At(1.0, writes(200), 1), At(1.01, writes(100), 2)),
+            *(At(1.0 + WINDOW_S - EPSILON, ours(100), 2), At(1.01 + WINDOW_S, time_passes)),
+        ],
+    ),
+    "a slow gripper shows the image before the last": (
+        0,
+        [
+            *(At(1.0, writes(10), 1), At(1.1, writes(20), 2), At(1.2, writes(30), 3)),
+            *(At(1.21, ours(10), 2), At(1.22, ours(10), 2), At(1.31, ours(20), 1), At(1.41, ours(30))),
+        ],
+    ),
+    "a gripper skips an image": (
+        0,
+        [At(1.0, writes(10), 1), At(1.01, writes(20), 2), At(1.02, ours(0), 2), At(1.03, ours(20))],
+    ),
     # Speed and force have no echo.
-    "a speed": "0: 1 writes 0 speed 200 (1), 1.005 ours 0 (1), 1+S-e passes (1), 1+S passes",
-    "a force": "0: 1 writes 0 force 200 (1), 1.005 ours 0 (1), 1+S-e passes (1), 1+S passes",
-    "an identical image": "0: 1 writes 0",
-    "a speed behind a position waits for it": "0: 1 writes 100 (1), 1.01 writes 100 speed 200 (2), "
-    "1.01+S passes (2), 1.02+S ours 100",
-    "a speed right behind a position has its time after the echo": "0: 1 writes 100 (1), "
-    "1.001 writes 100 speed 200 (2), 1.01 ours 100 (1), 1.001+S passes",
-    "a position behind a speed shows both": "0: 1 writes 0 speed 200 (1), 1.01 writes 100 speed 200 (2), "
-    "1.02 ours 100 speed 200",
+    "a speed": (
+        0,
+        [
+            *(At(1.0, writes(0, speed=200), 1), At(1.005, ours(0), 1)),
+            *(At(1.0 + SILENT_S - EPSILON, time_passes, 1), At(1.0 + SILENT_S, time_passes)),
+        ],
+    ),
+    "a force": (
+        0,
+        [
+            *(At(1.0, writes(0, force=200), 1), At(1.005, ours(0), 1)),
+            *(At(1.0 + SILENT_S - EPSILON, time_passes, 1), At(1.0 + SILENT_S, time_passes)),
+        ],
+    ),
+    "an identical image": (0, [At(1.0, writes(0))]),
+    "a speed behind a position waits for it": (
+        0,
+        [
+            *(At(1.0, writes(100), 1), At(1.01, writes(100, speed=200), 2)),
+            *(At(1.01 + SILENT_S, time_passes, 2), At(1.02 + SILENT_S, ours(100))),
+        ],
+    ),
+    "a speed right behind a position has its time after the echo": (
+        0,
+        [
+            *(At(1.0, writes(100), 1), At(1.001, writes(100, speed=200), 2)),
+            *(At(1.01, ours(100), 1), At(1.001 + SILENT_S, time_passes)),
+        ],
+    ),
+    "a position behind a speed shows that both act": (
+        0,
+        [
+            *(At(1.0, writes(0, speed=200), 1), At(1.01, writes(100, speed=200), 2)),
+            At(1.02, ours(100, speed=200)),
+        ],
+    ),
     # Another client's image is foreign until it is adopted, an older one of ours after the window.
-    "another client": "0: 1 foreign 77, 1.1 foreign 77, 1.1 adopts 77, 1.2 ours 77",
-    "another client undoes a write": "100: 1 writes 200 (1), 1.005 ours 100 (1), 1+W+e foreign 100",
-    "the image before comes back": "100: 1 writes 200 (1), 1.01 ours 200, 1+W ours 100, 1+W+e foreign 100, "
-    "1000000 ours 200",
-    "the newest before the window is kept": "0: 1 writes 10 (1), 2 writes 20 (1), 2.4 writes 30 (2), "
-    "2.41 ours 30, 2.6 ours 20, 2.6 foreign 10",
-    "what had shown before an adoption": "100: 1 writes 200 (1), 1.01 ours 200, 1.02 adopts 77, "
-    "1.03 foreign 100, 1.03 foreign 200",
-    "what was written before a restart": "100: 1 sends 200 (1), 1.1 restarts 50, 1.11 ours 50, "
-    "1.12 foreign 200, 1.13 foreign 100",
-    "an overtaken write may still act": "100: 1 writes 200 (1), 1.01 foreign 77 (1), 1.01 adopts 77 (1?), "
-    "1.02 ours 200",
+    "another client": (
+        0,
+        [At(1.0, foreign(77)), At(1.1, foreign(77)), At(1.1, adopts(77)), At(1.2, ours(77))],
+    ),
+    "another client that undoes a write before it shows": (
+        100,
+        [At(1.0, writes(200), 1), At(1.005, ours(100), 1), At(1.0 + WINDOW_S + EPSILON, foreign(100))],
+    ),
+    "the image before the last comes back": (
+        100,
+        [
+            *(At(1.0, writes(200), 1), At(1.01, ours(200))),
+            *(At(1.0 + WINDOW_S, ours(100)), At(1.0 + WINDOW_S + EPSILON, foreign(100)), At(1e6, ours(200))),
+        ],
+    ),
+    "of older images the newest before the window is kept": (
+        0,
+        [
+            *(At(1.0, writes(10), 1), At(2.0, writes(20), 1), At(2.4, writes(30), 2), At(2.41, ours(30))),
+            *(At(2.6, ours(20)), At(2.6, foreign(10))),
+        ],
+    ),
+    "what had shown before an adoption": (
+        100,
+        [
+            *(At(1.0, writes(200), 1), At(1.01, ours(200)), At(1.02, adopts(77))),
+            *(At(1.03, foreign(100)), At(1.03, foreign(200))),
+        ],
+    ),
+    "what was written before a restart": (
+        100,
+        [
+            *(At(1.0, sends(200), 1), At(1.1, restarts(50)), At(1.11, ours(50))),
+            *(At(1.12, foreign(200)), At(1.13, foreign(100))),
+        ],
+    ),
+    "a write that another client's overtook may still act": (
+        100,
+        [
+            *(At(1.0, writes(200), 1), At(1.01, foreign(77), 1), At(1.01, adopts(77), 1, in_doubt=True)),
+            At(1.02, ours(200)),
+        ],
+    ),
     # A write that was lost with the link is in doubt until it shows, or as long as the window.
-    "an acknowledged write is not lost": "100: 1 writes 200 (1), 1 lost (1)",
-    "a lost write had arrived": "100: 1 sends 200 (1), 1 lost (1?), 1+W ours 200",
-    "a lost write arrives": "100: 1 sends 200 (1), 1 lost (1?), 1.1 ours 100 (1?), 1.1 adopts 100 (1?), "
-    "1.12 ours 100 (1?), 1.15 ours 200",
-    "a lost write does not arrive": "100: 1 sends 200 (1), 1 lost (1?), 9 adopts 100 (1?), "
-    "9+W-e passes (1?), 9+W ours 100 (0?), 9+W+e ours 100, 20 ours 100, 20 foreign 200",
+    "an acknowledged write is not lost": (100, [At(1.0, writes(200), 1), At(1.0, link_lost, 1)]),
+    "a lost write had arrived": (100, [*LOST, At(1.0 + WINDOW_S, ours(200))]),
+    "a lost write arrives": (
+        100,
+        [
+            *(
+                *LOST,
+                At(1.1, ours(100), 1, True),
+                At(1.1, adopts(100), 1, True),
+                At(1.12, ours(100), 1, True),
+            ),
+            At(1.15, ours(200)),
+        ],
+    ),
+    "a lost write does not arrive": (
+        100,
+        [
+            *(*LOST, At(9.0, adopts(100), 1, True), At(9.0 + WINDOW_S - EPSILON, time_passes, 1, True)),
+            *(At(9.0 + WINDOW_S, ours(100), 0, True), At(9.0 + WINDOW_S + EPSILON, ours(100))),
+            *(At(20.0, ours(100)), At(20.0, foreign(200))),
+        ],
+    ),
 }
-"""What a gripper shows first; then events: when, what, the position, and how many images do not act yet then.
-
-A question mark says that one of them may never act. W is the window, S the time of what has no echo.
-"""
-TIMES = {"W": WINDOW_S, "S": SILENT_S, "e": EPSILON, "-e": -EPSILON}
-STEP = re.compile(r"(\S+) (\w+)(?: (\d+))?(?: (speed|force) (\d+))?( without go)?(?: \((\d)(\?)?\))?")
-
-
-def happen(history: History, event: str, at: float, asked: Request) -> None:
-    match event:
-        case "writes":
-            history.write(asked, at)
-        case "sends":
-            history.writing(asked, at)
-        case "acknowledged":
-            history.acknowledged(at)
-        case "lost":
-            history.lost()
-        case "adopts":
-            history.adopt(asked, asked.echo, at)
-        case "restarts":
-            history.restart(asked, asked.echo, at)
-        case "ours" | "foreign":
-            shown = history.look(shows(asked.axes[0].position, at, go=asked.go))
-            assert shown == (asked if event == "ours" else None), at
 
 
 @pytest.mark.parametrize("name", STORIES)
 def test_a_history_of_writes(name: str) -> None:
-    start, _, story = STORIES[name].partition(": ")
-    history = History(int(start))
-    for step in story.split(", "):
-        words = STEP.fullmatch(step)
-        assert words is not None, step
-        when, event, position, setting, value, halts, waiting, in_doubt = words.groups()
-        at = sum(TIMES.get(word) or float(word) for word in when.replace("-e", "+-e").split("+"))
-        settings: dict[str, Any] = {setting: int(value)} if setting else {}
-        happen(history, event, at, image(int(position or 0), go=not halts, **settings))
+    position, story = STORIES[name]
+    history = History(position)
+    for at, event, waiting, in_doubt in story:
+        event(history, at)
         waits = [n for n in range(1, history.last_number + 1) if not history.acts(n, at)]
-        assert (len(waits), history.is_in_doubt) == (int(waiting or 0), bool(in_doubt)), step
+        assert (len(waits), history.is_in_doubt) == (waiting, in_doubt), at
 
 
 @pytest.mark.parametrize(

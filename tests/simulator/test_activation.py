@@ -7,35 +7,13 @@ from typing import TYPE_CHECKING
 import pytest
 
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.values.enums import Finger, Initialization
+from robotiq_async.values.enums import Fault, Finger, Initialization
 from robotiq_async.values.request import Request
-from tests.simulator.stories import tell
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tests.simulator.conftest import Bench
-
-STORIES = {
-    "one that fails": "on, fail-activation, write rACT=1, settle, fault 13, state activating, go 255, "
-    "wait 5, rests, fault 13, write rACT=0 rGTO=0, fault 0, write rACT=1, settle, state complete",
-    "a request waits for it": "on, write rACT=1, go 200, fault 5, words 19 00, settle, fault 0, "
-    "at 200 200 200",
-    "a go without one": "on, go 255, wait 5, fault 7, at 6 6 6 137, write rGTO=0, fault 0",
-    "a reset stops it at once": "on, write rACT=1, wait 1, write rACT=0 rGTO=0, words 00 00, note, wait 5, "
-    "still, rests",
-    "a reset stops a motion at once": "on, write rACT=1, settle, go 255, wait 1, write rACT=0 rGTO=0, "
-    "words 00 00, note, wait 5, still, rests",
-    "the same image changes nothing": "active, place B 100, reach 255, note, write, wait 1, write, wait 1, "
-    "unchanged",
-    # Active, then reset.
-    "a power cycle clears faults": "active, inject 13, power-cycle, fault 0, inject 13, power-cycle, fault 0",
-}
-
-
-@pytest.mark.parametrize("name", STORIES)
-def test_a_story(name: str) -> None:
-    tell(STORIES[name])
 
 
 def test_activation_closes_and_opens_the_fingers(bench: Bench) -> None:
@@ -50,6 +28,65 @@ def test_activation_closes_and_opens_the_fingers(bench: Bench) -> None:
     assert bench.gripper.travel(Finger.A) == 2 * 235
     assert bench.positions == (6, 6, 6, 137)
     assert 2 < bench.now - began < 20
+
+
+def test_failed_activation(bench: Bench) -> None:
+    bench.gripper.fail_activation = True
+    bench.write_and_settle(activate=True)
+    assert bench.fault is Fault.ACTIVATION_FAULT
+    assert bench.status.initialization is Initialization.ACTIVATING
+    bench.go(255)
+    bench.wait(5)
+    assert not bench.gripper.is_moving
+    assert bench.fault is Fault.ACTIVATION_FAULT
+    bench.write(activate=False, go=False)
+    assert bench.fault is Fault.NONE
+    assert not bench.gripper.fail_activation
+    bench.activate()
+
+
+def test_a_request_during_activation_waits_for_it(bench: Bench) -> None:
+    bench.write(activate=True)
+    bench.go(200)
+    assert bench.fault is Fault.ACTIVATION_PENDING
+    assert bench.words == (0x19, 0x00)
+    bench.settle()
+    assert bench.fault is Fault.NONE
+    assert bench.positions[:3] == (200, 200, 200)
+
+
+def test_a_go_without_activation(bench: Bench) -> None:
+    bench.go(255)
+    bench.wait(5)
+    assert bench.fault is Fault.NOT_ACTIVATED
+    assert bench.positions == (6, 6, 6, 137)
+    bench.write(go=False)
+    assert bench.fault is Fault.NONE
+
+
+@pytest.mark.parametrize("activating", [False, True])
+def test_reset_stops_at_once_and_clears(bench: Bench, activating: bool) -> None:
+    bench.write(activate=True)
+    if not activating:
+        bench.settle()
+        bench.go(255)
+    bench.wait(1)
+    bench.write(activate=False, go=False)
+    stopped_at = bench.positions
+    assert bench.words == (0, 0)
+    bench.wait(5)
+    assert bench.positions == stopped_at
+    assert not bench.gripper.is_moving
+
+
+def test_rewriting_the_image_changes_nothing(active: Bench) -> None:
+    active.gripper.place_object(Finger.B, 100)
+    active.close()
+    before = active.gripper.status_registers()
+    for _ in range(5):
+        active.write()
+        active.wait(1)
+    assert active.gripper.status_registers() == before
 
 
 # Device cycle and partial writes.
@@ -141,6 +178,13 @@ def test_writes_without_power_are_lost(active: Bench) -> None:
     active.wait(2)
     assert active.gripper.is_powered
     assert active.words == (0, 0)
+
+
+def test_power_cycle_clears_faults(active: Bench) -> None:
+    for _ in range(2):  # active, then reset
+        active.gripper.inject_fault(Fault.ACTIVATION_FAULT)
+        active.gripper.power_cycle()
+        assert active.fault is Fault.NONE
 
 
 def test_a_gripper_that_is_not_switched_on(make_bench: Callable[..., Bench]) -> None:

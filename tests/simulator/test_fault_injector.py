@@ -7,7 +7,7 @@ import itertools
 import re
 import struct
 from collections.abc import AsyncIterator
-from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 
 import pytest
@@ -21,7 +21,6 @@ from robotiq_async.simulator import (
 )
 from robotiq_async.simulator import parse_troubles as plan_of
 from robotiq_async.simulator.server.endpoint import SimulatorEndpoint
-from robotiq_async.simulator.troubles.fault_injector import Ongoing
 from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values.enums import Fault
 from robotiq_async.values.model import THREE_FINGER
@@ -105,119 +104,51 @@ async def activate(server: SimulatorServer) -> None:
     assert status(server).is_activated
 
 
-# What one thing after another leads to.
-
-TWICE = tuple(itertools.product(("refuse", "power-cut"), ("refuse", "power-cut"), (1, 2)))
-SCENES = {
-    "the lost reply to a write": "connect, begin drop on write, read yes, write no, carried out 1, "
-    "write yes, hits 1, lasting 0",
-    "two drops": "connect, begin drop for 60, begin drop for 60, read no, read no, read no, hits 3, "
-    "lasting 2, end 1, lasting 1, read no, end 2, read yes",
-    "the older one is not about writes": "connect, begin delay 0.3 on read, begin drop, takes 0.3, hits 1, "
-    "lasting 2, write no, lasting 1",
-    "in silence nothing is heard and connections stay": "connect, begin silence, write no, read no, "
-    "let in no, hits 3, end 1, read yes, writes 0",
-    "silence for once": "connect, begin silence once, write no, write yes, writes 1, carried out 2",
-    "accepted in silence": "begin accept-silence, connect, write no, writes 0, end 1, read yes",
-    "without power the gripper forgets everything": "activate, begin power-cut, powered no, let in no, "
-    "end 1, powered yes, let in yes, shows reset",
-    # Refused until the last of two ends, in any order.
-    **{
-        f"{first}, {second}, {ending} first": f"begin {first}, begin {second}, end {ending}, let in no, "
-        f"powered {'yes' if (first, second)[2 - ending] == 'refuse' else 'no'}, "
-        f"end {3 - ending}, let in yes, powered yes"
-        for first, second, ending in TWICE
-    },
-    # It does not start a server that was stopped.
-    **{
-        f"{kind} ends after a stop": f"begin {kind}, stop, end 1, running no, powered yes, let in no"
-        for kind in ("refuse", "power-cut")
-    },
-    "two slow devices": "begin slow-device 0.2, begin slow-device 0.5, end 1, cycle 0.5, end 2, cycle 0.005",
-    "of two faults the greater lasts": "begin fault 14, begin interference, end 2, fault 14",
-    "interference outlasts a fault": "begin interference, begin fault 9, end 2, fault 10",
-    "a fault outlasts a greater one": "begin fault 9, begin fault 14, end 2, fault 9",
-    "what is over stays over": "begin fault 9, end 1, inject 14, end 1, fault 14",
-    "a fault": "activate, begin fault, fault 9, wait 60, fault 9, end 1, fault 0, lasting 0",
-    "fault 15": "activate, begin fault 15, fault 15, wait 60, fault 15, end 1, fault 0",
-    "interference": "activate, begin interference, fault 10, wait 60, fault 14, end 1, fault 0",
-    "a release is an event": "activate, begin release, lasting 0, fault 11, wait 60, fault 15",
-    # Any request counts, and the connection stays.
-    "an idle gripper loses its activation": "connect, activate, begin idle-reset 2, wait 1.9, read yes, "
-    "wait 1.9, write yes, wait 1.9, shows active, wait 0.2, shows reset, read yes, end 1, activate, "
-    "wait 100, shows active",
-    "what is not heard is no request": "connect, activate, begin idle-reset 2, begin silence, read no, "
-    "read no, read no, read no, read no, shows reset",
-    "what is heard and not answered is one": "connect, activate, begin idle-reset 2, begin drop for 9, "
-    "read no, read no, read no, read no, read no, shows active",
-    "an idle gripper without power": "begin power-cut, begin idle-reset 1, wait 5, end 2, powered no",
-    "the least patient of two": "activate, begin idle-reset 9, begin idle-reset 2, wait 1, end 2, wait 8, "
-    "shows active, wait 2, shows reset",
-}
-"""Troubles in their own words begin, and the first, the second of them ends; a read, a write (of 1, of 2,
-...) of the one client is answered or not, a new client let in or not; hits are those of the first trouble."""
-
-
-@pytest.mark.parametrize("name", SCENES)
-async def test_a_scene(server: SimulatorServer, name: str) -> None:
-    injector, gripper = server.fault_injector, server.gripper
-    begun: list[Ongoing] = []
-    clients: list[RawClient] = []
-    values = itertools.count(1)
-    async with AsyncExitStack() as stack:
-        for step in SCENES[name].split(", "):
-            what, _, argument = step.rpartition(" ") if " " in step else (step, "", "")
-            match what.split():
-                case ["connect"]:
-                    clients.append(await stack.enter_async_context(raw_client(server)))
-                case ["begin", *_]:
-                    begun.append(await injector.begin(*plan_of(step.removeprefix("begin "))))
-                case ["end"]:
-                    await injector.end(begun[int(argument) - 1])
-                case ["read"]:
-                    assert await is_answered(clients[0]) is (argument == "yes"), step
-                case ["write"]:
-                    assert await is_answered(clients[0], write(next(values))) is (argument == "yes"), step
-                case ["takes"]:
-                    began = now()
-                    assert await is_answered(clients[0])
-                    assert now() - began == pytest.approx(float(argument), abs=0.01)
-                case ["let", "in"]:
-                    assert await is_let_in(server) is (argument == "yes"), step
-                case ["hits"]:
-                    assert begun[0].hits == int(argument)
-                case ["lasting"]:
-                    assert injector.ongoing == tuple(each for each in begun if not each.over.is_set())
-                    assert len(injector.ongoing) == int(argument), step
-                case ["carried", "out"]:
-                    assert gripper.request_registers[1] == int(argument), step
-                case ["writes"]:
-                    assert len(gripper.writes) == int(argument)
-                case ["activate"]:
-                    await activate(server)
-                case ["wait"]:
-                    await asyncio.sleep(float(argument))
-                case ["shows"]:
-                    shown = status(server)
-                    assert (shown.is_activated, shown.is_reset) == (argument == "active", argument == "reset")
-                    assert argument == "active" or gripper.request_registers == (0,) * 8
-                case ["fault"]:
-                    assert status(server).fault == int(argument), step
-                case ["inject"]:
-                    gripper.inject_fault(int(argument))
-                case ["powered"]:
-                    assert gripper.is_powered is (argument == "yes"), step
-                case ["running"]:
-                    assert server.is_running is (argument == "yes")
-                case ["cycle"]:
-                    assert gripper.device_cycle == float(argument), step
-                case ["stop"]:
-                    await server.stop()
-                case _:
-                    raise AssertionError(step)
-
-
 # Replies.
+
+
+async def test_the_lost_reply_to_a_write(server: SimulatorServer, client: RawClient) -> None:
+    lost = await server.fault_injector.begin(Trouble("drop", on="write"))
+    assert await is_answered(client)
+    assert not await is_answered(client, write(5))
+    assert server.gripper.request_registers[1] == 5, "it was carried out"
+    assert await is_answered(client, write(6))
+    assert lost.hits == 1
+    assert server.fault_injector.ongoing == ()
+
+
+async def test_all_replies_are_lost_until_the_last_of_two_ends(
+    server: SimulatorServer, client: RawClient
+) -> None:
+    one, other = [await server.fault_injector.begin(Trouble("drop", lasts=60)) for _ in range(2)]
+    assert [await is_answered(client) for _ in range(3)] == [False] * 3
+    assert (one.hits, other.hits) == (3, 0)
+    assert server.fault_injector.ongoing == (one, other)
+    await server.fault_injector.end(one)
+    assert server.fault_injector.ongoing == (other,)
+    assert not await is_answered(client)
+    await server.fault_injector.end(other)
+    assert await is_answered(client)
+
+
+async def test_the_oldest_trouble_acts(server: SimulatorServer, client: RawClient) -> None:
+    older = await server.fault_injector.begin(Trouble("delay", 0.3, on="read"))
+    newer = await server.fault_injector.begin(Trouble("drop"))
+    began = now()
+    assert await is_answered(client)
+    assert now() - began == pytest.approx(0.3, abs=0.01)
+    assert (older.hits, newer.hits) == (1, 0)
+    assert not await is_answered(client, write(5)), "the older one is not about writes"
+    assert server.fault_injector.ongoing == (older,)
+
+
+async def test_a_late_reply_holds_up_the_next_one(server: SimulatorServer, client: RawClient) -> None:
+    began = now()
+    await server.fault_injector.begin(Trouble("late"))
+    client.writer.write(client.frame(write(5)) + client.frame(READ))
+    assert (await client.reply())[2][0] == 6
+    assert now() - began == pytest.approx(0.7, abs=0.01)
+    assert (await client.reply())[2][0] == 4
 
 
 async def test_the_policy_decides_on_replies_that_no_trouble_is_about(
@@ -236,6 +167,67 @@ async def test_the_policy_decides_on_replies_that_no_trouble_is_about(
         assert await is_answered(client, write(5))
     assert await is_answered(client)
     assert [reply[7] for reply in seen] == [6, 4]
+
+
+# Requests and connections.
+
+
+async def test_in_silence_nothing_is_heard_and_connections_stay(
+    server: SimulatorServer, client: RawClient
+) -> None:
+    async with server.fault_injector.making(Trouble("silence")) as silence:
+        assert not await is_answered(client, write(5))
+        assert not await is_answered(client)
+        assert not await is_let_in(server), "new connections are accepted and not answered"
+        assert silence.hits == 3
+    assert await is_answered(client)
+    assert server.gripper.writes == ()
+
+
+async def test_silence_for_once_is_one_request_that_is_not_heard(
+    server: SimulatorServer, client: RawClient
+) -> None:
+    await server.fault_injector.begin(Trouble("silence", lasts=0))
+    assert not await is_answered(client, write(5))
+    assert await is_answered(client, write(6))
+    assert [each.registers[1] for each in server.gripper.writes] == [6]
+
+
+async def test_accepted_in_silence_and_answered_after_it(server: SimulatorServer) -> None:
+    silence = await server.fault_injector.begin(Trouble("accept-silence"))
+    async with raw_client(server) as client:
+        assert not await is_answered(client, write(5))
+        assert server.gripper.writes == ()
+        await server.fault_injector.end(silence)
+        assert await is_answered(client)
+
+
+async def test_without_power_the_gripper_forgets_everything(server: SimulatorServer) -> None:
+    await activate(server)
+    async with server.fault_injector.making(Trouble("power-cut")):
+        assert not server.gripper.is_powered
+        assert not await is_let_in(server)
+    assert server.gripper.is_powered
+    assert await is_let_in(server)
+    assert status(server).is_reset
+    assert server.gripper.request_registers == (0,) * 8
+
+
+@pytest.mark.parametrize("first", ["refuse", "power-cut"])
+@pytest.mark.parametrize("second", ["refuse", "power-cut"])
+@pytest.mark.parametrize("in_order", [True, False])
+async def test_refused_until_the_last_of_two_ends(
+    server: SimulatorServer, first: str, second: str, in_order: bool
+) -> None:
+    begun = [await server.fault_injector.begin(Trouble(kind)) for kind in (first, second)]
+    assert server.gripper.is_powered == ("power-cut" not in (first, second))
+    ending, lasting = begun if in_order else begun[::-1]
+    await server.fault_injector.end(ending)
+    assert not await is_let_in(server)
+    assert server.gripper.is_powered == (lasting.trouble.kind == "refuse")
+    await server.fault_injector.end(lasting)
+    assert await is_let_in(server)
+    assert server.gripper.is_powered
 
 
 async def ask_and_go(server: SimulatorServer, pdu: bytes = READ) -> bytes:
@@ -264,7 +256,7 @@ async def test_a_multiplexer_hands_a_late_reply_to_whoever_is_connected_then(ser
     began = now()
     await ask_and_go(server, write(5))
     assert server.gripper.request_registers[1] == 5, "it was carried out"
-    async with raw_client(server), raw_client(server) as newest:
+    async with raw_client(server), raw_client(server), raw_client(server) as newest:
         assert (await newest.reply())[2][0] == 6
     assert now() - began == pytest.approx(0.7, abs=0.01)
 
@@ -292,6 +284,16 @@ async def test_a_multiplexer_keeps_no_more_than_a_hundred_replies(server: Simula
         assert await is_answered(client)
 
 
+@pytest.mark.parametrize("kind", ["refuse", "power-cut"])
+async def test_ending_it_does_not_start_a_server_that_was_stopped(server: SimulatorServer, kind: str) -> None:
+    begun = await server.fault_injector.begin(Trouble(kind))
+    await server.stop()
+    await server.fault_injector.end(begun)
+    assert not server.is_running
+    assert server.gripper.is_powered
+    assert not await is_let_in(server)
+
+
 # Troubles that overlap.
 
 
@@ -310,6 +312,31 @@ async def test_a_refusal_is_not_corrupted(
     begun = await server.fault_injector.begin(Trouble(kind))
     assert (await client.ask(bytes.fromhex(request_)))[0] & 0x80
     assert begun.hits == 0
+
+
+async def test_two_slow_devices_are_both_undone(server: SimulatorServer) -> None:
+    one = await server.fault_injector.begin(Trouble("slow-device", 0.2))
+    other = await server.fault_injector.begin(Trouble("slow-device", 0.5))
+    await server.fault_injector.end(one)
+    assert server.gripper.device_cycle == 0.5, "the other one lasts"
+    await server.fault_injector.end(other)
+    assert server.gripper.device_cycle == 0.005
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "left"),
+    [
+        ("fault 14", "interference", 14),
+        ("interference", "fault 9", 10),
+        ("fault 9", "fault 14", 9),
+    ],
+)
+async def test_a_fault_outlasts_another(server: SimulatorServer, first: str, second: str, left: int) -> None:
+    (lasting,), (ending,) = plan_of(first), plan_of(second)
+    async with server.fault_injector.making(lasting):
+        async with server.fault_injector.making(ending):
+            pass
+        assert status(server).fault is Fault(left)
 
 
 async def test_a_plan_waits_for_what_happens_once(server: SimulatorServer, client: RawClient) -> None:
@@ -351,7 +378,84 @@ async def test_requests_to_a_slow_device_take_effect_later(value: float | None, 
         assert server.gripper.device_cycle == 0.02
 
 
+@pytest.mark.parametrize(
+    ("words", "at_once", "in_a_minute"),
+    [("fault", 9, 9), ("fault 15", 15, 15), ("interference", 10, 14), ("release", 11, 15)],
+)
+async def test_a_fault_is_reported(
+    server: SimulatorServer, words: str, at_once: int, in_a_minute: int
+) -> None:
+    await activate(server)
+    (trouble,) = plan_of(words)
+    async with server.fault_injector.making(trouble):
+        assert status(server).fault == Fault(at_once)
+        await asyncio.sleep(60)
+        assert status(server).fault == Fault(in_a_minute)
+    if words != "release":  # an event, which nothing undoes
+        assert status(server).fault is Fault.NONE
+    assert server.fault_injector.ongoing == ()
+
+
+async def test_an_idle_gripper_loses_its_activation(server: SimulatorServer, client: RawClient) -> None:
+    await activate(server)
+    async with server.fault_injector.making(Trouble("idle-reset", 2)):
+        await asyncio.sleep(1.9)
+        for _ in range(5):
+            assert await is_answered(client), "a request, whatever it asks"
+            await asyncio.sleep(1.9)
+            assert status(server).is_activated
+        await asyncio.sleep(0.2)
+        assert status(server).is_reset
+        assert server.gripper.request_registers == (0,) * 8
+        assert await is_answered(client), "the connection stays"
+    await activate(server)
+    await asyncio.sleep(100)
+    assert status(server).is_activated, "it is over"
+
+
+@pytest.mark.parametrize(
+    ("silent", "is_reset"), [(Trouble("silence"), True), (Trouble("drop", lasts=9), False)]
+)
+async def test_what_is_not_heard_is_no_request(
+    server: SimulatorServer, client: RawClient, silent: Trouble, is_reset: bool
+) -> None:
+    await activate(server)
+    async with (
+        server.fault_injector.making(Trouble("idle-reset", 2)),
+        server.fault_injector.making(silent),
+    ):
+        for _ in range(5):
+            assert not await is_answered(client)
+        assert status(server).is_reset is is_reset
+
+
+async def test_an_idle_gripper_without_power_stays_without(server: SimulatorServer) -> None:
+    async with server.fault_injector.making(Trouble("power-cut")):
+        async with server.fault_injector.making(Trouble("idle-reset", 1)):
+            await asyncio.sleep(5)
+        assert not server.gripper.is_powered
+
+
+async def test_the_least_patient_of_two_counts(server: SimulatorServer) -> None:
+    await activate(server)
+    async with server.fault_injector.making(Trouble("idle-reset", 9)):
+        async with server.fault_injector.making(Trouble("idle-reset", 2)):
+            await asyncio.sleep(1)
+        await asyncio.sleep(8)
+        assert status(server).is_activated
+        await asyncio.sleep(2)
+        assert status(server).is_reset
+
+
 # Beginning and ending.
+
+
+async def test_what_is_over_stays_over(server: SimulatorServer) -> None:
+    begun = await server.fault_injector.begin(Trouble("fault", 9))
+    await server.fault_injector.end(begun)
+    server.gripper.inject_fault(14)
+    await server.fault_injector.end(begun)
+    assert status(server).fault is Fault.SCISSOR_BLOCKED
 
 
 async def test_a_block_that_fails_ends_its_trouble(server: SimulatorServer) -> None:

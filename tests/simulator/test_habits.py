@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from robotiq_async.simulator import Habits
-from robotiq_async.values.enums import Finger, Initialization, Mode, ObjectStatus
-from tests.simulator.stories import tell
+from robotiq_async.values.enums import Fault, Finger, Initialization, Mode, ObjectStatus
+from robotiq_async.values.model import THREE_FINGER
+from robotiq_async.values.request import AxisRequest
 
 if TYPE_CHECKING:
     from tests.simulator.conftest import Bench
@@ -26,90 +27,6 @@ def seconds_of_activation(bench: Bench, **changes: Any) -> float:
         bench.wait(0.01)
         assert bench.now < began + 100
     return bench.now - began
-
-
-IN_VAIN = "write rACT=1, wait 60, fault 5, state activating, rests, write rACT=0, fault 0, state reset, "
-STORIES = {
-    "a reset shows at once, also when the object status is late": "individual, habits status_lag=0.04, "
-    "wait 1, write rACT=0 rGTO=0, words 00 00",
-    # The fault of silence.
-    "the first status after a second shows it once": "active, habits silence_fault=1, fault 0, wait 0.99, "
-    "fault 0, wait 1, fault 9, fault 0, fault 0",
-    "a write takes it away and nothing stops": "active, habits silence_fault=1, go 255 speed=0, wait 5, "
-    "write, fault 0, wait 2, moves, fault 9, settle, at 241 241 241",
-    "a serious fault is shown in its place": "on, habits silence_fault=1, wait 1, fault 9, fault 0, "
-    "inject 14, wait 5, fault 14",
-    # Limits.
-    **{
-        f"a limit is echoed for {asked}": f"individual, habits echoes_limits=yes, reach S={asked}, "
-        f"S arrived at {shown}, S echoes {shown}, write rGTO=0, S echoes {shown}"
-        for asked, shown in ((255, 232), (100, 100), (0, 15))
-    },
-    # No request is looked at while reset.
-    "what is a stop and no limit is echoed as asked": "individual, habits echoes_limits=yes, reach 255, "
-    "echo 255 255 255 232, write rACT=0 rGTO=0, S echoes 255",
-    # The register of the scissor is not used.
-    "the limit of the pinch mode is one": "on, habits echoes_limits=yes, write rACT=1 rMOD=1, settle, "
-    "reach 255, at 113 113 113 219, echo 113 113 113 255",
-    # An emergency stop.
-    "it stops, and does not come back by itself": "active, go 255, wait 1, stop, rests, words 19 00, "
-    "fault 5, stop-ends, wait 100, words 19 00, fault 5",
-    **{
-        f"after it {resets} resets are needed": f"active, stop {resets}, stop-ends, {resets * IN_VAIN}"
-        "write rACT=1, settle, state complete, fault 0"
-        for resets in (1, 2, 9)
-    },
-    "before its end no reset helps": "active, stop, write rACT=0, write rACT=1, wait 60, fault 5, "
-    "write rACT=0, write rACT=1, wait 60, fault 5, stop-ends, write rACT=0, write rACT=1, settle, "
-    "state complete",
-    "power that was off is as good as resets": "active, stop 9, stop-ends, power-cycle, write rACT=1, "
-    "settle, state complete",
-    "in it a release does not move": "active, reach 255, stop, write rATR=1, wait 60, at 241 241 241",
-    # Asleep.
-    "the image that wakes it is echoed and moves nothing, the next does": "individual, sleep, go A=200, "
-    "wait 5, A echoes 200, at 6, awake, write, settle, at 200",
-    **{
-        f"{image} wakes it": f"individual, sleep, {image}, awake, reach A=200, at 200"
-        for image in ("write", "write rGTO=0")
-    },
-    "what moves goes on while it is asleep, and can be stopped": "individual, go A=200, sleep, wait 0.2, "
-    "moves, go A=0, wait 0.2, target A 200, sleep, write rGTO=0, rests",
-    "an activation and a reset are not ignored": "on, sleep, write rACT=1, settle, state complete, sleep, "
-    "write rACT=0, state reset, asleep",
-    # What no source settles.
-    "with no go there may be no object status": "individual, place A 100, reach A=200, write rGTO=0, "
-    "words 71 FE, write rGTO=1, settle, habits keeps_status_on_halt=no, write rGTO=0, words 31 00",
-    **{
-        f"clearing rICS may open the fingers or not, rGTO={go}": "individual, reach 255, "
-        f"habits opens_without_rics=no, write rICS=0 rMOD=0 rGTO={go}, settle, travel A 705, "
-        f"at 241 241 241 {scissor}, write rICS=1, habits, write rICS=0, state changing, settle, "
-        f"travel A {after}"
-        for go, scissor, after in ((0, 232, 940), (1, 137, 1175))
-    },
-    "without rICS another mode opens them in any case": "active, habits opens_without_rics=no, write rMOD=2, "
-    "state changing",
-    **{
-        f"fault {fault} is a halt for a grip that {'ends' if ends else 'stays'}": f"individual, {habit}, "
-        f"place ABC 150, reach 255, inject {fault}, holds{'' if ends else ' ABC'}, write rACT=0, holds"
-        for fault in (9, 14)
-        for habit, ends in (("habits", False), ("habits lets_go_on_halt=yes", True))
-    },
-    "a grip that stays ends with the power and a new request": "individual, place ABC 150, reach 255, "
-    "write rGTO=0, holds ABC, go 150, settle, holds, reach 255, write rGTO=0, holds ABC, power-off, holds",
-    # By the vendor a part stays held when rGTO is cleared; as no one measured it, it may be otherwise.
-    **{
-        f"an axis grips while it is driven against what it touches, {halted}": f"individual, {habit}, "
-        "place A 150, place B 60 opening, reach B=255, grips, go A=200 B=0, grips, settle, grips AB, "
-        f"write rGTO=0, grips, {halted}, A closing at 150, write rGTO=1, settle, grips AB, holds AB, "
-        "go A=150, grips B, holds B, A arrived at 150"
-        for habit, halted in (("habits", "holds AB"), ("habits lets_go_on_halt=yes", "holds"))
-    },
-}
-
-
-@pytest.mark.parametrize("name", STORIES)
-def test_a_story(name: str) -> None:
-    tell(STORIES[name])
 
 
 # How long an activation takes.
@@ -181,6 +98,45 @@ def test_a_motion_that_is_shorter_than_the_lag_is_seen_for_its_time(late: Bench)
     assert [state for state, _ in groupby(seen)] == [ARRIVED, MOVING, ARRIVED]
 
 
+def test_a_reset_shows_at_once(late: Bench) -> None:
+    late.write(activate=False, go=False)
+    assert late.words == (0, 0)
+
+
+# The fault of silence.
+
+
+def test_the_first_status_after_a_second_shows_a_fault_once(active: Bench) -> None:
+    active.gripper.habits = Habits(silence_fault=1.0)
+    assert active.fault is Fault.NONE
+    active.wait(0.99)
+    assert active.fault is Fault.NONE
+    active.wait(1.0)
+    assert [active.fault for _ in range(3)] == [Fault.COMMUNICATION_NOT_READY, Fault.NONE, Fault.NONE]
+
+
+def test_a_write_takes_it_away_and_nothing_stops(active: Bench) -> None:
+    active.gripper.habits = Habits(silence_fault=1.0)
+    active.go(255, speed=0)
+    active.wait(5)
+    active.write()
+    assert active.fault is Fault.NONE
+    active.wait(2)
+    assert active.gripper.is_moving
+    assert active.fault is Fault.COMMUNICATION_NOT_READY
+    active.settle()
+    assert active.positions[:3] == (241, 241, 241)
+
+
+def test_a_serious_fault_is_shown_in_its_place(bench: Bench) -> None:
+    bench.gripper.habits = Habits(silence_fault=1.0)
+    bench.wait(1)
+    assert [bench.fault, bench.fault] == [Fault.COMMUNICATION_NOT_READY, Fault.NONE]
+    bench.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    bench.wait(5)
+    assert bench.fault is Fault.SCISSOR_BLOCKED
+
+
 # Writes that come too soon.
 
 
@@ -204,6 +160,206 @@ def test_writes_at_their_distance_are_kept(active: Bench) -> None:
         active.wait(0.01)
         active.gripper.write(1, [number])
         assert active.gripper.request_registers[1] == number
+
+
+# Limits.
+
+
+def test_a_limit_is_echoed_in_place_of_the_request(individual: Bench) -> None:
+    individual.gripper.habits = Habits(echoes_limits=True)
+    for asked, shown in ((255, 232), (100, 100), (0, 15)):
+        individual.reach({Finger.SCISSOR: asked})
+        assert individual.status.requested_position(Finger.SCISSOR) == shown
+        assert individual.status.position(Finger.SCISSOR) == shown
+        assert individual.outcomes[3] is ARRIVED
+        individual.write(go=False)
+        assert individual.status.requested_position(Finger.SCISSOR) == shown
+
+
+def test_what_is_a_stop_and_no_limit_is_echoed_as_asked(individual: Bench) -> None:
+    individual.gripper.habits = Habits(echoes_limits=True)
+    individual.close()
+    assert [individual.status.requested_position(axis) for axis in THREE_FINGER.axes] == [255, 255, 255, 232]
+    individual.write(activate=False, go=False)
+    assert individual.status.requested_position(Finger.SCISSOR) == 255, "no request is looked at while reset"
+
+
+def test_the_limit_of_the_pinch_mode_is_one(bench: Bench) -> None:
+    bench.gripper.habits = Habits(echoes_limits=True)
+    bench.activate(mode=Mode.PINCH)
+    bench.close()
+    assert bench.positions == (113, 113, 113, 219)
+    echoes = [bench.status.requested_position(axis) for axis in THREE_FINGER.axes]
+    assert echoes == [113, 113, 113, 255], "the register of the scissor is not used"
+
+
+# An emergency stop.
+
+
+def test_an_emergency_stop_stops_and_sticks(active: Bench) -> None:
+    active.go(255)
+    active.wait(1)
+    active.gripper.emergency_stop()
+    assert not active.gripper.is_moving
+    assert active.words == (0x19, 0x00)
+    assert active.fault is Fault.ACTIVATION_PENDING
+    active.gripper.end_emergency_stop()
+    active.wait(100)
+    assert active.words == (0x19, 0x00), "it does not come back by itself"
+    assert active.fault is Fault.ACTIVATION_PENDING
+
+
+@pytest.mark.parametrize("resets", [1, 2, 9])
+def test_after_it_some_resets_are_needed(active: Bench, resets: int) -> None:
+    active.gripper.emergency_stop(resets)
+    active.gripper.end_emergency_stop()
+    for _ in range(resets):
+        active.write(activate=True)
+        active.wait(60)
+        assert active.fault is Fault.ACTIVATION_PENDING
+        assert active.status.initialization is Initialization.ACTIVATING
+        assert not active.gripper.is_moving
+        active.write(activate=False)
+        assert active.fault is Fault.NONE
+        assert active.status.is_reset
+    active.activate()
+    assert active.fault is Fault.NONE
+
+
+def test_before_its_end_no_reset_helps(active: Bench) -> None:
+    active.gripper.emergency_stop()
+    for _ in range(3):
+        active.write(activate=False)
+        active.write(activate=True)
+        active.wait(60)
+        assert active.fault is Fault.ACTIVATION_PENDING
+    active.gripper.end_emergency_stop()
+    active.write(activate=False)
+    active.activate()
+
+
+@pytest.mark.parametrize("pressed", [False, True])
+def test_power_that_was_off_is_as_good_as_resets(active: Bench, pressed: bool) -> None:
+    active.gripper.emergency_stop(9)
+    if not pressed:
+        active.gripper.end_emergency_stop()
+    active.gripper.power_cycle()
+    active.gripper.end_emergency_stop()
+    active.activate()
+
+
+def test_in_an_emergency_stop_a_release_does_not_move(active: Bench) -> None:
+    active.close()
+    active.gripper.emergency_stop()
+    active.write(release=True)
+    active.wait(60)
+    assert active.positions[:3] == (241, 241, 241)
+
+
+# Asleep.
+
+
+def test_the_image_that_wakes_it_moves_nothing(individual: Bench) -> None:
+    individual.gripper.is_asleep = True
+    individual.go({Finger.A: 200})
+    individual.wait(5)
+    assert individual.status.requested_position(Finger.A) == 200, "it is echoed"
+    assert individual.gripper.position(Finger.A) == 6
+    assert not individual.gripper.is_asleep
+    individual.write_and_settle()
+    assert individual.gripper.position(Finger.A) == 200, "the same image once more"
+
+
+@pytest.mark.parametrize("changes", [{}, {"go": False}], ids=["the same", "no rGTO"])
+def test_any_image_with_ract_wakes_it(individual: Bench, changes: dict[str, bool]) -> None:
+    individual.gripper.is_asleep = True
+    individual.write(**changes)
+    assert not individual.gripper.is_asleep
+    individual.reach({Finger.A: 200})
+    assert individual.gripper.position(Finger.A) == 200
+
+
+def test_what_moves_goes_on_while_it_is_asleep_and_can_be_stopped(individual: Bench) -> None:
+    individual.go({Finger.A: 200})
+    individual.gripper.is_asleep = True
+    individual.wait(0.2)
+    assert individual.gripper.is_moving
+    individual.go({Finger.A: 0})
+    individual.wait(0.2)
+    assert individual.gripper.target(Finger.A) == 200, "the new request is ignored, not the old one"
+    individual.gripper.is_asleep = True
+    individual.write(go=False)
+    assert not individual.gripper.is_moving
+
+
+def test_an_activation_and_a_reset_are_not_ignored(bench: Bench) -> None:
+    bench.gripper.is_asleep = True
+    bench.activate()
+    bench.gripper.is_asleep = True
+    bench.write(activate=False)
+    assert bench.status.is_reset
+    assert bench.gripper.is_asleep
+
+
+# What no source settles.
+
+
+def test_with_no_go_there_may_be_no_object_status(individual: Bench) -> None:
+    individual.gripper.place_object(Finger.A, 100)
+    individual.reach({Finger.A: 200})
+    individual.write(go=False)
+    assert individual.words == (0x71, 0xFE)
+    individual.write_and_settle(go=True)
+    individual.gripper.habits = Habits(keeps_status_on_halt=False)
+    individual.write(go=False)
+    assert individual.words == (0x31, 0x00)
+
+
+@pytest.mark.parametrize("go", [False, True])
+def test_clearing_rics_may_open_the_fingers_or_not(individual: Bench, go: bool) -> None:
+    individual.close()
+    travelled = individual.gripper.travel(Finger.A)
+    individual.gripper.habits = Habits(opens_without_rics=False)
+    individual.write_and_settle(individual_scissor=False, mode=Mode.BASIC, go=go)
+    assert individual.gripper.travel(Finger.A) == travelled
+    assert individual.positions == (241, 241, 241, 137 if go else 232)
+    individual.write(individual_scissor=True)
+    individual.gripper.habits = Habits()
+    individual.write(individual_scissor=False)
+    assert individual.status.initialization is Initialization.CHANGING_MODE
+    individual.settle()
+    assert individual.gripper.travel(Finger.A) >= travelled + 235
+
+
+def test_without_rics_another_mode_opens_them_in_any_case(active: Bench) -> None:
+    active.gripper.habits = Habits(opens_without_rics=False)
+    active.write(mode=Mode.WIDE)
+    assert active.status.initialization is Initialization.CHANGING_MODE
+
+
+@pytest.mark.parametrize("fault", [Fault.COMMUNICATION_NOT_READY, Fault.SCISSOR_BLOCKED])
+@pytest.mark.parametrize("lets_go", [False, True])
+def test_a_fault_is_a_halt_for_a_grip(individual: Bench, fault: Fault, lets_go: bool) -> None:
+    individual.gripper.habits = Habits(lets_go_on_halt=lets_go)
+    individual.gripper.place_object(Finger.ABC, 150)
+    individual.close()
+    individual.gripper.inject_fault(fault)
+    assert bool(individual.gripper.holds) is not lets_go
+    individual.write(activate=False)
+    assert not individual.gripper.holds
+
+
+def test_a_grip_that_stays_ends_with_the_power_and_with_a_new_request(individual: Bench) -> None:
+    individual.gripper.place_object(Finger.ABC, 150)
+    individual.close()
+    individual.write(go=False)
+    assert individual.gripper.holds == Finger.ABC
+    individual.write_and_settle(go=True, axes=(AxisRequest(150, 255, 0),) * 4)
+    assert not individual.gripper.holds
+    individual.close()
+    individual.write(go=False)
+    individual.gripper.power_off()
+    assert not individual.gripper.holds
 
 
 # Values.

@@ -15,7 +15,6 @@ from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.enums import Finger, ObjectStatus
 from robotiq_async.values.model import THREE_FINGER
 from tests.simulator.conftest import CYCLE
-from tests.simulator.stories import tell
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -84,13 +83,6 @@ def test_a_limit_replaces_the_request_and_the_echo_keeps_it(make_bench: Callable
     assert bench.status.finger_status(Finger.SCISSOR) is ObjectStatus.AT_POSITION
 
 
-def test_halt_stops_where_the_finger_is_and_going_again_resumes() -> None:
-    tell(
-        "active, go 255, wait 1, moves, write rGTO=0, note, rests, words 31 C0, wait 10, still, rests, "
-        "write rGTO=1, moves, settle, at 241 241 241"
-    )
-
-
 def test_a_new_target_on_the_way_turns_the_finger_round(individual: Bench) -> None:
     individual.go({Finger.A: 255})
     individual.wait(1)
@@ -108,6 +100,20 @@ def test_a_new_speed_on_the_way_counts_from_there(individual: Bench) -> None:
     individual.reach({Finger.A: 241}, speed=255)
     expected = 2 + way_left / THREE_FINGER.stroke.counts * closing_time(255)
     assert individual.now - began == pytest.approx(expected, abs=0.1)
+
+
+def test_halt_stops_where_the_finger_is_and_going_again_resumes(active: Bench) -> None:
+    active.go(255)
+    active.wait(1)
+    active.write(go=False)
+    stopped_at = active.positions
+    assert 7 < stopped_at[0] < 240
+    active.wait(10)
+    assert active.positions == stopped_at
+    assert not active.gripper.is_moving
+    assert not active.status.is_moving
+    active.write_and_settle(go=True)
+    assert active.positions[:3] == (241, 241, 241)
 
 
 def test_speedup(make_bench: Callable[..., Bench]) -> None:
