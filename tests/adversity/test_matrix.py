@@ -7,8 +7,7 @@ import pytest
 from robotiq_async import Finger
 from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values.model import TWO_FINGER_85, Model
-from tests.adversity.cell import outcome
-from tests.adversity.table import Cell, cells
+from tests.adversity.cell import Cell, cells, outcome
 from tests.adversity.world import HABITS, MODEL, HeldLoopError, world
 from tests.virtual import run
 
