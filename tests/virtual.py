@@ -324,7 +324,7 @@ def virtual(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., Non
     return in_virtual_time
 
 
-OPENED = {"hand", "reader"}
+OPENED = ("hand", "reader")
 
 
 def inside(
@@ -350,7 +350,7 @@ def inside(
                     scene(**{each: arguments[each] for each in given}, **options)
                 )
                 found = {**arguments, "here": here}
-                for name in OPENED.intersection(wanted):
+                for name in [each for each in wanted if each in OPENED]:
                     found[name] = await stack.enter_async_context(getattr(here, name)())
                 await test(**{name: found[name] for name in wanted})
 

@@ -168,16 +168,14 @@ def test_a_line_that_is_not_certain_is_not_told(tmp_path: Path) -> None:
         read(tmp_path, f'site = "lab"\n{port}')
 
 
-def test_keys_and_an_open_door_exclude_each_other(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [("insecure = true", "cannot be combined"), ('listen = ["tcp/127.0.0.1:7447"]', "line 2.*tls/")],
+)
+def test_with_keys_nothing_goes_unencrypted(tmp_path: Path, line: str, words: str) -> None:
     put_keys(tmp_path)
-    with pytest.raises(AgentFileError, match="cannot be combined"):
-        read(tmp_path, f'keys = "cell-1"\ninsecure = true\n{GOOD}')
-
-
-def test_with_keys_nothing_goes_unencrypted(tmp_path: Path) -> None:
-    put_keys(tmp_path)
-    with pytest.raises(AgentFileError, match=r"line 2.*tls/"):
-        read(tmp_path, f'keys = "cell-1"\nlisten = ["tcp/127.0.0.1:7447"]\n{GOOD}')
+    with pytest.raises(AgentFileError, match=words):
+        read(tmp_path, f'keys = "cell-1"\n{line}\n{GOOD}')
 
 
 def test_a_file_that_is_not_there_or_no_text(tmp_path: Path) -> None:
