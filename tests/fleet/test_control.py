@@ -91,6 +91,20 @@ async def test_whoever_lost_the_lease_notices_although_the_agent_does_not_unders
 
 
 @inside(lab)
+async def test_a_lease_that_was_lost_unnoticed_is_not_taken_for_held(here: Lab, hand: RemoteHand) -> None:
+    async with here.client("other", control=False) as other:
+        stream = here.network.stream("agent", "client")
+        stream.is_cut = True
+        await other.take()
+        acquiring = asyncio.create_task(hand.acquire())
+        await asyncio.sleep(0.01)
+        here.network.mend(stream)
+        with pytest.raises(ControlLostError, match="commands the gripper"):
+            await acquiring
+        assert not hand.is_in_control
+
+
+@inside(lab)
 async def test_silence_is_noticed_while_the_lease_is_asked_for_again(here: Lab, hand: RemoteHand) -> None:
     """The last status of an agent that had died was shown as the present one for ever."""
     here.network.cut(("client", "agent"))
