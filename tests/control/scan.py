@@ -1,11 +1,7 @@
-"""Cycles of read, decide and write without I/O: the controller, an exact simulated gripper, one clock.
-
-The object status may be late: every scan's by ``STATUS_LAG`` reads, if that is in the environment.
-"""
+"""Cycles of read, decide and write without I/O: the controller, an exact simulated gripper, one clock."""
 
 from __future__ import annotations
 
-import os
 from collections import deque
 from collections.abc import Callable
 from typing import Any
@@ -25,7 +21,6 @@ from robotiq_async.values.request import Request
 from tests.register_words import with_object_status
 
 POLL_S = 0.005
-LAG = int(os.environ.get("STATUS_LAG", "0"))
 
 
 class Outcome:
@@ -67,7 +62,7 @@ class Scan:
         device_cycle: float = 0.005,
         speed: int = 128,
         after: Scan | None = None,
-        lag: int = LAG,
+        lag: int = 0,
         model: Model = THREE_FINGER,
         **options: Any,
     ) -> None:
@@ -226,7 +221,7 @@ class Scan:
         return {axis: status.position(axis) for axis in self.gripper.model.axes}
 
 
-def started(device_cycle: float = 0.005, *, lag: int = LAG) -> Scan:
+def started(device_cycle: float = 0.005, *, lag: int = 0) -> Scan:
     """A hand that has activated its gripper."""
     scan = Scan(device_cycle=device_cycle, lag=lag)
     scan.start()

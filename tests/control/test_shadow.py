@@ -12,7 +12,7 @@ from robotiq_async.values.enums import NO_AXES, Finger
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
-from tests.control.histories import EPSILON, Shadow, image, shows
+from tests.control.histories import EPSILON, image, shows
 from tests.register_words import status_of
 
 A, B, C, S = THREE_FINGER.axes
@@ -20,6 +20,50 @@ A, B, C, S = THREE_FINGER.axes
 
 def positions(request: Request) -> list[int]:
     return [request.position(axis) for axis in THREE_FINGER.axes]
+
+
+class Shadow(RequestShadow):
+    """One that sees statuses as they are answered, and writes that are acknowledged at once."""
+
+    def __init__(self) -> None:
+        super().__init__(128, 64)
+        self.at = 0.0
+
+    def shown(self, status: RobotiqStatus, at: float) -> RobotiqStatus:
+        self.at = at
+        self.see(status, at)
+        return status
+
+    def follows(self, status: RobotiqStatus) -> bool:
+        """Whether it goes on from a status that shows requests of ours, or those that were adopted."""
+        whose = self.identify()
+        if whose is not Whose.FOREIGN:
+            self.follow(whose, status)
+        return whose is not Whose.FOREIGN
+
+    def write(self, request: Request, moved: Finger = Finger.ALL, *, answered: bool = True) -> int:
+        number = self.writing(request, moved, self.at)
+        if answered:
+            self.acknowledged(self.at)
+        else:
+            self.lost()
+        return number
+
+
+@pytest.fixture
+def shadow() -> Shadow:
+    """Of a gripper that another client has brought to 100, and that the hand has found at 1.0."""
+    shadow = Shadow()
+    shadow.returned(shadow.shown(shows(100, 1.0), 1.0))
+    return shadow
+
+
+@pytest.fixture
+def ours(shadow: Shadow) -> Shadow:
+    """Of a gripper that we have sent from 100 to 200."""
+    shadow.write(image(200))
+    assert shadow.follows(shadow.shown(shows(200, 1.1), 1.1))
+    return shadow
 
 
 # -- before anything was written ---------------------------------------------------------------------------

@@ -44,76 +44,62 @@ def channel() -> Channel[int]:
     return Channel(Listeners())
 
 
-# -- stories of one stream after another -------------------------------------------------------------------
-
-STORIES = {
-    "a reader that waits gets each": "open 1, wait, push 0, got 0, wait, push 1, got 1, missed 0",
-    "missed add up": "open 1, push 1 2 3, read 3, missed 2, push 4, read 4, missed 2, push 5 6, missed 3",
-    "a buffer of the newest three": "open 3, push 1 2 3 4 5, end, missed 2, read 3, read 4, read 5, read end",
-    "a buffer that is not full": "open 3, push 1 2, end, missed 0, read 1, read 2, read end",
-    "a buffer for all": "open None, push 1 2 3 4, end, missed 0, read 1, read 2, read 3, read 4, read end",
-    "nothing from before it was opened": "push 1, open None, push 2, end, read 2, read end",
-    "the failure comes after what is left, and again": "open 3, push 1, lost, read 1, read lost, read lost",
-    "after the end nothing is added": "open None, end, push 1, read end",
-    "before a start it waits for one": "open 1, wait, start, waits, push 1, got 1",
-    "after a quiet end it waits for a start": "end, open 1, wait, start, waits, push 1, got 1",
-    "why the hand gave up, until a new start": "lost, open 1, read lost, start, open 1, push 1, read 1",
-    "a new start is none for what has ended": "open 1, lost, start, push 1, read lost",
-    "closing ends a reader that waits": "open 1, wait, close, got end",
-    "an item comes as it is closed": "open 1, wait, push 1, close, got end",
-    "closing drops what is left and what comes": "open 3, push 1, close, close, push 2, lost, read end",
-    "an item, and cancelled": "open 1, wait, push 1, cancel, got cancelled, read 1, missed 0",
-    "cancelled, and an item": "open 1, wait, cancel, push 1, got cancelled, read 1, missed 0",
-    "a reader after one that was cancelled": "open 1, wait, cancel, got cancelled, wait, push 1, got 1",
-    "a second reader is refused": "open 1, wait, read refused, push 1, got 1",
-}
-"""What happens to a channel, to the stream that was opened last and to the reader that last began to wait."""
+# -- newest wins -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", STORIES)
-async def test_a_story(channel: Channel[int], name: str) -> None:
-    streams: list[Stream[int]] = []
-    readers: list[asyncio.Task[int]] = []
-    for step in STORIES[name].split(", "):
-        what, *arguments = step.split()
-        match what:
-            case "open":
-                streams.append(channel.open(None if arguments == ["None"] else int(arguments[0])))
-            case "push":
-                for item in arguments:
-                    channel.push(int(item))
-            case "end" | "lost":
-                channel.end(lost if what == "lost" else None)
-            case "start":
-                channel.reopen(asyncio.get_running_loop())
-            case "close":
-                await streams[-1].aclose()
-            case "missed":
-                assert [str(streams[-1].missed)] == arguments, step
-            case "read":
-                assert [await outcome(anext(streams[-1]))] == arguments, step
-            case "wait":
-                readers.append(await reading(streams[-1]))
-            case "waits":
-                await steps()
-                assert not readers[-1].done()
-            case "cancel":
-                readers[-1].cancel()
-            case "got":
-                assert [await outcome(readers[-1])] == arguments, step
+async def test_a_reader_that_waits_gets_each_item_and_misses_nothing(channel: Channel[int]) -> None:
+    stream = channel.open(1)
+    for item in range(5):
+        task = await reading(stream)
+        channel.push(item)
+        assert await task == item
+    assert stream.missed == 0
 
 
-async def outcome(item: Awaitable[int]) -> str:
-    try:
-        return str(await item)
-    except StopAsyncIteration:
-        return "end"
-    except ConnectionLostError as error:
-        return "lost" if str(error) == "gave up" else str(error)
-    except RuntimeError as error:
-        return "refused" if "one reader" in str(error) else str(error)
-    except asyncio.CancelledError:
-        return "cancelled"
+async def test_missed_items_add_up(channel: Channel[int]) -> None:
+    stream = channel.open(1)
+    for item in (1, 2, 3):
+        channel.push(item)
+    assert (await anext(stream), stream.missed) == (3, 2)
+    channel.push(4)
+    assert (await anext(stream), stream.missed) == (4, 2)
+    for item in (5, 6):
+        channel.push(item)
+    assert (await anext(stream), stream.missed) == (6, 3)
+
+
+@pytest.mark.parametrize("buffer", [1, 3, 10, None])
+async def test_a_buffer_keeps_that_many_of_the_newest_items_in_order(
+    channel: Channel[int], buffer: int | None
+) -> None:
+    stream = channel.open(buffer)
+    for item in range(10):
+        channel.push(item)
+    channel.end()
+    missed = 10 - (buffer or 10)
+    assert stream.missed == missed
+    assert await rest(stream) == list(range(missed, 10))
+
+
+async def test_a_stream_gives_nothing_from_before_it_was_opened(channel: Channel[int]) -> None:
+    channel.push(1)
+    stream = channel.open(None)
+    channel.push(2)
+    channel.end()
+    assert await rest(stream) == [2]
+
+
+# -- the end -----------------------------------------------------------------------------------------------
+
+
+async def test_a_stream_ends_with_the_failure_after_what_is_left_and_again(channel: Channel[int]) -> None:
+    stream = channel.open(3)
+    channel.push(1)
+    channel.end(lost)
+    assert await anext(stream) == 1
+    for _ in range(2):
+        with pytest.raises(ConnectionLostError, match="gave up"):
+            await anext(stream)
 
 
 async def test_each_reader_gets_a_failure_of_its_own(channel: Channel[int]) -> None:
@@ -126,11 +112,102 @@ async def test_each_reader_gets_a_failure_of_its_own(channel: Channel[int]) -> N
     assert one is not other
 
 
-async def test_what_is_pushed_into_a_stream_that_has_ended_is_dropped(channel: Channel[int]) -> None:
+async def test_after_the_end_nothing_is_added(channel: Channel[int]) -> None:
     stream = channel.open(None)
     channel.end()
+    channel.push(1)
     stream.push(2)
     assert await rest(stream) == []
+
+
+@pytest.mark.parametrize("when", ["before a start", "after a quiet end"])
+async def test_a_stream_that_is_opened_while_the_hand_does_not_run_waits_for_the_next_start(
+    channel: Channel[int], when: str
+) -> None:
+    if when == "after a quiet end":
+        channel.end()
+    task = await reading(channel.open(1))
+    channel.reopen(asyncio.get_running_loop())
+    await steps()
+    assert not task.done()
+    channel.push(1)
+    assert await task == 1
+
+
+async def test_a_stream_raises_why_the_hand_gave_up_until_a_new_start(channel: Channel[int]) -> None:
+    before = channel.open(1)
+    channel.end(lost)
+    with pytest.raises(ConnectionLostError):
+        await anext(channel.open(1))
+    channel.reopen(asyncio.get_running_loop())
+    stream = channel.open(1)
+    channel.push(1)
+    assert await anext(stream) == 1
+    with pytest.raises(ConnectionLostError):
+        await anext(before)
+
+
+# -- closing -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("comes", [False, True])
+async def test_closing_ends_a_waiting_reader_also_when_an_item_comes_at_the_same_moment(
+    channel: Channel[int], comes: bool
+) -> None:
+    stream = channel.open(1)
+    task = await reading(stream)
+    if comes:
+        channel.push(1)
+    await stream.aclose()
+    with pytest.raises(StopAsyncIteration):
+        await task
+
+
+async def test_closing_drops_what_is_left_and_what_comes_later_and_may_be_repeated(
+    channel: Channel[int],
+) -> None:
+    stream = channel.open(3)
+    channel.push(1)
+    await stream.aclose()
+    await stream.aclose()
+    channel.push(2)
+    channel.end(lost)
+    assert await rest(stream) == []
+
+
+# -- cancelling --------------------------------------------------------------------------------------------
+
+
+async def test_a_wait_that_is_cancelled_together_with_an_item_loses_nothing(channel: Channel[int]) -> None:
+    for item_first in (True, False):
+        stream = channel.open(1)
+        task = await reading(stream)
+        if item_first:
+            channel.push(1)
+            task.cancel()
+        else:
+            task.cancel()
+            channel.push(1)
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        assert await anext(stream) == 1
+        assert stream.missed == 0
+
+
+# -- one reader --------------------------------------------------------------------------------------------
+
+
+async def test_a_second_reader_is_refused_unless_the_first_was_cancelled(channel: Channel[int]) -> None:
+    stream = channel.open(1)
+    first = await reading(stream)
+    first.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await first
+    second = await reading(stream)
+    with pytest.raises(RuntimeError, match="one reader"):
+        await anext(stream)
+    channel.push(1)
+    assert await second == 1
 
 
 async def test_a_second_reader_that_takes_the_item_does_not_end_the_first(channel: Channel[int]) -> None:

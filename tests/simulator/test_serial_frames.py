@@ -121,6 +121,33 @@ async def test_requests_that_came_while_the_loop_was_held_up_are_all_answered(cl
     assert await client.hear() == 3 * RESET_READING
 
 
+# What is answered.
+
+
+def frame(pdu: str) -> bytes:
+    return with_crc(bytes.fromhex(f"09 {pdu}"))
+
+
+@pytest.mark.parametrize(
+    "exchanges",
+    [
+        [("10 03e8 0008 10 0100" + 28 * "0", "10 03e8 0008"), ("03 03e8 0001", "03 02 0100")],
+        [
+            ("10 03ea 0002 04 aaaa bbbb", "10 03ea 0002"),
+            ("06 03eb 1234", "06 03eb 1234"),
+            ("03 03ea 0002", "03 04 aaaa 1234"),
+        ],
+        # The manual's example of function 23, but for the checksum that it prints under the request.
+        [("17 07d0 0002 03e9 0002 04 00e6 3cc8", "17 04 0000 0000"), ("03 03e9 0002", "03 04 00e6 3cc8")],
+        # What is written comes before what is read.
+        [("17 03e9 0001 03e9 0001 02 1234", "17 02 1234"), ("17 03e9 0001 03e9 0001 02 5678", "17 02 5678")],
+    ],
+)
+async def test_requests_are_answered(client: Client, exchanges: list[tuple[str, str]]) -> None:
+    for request, answer in exchanges:
+        assert await client.ask(frame(request)) == frame(answer)
+
+
 # What is refused.
 
 

@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import asyncio
 import os
-import struct
 from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
+from robotiq_async.simulator import SerialSimulatorServer
 from robotiq_async.simulator.server.framing import take_rtu
-from robotiq_async.values.status import RobotiqStatus
 from tests.serial_line import with_crc
+from tests.simulator.test_serial_frames import READ, RESET_READING
 
 pytest.importorskip("serial")
 pty = pytest.importorskip("pty")
 tty = pytest.importorskip("tty")
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Iterator
+    from collections.abc import Iterator
 
 
 def test_the_checksum_itself() -> None:
     assert with_crc(b"123456789")[-2:] == (0x4B37).to_bytes(2, "little")
+    assert with_crc(bytes.fromhex("09 17 04 e000 0000"))[-2:] == bytes.fromhex("4727"), "the manual's"
 
 
 class Line:
@@ -55,19 +55,6 @@ class Line:
             loop.remove_reader(self.master)
         return data
 
-    async def ask(self, pdu: bytes, answer_size: int, unit: int = 9) -> bytes:
-        """The PDU that answers, checked."""
-        self.send(with_crc(bytes([unit]) + pdu))
-        answer = await self.receive(1 + answer_size + 2)
-        assert answer == with_crc(answer[:-2])
-        assert answer[0] == unit
-        return answer[1:-2]
-
-    async def read_status(self) -> RobotiqStatus:
-        answer = await self.ask(bytes.fromhex("03 07d0 0008"), 18)
-        assert answer[:2] == b"\x03\x10"
-        return RobotiqStatus.from_registers(struct.unpack(">8H", answer[2:]))
-
     def close(self) -> None:
         os.close(self.master)
         os.close(self.slave)
@@ -78,43 +65,6 @@ def line() -> Iterator[Line]:
     line = Line()
     yield line
     line.close()
-
-
-@pytest.fixture
-async def server(line: Line) -> AsyncIterator[SerialSimulatorServer]:
-    async with SerialSimulatorServer(line.port, SimulatedGripper(speedup=100.0)) as server:
-        yield server
-
-
-async def test_activation(server: SerialSimulatorServer, line: Line) -> None:
-    write = bytes.fromhex("10 03e8 0008 10 0100 0000 0000 0000 0000 0000 0000 0000")
-    assert await line.ask(write, 5) == bytes.fromhex("10 03e8 0008")
-    while not (await line.read_status()).is_activated:
-        pass
-    assert server.gripper.request_registers[0] == 0x0100
-
-
-async def test_partial_write_and_read_back(server: SerialSimulatorServer, line: Line) -> None:
-    assert await line.ask(bytes.fromhex("10 03ea 0002 04 aaaa bbbb"), 5) == bytes.fromhex("10 03ea 0002")
-    assert await line.ask(bytes.fromhex("06 03eb 1234"), 5) == bytes.fromhex("06 03eb 1234")
-    assert await line.ask(bytes.fromhex("03 03ea 0002"), 6) == bytes.fromhex("03 04 aaaa 1234")
-
-
-async def test_reading_and_writing_at_once(server: SerialSimulatorServer, line: Line) -> None:
-    """The manual's example of function 23, but for the checksum it prints under the request."""
-    server.gripper.device_cycle = (
-        5.0  # on a busy machine the read comes late, and is to come before the effect
-    )
-    request = bytes.fromhex("17 07d0 0002 03e9 0002 04 00e6 3cc8")
-    assert with_crc(b"\x09" + bytes.fromhex("17 04 e000 0000"))[-2:] == bytes.fromhex("4727"), "as printed"
-    assert await line.ask(request, 6) == bytes.fromhex("17 04 0000 0000")
-    assert server.gripper.request_registers == (0, 0x00E6, 0x3CC8, 0, 0, 0, 0, 0)
-
-
-async def test_what_is_written_comes_before_what_is_read(server: SerialSimulatorServer, line: Line) -> None:
-    for value in (b"\x12\x34", b"\x56\x78"):
-        request = bytes.fromhex("17 03e9 0001 03e9 0001 02") + value
-        assert await line.ask(request, 4) == bytes.fromhex("17 02") + value
 
 
 @pytest.mark.parametrize(
@@ -145,7 +95,8 @@ async def test_life(line: Line) -> None:
     await server.stop()
     await server.stop()
     await server.start()
-    assert (await line.read_status()).is_reset
+    line.send(READ)
+    assert await line.receive(len(RESET_READING)) == RESET_READING
     await server.stop()
 
 
