@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import gc
+from typing import Any
 
 import pytest
 
@@ -17,7 +18,7 @@ from robotiq_async.fleet.wire.envelope import Answer, Call
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.values.errors import AgentError, NotAllowedError, NotAllStoppedError, RobotiqStateError
 from tests.fleet.cell import ask, move_slowly, told
-from tests.fleet.lab import LEFT, Lab, Spoiling, lab
+from tests.fleet.lab import LEFT, Garbling, Lab, Spoiling, lab
 from tests.fleet.world import World, motions, world
 from tests.grippers import Restless
 from tests.virtual import VirtualLoop, inside, virtual
@@ -109,6 +110,16 @@ async def test_a_halt_is_acknowledged_however_slowly(here: World) -> None:
             here.network.delay(name, "agent", 0.4)
         await here.other.do(here.other.hand.halt())
         assert set((await fleet.halt_all()).values()) == {"stopped"}
+
+
+@inside(lab)
+async def test_an_answer_to_another_request_confirms_no_halt(here: Lab) -> None:
+    bus: Any = Garbling(here.network.bus("console"), to="robotiq/v1/lab/cell/right")
+    bus.verb = "/halt"
+    async with Fleet("lab", bus=bus) as fleet:
+        with pytest.raises(NotAllStoppedError) as failed:
+            await fleet.halt_all()
+    assert failed.value.outcomes == {LEFT: "refused: the answer to another request"}
 
 
 @inside(world)
