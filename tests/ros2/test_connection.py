@@ -95,14 +95,18 @@ async def test_opening_permitting_and_closing_activate_nothing(
     assert not any(write.registers[0] >> 8 & 0x01 for write in gripper.writes), "rACT"
 
 
+@pytest.mark.parametrize("opened", [True, False])
 async def test_a_node_that_was_never_active_leaves_the_fingers_alone(
-    inactive: Connection, gripper: SimulatedGripper
+    server: SimulatorServer, gripper: SimulatedGripper, opened: bool
 ) -> None:
-    await inactive.close("the end")
-    await inactive.close("twice")
+    connection = Connection(RobotiqHand(server.address), SETTINGS)
+    if opened:
+        await connection.open()
+    await connection.close("the end")
+    await connection.close("twice")
     assert not gripper.writes
-    await refuses("the connection has been closed", inactive.open(), inactive.permit())
-    assert not inactive.takes_commands
+    await refuses("the connection has been closed", connection.open(), connection.permit())
+    assert not connection.takes_commands
 
 
 async def test_a_node_that_was_never_active_does_not_halt_what_another_client_has_activated(

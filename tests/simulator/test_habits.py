@@ -248,6 +248,15 @@ def test_power_that_was_off_is_as_good_as_resets(active: Bench, pressed: bool) -
     active.activate()
 
 
+def test_power_that_was_off_does_not_unlock_the_emergency_stop(active: Bench) -> None:
+    active.gripper.emergency_stop()
+    active.gripper.power_cycle()
+    active.write(activate=False)
+    active.write(activate=True)
+    active.wait(60)
+    assert active.fault is Fault.ACTIVATION_PENDING
+
+
 def test_in_an_emergency_stop_a_release_does_not_move(active: Bench) -> None:
     active.close()
     active.gripper.emergency_stop()

@@ -24,7 +24,7 @@ from robotiq_async import (
 )
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import ACTIONS, Operator
-from robotiq_async.values.enums import DEFAULT_SPEED
+from robotiq_async.values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from tests.grippers import lose_link, shows
 from tests.virtual import until
 
@@ -83,7 +83,7 @@ async def test_halt_reset_release_and_recover(operator: Operator, gripper: Simul
 async def test_speed_and_force_stay_in_range(operator: Operator) -> None:
     with pytest.raises(NotActivatedError):
         await operator.change_speed(16)
-    assert operator.speed == DEFAULT_SPEED, "what is refused changes nothing"
+    assert (operator.speed, operator.force) == (DEFAULT_SPEED, DEFAULT_FORCE), "a refusal changes nothing"
     await operator.act(ACTIONS["activate"])
     assert await operator.change_speed(1000) == "255"
     assert await operator.change_speed(-5) == "250"
