@@ -85,6 +85,8 @@ class Scan:
             self.machine, speed, 64, units_of(None, None, model).closing_s, model=model
         )
         self.written: list[Registers] = []
+        self.forgets = 0
+        """How many of the next writes the gripper acknowledges and forgets."""
         self.polls = 0
 
     @property
@@ -119,7 +121,10 @@ class Scan:
         request = self.controller.decide(self.now)
         if request is not None:
             self.written.append(request.registers)
-            self.gripper.write(0, request.registers)
+            if self.forgets:
+                self.forgets -= 1
+            else:
+                self.gripper.write(0, request.registers)
             if answer:
                 self.controller.acknowledged(self.now)
             else:

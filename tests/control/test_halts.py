@@ -105,3 +105,17 @@ def test_a_halt_outlives_a_fault_in_the_same_poll() -> None:
     scan.run(10)
     assert halted.told == [None]
     assert scan.positions()[A] <= at + 4
+
+
+@pytest.mark.parametrize("forgotten", [1, 2])
+def test_a_halt_that_the_gripper_forgets_is_written_once_more(scan: Scan, forgotten: int) -> None:
+    """A gripper may acknowledge a write and forget it. The caller gets an answer in any case."""
+    scan.move(255, speed=0)
+    scan.run(0.5)
+    halted, before = scan.halt(), len(scan.written)
+    scan.forgets = forgotten
+    scan.run(1.5)
+    assert halted.told == [None]
+    assert len(scan.written) - before == 2
+    assert scan.written[-1] == scan.written[-2]
+    assert scan.gripper.is_moving is (forgotten == 2)
