@@ -113,6 +113,12 @@ def test_the_limit_of_the_pinch_mode_ends_with_the_mode(active: Bench) -> None:
     assert active.positions == (120, 120, 120, 120)
 
 
+def test_another_mode_gives_the_fingers_their_stroke_back(active: Bench) -> None:
+    active.write_and_settle(mode=Mode.PINCH)
+    active.reach(255, mode=Mode.BASIC)
+    assert active.positions == (241, 241, 241, 137)
+
+
 def test_a_contact_outlasts_the_limit_of_the_pinch_mode(active: Bench) -> None:
     active.write_and_settle(mode=Mode.PINCH)
     active.gripper.place_object(Finger.B, 100)

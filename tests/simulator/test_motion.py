@@ -112,6 +112,7 @@ def test_halt_stops_where_the_finger_is_and_going_again_resumes(active: Bench) -
     assert active.positions == stopped_at
     assert not active.gripper.is_moving
     assert not active.status.is_moving
+    assert active.gripper.target(Finger.A) == stopped_at[0]
     active.write_and_settle(go=True)
     assert active.positions[:3] == (241, 241, 241)
 
