@@ -14,6 +14,8 @@ from tests.contract.bench import Bench, contract, ended
 @contract
 async def test_a_state_that_it_is_in(here: Bench, hand: Hand) -> None:
     assert await hand.wait_for_state(State.FAULT, State.RUNNING_IDLE) is State.RUNNING_IDLE
+    with pytest.raises(ValueError, match=r"^timeout must be"):
+        await hand.wait_for_state(State.RUNNING_IDLE, timeout=0)
 
 
 @contract

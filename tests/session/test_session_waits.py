@@ -57,6 +57,17 @@ async def test_a_state_that_is_not_reached_in_time_is_said_with_the_one_that_is(
         await session.reach({State.FAULT}, 0.5, what="no fault came")
 
 
+async def test_a_state_of_the_request_itself_is_returned_though_another_follows_at_once(
+    session: Session,
+) -> None:
+    def ask() -> None:
+        session.controller.command(Command(Finger.A, 100))
+        session.controller.reset()
+
+    reached = await session.reach({State.RUNNING_CC}, 1.0, what="", ask=ask)
+    assert (reached, session.machine.state) == (State.RUNNING_CC, State.DO_RESET)
+
+
 async def test_a_state_that_means_it_will_not_come_is_an_error(session: Session, wire: Wire) -> None:
     reaching = asyncio.create_task(
         session.reach(
