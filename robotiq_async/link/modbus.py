@@ -99,11 +99,7 @@ class ModbusTransport:
         response_timeout: float,
         log: Log = log,
     ) -> None:
-        """Keep the settings; opens nothing.
-
-        The address is tcp, rtu or rtu+tcp. Timeouts are in seconds; on a serial line a read may be repeated
-        after ``response_timeout``.
-        """
+        """Keep the settings, in seconds; opens nothing. A tcp, rtu or rtu+tcp address."""
         self.repeats = 0
         self._log = log
         self._address = address
