@@ -82,8 +82,10 @@ async def test_one_in_fault_is_left_there(here: Bench) -> None:
     await asyncio.sleep(0.1)
     writes = here.writes
     async with here.make() as hand:
+        await statuses(hand, 10)
         assert hand.state is State.FAULT
         assert here.writes == writes
+        assert hand.statistics.foreign_commands == 0
 
 
 @contract
