@@ -79,10 +79,11 @@ def test_stop_does_not_take_back_an_activation_that_never_arrived_and_that_other
 
 
 def test_the_shutdown_clears_rgto_and_changes_nothing_else(scan: Scan) -> None:
-    scan.move(200, A, speed=7, force=9)
+    _, told = scan.move(200, A, speed=7, force=9)
     scan.run(0.5)
     before = scan.last_image
     scan.stop()
+    assert isinstance(told.error, NotStartedError)
     assert scan.last_image == replace(before, go=False)
 
 

@@ -88,7 +88,7 @@ def restarts(position: int) -> Event:
 
 
 class At(NamedTuple):
-    """What happens at a time, how many images do not act yet then, and whether one of them may never act."""
+    """What happens at a time, how many of the last images do not act yet, and whether one may never act."""
 
     time: float
     event: Event
@@ -273,8 +273,9 @@ def test_a_history_of_writes(name: str) -> None:
     history = History(position)
     for at, event, waiting, in_doubt in story:
         event(history, at)
-        waits = [n for n in range(1, history.last_number + 1) if not history.acts(n, at)]
-        assert (len(waits), history.is_in_doubt) == (waiting, in_doubt), at
+        numbers = range(1, history.last_number + 1)
+        waits = [number for number in numbers if not history.acts(number, at)]
+        assert (waits, history.is_in_doubt) == ([*numbers[len(numbers) - waiting :]], in_doubt), at
 
 
 @pytest.mark.parametrize(
