@@ -99,7 +99,11 @@ class ModbusTransport:
         response_timeout: float,
         log: Log = log,
     ) -> None:
-        """Keep the settings, in seconds; opens nothing. A tcp, rtu or rtu+tcp address."""
+        """Keep the settings; opens nothing.
+
+        The address is tcp, rtu or rtu+tcp. Timeouts are in seconds; on a serial line a read may be repeated
+        after ``response_timeout``.
+        """
         self.repeats = 0
         self._log = log
         self._address = address

@@ -212,7 +212,7 @@ class Session:
         ask: Callable[[], None] | None = None,
         failing: Failing | None = None,
     ) -> State:
-        """Make a request and wait for one of some states, so many seconds or (None) as long as the hand runs.
+        """Make a request and wait for one of some states; ``timeout`` in seconds, None for no limit.
 
         ``failing`` are states in which the wait is in vain, besides a lost link and a stop; None waits those
         out, too. ``what`` is the message of a timeout.

@@ -199,9 +199,11 @@ async def test_it_paints_a_dozen_times_a_second_and_not_at_every_poll(server: Si
         panel = pilot.app.query_one(Axes)
         panel.__class__ = Counted
         statuses = hand.statuses(1000)
+        first = newest = await anext(statuses)
         for _ in range(200):
-            await anext(statuses)
-        assert 2 <= len(painted) <= 20
+            newest = await anext(statuses)
+        seconds = newest.timestamp - first.timestamp  # 1, and more on a busy machine
+        assert 2 <= len(painted) <= 2 + 16 * seconds
         assert painted[-1] is not painted[0], "the newest one"
 
 

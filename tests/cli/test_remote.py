@@ -148,6 +148,8 @@ async def test_monitor_and_record(shell: Shell, agent: Process, tmp_path: Path) 
     watching = await shell.start("monitor", "--json", ADDRESS)
     assert "state" in await shell.read_line(watching)
     recording = await shell.start("record", str(tmp_path / "a.mcap"), ADDRESS)
+    assert ADDRESS in await shell.read_line(recording)
+    assert "Recording in" in await shell.read_line(recording)
     (await shell.run("move", "60", "--yes", ADDRESS)).assert_succeeded()
     for process in (watching, recording):
         process.send_signal(signal.SIGINT)

@@ -203,4 +203,4 @@ def test_the_list_of_troubles(call: Call) -> None:
         assert kind.meaning in line
         assert ("VALUE: " in line) == (kind.value is not None)
         assert line.endswith(f"; {kind.link} only") == (kind.link is not None)
-        assert ("without end" in line) == (kind.lasts > 0)
+        assert ("lasts for ever" in line) == (kind.lasts > 0)

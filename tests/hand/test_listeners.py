@@ -64,7 +64,7 @@ async def test_it_is_called_before_any_reader_and_any_caller_goes_on(hand: Robot
     remove = hand.add_listener(listen)
     reading = asyncio.create_task(read())
     await ask()
-    result = await hand.move(60, A)
+    result = await hand.move(255, A, speed=0)
     order.append(f"moved {result.status.sequence}")
     reading.cancel()
     assert sum(each.startswith("read") for each in order) > 2

@@ -74,13 +74,13 @@ async def verify(
         model: Which gripper it is (default: that of the address, or 3f).
     """
     if is_remote(address):
-        raise UsageError("verify does not use an agent: run it on the host that has the gripper's line")
+        raise UsageError("verify does not use an agent: run it on the host that is connected to the gripper")
     last = 9 if up_to is None else up_to
     agreed = -1 if yes_to is None else yes_to
     has_person = has_terminal()
     if not has_person and not (last <= HARMLESS and agreed >= last):
         raise UsageError(
-            "without a terminal to ask and to stop it, verify needs --up-to and --yes-to, both at most 2"
+            "without a terminal to ask at and to be stopped at, verify needs --up-to and --yes-to, at most 2"
         )
     with usage():
         parsed = parse_address(address)

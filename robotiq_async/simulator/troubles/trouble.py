@@ -197,7 +197,7 @@ class Trouble:
         if self.lasts is not None and self.lasts != math.inf:
             self._keep("lasts", check_seconds("for", self.lasts, 0, LONGEST))
         if self.duration == 0 and not known.can_hit_once:
-            raise ValueError(f"{self.kind} is a condition: give a duration, or leave it out for no end")
+            raise ValueError(f"{self.kind} is a condition: give a duration, or leave it out to last for ever")
         if self.every is not None:
             self._keep("every", check_seconds("every", self.every, 0.001, LONGEST))
             if self.every <= self.duration:

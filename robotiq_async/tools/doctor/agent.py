@@ -184,7 +184,7 @@ def _report_statuses(listener: _Listener, seconds: float, info: Fields, report: 
     if lost < LOST:
         report(Finding(Level.GOOD, "statuses", found))
     else:
-        advice = "Commands are safe, but streams and recordings have gaps. Use a wired network."
+        advice = "Commands are safe, the newest counts; streams and recordings have gaps. A wired network?"
         report(Finding(Level.DOUBT, "statuses", found, advice))
 
 

@@ -94,7 +94,7 @@ async def _find(name: GripperName, bus: Bus, report: Report) -> None:
             advice = "Check the three names in the address."
         else:
             advice = (
-                "Does robotiq-async agent run there, and does it listen there? With keys: is this client in "
+                "Does robotiq-async agent run there, and is it what listens? With keys: is this client in "
                 "the agent's access.toml, and was the agent started since?"
             )
         report(Finding(Level.BAD, "agent", found, advice))
@@ -216,10 +216,11 @@ async def _is_open(endpoint: Endpoint, report: Report) -> bool:
 
 
 async def _shake_hands(endpoint: Endpoint, keys: Path, report: Report) -> bool:
+    own = _context(keys, shows=True)
     stays, found = False, "the agent does not trust this certificate"
     advice = "Is it from the same authority? Check the clock of the agent's host, too."
     try:
-        stays = await _connect(endpoint, _context(keys, shows=True))
+        stays = await _connect(endpoint, own)
     except ssl.SSLCertVerificationError as error:
         found = f"its certificate is not trusted: {error.verify_message}"
         advice = (

@@ -15,7 +15,7 @@ from .catalogue import EndError
 from .recorded_link import RecordedLink
 from .watch import ANYWHERE, Watch, describe
 
-MARGIN: Final = 4  # counts that an axis may leave its path: it may stop 2 off its request (manual)
+MARGIN: Final = 4  # counts by which an axis may leave its path: it may stop 2 off its request (manual)
 ASIDE: Final = 3  # counts by which the position of a resting axis may change
 ACTIVATION_S: Final = 60.0  # a longer activation is taken back: drivers wait for 25 to 30 s
 

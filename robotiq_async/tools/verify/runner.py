@@ -149,7 +149,7 @@ class Runner:
             await self._ask_to_clear_go(stage)
         if stage.needs_active and not status.is_activated:
             if self._bench.is_active:
-                report_lost_activation(self._bench, "without a client between two stages")
+                report_lost_activation(self._bench, "between two stages, while no client asked")
             raise EndError("inactive", f"stage {stage.number} needs an active gripper: begin with --from 3")
         return as_found(status)
 

@@ -196,7 +196,7 @@ class PageCommands:
         if not self._operators:
             raise ValueError("this page only watches; to command from a page: robotiq-async web --control")
         if name != HALT and self.is_ending:
-            raise ValueError("the page is closing: it takes no more commands")
+            raise ValueError("the page is closing: it takes no command but halt")
         if name != HALT and not 0 <= monotonic() - request["at"] <= FRESH_S:
             raise ValueError("this arrived too late and was not carried out: the connection was delayed")
         if name != HALT and len(self._tasks.get(page, ())) > MAX_COMMANDS:

@@ -95,7 +95,7 @@ def _judge_times(bench: Bench, times: dict[int, float]) -> None:
     share = max(abs(took / usual(speed) - 1) for speed, took in times.items())
     words = ", ".join(f"{took:.2f} s at speed {speed}" for speed, took in times.items())
     if share > SHARE:
-        words += f"; up to {100 * share:.0f} % from what is assumed"
+        words += f"; up to {100 * share:.0f} % off what is assumed"
     follows = "Run robotiq-async measure speed, and give its table to the hand as calibration."
     bench.judge("stroke.time", share <= SHARE, words, follows, **figures)
 

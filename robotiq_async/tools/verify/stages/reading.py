@@ -105,7 +105,7 @@ def _registers(bench: Bench) -> None:
         f"unit {found.device_id}, function {found.read_function}, "
         f"requests at {found.request}, status at {found.status}"
     )
-    follows = "Give the hand the options below. Check that they hold the status, not the requests."
+    follows = "Give the hand the options below. Check that these registers hold the status."
     bench.judge("read.registers", not options, words, follows, options)
 
 
@@ -188,7 +188,7 @@ async def _round_trip(bench: Bench) -> None:
         worst = max(worst, p99)
     found = f"99 of 100 reads take at most {1000 * worst:.1f} ms"
     interval = min(LONGEST_INTERVAL_S, math.ceil(1000 * worst * 1.2) / 1000)
-    follows = f"A hand reads the status every {1000 * interval:g} ms at best; use a wired network."
+    follows = f"A hand reads the status every {1000 * interval:g} ms at best; a wired network is quicker."
     options = {"poll_interval": interval}
     bench.judge("read.round_trip", worst < bench.interval, found, follows, options, **figures)
 

@@ -29,7 +29,7 @@ async def soft_part(bench: Bench) -> None:
     """Close on it, stop with it held, and open."""
     person = bench.person
     if not await person.consents(PLACE):
-        raise EndError("declined", "the foam was not confirmed")
+        raise EndError("declined", "the foam was not confirmed: the fingers did not close")
     watch = bench.watch(SECONDS)
     start = await watch.look()
     home = {finger: start.position(finger) for finger in bench.fingers}

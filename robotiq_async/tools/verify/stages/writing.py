@@ -146,7 +146,7 @@ async def _spacing(bench: Bench, watch: Watch, image: Request, usual: float) -> 
         if counted < PAIRS:
             bench.inconclusive(
                 "write.spacing",
-                "writes left late: is this computer busy?",
+                "writes were sent late: is this computer busy?",
                 gap_pairs_acted=kept,
             )
             return
