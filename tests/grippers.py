@@ -59,7 +59,7 @@ async def shows(hand: Hand, wanted: Callable[[RobotiqStatus], bool]) -> RobotiqS
 
 
 async def lose_link(server: SimulatorServer, hand: Hand) -> None:
-    """Lose a gripper that takes no connection until it is told to."""
+    """Take the link away, and let no connection in; wait until the hand shows it."""
     server.refuse()
     server.cut()
     await hand.wait_for_state(State.DISCONNECTED)

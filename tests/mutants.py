@@ -1,6 +1,6 @@
 """How strong the tests are: small mistakes are made in the library, and the tests should notice each.
 
-    python -m tests.mutants /tmp/mutants.jsonl [--mutants 300] [--seed 24]
+    python -m tests.mutants ../mutants.jsonl [--mutants 300] [--seed 24]
 
 The first run keeps a copy of the tree beside the file, runs the tests once and notes which test runs which
 statement. Then the mistakes are made in the copy, one at a time, and some of those tests run that run the

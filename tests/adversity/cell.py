@@ -18,7 +18,7 @@ from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values.registers import Registers
 from tests.adversity.phases import PHASES, TARGET, Call, Phase
 from tests.adversity.world import World
-from tests.pages import table
+from tests.docs.pages import table
 
 LINE_PULLED = "line pulled"
 """A trouble that is not the simulator's: the serial port is gone."""

@@ -18,7 +18,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.values.model import THREE_FINGER, Model
 from robotiq_async.values.request import Request
 from tests.fleet.lab import SPEEDUP, Lab, lab
-from tests.grippers import activate_beforehand
+from tests.grippers import activate_beforehand, lose_link
 from tests.virtual import inside, until
 
 T = TypeVar("T")
@@ -103,9 +103,7 @@ class Bench:
 
     async def unplug(self, hand: Hand) -> None:
         """Take away the link between hand, or agent, and gripper, and wait until the hand shows it."""
-        self.server.refuse()
-        self.server.cut()
-        await hand.wait_for_state(State.DISCONNECTED)
+        await lose_link(self.server, hand)
 
     async def plug(self, hand: Hand) -> None:
         await self.server.accept()

@@ -12,7 +12,7 @@ from robotiq_async import RobotiqError, RobotiqHand, State
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.hand import Hand
 from tests.contract.bench import A, Bench, contract, ended
-from tests.pages import table
+from tests.docs.pages import table
 from tests.virtual import until
 
 
@@ -24,7 +24,7 @@ class Row(NamedTuple):
 
 
 def rows() -> dict[str, Row]:
-    _, *rows = table("how-to/fleet.md", after="\n## What differs\n")
+    _, *rows = table("how-to/fleet.md", "## What differs")
     return {row[0]: Row(*row) for row in rows}
 
 

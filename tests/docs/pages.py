@@ -27,6 +27,18 @@ def named(page: object) -> str:
     return str(page.relative_to(ROOT)) if isinstance(page, Path) else ""
 
 
+def table(page: Path | str, heading: str = "") -> list[list[str]]:
+    """The rows of the tables on a page, heads and all; or in the section of a heading, up to the next one."""
+    text = read(page)
+    if heading:
+        text = text.partition(f"\n{heading}\n")[2].partition("\n#")[0]
+    return [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in text.splitlines()
+        if line.startswith("|") and not line.startswith("| --")
+    ]
+
+
 class Block(NamedTuple):
     """A fenced block of a page."""
 

@@ -15,9 +15,9 @@ from robotiq_async.fleet.wire.envelope import Call, unpack_answer
 from robotiq_async.values.errors import ControlLostError
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
+from tests.docs.pages import table
 from tests.fleet.lab import LEFT, instantly
 from tests.fleet.world import PROMPT_S, WINDOW_S, Client, World, motions
-from tests.pages import table
 
 Trouble = Callable[[World], Coroutine[Any, Any, None]]
 TARGET = 130

@@ -21,6 +21,7 @@ from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
 from tests.conftest import Clock
 from tests.fake_transport import Wire
+from tests.grippers import lose_link
 from tests.virtual import VirtualLoop
 
 pytestmark = pytest.mark.virtual_time
@@ -193,9 +194,7 @@ async def test_a_stop_over_a_new_link_does_not_activate_a_gripper_that_lost_its_
     hand = RobotiqHand(server.address, reconnect=ReconnectPolicy(first_delay=5.0))
     await hand.start()
     await hand.set_position(255)
-    server.refuse()
-    server.cut()
-    await hand.wait_for_state(State.DISCONNECTED)
+    await lose_link(server, hand)
     gripper.power_cycle()
     writes = len(gripper.writes)
     await server.accept()

@@ -6,28 +6,22 @@ import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
-from pathlib import Path
 
 import pytest
 
 from robotiq_async import Fault, Finger, RobotiqError, RobotiqHand, State
 from robotiq_async.simulator import SimulatorServer
+from tests.docs.pages import table
 
 pytestmark = pytest.mark.virtual_time
 
-PAGE = Path(__file__).parents[2] / "docs" / "what-happens-when.md"
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 HELD = B | C
 
 
 def rows() -> dict[str, tuple[str, str]]:
     """For each row what becomes of the grip as usual, and with keep_grip."""
-    _, _, section = PAGE.read_text(encoding="utf-8").partition("\n## A grip\n")
-    _, *rows = (
-        [word.strip() for word in line.strip("|").split("|")]
-        for line in section.splitlines()
-        if line.startswith("|") and not line.startswith("| --")
-    )
+    _, *rows = table("what-happens-when.md", "## A grip")
     return {what: (usual, kept) for what, usual, kept, _ in rows}
 
 

@@ -82,7 +82,7 @@ def run_suite(python: Path) -> str:
 
 
 def exit_code(work: Callable[[], object]) -> int:
-    """1 if a part of the work fails, which is told."""
+    """1 if a part of the work fails; says which."""
     try:
         work()
     except FailedError as error:

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import re
 
-from tests.docs.pages import DOCS
-
-PAGE = DOCS / "hardware.md"
+from tests.docs.pages import table
 
 
 def rows(heading: str) -> list[list[str]]:
     """The cells of the table under a heading, without its head."""
-    section = PAGE.read_text(encoding="utf-8").partition(f"## {heading}\n")[2].partition("\n## ")[0]
-    lines = [line for line in section.splitlines() if line.startswith("|")]
-    return [[cell.strip().strip("`") for cell in line.strip("|").split("|")] for line in lines[2:]]
+    _, *rows = table("hardware.md", f"## {heading}")
+    return [[cell.strip("`") for cell in row] for row in rows]
 
 
 HABITS = rows("A gripper with another habit")

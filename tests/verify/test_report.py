@@ -26,10 +26,10 @@ from robotiq_async.tools.verify import CATALOGUE, ENDINGS, Check, Plan, Report, 
 from robotiq_async.tools.verify.files import JSON, NAME, PAGE, Folder, Recording, Scrubber
 from robotiq_async.tools.verify.recorded_link import Frame
 from robotiq_async.tools.verify.report import SCHEMA, lines, page, sentences
-from tests.docs.pages import DOCS
+from tests.docs.pages import read, table
 from tests.verify.people import SHORT, Helper, Roll, served, threads, verified
 
-HARDWARE = (DOCS / "hardware.md").read_text(encoding="utf-8")
+HARDWARE = read("hardware.md")
 
 
 def begun(path: Path, server: SimulatorServer, **plan: Any) -> tuple[Folder, Runner]:
@@ -280,8 +280,8 @@ def test_checks_that_were_not_reached_are_said_to_be_so() -> None:
 
 
 def first_cells(heading: str) -> list[str]:
-    section = HARDWARE.partition(f"{heading}\n")[2].partition("\n#")[0]
-    return re.findall(r"^\| `([^`]+)`", section.partition("| -- |")[2], re.MULTILINE)
+    _, *rows = table("hardware.md", heading)
+    return [cells[0].strip("`") for cells in rows]
 
 
 def test_the_page_names_every_key_ending_and_check() -> None:
@@ -294,9 +294,7 @@ def test_the_page_names_every_key_ending_and_check() -> None:
 
 def test_every_question_that_no_source_settles_has_an_answer() -> None:
     """A check, or the reason why there is none."""
-    registers = (
-        (DOCS / "registers.md").read_text(encoding="utf-8").partition("## What no public source settles")[2]
-    )
+    registers = read("registers.md").partition("## What no public source settles")[2]
     asked = re.findall(r"^\| ([^|]+\?) \|", registers, re.MULTILINE)
     answers = re.findall(r"^\| [^|]+\? \|.* \| ([^|]+) \|$", registers, re.MULTILINE)
     assert asked
