@@ -159,7 +159,7 @@ async def _carry_out(
 
 
 @contextmanager
-def file_errors() -> Iterator[None]:
+def table_errors() -> Iterator[None]:
     """Turn TableError and OSError of tables and pictures into CommandError."""
     from ...values.calibration.csv_tables import TableError
 
@@ -217,7 +217,7 @@ def speed(
     factor = check(address, output, speedup, runs, step, not no_plot)
     from ...tools.measure.campaigns import speed_campaign
 
-    with file_errors():
+    with table_errors():
         origin = {"gripper": full_address(address), "fingers": str(fingers.name)}
         campaign = speed_campaign(output, step, runs, **origin)
     if campaign.left:
@@ -240,5 +240,5 @@ async def _measure(address: str, campaign: Campaign, fingers: Finger, speedup: f
         from ...tools.measure.plots import plot_speed
 
         label = "simulated" if is_simulated(address) else "measured"
-        with file_errors():
+        with table_errors():
             print_files(plot_speed(output.with_suffix(""), campaign.table, label))

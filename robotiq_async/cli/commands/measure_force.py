@@ -17,7 +17,7 @@ from ..addresses import full_address, is_simulated, named_model
 from ..arguments import Address, Byte, Yes
 from ..consent import consent, read_line
 from ..failures import CommandError, UsageError
-from .measure import NoPlot, Runs, Speedup, check, file_errors, measure_left, print_files
+from .measure import NoPlot, Runs, Speedup, check, measure_left, print_files, table_errors
 
 if TYPE_CHECKING:
     from ...hand import Hand
@@ -78,7 +78,7 @@ def force(
     from ...tools.measure.campaigns import force_campaign
     from ...values.calibration.csv_tables import FORCE, read_table
 
-    with file_errors():
+    with table_errors():
         readings = None if scale is None else read_table(scale, FORCE)
         origin = {"gripper": full_address(address), "surface": surface, "speed": str(speed)}
         campaign = force_campaign(path, step, runs, **origin)
@@ -194,7 +194,7 @@ def _plot(output: Path, surface: str, table: Table, label: str) -> None:
     from ...tools.measure.campaigns import read_currents
     from ...tools.measure.plots import plot_current_over_time, plot_force, plot_peak_currents
 
-    with file_errors():
+    with table_errors():
         currents = read_currents(currents_beside(output))
         over_time = {surface: currents}
         other = "rigid" if surface == "foam" else "foam"
@@ -203,7 +203,7 @@ def _plot(output: Path, surface: str, table: Table, label: str) -> None:
             over_time[other] = read_currents(currents_beside(beside))
     stem = output.with_suffix("")
     base = output.with_name(currents_beside(output).stem)
-    with file_errors():
+    with table_errors():
         print_files(plot_force(stem, table, surface, label))
         print_files(plot_peak_currents(base.with_name(f"{base.name}_peak"), currents, surface, label))
         by_surface = dict(sorted(over_time.items()))

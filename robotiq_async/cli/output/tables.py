@@ -23,15 +23,16 @@ def print_status(hand: Hand) -> None:
     print(f"{hand.state.name}: {_activation(last)}, {'moving' if last.is_moving else 'not moving'}")
     if last.fault is not Fault.NONE:
         print(f"{last.fault.severity.value} fault 0x{int(last.fault):02X}: {last.fault.description}")
-    axes = last.model.axes
-    states = [axis_words(last.axis_state(axis)) for axis in axes]
-    columns = (
-        map(last.position, axes),
-        map(last.requested_position, axes),
-        states,
-        map(last.current_ma, axes),
-    )
-    _print_table(("position", "requested", "state", "mA"), axes, [*zip(*columns, strict=True)])
+    rows = [
+        (
+            last.position(axis),
+            last.requested_position(axis),
+            axis_words(last.axis_state(axis)),
+            last.current_ma(axis),
+        )
+        for axis in last.model.axes
+    ]
+    _print_table(("position", "requested", "state", "mA"), last.model.axes, rows)
 
 
 def _activation(status: RobotiqStatus) -> str:

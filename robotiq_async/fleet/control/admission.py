@@ -46,7 +46,8 @@ class Admission:
     def is_repeated(self, call: Call) -> bool:
         """Whether a request for the lease is a repetition of the one that gave its sender the present lease.
 
-        AgentError: a repetition, but its sender does not hold the lease now.
+        Raises:
+            AgentError: a repetition, but its sender does not hold the lease now.
         """
         before = self._asked.pop(call.client, -1)
         self._asked[call.client] = max(before, call.number)

@@ -48,7 +48,11 @@ def check_endpoints(
     """Check endpoints to "listen" on, or to "connect" to, where others could read and write as well.
 
     Without keys, which are certificates for mutual TLS, only this machine is allowed; with ``insecure`` the
-    operator vouches for everyone on that network. TypeError, ValueError: malformed or unprotected.
+    operator vouches for everyone on that network.
+
+    Raises:
+        TypeError: an endpoint is not a string.
+        ValueError: an endpoint is malformed or unprotected.
     """
     if has_keys and insecure:
         raise ValueError("keys and insecure cannot be combined: with keys everything is encrypted")

@@ -55,7 +55,9 @@ def default_route() -> Route:
 def parse_remote_address(address: object) -> tuple[GripperName, Route]:
     """Parse an address into gripper and route. The environment supplies what the address leaves out.
 
-    TypeError, ValueError: not a string, or malformed; the message shows the form.
+    Raises:
+        TypeError: not a string.
+        ValueError: malformed; the message shows the form.
     """
     if not isinstance(address, str):
         raise TypeError(f"address must be a string, got {address!r}; accepted: {FORM}")

@@ -75,7 +75,11 @@ class StatusMessage(NamedTuple):
 
 
 def unpack(data: bytes) -> StatusMessage:
-    """Parse a status message: ProtocolError if it is none, or one of another version."""
+    """Parse a status message.
+
+    Raises:
+        ProtocolError: not a status message, or one of another version.
+    """
     if len(data) != SIZE or data[0] != VERSION:
         raise ProtocolError(f"not a status of version {VERSION}: {data[:8].hex()} ({len(data)} bytes)")
     _, place, flags, model, mark, lease, events, epoch, sequence, stamp, age, *registers = _LAYOUT.unpack(

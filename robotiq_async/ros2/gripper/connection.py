@@ -111,7 +111,12 @@ class Connection:
     # -- commands --------------------------------------------------------------------------------------
 
     async def command(self, name: str) -> str:
-        """Carry out one of :data:`COMMANDS`; returns its outcome as a text."""
+        """Carry out one of :data:`COMMANDS`; returns its outcome as a text.
+
+        Raises:
+            RefusedError: the node is not active, too many commands are under way, or a stop took over.
+            RobotiqError: the command failed.
+        """
         if name == "halt":
             return await self._stop("a halt took over")
         self._check_active()
@@ -130,7 +135,12 @@ class Connection:
         return call.result()
 
     async def check_goal(self) -> None:
-        """Refuse a goal that cannot begin now: RefusedError with the reason."""
+        """Refuse a goal that cannot begin now.
+
+        Raises:
+            RefusedError: the node is not active, the link is down, the gripper is not in a state to move, or
+                it is being stopped.
+        """
         self._check_active()
         reason = why_not(self.hand)
         if reason is not None:
@@ -142,7 +152,8 @@ class Connection:
     ) -> Outcome:
         """Carry out a goal; see :meth:`GoalRunner.run`. ``stops`` is :attr:`stops` when it was accepted.
 
-        RefusedError: a stop came since, or the conditions of :meth:`check_goal` have changed.
+        Raises:
+            RefusedError: a stop came since, or the conditions of :meth:`check_goal` have changed.
         """
         if stops != self.stops:
             raise RefusedError("a stop took over before it began")
@@ -243,7 +254,9 @@ def make_hand(settings: Settings) -> Hand:
 
     A hand on another host acquires its lease with the first command: connecting only reads.
 
-    ValueError: an option that the hand refuses. RobotiqError: an extra is not installed.
+    Raises:
+        ValueError: an option that the hand refuses.
+        RobotiqError: the extra that this address needs is not installed.
     """
     if is_remote(settings.address):
         if find_spec("zenoh") is None:

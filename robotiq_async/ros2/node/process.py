@@ -68,7 +68,8 @@ class Spinner(threading.Thread):
 async def serve(arguments: Sequence[str]) -> None:
     """Run the node, with the command line for ROS (``PROGRAM --ros-args ...``), until a signal arrives.
 
-    RuntimeError: the executor, or publishing, failed; the hand has been stopped.
+    Raises:
+        RuntimeError: the executor, or publishing, failed; the hand has been stopped.
     """
     loop = asyncio.get_running_loop()
     ended: asyncio.Future[None] = loop.create_future()

@@ -15,7 +15,9 @@ _REFERENCES: Final = {"parent": "link", "child": "link", "mimic": "joint"}
 def robot_description(path: str, prefix: str) -> str:
     """The URDF in a file, unchanged; without a path the packaged one, with the prefix on all names.
 
-    OSError: the file cannot be read. ValueError: it is not a URDF.
+    Raises:
+        OSError: the file cannot be read.
+        ValueError: it is not a URDF.
     """
     if not path:
         return prefixed(urdf(), prefix)

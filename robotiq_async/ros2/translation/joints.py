@@ -125,10 +125,13 @@ class Motion:
 def targets(
     names: Sequence[str], angles: Sequence[float], prefix: str = "", model: Model = THREE_FINGER
 ) -> Targets:
-    """The targets of a goal; GoalError if it is invalid, for angles are never adjusted to fit.
+    """The targets of a goal.
 
     The names of joints have the prefix; without names there is one angle for all fingers, or for the jaw.
     Angles are in radians, or in metres for a Hand-E.
+
+    Raises:
+        GoalError: the goal is invalid; angles are never adjusted to fit.
     """
     if model is not THREE_FINGER:
         return _jaw_targets(names, angles, prefix, model)

@@ -88,7 +88,11 @@ class Settings:
 
 
 def check_settings(values: Mapping[str, object]) -> Settings:
-    """Check all parameters: ValueError names the parameter, the value and the range."""
+    """Check all parameters.
+
+    Raises:
+        ValueError: a value out of range or of the wrong type; names the parameter, the value and the range.
+    """
     checked = {name: check_parameter(name, values[name]) for name in PARAMETERS}
     own = {each.name for each in fields(Settings)}
     options = {name: _option_value(name, checked.pop(name)) for name in OF_HAND if name not in own}

@@ -34,8 +34,10 @@ LONGEST_PERIOD_S: Final = 0.1  # the longest poll_interval of a hand
 async def examine(address: Address, report: Report, *, device_id: int | None = None) -> None:
     """Examine a connection; reports each finding at once, and never raises for a bad one.
 
+    ``device_id`` is the Modbus unit id; None for the usual one.
+
     Raises:
-        ValueError: a unit id that is not valid on such a link; None is the usual one.
+        ValueError: a unit id that is not valid on such a link.
     """
     registers, model = registers_of(address, device_id=device_id), model_of(address.model)
     try:

@@ -125,7 +125,8 @@ class CsvFile:
 def export(entries: Iterable[Entry], kind: str, target: Path | str) -> int:
     """Write the messages of one kind into a CSV file, all or none; an existing file is replaced.
 
-    Returns the number of rows; 0 writes no file.
+    Returns:
+        The number of rows; 0 writes no file.
 
     Raises:
         RecordingError: a message does not have a recorder's format.

@@ -60,7 +60,9 @@ class Service:
         }
 
     async def call(self, operator: Operator, payload: bytes) -> str:
-        """Carry out a request, a JSON object with the arguments; returns a description of the outcome.
+        """Carry out a request; returns a description of the outcome.
+
+        The payload is a JSON object with the arguments; empty for none.
 
         Raises:
             ValueError: malformed, or an argument that is missing, unknown or outside its range.
