@@ -6,6 +6,7 @@ command and harmless. Any other address may be a real gripper, also the address 
 
 from __future__ import annotations
 
+import select
 import sys
 from contextlib import suppress
 from typing import TextIO
@@ -31,6 +32,7 @@ def consent(address: str, what: str, *, yes: bool) -> None:
         raise UsageError(f"this moves the gripper at {gripper}; without a terminal to ask at it needs --yes")
     forget_keys()
     print(f"{gripper}: {what}\n{NOTE}\nContinue? [y/N] ", end="", file=screen, flush=True)
+    _wait_for_key()
     if read_line().strip().lower() not in ("y", "yes"):
         raise CommandError(f"nothing was sent to the gripper at {gripper}: the answer was not yes")
 
@@ -46,6 +48,14 @@ def forget_keys() -> None:
 def read_line() -> str:
     """The next line of standard input, at most 1000 bytes; empty at its end."""
     return "" if sys.stdin is None else sys.stdin.buffer.readline(1000).decode(errors="replace")
+
+
+def _wait_for_key() -> None:
+    # A signal that comes just before a read blocks, or that the system hands to another thread, does not
+    # interrupt the read: Ctrl-C would be lost. Between two waits its handler runs.
+    with suppress(OSError, ValueError):  # Windows waits for sockets only
+        while not select.select([sys.stdin], [], [], 0.1)[0]:
+            pass
 
 
 def _screen() -> TextIO | None:

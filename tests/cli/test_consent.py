@@ -38,6 +38,14 @@ from robotiq_async.cli import main
 sys.exit(main(["move", "30", {!r}]))
 """
 """A command whose output goes into a file."""
+UNINTERRUPTED = """
+import signal, sys, threading, time
+threading.Thread(target=time.sleep, args=[60], daemon=True).start()
+signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+from robotiq_async.cli import main
+sys.exit(main(["move", "30", {!r}]))
+"""
+"""A command with two threads: the system hands SIGINT to the other one, so that no read is interrupted."""
 
 
 @pytest.fixture
@@ -127,6 +135,14 @@ async def test_only_a_yes_to_the_question_moves(
     terminal.press(answer)
     assert await terminal.end() == code
     assert (b"AT_POSITION" in terminal.out, bool(server.gripper.writes)) == (code == 0, code == 0)
+
+
+async def test_ctrl_c_ends_the_question_though_it_interrupts_no_read(server: SimulatorServer) -> None:
+    terminal = Terminal("-c", UNINTERRUPTED.format(server.address))
+    await terminal.shows(b"Continue? [y/N]")
+    terminal.press("\x03")
+    assert await terminal.end() == 130
+    assert not server.gripper.writes
 
 
 @pytest.mark.parametrize("elsewhere", [1, 2])
