@@ -70,7 +70,7 @@ async def moving(folder: str, gripper: SimulatedGripper) -> None:
     terminal.press("\n")
     await terminal.shows(b"> ", after=b"Stage 4")
     terminal.press("\n")
-    for number, key in enumerate("apos", 1):
+    for number, key in enumerate("alrs", 1):
         while terminal.out.count(b"report so far\r\n> ") < number:  # noqa: ASYNC110  # a count of the terminal's
             await asyncio.sleep(0.05)
         if key == "a":

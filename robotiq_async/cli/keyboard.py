@@ -116,6 +116,7 @@ class Keyboard:
                 return key
             if key in (END, ""):
                 return None
+            self.tell(f"Please press one of {', '.join([*names.values(), END])}.")
 
     async def _key(self) -> str:
         import termios

@@ -145,6 +145,20 @@ async def test_what_was_typed_before_the_question_is_no_answer(
     assert await terminal.end() == 1
 
 
+async def test_a_key_that_answers_no_question_is_refused(tmp_path: Path) -> None:
+    async with SimulatorServer(SimulatedGripper(speedup=50)) as server:
+        terminal = at_terminal(server, tmp_path, "--from", "3", "--up-to", "4")
+        for stage in (b"Stage 3", b"Stage 4"):
+            await asks(terminal, stage)
+            terminal.press("\n")
+        await asks(terminal, b"Which finger")
+        terminal.press("p")
+        await asks(terminal, b"Please press one of a, l, r, s, n, q")
+        terminal.press("q")
+        assert await terminal.end() == 1
+        assert b"declined" in terminal.out
+
+
 KEYS: dict[str, Callable[[Terminal], object]] = {
     "space": lambda terminal: terminal.press(" "),
     "Enter": lambda terminal: terminal.press("\n"),

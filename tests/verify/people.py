@@ -20,7 +20,7 @@ from tests.grippers import activate_beforehand
 SHORT = Lengths(reads=50, idle=(0.5, 1.0, 1.5, 5.0), alone=(10.0,), soak=3.0, commands=0.5, interval=0.04)
 FOAM = 120
 """Where the fingers meet it."""
-WHICH = {Finger.A: "a", Finger.B: "p", Finger.C: "o", Finger.SCISSOR: "s"}
+WHICH = {Finger.A: "a", Finger.B: "l", Finger.C: "r", Finger.SCISSOR: "s"}
 
 
 @contextlib.asynccontextmanager

@@ -13,14 +13,14 @@ import pytest
 
 from robotiq_async.link.address import parse_address
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
-from robotiq_async.tools.verify import Plan, Report, Runner
+from robotiq_async.tools.verify import ENTER, Plan, Report, Runner
 from robotiq_async.tools.verify.runner import LEFT_SET
-from robotiq_async.tools.verify.stages import first_motions
+from robotiq_async.tools.verify.stages import first_motions, loss, soft_part
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.model import TWO_FINGER_85
 from robotiq_async.values.request import AxisRequest, Request
 from tests.tools.test_doctor import answering, registers_in, reply
-from tests.verify.people import SHORT, Helper, Roll, served, verified
+from tests.verify.people import SHORT, Helper, Roll, differing, served, verified
 
 pytestmark = pytest.mark.virtual_time
 
@@ -215,13 +215,56 @@ async def test_what_is_not_agreed_to_is_not_done(number: int) -> None:
         assert server.gripper.writes == before
 
 
-@pytest.mark.parametrize("answer", ["p", "n"])
-async def test_a_finger_that_is_not_the_one_asked_for_ends_the_run(answer: str) -> None:
+async def stage_4(answers: str, *, is_sure: bool = True) -> Report:
+    """A run of it with these answers about A, B, C and the scissor."""
+    async with served(active=True) as server:
+        helper, keys = Helper(server), iter(answers)
+
+        def answer(words: str) -> object:
+            if words == first_motions.QUESTION:
+                return next(keys)
+            return is_sure if words.startswith("Commanded was") else None
+
+        helper.before = answer
+        report = await verified(server, helper, first=4, last=4)
+        assert not server.gripper.is_moving
+        return report
+
+
+@pytest.mark.parametrize("answers", ["l", "n", "an", "aa", "all", "alrl"])
+async def test_a_finger_that_is_not_the_one_asked_for_ends_the_run(answers: str) -> None:
+    report = await stage_4(answers)
+    assert (report.why, report.entered) == ("deviation", [4])
+    assert "Do not use" in report.checks["axis.finger"].follows
+
+
+@pytest.mark.parametrize(("answers", "side"), [("alrs", "the left"), ("arls", "the right")])
+async def test_b_may_be_on_either_side_and_the_report_says_which(answers: str, side: str) -> None:
+    report = await stage_4(answers)
+    assert report.why == "done"
+    assert f"B is {side} finger of the pair" in report.checks["axis.finger"].found
+
+
+async def test_a_wrong_key_is_not_held_against_the_gripper() -> None:
+    report = await stage_4("n", is_sure=False)
+    assert report.why == "declined"
+    assert "axis.finger" not in differing(report)
+
+
+async def test_an_emergency_stop_that_does_not_reach_the_gripper_ends_the_run() -> None:
     async with served(active=True) as server:
         helper = Helper(server)
-        helper.before = lambda words: answer if words == first_motions.QUESTION else None
-        report = await verified(server, helper, first=4)
+        helper.before = lambda words: ENTER if words == loss.ESTOP else None
+        report = await verified(server, helper, first=8, last=8)
         assert report.why == "deviation"
-        assert report.entered == [4]
-        assert "Do not use" in report.checks["axis.finger"].follows
-        assert not server.gripper.is_moving
+        assert "loss.estop" in differing(report)
+
+
+async def test_after_a_stop_with_the_foam_held_the_run_says_how_to_go_on() -> None:
+    async with served(active=True) as server:
+        helper = Helper(server)
+        helper.before = lambda words: False if words == soft_part.RELEASE else None
+        assert (await verified(server, helper, first=7, last=7)).why == "declined"
+        report = await verified(server, first=7, last=7)
+        assert report.why == "refused"
+        assert "robotiq-async move 0" in report.words

@@ -258,7 +258,8 @@ def test_three_sentences_for_every_ending(why: str) -> None:
     report.why, report.words = why, "so it was"
     usable, known, wanted = sentences(report)
     is_bad = why in ("fault", "envelope", "time", "foreign", "deviation", "inactive")
-    assert usable.startswith("Do not use" if is_bad else "This gripper can be used")
+    assert usable.startswith("Do not use" if is_bad else "So far nothing speaks against")
+    assert is_bad or usable.endswith("It has not moved yet.")
     assert "not finished: stage 3, 4, 5, 6, 7, 8, 9" in known
     assert "read.registers" in wanted
     report.stages = [0]
@@ -267,6 +268,16 @@ def test_three_sentences_for_every_ending(why: str) -> None:
     usable, _, wanted = sentences(Report("tcp", stages=[0], entered=[0], why="done"))
     assert usable.startswith("Nothing is known about the gripper")
     assert wanted == "There is nothing to send yet."
+
+
+def test_only_a_whole_run_says_that_the_gripper_can_be_used() -> None:
+    report = report_with(write_spacing=0.042)
+    report.stages = report.entered = list(range(10))
+    assert sentences(report)[0] == "This gripper can be used with write_spacing=0.042."
+    report.stages = list(range(9))
+    assert sentences(report)[0].endswith(
+        "nothing speaks against using this gripper with write_spacing=0.042."
+    )
 
 
 def test_checks_that_were_not_reached_are_said_to_be_so() -> None:

@@ -13,6 +13,7 @@ from robotiq_async.simulator import SimulatorServer, Trouble
 from robotiq_async.simulator.troubles.like_hardware import LIKE_HARDWARE, OWN_HABITS
 from robotiq_async.tools.verify import Plan, Report, Runner
 from robotiq_async.tools.verify.catalogue import CATALOGUE, HARMLESS
+from robotiq_async.tools.verify.motions import REACHED, UNREACHED
 from robotiq_async.values.registers import rGTO
 from tests.verify.matrix import EVENTS, HABITS, options
 from tests.verify.people import SHORT, Helper, Roll, assert_as_assumed, differing, served, verified
@@ -126,3 +127,20 @@ async def test_a_key_stops_a_gripper_that_forgets_writes_and_shows_them_late(sta
         assert not any(rGTO.read(image) for image in cue.written_after())
         assert report.last is not None
         assert not report.last.go_echo
+
+
+async def test_an_alarm_is_withdrawn_when_the_gripper_answers_again() -> None:
+    async with served(active=True) as server:
+        helper = Helper(server)
+        injector, ending = server.fault_injector, list[asyncio.Future[None]]()
+
+        def alarm(words: str) -> None:
+            helper.alarms.append(words)
+            ending.extend(asyncio.ensure_future(injector.end(each)) for each in injector.ongoing)
+
+        helper.alarm = alarm  # type: ignore[method-assign]
+        report, _ = await with_trouble(server, helper, "silence", 4)
+        await asyncio.gather(*ending)
+        assert report.why == "link"
+        assert helper.alarms == [UNREACHED.format("rGTO = 0 could not be sent"), REACHED]
+        assert not server.gripper.is_moving

@@ -91,7 +91,7 @@ def _check_rest(status: RobotiqStatus, not_ready: int) -> None:
         raise EndError("refused", f"the gripper reports fault 0x{int(fault):02X}: {fault.description}")
     if status.is_activated and status.contacts:
         held = f"{status.contacts} reads a contact: the gripper holds something"
-        raise EndError("refused", f"{held}. Take it out with your usual program, and open the fingers.")
+        raise EndError("refused", f"{held}. Open the fingers (robotiq-async move 0): it falls.")
     if status.is_moving:
         raise EndError("refused", f"an axis is moving: the gripper is {describe(status)}")
     if status.activation_echo and not status.is_activated and fault is Fault.NONE:

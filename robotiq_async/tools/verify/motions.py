@@ -93,6 +93,7 @@ APART_S: Final = (0.02, 0.05, 0.1, 0.25, 0.5)
 """Seconds between tries: at first twice what the manual asks for between writes, in case one was forgotten;
 at last more than the slowest known device takes to follow."""
 UNREACHED: Final = "THE FINGERS MAY STILL MOVE: {}. Press the emergency stop, or cut the power."
+REACHED: Final = "The gripper answers again, and shows rGTO = 0."
 
 
 async def stop_fingers(
@@ -103,7 +104,8 @@ async def stop_fingers(
     Args:
         link: to the gripper; opened again if it was lost.
         image: the one that was written last; rATR is cleared as well.
-        alarm: is called, once, with words for the person when the gripper cannot be reached; must not block.
+        alarm: takes words for the person when the gripper cannot be reached, and when it is after all; must
+            not block.
 
     Returns:
         The status that shows it; None if there was none.
@@ -117,6 +119,8 @@ async def stop_fingers(
             await link.write(stop)
             status = await link.read()
             if not status.go_echo and (stop.activate or not status.activation_echo):
+                if has_alarmed:
+                    alarm(REACHED)
                 return status
         except RobotiqConnectionError:
             if not has_alarmed:

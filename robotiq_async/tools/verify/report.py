@@ -10,7 +10,7 @@ from ...runtime.version import __version__
 from ...values.model import THREE_FINGER, Model
 from ...values.registers import RegisterMap
 from ...values.status import RobotiqStatus
-from .catalogue import CATALOGUE, ENDINGS, LAST, Check, Verdict, checks_of
+from .catalogue import CATALOGUE, ENDINGS, HARMLESS, LAST, Check, Verdict, checks_of
 
 T = TypeVar("T")
 
@@ -111,20 +111,26 @@ def _usable(report: Report) -> str:
         return f"Whether this gripper can be used could not be judged: {words}."
     if not any(report.stages):
         return "Nothing is known about the gripper yet: only this computer was checked."
-    how_far = "" if LAST in report.stages else f", checked up to stage {max(report.stages, default=0)}"
+    how = "as it is: no check differs"
     if report.options:
-        options = ", ".join(f"{name}={value:g}" for name, value in report.options.items())
-        return f"This gripper can be used with {options}{how_far}."
-    if report.differing:
-        return f"This gripper can be used as it is{how_far}: the differences need no option."
-    return f"This gripper can be used as it is{how_far}: no check differs."
+        how = "with " + ", ".join(f"{name}={value:g}" for name, value in report.options.items())
+    elif report.differing:
+        how = "as it is: the differences need no option"
+    if not _missing(report):
+        return f"This gripper can be used {how}."
+    moved = "" if max(report.entered) > HARMLESS else " It has not moved yet."
+    return f"So far nothing speaks against using this gripper {how}.{moved}"
+
+
+def _missing(report: Report) -> list[int]:
+    return [number for number in range(LAST + 1) if number not in report.stages]
 
 
 def _known(report: Report) -> str:
     total, differing, inconclusive = len(report.checks), len(report.differing), len(report.inconclusive)
     as_assumed = total - differing - inconclusive
     words = f"{total} checks: {as_assumed} as assumed, {differing} different, {inconclusive} inconclusive"
-    missing = [number for number in range(LAST + 1) if number not in report.stages]
+    missing = _missing(report)
     rest = f"; not finished: stage {', '.join(map(str, missing))}" if missing else ""
     return f"{words}{rest}."
 

@@ -34,7 +34,7 @@ async def activation(bench: Bench) -> None:
     words = f"registers {status.registers[0]:04X} {status.registers[1]:04X}"
     zeros = all(status.finger_status(axis) is ObjectStatus.IN_MOTION for axis in status.model.axes)
     follows = "No option is needed: a hand ignores gDT until it has commanded a position. Report this."
-    bench.judge("activation.words", zeros and not status.go_echo, words, follows)
+    bench.judge("activation.registers", zeros and not status.go_echo, words, follows)
     bench.is_active = True
 
 
@@ -46,17 +46,22 @@ LAG_READ_S: Final = 0.002
 LAG_S: Final = 0.25  # how long a hand ignores an object status that nothing else confirms
 END_COUNTS: Final = 2
 
-QUESTION: Final = "Which finger has moved, there and back?"
+QUESTION: Final = (
+    "Which finger has moved, there and back? Left and right are those of the palm, seen from its front with "
+    "the single finger at the bottom."
+)
 ANSWERS: Final = {
-    "a": "the finger that stands alone",
-    "p": "one finger of the pair",
-    "o": "the other finger of the pair",
+    "a": "the single finger",
+    "l": "the left finger of the pair",
+    "r": "the right finger of the pair",
     "s": "the pair came together or spread",
-    "n": "none, or more than one of these",
+    "n": "nothing, or several of these",
 }
 JAW_QUESTION: Final = "What has moved, there and back?"
 JAW_ANSWERS: Final = {"a": "the jaw", "n": "nothing, or something else"}
-RIGHT: Final = {Finger.A: "a", Finger.B: "p", Finger.C: "o", Finger.SCISSOR: "s"}
+EXPECTED: Final = {Finger.A: "a", Finger.B: "lr", Finger.C: "lr", Finger.SCISSOR: "s"}
+"""Answers for each axis. No source says on which side B is; C must be on the other."""
+SURE: Final = "Commanded was {axis}, and your answer is: {answer}. Is this what you saw?"
 
 
 @dataclass
@@ -65,25 +70,37 @@ class _Found:
 
     lags: list[float] = field(default_factory=list)
     errors: list[int] = field(default_factory=list)
+    answers: dict[Finger, str] = field(default_factory=dict)
 
 
 async def single_axis(bench: Bench) -> None:
     """Each axis there and back; the person says which finger it was."""
     found = _Found()
     has_several = len(bench.model.axes) > 1
-    question, answers = (QUESTION, ANSWERS) if has_several else (JAW_QUESTION, JAW_ANSWERS)
     for axis in bench.model.axes:
         await _there_and_back(bench, axis, found)
-        answer = await bench.person.chooses(question, answers)
-        if answer is None:
-            raise EndError("declined", "the question was not answered")
-        if answer != RIGHT[axis]:
-            seen = f"the register of {axis.name} moves: {answers[answer]}"
-            bench.differs("axis.finger", seen, "Do not use names of fingers with this gripper; report this.")
-    bench.as_assumed("axis.finger", "each moved as named")
+        await _ask_what_moved(bench, axis, found.answers)
     if has_several:
+        side = ANSWERS[found.answers[Finger.B]]
+        bench.as_assumed("axis.finger", f"each moved as named; B is {side}", b_is=side)
         bench.as_assumed("axis.alone", "the other axes did not move")
+    else:
+        bench.as_assumed("axis.finger", "the jaw moved")
     _judge(bench, found)
+
+
+async def _ask_what_moved(bench: Bench, axis: Finger, before: dict[Finger, str]) -> None:
+    question, answers = (QUESTION, ANSWERS) if len(bench.model.axes) > 1 else (JAW_QUESTION, JAW_ANSWERS)
+    answer = await bench.person.chooses(question, answers)
+    if answer is None:
+        raise EndError("declined", "the question was not answered")
+    if answer not in EXPECTED[axis] or answer in before.values():
+        # One wrong key must not condemn a gripper.
+        if not await bench.person.consents(SURE.format(axis=axis.name, answer=answers[answer])):
+            raise EndError("declined", "the answer was not confirmed: begin with --from 4")
+        seen = f"commanded was {axis.name}; what moved: {answers[answer]}"
+        bench.differs("axis.finger", seen, "Do not use names of fingers with this gripper; report this.")
+    before[axis] = answer
 
 
 async def _there_and_back(bench: Bench, axis: Finger, found: _Found) -> None:
@@ -157,4 +174,4 @@ def _judge(bench: Bench, found: _Found) -> None:
     worst_error = max(found.errors)
     words = f"at most {worst_error} counts beside the request"
     follows = "Do not compare positions with requests; a hand uses gDT."
-    bench.judge("axis.end", worst_error <= END_COUNTS, words, follows, counts=worst_error)
+    bench.judge("axis.accuracy", worst_error <= END_COUNTS, words, follows, counts=worst_error)

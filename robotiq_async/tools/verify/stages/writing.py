@@ -11,7 +11,7 @@ from ....values.request import Request
 from ....values.statistics import percentile
 from ....values.status import RobotiqStatus
 from ..bench import Bench
-from ..catalogue import Figure
+from ..catalogue import NO_OPTIONS, Figure, Options
 from ..motions import as_found
 from ..watch import Watch, describe
 
@@ -36,7 +36,7 @@ async def writing(bench: Bench) -> None:
     before = await watch.look()
     image = as_found(before)
     await _same(bench, watch, image)
-    await _still(bench, watch, image)
+    await _motion(bench, watch, image)
     marked = _marked(image, 2)
     await asyncio.sleep(APART_S)
     await watch.write(marked)
@@ -68,7 +68,7 @@ def _lasting(status: RobotiqStatus) -> tuple[object, ...]:
     return status.activation_echo, status.initialization, status.mode, status.echo
 
 
-async def _still(bench: Bench, watch: Watch, image: Request) -> None:
+async def _motion(bench: Bench, watch: Watch, image: Request) -> None:
     before = await watch.look()
     await watch.write(_marked(image, 1))
     moved: list[str] = []
@@ -82,11 +82,11 @@ async def _still(bench: Bench, watch: Watch, image: Request) -> None:
         return bool(moved)
 
     if await watch.until(moves, STILL_S) is None:
-        bench.as_assumed("write.still", f"nothing moved within {STILL_S:g} s")
+        bench.as_assumed("write.motion", f"nothing moved within {STILL_S:g} s")
     else:
         await watch.write(image)
         follows = "Keep away from the fingers, and report this: a stop may not stop them."
-        bench.differs("write.still", f"with rGTO = 0 {', '.join(moved)}", follows)
+        bench.differs("write.motion", f"with rGTO = 0 {', '.join(moved)}", follows)
 
 
 async def _echo(bench: Bench, watch: Watch, image: Request) -> float:
@@ -174,14 +174,13 @@ def _judge_spacing(bench: Bench, kept: list[Figure], enough: list[float]) -> Non
         return
     forgotten = max(set(GAPS_S) - set(enough))
     found = f"a write within {1000 * forgotten:.0f} ms of another is acknowledged and forgotten"
-    if forgotten < WRITE_SPACING_S:
-        spacing = WRITE_SPACING_S
-        follows = "The default write_spacing is enough; programs that write faster lose commands."
-    else:
+    options: Options = NO_OPTIONS
+    follows = "No option is needed: a hand leaves enough time. Programs that write faster lose commands."
+    if forgotten >= WRITE_SPACING_S:
         spacing = min(LONGEST_SPACING_S, 2 * forgotten)
-        follows = "Leave more time between writes."
-    bench.spacing = max(bench.spacing, spacing)
-    bench.differs("write.spacing", found, follows, {"write_spacing": round(spacing, 3)}, gap_pairs_acted=kept)
+        bench.spacing = max(bench.spacing, spacing)
+        options, follows = {"write_spacing": round(spacing, 3)}, "Leave more time between writes."
+    bench.differs("write.spacing", found, follows, options, gap_pairs_acted=kept)
 
 
 def _marked(image: Request, number: int) -> Request:
