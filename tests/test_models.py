@@ -354,7 +354,7 @@ OTHERWISE = {
     "test_a_hold_leaves_a_grip_alone": FINGERS,
     "test_a_part_that_every_finger_meets": FINGERS,
     "test_a_part_that_is_pulled_out_is_noticed_when_the_fingers_try_again": FINGERS,
-    "test_letting_go_is_told_from_losing": FINGERS,
+    "test_opening_releases_the_part_and_a_reset_loses_it": FINGERS,
     "test_the_link_is_lost_and_comes_back": FINGERS,
     "test_there": FINGERS,
     "test_against_something": FINGERS,

@@ -358,14 +358,14 @@ class ModbusTransport:
         self.repeats += 1
         if self._heard - self._warned >= REPEAT_WARNING_S:
             self._warned = self._heard
-            self._log.warning("a read was asked again: %s (%d times so far)", why, self.repeats)
+            self._log.warning("a read was repeated: %s (%d times so far)", why, self.repeats)
         return answer
 
     async def _hush(self) -> None:
         """Drop what arrives until the line is silent.
 
         Raises:
-            ProtocolError: the line does not fall silent; the connection is closed.
+            ProtocolError: the line does not become silent; the connection is closed.
         """
         loop = self._loop
         began = loop.time()
@@ -375,7 +375,7 @@ class ModbusTransport:
         try:
             while (left := until - loop.time()) > 0:
                 if loop.time() - began > LONGEST_HUSH_S:
-                    raise ProtocolError(f"{self._address} does not fall silent")
+                    raise ProtocolError(f"{self._address}: the line does not become silent")
                 await asyncio.sleep(left)
                 until = max(until, self._heard + HUSH_S)
         except BaseException:

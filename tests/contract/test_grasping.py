@@ -99,7 +99,9 @@ async def test_a_thin_part_is_not_seen(here: Bench, hand: Hand) -> None:
 
 
 @contract
-async def test_a_part_that_is_gone_still_counts_until_the_fingers_try_again(here: Bench, hand: Hand) -> None:
+async def test_a_part_taken_away_still_counts_as_held_until_the_fingers_press_again(
+    here: Bench, hand: Hand
+) -> None:
     """A contact latches. What the gripper reports is all there is to go by."""
     here.gripper.place_object(Finger.ABC, position=150)
     assert await hand.grasp(force=30)
@@ -175,7 +177,7 @@ async def test_a_grasp_that_is_given_up_holds_what_moves_and_keeps_the_grip(
 
 
 @contract
-async def test_contacts_are_told_as_they_are_made(here: Bench, hand: Hand) -> None:
+async def test_a_contact_is_an_event_as_soon_as_it_is_made(here: Bench, hand: Hand) -> None:
     here.gripper.place_object(A, position=60)
     here.gripper.place_object(B, position=150)
     events = hand.grip_events()
@@ -218,7 +220,7 @@ async def test_a_part_that_slips_and_is_held_again(here: Bench, hand: Hand) -> N
 
 
 @contract
-async def test_letting_go_is_told_from_losing(here: Bench, hand: Hand) -> None:
+async def test_opening_releases_the_part_and_a_reset_loses_it(here: Bench, hand: Hand) -> None:
     here.gripper.place_object(Finger.ABC, position=150)
     for let_go, change in ((hand.open, RELEASED), (hand.reset, LOST)):
         grasp = await hand.grasp()
@@ -230,7 +232,7 @@ async def test_letting_go_is_told_from_losing(here: Bench, hand: Hand) -> None:
 
 
 @contract
-async def test_what_has_become_of_it_since_the_grasp(here: Bench, hand: Hand) -> None:
+async def test_events_begin_with_the_newest_status_or_the_one_given(here: Bench, hand: Hand) -> None:
     here.gripper.place_object(A, position=150)
     grasp = await hand.grasp(A)
     await hand.open(A)

@@ -64,7 +64,7 @@ async def test_a_control_loop_is_refused_at_once_and_nothing_of_it_is_sent_after
 
 @inside(lab)
 async def test_a_caller_hears_at_once_that_the_hand_was_stopped(here: Lab, hand: RemoteHand) -> None:
-    """It waited for the end of the run."""
+    """It does not wait for the end of the run."""
     here.network.cut(("client", "agent"), ("agent", "client"))
     moving = asyncio.create_task(hand.move(255))
     await asyncio.sleep(0.05)
@@ -83,7 +83,7 @@ async def test_a_caller_hears_at_once_that_the_hand_was_stopped(here: Lab, hand:
 async def test_the_strongest_stop_counts_whoever_asks_first(
     here: Lab, hand: RemoteHand, first: str, second: str, between: float
 ) -> None:
-    """With a gentler one under way, stop() returned with rGTO set, and the fingers went on."""
+    """A gentler one that is under way does not leave rGTO set."""
     await hand.set_speed(0)
     await hand.set_position(255)
     await until(lambda: here.gripper.is_moving)
@@ -130,7 +130,7 @@ async def slowly(here: Lab, hand: RemoteHand) -> asyncio.Task[Any]:
 @pytest.mark.parametrize("after", [each / 10_000 for each in range(12)])
 @inside(lab)
 async def test_a_command_that_waits_for_its_lease_is_not_sent_after_stop(here: Lab, after: float) -> None:
-    """control=None: the lease came, and the command went out, with the hand stopped."""
+    """control=None: the lease may come after the stop."""
     hand = here.client(control=None)
     await hand.start()
     writes = len(here.gripper.writes)
@@ -196,7 +196,7 @@ async def test_a_gentle_stop_does_not_give_up_a_halt(here: Lab, holds: bool) -> 
 @pytest.mark.parametrize("how", ["stop", "release"])
 @inside(lab)
 async def test_a_stronger_end_beside_a_gentle_release_wins(here: Lab, hand: RemoteHand, how: str) -> None:
-    """The lease was on its way back, and so the hand took itself for one that only reads."""
+    """While the lease is on its way back the hand is not yet one that only reads."""
     await slowly(here, hand)
     gentle = asyncio.create_task(hand.release(halt=False))
     await asyncio.sleep(0)
@@ -267,7 +267,7 @@ def every_motion(hand: RemoteHand) -> Iterator[Asked]:
 
 
 @inside(lab)
-async def test_an_agent_takes_nothing_from_the_moment_it_is_told_to_end(here: Lab, hand: RemoteHand) -> None:
+async def test_an_ending_agent_takes_no_request(here: Lab, hand: RemoteHand) -> None:
     """Before its tasks have had a turn."""
     requests = list(every_motion(hand))
     writes = len(here.gripper.writes)
@@ -298,7 +298,7 @@ async def test_what_was_let_in_just_before_does_not_go_out_after_it(here: Lab, h
 async def test_a_halt_beside_the_gentle_end_of_an_agent_counts(
     here: Lab, reader: RemoteHand, after: float
 ) -> None:
-    """It was refused: the hand is being stopped. But its grips were kept, and its fingers held."""
+    """The agent takes it although its hand is stopping: grips are kept otherwise."""
     here.gripper.place_object(Finger.B, 30)
     await here.local.set_speed(0, A)
     await here.local.close(Finger.B)

@@ -290,7 +290,7 @@ async def test_reads_asked_again_are_told_once_in_a_while(
     for _ in range(3):
         device.spoil = wrong_checksum
         await transport.read()
-    said = [each.getMessage() for each in caplog.records if "asked again" in each.getMessage()]
+    said = [each.getMessage() for each in caplog.records if "was repeated" in each.getMessage()]
     assert len(said) == 1
     assert "a wrong checksum" in said[0]
 

@@ -90,11 +90,11 @@ class Admission:
         is_known = type(again) is int and call.arguments.get("run") in self.lease.runs
         reason = self.lease.why_not_again(again if is_known else 0)
         if reason:
-            raise ControlLostError(f"the gripper was {reason} since: acquire() it when people agree", reason)
+            raise ControlLostError(f"the gripper was {reason} since: call acquire() once all agree", reason)
         if not is_known:
             raise ControlLostError(
-                "the agent was restarted, and does not know whether the gripper was halted since: acquire() "
-                "it when people agree",
+                "the agent was restarted, and does not know whether the gripper was halted since: call "
+                "acquire() once all agree",
                 "restarted",
             )
 

@@ -118,7 +118,7 @@ async def _other_frames(address: Address) -> str:
     except RobotiqConnectionError:
         return ""
     await link.close()
-    return f"The frames there are others: write the address as {other}."
+    return f"It answers to another framing: write the address as {other}."
 
 
 def _link(address: Address, registers: RegisterMap, patience: float) -> Link:
