@@ -71,11 +71,11 @@ STAGES: Final = (
     ),
     Stage(
         *(5, "stopping", stopping.stopping),
-        "A, B and C together, stopped and turned half way",
+        "A, B and C together, stopped half way and turned back",
         "80 counts of 255, about a third of the way",
         "speed 64 of 255, the weakest force",
         *(_WAY, "20 s"),
-        jaw_moves="the jaw, stopped and turned half way",
+        jaw_moves="the jaw, stopped half way and turned back",
     ),
     Stage(
         *(6, "full strokes", full_strokes.full_strokes),
