@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
+import subprocess
+import sys
+from pathlib import Path
 from time import monotonic
 from typing import Any
 
@@ -317,3 +321,13 @@ def test_a_browser_that_comes_back_has_caught_up_when_it_knows_a_time_since() ->
     heartbeat.heard(monotonic())
     assert heartbeat.has_caught_up()
     assert not heartbeat.has_caught_up(), "told once"
+
+
+async def test_a_process_of_the_page_without_settings_ends_and_leaves_no_folder(tmp_path: Path) -> None:
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "robotiq_async.tools.web.page"),
+        stdin=subprocess.DEVNULL,
+        env=os.environ | {"TMPDIR": str(tmp_path)},
+    )
+    assert await process.wait() == 1
+    assert not list(tmp_path.iterdir())

@@ -9,7 +9,7 @@ import ssl
 import sys
 from collections.abc import Iterator
 from contextlib import suppress
-from tempfile import mkdtemp
+from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO
 
 from ....runtime.sockets import listen
@@ -46,13 +46,17 @@ def main() -> int:
             signal.signal(getattr(signal, name), signal.SIG_IGN)
     if hasattr(os, "nice"):
         os.nice(5)  # the hand comes first
-    # NiceGUI can store data of its visitors. We do not use that, but it looks for the folder at once.
-    os.environ["NICEGUI_STORAGE_PATH"] = mkdtemp(prefix="robotiq_async-")
     pipes = Pipes()
     line = pipes.first_line()
     if not line:
         return 1
-    settings = PageSettings.read(line)
+    # NiceGUI can store data of its visitors. We do not use that, but it looks for the folder at once.
+    with TemporaryDirectory(prefix="robotiq_async-", ignore_cleanup_errors=True) as folder:
+        os.environ["NICEGUI_STORAGE_PATH"] = folder
+        return _serve(PageSettings.read(line), pipes)
+
+
+def _serve(settings: PageSettings, pipes: Pipes) -> int:
     try:
         listening = listen(settings.host, settings.port)
     except OSError as error:
@@ -67,9 +71,6 @@ def main() -> int:
     except OSError as error:  # a certificate that cannot be read
         pipes.say({"failed": f"{settings.certificate or settings.host}: {error.strerror or error}"})
         return 1
-    finally:
-        with suppress(OSError):
-            os.rmdir(os.environ["NICEGUI_STORAGE_PATH"])
     return 0
 
 
