@@ -105,6 +105,19 @@ async def test_a_lease_that_was_lost_unnoticed_is_not_taken_for_held(here: Lab, 
 
 
 @inside(lab)
+async def test_the_error_goes_on_saying_that_another_client_took_the_lease(
+    here: Lab, hand: RemoteHand
+) -> None:
+    """The hand does not ask for it again, and so does not hear that it is held."""
+    async with here.client("other", control=False) as other:
+        await other.take()
+        await asyncio.sleep(2)
+        with pytest.raises(ControlLostError) as lost:
+            await hand.set_speed(9)
+        assert lost.value.reason == "taken"
+
+
+@inside(lab)
 async def test_silence_is_noticed_while_the_lease_is_asked_for_again(here: Lab, hand: RemoteHand) -> None:
     """The last status of an agent that had died was shown as the present one for ever."""
     here.network.cut(("client", "agent"))

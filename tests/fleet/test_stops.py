@@ -108,6 +108,17 @@ async def test_a_weaker_stop_hears_that_a_stronger_one_counts(
     assert "a stop that is under way is stronger: the fingers are stopped" in caplog.text
 
 
+@inside(lab)
+async def test_a_stop_after_a_release_leaves_the_motion_that_was_released(
+    here: Lab, hand: RemoteHand
+) -> None:
+    await here.moving(hand)
+    await hand.release(halt=False)
+    await hand.stop()
+    await asyncio.sleep(0.1)
+    assert here.gripper.is_moving
+
+
 # -- stop races --------------------------------------------------------------------------------------------
 
 
