@@ -23,7 +23,7 @@ class Client:
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
-        self.told: list[dict[str, Any]] = []
+        self.messages: list[dict[str, Any]] = []
         self.channels: dict[str, dict[str, Any]] = {}
         self.services: dict[str, dict[str, Any]] = {}
         self._topics: dict[int, str] = {}
@@ -36,7 +36,7 @@ class Client:
             frame = await self.socket.recv()
         if isinstance(frame, str):
             said = json.loads(frame)
-            self.told.append(said)
+            self.messages.append(said)
             if said["op"] == "advertise":
                 self.channels |= {channel["topic"]: channel for channel in said["channels"]}
             elif said["op"] == "advertiseServices":

@@ -102,8 +102,8 @@ def _decoded(stage: Segment) -> Iterator[Difference]:
         now = status.as_dict()
         wrong = {name: fields.get(name) for name in now if now[name] != fields.get(name)}
         if wrong:
-            told = {name: now[name] for name in wrong}
-            yield Difference(stage.stage, seconds - stage.began, "decoder", wrong, told)
+            shown = {name: now[name] for name in wrong}
+            yield Difference(stage.stage, seconds - stage.began, "decoder", wrong, shown)
 
 
 def _simulated(stages: list[Segment], habits: Habits) -> Iterator[Difference]:

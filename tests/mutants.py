@@ -270,7 +270,7 @@ class Tree:
         original, stat = path.read_text(), path.stat()
         module = ast.parse(original)
         mistake = list(mistakes(module))[number]
-        told = {
+        mutant = {
             "file": file,
             "number": number,
             "line": getattr(mistake.node, "lineno", 0),
@@ -279,7 +279,7 @@ class Tree:
         seconds = {test: self.seconds[test] for test in self.covering(file, mistake.statement)}
         tests = tuple(fitting(seconds, file.split("/")[1]))
         if not tests:
-            return {**told, "result": "uncovered"}
+            return {**mutant, "result": "uncovered"}
         limit = max(15.0, 5 * (2 + sum(self.seconds[test] for test in tests)))
         try:
             path.write_text(with_mistake(module, mistake))
@@ -289,12 +289,12 @@ class Tree:
             path.write_text(original)
             os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
         if code == 0:
-            return {**told, "result": "survived", "tests": len(tests)}
+            return {**mutant, "result": "survived", "tests": len(tests)}
         if code not in (1, None):
-            return {**told, "result": "error", "code": code, "by": failed}
+            return {**mutant, "result": "error", "code": code, "by": failed}
         if not self.passes((failed,) if failed in self.seconds else tests):
-            return {**told, "result": "error", "code": code, "by": f"fails without it: {failed}"}
-        return {**told, "result": "killed", "by": failed or "time-out"}
+            return {**mutant, "result": "error", "code": code, "by": f"fails without it: {failed}"}
+        return {**mutant, "result": "killed", "by": failed or "time-out"}
 
 
 def prepared(work: Path) -> Tree:

@@ -35,19 +35,19 @@ def test_nothing_in_a_name_is_worked_out(name: str, caplog: pytest.LogCaptureFix
     assert [each.getMessage() for each in caplog.records] == [f"{name}: it stands still", f"{name}: at 7"]
 
 
-def test_a_record_tells_who_logged_it_and_the_error(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_record_names_the_function_and_the_error(caplog: pytest.LogCaptureFixture) -> None:
     for each in (Log("left"), log):
         try:
             raise ValueError("why")
         except ValueError:
             each.exception("it failed")
     for record in caplog.records:
-        assert record.funcName == "test_a_record_tells_who_logged_it_and_the_error"
+        assert record.funcName == "test_a_record_names_the_function_and_the_error"
         assert record.exc_info is not None
         assert record.exc_info[0] is ValueError
 
 
-def test_what_is_not_wanted_is_not_made(caplog: pytest.LogCaptureFixture) -> None:
+def test_arguments_below_the_level_are_not_formatted(caplog: pytest.LogCaptureFixture) -> None:
     class Costly:
         def __str__(self) -> str:
             raise AssertionError
@@ -59,18 +59,16 @@ def test_what_is_not_wanted_is_not_made(caplog: pytest.LogCaptureFixture) -> Non
 
 def test_where_one_hand_is_shown_its_name_is_left_out() -> None:
     outside: list[str] = []
-    told: list[str] = []
-    with forwarded_warnings(outside.append), forwarded_warnings(told.append, of="left"):
+    inside: list[str] = []
+    with forwarded_warnings(outside.append), forwarded_warnings(inside.append, of="left"):
         Log("left").warning("link lost")
         Log("right").warning("link lost")
-    assert told == ["link lost", "right: link lost"]
+    assert inside == ["link lost", "right: link lost"]
     assert outside == []
 
 
 @pytest.mark.parametrize("words", ["two\nlines", "\x1b[2Jgone", "bell\a", "back\b\rover", "\u2028", "\x9b1m"])
-def test_what_others_say_neither_begins_a_line_nor_steers_a_terminal(
-    words: str, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_foreign_text_is_made_printable(words: str, caplog: pytest.LogCaptureFixture) -> None:
     log.warning("%s says: %s", "a client", words)
     log.warning("refused: %s", ValueError(words))
     for record in caplog.records:
@@ -78,7 +76,7 @@ def test_what_others_say_neither_begins_a_line_nor_steers_a_terminal(
         assert printable(words) in record.getMessage()
 
 
-def test_what_is_harmless_stays_as_it_is(caplog: pytest.LogCaptureFixture) -> None:
+def test_printable_text_stays_as_it_is(caplog: pytest.LogCaptureFixture) -> None:
     log.warning("%s: %d of %d", "Grüße", 3, 4)
     (record,) = caplog.records
     assert record.args == ("Grüße", 3, 4), "for those who look at the arguments"

@@ -366,7 +366,7 @@ OTHERWISE = {
     "test_timestamps_are_of_this_process_and_only_rise": STROKE,
     "test_statuses_opened_before_the_start_end_after_the_stop": STROKE,
     "test_nothing_there": READING,
-    "test_what_stops_a_finger_that_opens_is_not_held": READING,
+    "test_a_contact_while_opening_is_not_held": READING,
     "test_a_major_fault": "its codes mean something else on a sibling",
 }
 """Scenes of the contract that are about the 3-Finger alone, and why; the tests above have their like."""
@@ -413,7 +413,7 @@ async def test_a_recording_has_the_one_axis_and_can_be_read(tmp_path: Path) -> N
 
 def test_a_page_shows_the_axis_that_there_is() -> None:
     mirror = HandMirror(0, "sim://", State.RUNNING_IDLE)
-    told = {
+    message = {
         "state": "RUNNING_IDLE",
         "problem": "",
         "events": [],
@@ -421,12 +421,12 @@ def test_a_page_shows_the_axis_that_there_is() -> None:
         "model": "hand-e",
         "age": 0.0,
     }
-    mirror.hear(told | {"registers": registers(0xF9, 0, 0, 255, 228), "timestamp": 1.0, "sequence": 3})
+    mirror.hear(message | {"registers": registers(0xF9, 0, 0, 255, 228), "timestamp": 1.0, "sequence": 3})
     assert mirror.model is HAND_E
     assert mirror.samples[-1].positions == (228,)
 
 
-async def test_what_needs_three_fingers_says_so() -> None:
+async def test_calls_that_need_three_fingers_say_so() -> None:
     async with RobotiqHand("sim://?model=2f85&speedup=20") as hand:
         with pytest.raises(RobotiqStateError, match="a 2F-85 has no scissor"):
             await ACTIONS["wide"].run(hand)

@@ -45,7 +45,7 @@ def members(kind: type) -> dict[str, object]:
     return {name: getattr(kind, name) for name in own if not name.startswith("_")}
 
 
-def test_what_is_public_at_a_hand_every_hand_has() -> None:
+def test_every_hand_has_the_public_members_of_hand() -> None:
     """But for what belongs to the process that owns the link, and what takes a lease."""
     shared = members(Hand).keys()
     assert members(RobotiqHand).keys() - shared == {"add_listener"}
@@ -70,7 +70,7 @@ def names_in(path: Path) -> Iterator[str]:
             yield from (alias.name for alias in node.names)
 
 
-def test_what_stands_around_a_hand_does_not_know_which_one() -> None:
+def test_tools_do_not_know_which_kind_of_hand_they_use() -> None:
     """But for the one function that makes a hand from an address."""
     assert [path for path in AROUND if "RobotiqHand" in names_in(path)] == [ROOT / "cli" / "connect.py"]
 
@@ -122,7 +122,7 @@ async def test_the_monitor_of_a_hand_with_a_name() -> None:
         assert "  left (fake://hand)" in str(pilot.app.query_one("#state", Static).render())
 
 
-async def test_a_grasp_and_what_becomes_of_it(hand: FakeHand) -> None:
+async def test_a_grasp_and_its_events(hand: FakeHand) -> None:
     hand.obstacle = 150
     grasp = await hand.grasp()
     assert grasp.holds == Finger.ABC

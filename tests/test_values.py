@@ -178,7 +178,7 @@ def copies(value: Any) -> Iterator[Any]:
 
 
 @pytest.mark.parametrize("value", named(VALUES))
-def test_a_value_is_equal_to_its_copies_hashes_like_them_and_is_told_in_one_line(value: object) -> None:
+def test_a_value_equals_its_copies_and_has_a_repr_of_one_line(value: object) -> None:
     for again in copies(value):
         assert type(again) is type(value)
         assert again == value
@@ -230,7 +230,7 @@ NUMPY: dict[str, tuple[object, object]] = {
 
 
 @pytest.mark.parametrize("what", NUMPY)
-def test_what_is_made_of_numbers_of_numpy_holds_plain_ones(what: str) -> None:
+def test_values_made_from_numpy_hold_plain_numbers(what: str) -> None:
     given, kept = NUMPY[what]
     assert given == kept
     assert "np." not in repr(given)
@@ -289,7 +289,7 @@ def test_a_value_as_a_dict_holds_what_json_knows_by_the_names_of_its_attributes(
     assert value.as_dict(), "it is made anew each time"
 
 
-def test_what_is_of_one_axis_stands_below_its_name() -> None:
+def test_values_of_one_axis_are_listed_below_its_name() -> None:
     status = status_of(0xB9, 0x0A, echo=200, position=150, current=31)
     assert status.as_dict()["B"] == {
         "position": status.position(B),
@@ -306,12 +306,12 @@ def test_what_is_of_one_axis_stands_below_its_name() -> None:
     assert DICTS["SentRequest"].as_dict()["C"] == {"position": 1, "speed": 2, "force": 3}
 
 
-def test_a_status_is_made_again_of_what_was_told() -> None:
+def test_a_status_is_rebuilt_from_a_message() -> None:
     status = status_of(0xB9, 0xEA, fault=0x0C, at=12.5, sequence=7)
-    told = status.as_dict()
-    assert (told["fault"], told["fault_code"]) == ("UNKNOWN_0x0C", 12)
-    timed = {name: told[name] for name in ("timestamp", "sequence")}
-    assert RobotiqStatus.from_registers(told["registers"], **timed) == status
+    fields = status.as_dict()
+    assert (fields["fault"], fields["fault_code"]) == ("UNKNOWN_0x0C", 12)
+    timed = {name: fields[name] for name in ("timestamp", "sequence")}
+    assert RobotiqStatus.from_registers(fields["registers"], **timed) == status
 
 
 # -- mappings ----------------------------------------------------------------------------------------------

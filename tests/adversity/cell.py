@@ -56,18 +56,18 @@ async def outcome(world: World, phase: Phase, words: str) -> str:
         kind, bound = words.split()[0], phase.bound
         if kind == "e-stop" and phase.name == "connecting":
             bound += STALLED_S  # connected in time, start() waits for an activation that makes no progress
-        told = _noticed(world) if task is None else await _told(task, before.time + bound)
+        ending = _noticed(world) if task is None else await _told(task, before.time + bound)
         await _rest(world, (*SETTLED, *STUCK) if kind == "e-stop" else SETTLED)
         state = world.hand.state
         if phase.name == "keeping a grip":
-            told += ", kept" if world.gripper.grips == world.holds else ", let go"
+            ending += ", kept" if world.gripper.grips == world.holds else ", let go"
         if phase.bound == STOP_S and abs(world.gripper.position(Finger.A) - TARGET) <= 2:
-            told += ", fingers went on"
-        _check_motions(world, before, phase, kind, told)
+            ending += ", fingers went on"
+        _check_motions(world, before, phase, kind, ending)
         await _works(world, activate=kind != "e-stop")
         world.check_no_stale_status()
         world.check_loop()
-    return f"{told} → {state.name}"
+    return f"{ending} → {state.name}"
 
 
 class Before(NamedTuple):
@@ -154,7 +154,7 @@ async def _rest(world: World, settled: Collection[State]) -> None:
                 return
 
 
-def _check_motions(world: World, before: Before, phase: Phase, kind: str, told: str) -> None:
+def _check_motions(world: World, before: Before, phase: Phase, kind: str, ending: str) -> None:
     """No command was sent twice, neither in a row nor the one of the phase; only addressed axes moved."""
     motions = world.motions(before.writes)
     assert all(one != another for one, another in pairwise(motions)), motions
@@ -162,7 +162,7 @@ def _check_motions(world: World, before: Before, phase: Phase, kind: str, told: 
     if kind in MOVES_EVERYTHING:
         return
     _check_travel(world, before.travels, phase.addressed)
-    if phase.name == "moving" and told in ("GripperFault", "NotActivated"):
+    if phase.name == "moving" and ending in ("GripperFault", "NotActivated"):
         assert world.gripper.position(Finger.A) < TARGET - 2, "a motion resumed after a fault"
     if phase.name == "holding" and kind != "power-cut":
         assert world.gripper.request_registers == before.requests, "the grip was relaxed"

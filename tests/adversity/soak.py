@@ -103,12 +103,12 @@ class Soak:
             await self.rng.choice(calls)(mask)
             if self.hand.state not in RUNNING and self.rng.random() < 0.3:
                 self.everything_moved = True
-                await self.bounded("recover", 95.0, self.told("recover", self.hand.recover))
+                await self.bounded("recover", 95.0, self.checked("recover", self.hand.recover))
             await asyncio.sleep(self.rng.choice((0.0, 0.0, 0.01, 0.1)))
 
     async def move(self, axes: Finger) -> None:
         self.figures["moves asked"] += 1
-        result = await self.bounded("move", 25.0, self.told("move", lambda: self.random_move(axes)))
+        result = await self.bounded("move", 25.0, self.checked("move", lambda: self.random_move(axes)))
         if isinstance(result, MoveResult):
             self.figures["moves done"] += 1
 
@@ -116,7 +116,7 @@ class Soak:
         self.figures["moves cancelled"] += 1
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(self.rng.uniform(0, 0.5)):
-                await self.told("move", lambda: self.random_move(axes))
+                await self.checked("move", lambda: self.random_move(axes))
 
     def random_move(self, axes: Finger) -> Awaitable[MoveResult]:
         speed, force = self.writes.next_settings()
@@ -128,7 +128,7 @@ class Soak:
             self.hand.command(axes, speed=speed, force=force)  # leaves with the position
             await self.hand.set_position(self.rng.randrange(256), axes)
 
-        await self.bounded("write", 1.0, self.told("write", write))
+        await self.bounded("write", 1.0, self.checked("write", write))
 
     async def control_loop(self, axes: Finger) -> None:
         for _ in range(self.rng.randrange(1, 40)):
@@ -141,9 +141,9 @@ class Soak:
             await asyncio.sleep(0.005)
 
     async def halt(self, _: Finger) -> None:
-        await self.bounded("halt", 2.0, self.told("halt", self.hand.halt))
+        await self.bounded("halt", 2.0, self.checked("halt", self.hand.halt))
 
-    async def told(self, what: str, call: Callable[[], Awaitable[Any]]) -> Any:
+    async def checked(self, what: str, call: Callable[[], Awaitable[Any]]) -> Any:
         """Make a call; its error is counted if it is one of the contract, and a breach if not."""
         try:
             return await call()
@@ -198,10 +198,10 @@ class Soak:
         """Recover, and wait until nothing moves."""
         while True:
             if self.hand.state is State.SHUTDOWN:
-                await self.told("start", self.hand.start)
+                await self.checked("start", self.hand.start)
             elif self.hand.state not in RUNNING and self.hand.state is not State.DISCONNECTED:
                 self.everything_moved = True
-                await self.told("recover", self.hand.recover)
+                await self.checked("recover", self.hand.recover)
             await asyncio.sleep(0.7)
             if self.hand.state is State.RUNNING_IDLE and not self.hand.is_moving:
                 return
@@ -214,7 +214,7 @@ class Soak:
             return
         self.collect()
         await self.bounded("stop", 2.0, self.hand.stop())
-        await self.bounded("start", 5.0, self.told("start", self.hand.start))
+        await self.bounded("start", 5.0, self.checked("start", self.hand.start))
         self.figures["restarts"] += 1
 
     def collect(self) -> None:

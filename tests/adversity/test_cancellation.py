@@ -263,7 +263,7 @@ async def test_a_cancelled_move_stops_also_when_the_link_fails_at_that_moment(
 
 @inside(started)
 @pytest.mark.parametrize("turns", range(1, 12))
-async def test_a_move_cancelled_in_the_turn_in_which_the_link_is_lost_is_stopped_or_told(
+async def test_a_move_cancelled_in_the_turn_of_a_link_loss_is_held_or_reports_it(
     here: World, turns: int
 ) -> None:
     moving = asyncio.create_task(here.hand.move(255, A, speed=0))

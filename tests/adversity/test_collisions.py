@@ -62,14 +62,14 @@ async def collide(ready: str, first: str, second: str, turn: int) -> bool:
     """Make both calls and look at what is left; False if the first was over before the second came."""
     async with world(speedup=FAST, poll_interval=POLL_S) as here:
         await READY[ready][0](here)
-        one = asyncio.create_task(told(CALLS[first](here)))
+        one = asyncio.create_task(ending(CALLS[first](here)))
         other: asyncio.Future[asyncio.Task[str]] = here.loop.create_future()
         was_under_way = True
 
         def call() -> None:
             nonlocal was_under_way
             was_under_way = not one.done()
-            other.set_result(asyncio.create_task(told(CALLS[second](here))))
+            other.set_result(asyncio.create_task(ending(CALLS[second](here))))
 
         here.loop.after_turns(turn, call)
         async with asyncio.timeout(10):
@@ -81,7 +81,7 @@ async def collide(ready: str, first: str, second: str, turn: int) -> bool:
         return was_under_way
 
 
-async def told(call: Awaitable[Any]) -> str:
+async def ending(call: Awaitable[Any]) -> str:
     """How a call ended; anything but a result or an error of the contract fails the test."""
     try:
         await call

@@ -19,7 +19,7 @@ POLL_S = 0.01
 
 
 @inside(started, poll_interval=POLL_S)
-async def test_what_was_missed_is_counted_and_skipped(here: World) -> None:
+async def test_missed_polls_are_counted_and_skipped(here: World) -> None:
     await anext(here.hand.statuses())
     before, given = here.hand.statistics, len(here.gripper.stamps)
     here.loop.hold_up(1.0)
@@ -100,9 +100,7 @@ async def test_a_silent_gripper_is_given_up_on_also_in_a_loop_that_is_held_up_ag
 
 @inside(started)
 @pytest.mark.parametrize("how", ["command", "stop"])
-async def test_what_happened_while_the_loop_was_held_up_is_seen_before_the_next_write(
-    here: World, how: str
-) -> None:
+async def test_changes_during_a_stall_are_seen_before_the_next_write(here: World, how: str) -> None:
     await here.hand.move(50, A)
     here.gripper.write(0, [0x0000])  # another client resets the gripper ...
     here.loop.hold_up(1.0)  # ... while other code holds the loop
@@ -115,7 +113,7 @@ async def test_what_happened_while_the_loop_was_held_up_is_seen_before_the_next_
 
 @inside(started)
 @pytest.mark.parametrize("turns", range(1, 31))
-async def test_wherever_in_a_poll_the_loop_is_held_up_what_happened_meanwhile_is_seen_first(
+async def test_a_stall_anywhere_in_a_poll_delays_the_write_until_a_new_status(
     here: World, turns: int
 ) -> None:
     await here.hand.move(50, A)

@@ -43,7 +43,7 @@ def nobody_else_moves(world: World) -> Iterator[None]:
 
 
 @inside(world)
-async def test_a_reply_that_is_left_over_moves_no_axis_that_nobody_addressed(here: World) -> None:
+async def test_a_left_over_reply_moves_no_axis_that_was_not_addressed(here: World) -> None:
     await here.activate_beforehand()
     await send(here, 99, 200)
     async with here.server.fault_injector.making(Trouble("multiplexer", 0.03)):

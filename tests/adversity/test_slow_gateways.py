@@ -31,7 +31,7 @@ async def test_a_gateway_that_is_slow_is_a_gateway(here: World, late: float) -> 
 @pytest.mark.parametrize("trouble", [Trouble("silence"), Trouble("delay", 4.9), Trouble("delay", 1.5)])
 @pytest.mark.parametrize("after", [0.0, 0.003, 0.5, 1.2])
 @pytest.mark.parametrize("asked", [False, True])
-async def test_stop_ends_within_two_seconds_whatever_the_response_timeout(
+async def test_stop_ends_within_two_seconds_for_any_response_timeout(
     here: World, trouble: Trouble, after: float, asked: bool
 ) -> None:
     async with here.server.fault_injector.making(trouble):
@@ -63,7 +63,7 @@ async def test_a_gateway_that_is_a_little_slow_has_confirmed_the_stop_by_then(
 
 @inside(started, response_timeout=5.0, speedup=1.0)
 @pytest.mark.parametrize("late", [0.6, 0.8])
-async def test_a_slower_one_has_been_told_to_stop(
+async def test_a_slower_gateway_still_gets_the_stop(
     here: World, late: float, caplog: pytest.LogCaptureFixture
 ) -> None:
     """It is not waited for; the log says that it is unknown."""

@@ -85,7 +85,7 @@ async def test_stop_during_a_reset_does_not_activate_again(here: World, device_c
 @pytest.mark.parametrize(
     "phase", [phase for phase in PHASES if phase.name != "releasing"], ids=lambda phase: phase.name
 )
-async def test_a_stop_that_keeps_a_grip_leaves_nothing_moving_whatever_it_meets(
+async def test_a_stop_that_keeps_a_grip_leaves_nothing_moving_in_any_phase(
     here: World, phase: Phase, after: float, device_cycle: float
 ) -> None:
     """A release aside: rGTO does not end it, and no stop does."""

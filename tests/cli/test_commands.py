@@ -157,7 +157,7 @@ def test_move_in_fault_fails(call: Call, there: SimulatorServer) -> None:
 
 
 @pytest.mark.parametrize("command", ["status", "monitor", "move 3 --yes", "demo --yes"])
-def test_nobody_there(call: Call, refusing: str, command: str) -> None:
+def test_nothing_answers(call: Call, refusing: str, command: str) -> None:
     call(*command.split(), refusing).assert_failed(1, refusing)
 
 
@@ -236,7 +236,9 @@ def nobody_reads() -> Iterator[None]:
 
 
 @pytest.mark.parametrize("closed", [0, 1, 2])
-async def test_a_closed_stream_is_nobodys(shell: Shell, server: SimulatorServer, closed: int) -> None:
+async def test_a_closed_standard_stream_does_no_harm(
+    shell: Shell, server: SimulatorServer, closed: int
+) -> None:
     command = [sys.executable, "-m", "robotiq_async", "status", server.address]
     code = f"import os; os.close({closed}); os.execv({sys.executable!r}, {command!r})"
     (await shell.finish(await shell.python("-c", code))).assert_succeeded()

@@ -83,7 +83,7 @@ async def test_a_stream_that_is_closed_is_no_terminal(
 
 
 @pytest.mark.usefixtures("virtually")
-def test_a_simulated_gripper_inside_the_program_needs_nobody(call: Call) -> None:
+def test_a_simulated_gripper_inside_the_program_needs_no_consent(call: Call) -> None:
     outcome = call("move", "10", "sim://")
     outcome.assert_succeeded()
     assert "[y/N]" not in outcome.out
@@ -176,7 +176,7 @@ def test_every_command_that_moves_takes_yes() -> None:
     assert {each for each in commands if "yes" in inspect.signature(each).parameters} == moving - {verify}
 
 
-def test_what_does_not_move_writes_nothing(call: Call, there: SimulatorServer, file: Path) -> None:
+def test_commands_that_do_not_move_write_nothing(call: Call, there: SimulatorServer, file: Path) -> None:
     call("move", "50", "--yes", there.address).assert_succeeded()
     writes = len(there.gripper.writes)
     for command in (["status"], ["status", "--json"], ["doctor"], ["record", str(file), "--seconds", "0.2"]):

@@ -50,7 +50,9 @@ def test_it_overwrites_nothing_and_makes_nothing_then(
 @pytest.mark.parametrize(
     ("folder", "days", "words"), [("keys", "4000", "the authority ends on"), ("file", "30", "file")]
 )
-def test_what_fails_makes_no_key(call: Call, tmp_path: Path, folder: str, days: str, words: str) -> None:
+def test_a_failed_command_makes_no_key(
+    call: Call, tmp_path: Path, folder: str, days: str, words: str
+) -> None:
     (tmp_path / "file").touch()
     call("fleet", "keys", str(tmp_path / folder), "--read", "bob", "--days", days).assert_failed(1, words)
     assert not list(tmp_path.glob("keys/*-*"))

@@ -37,7 +37,7 @@ def ignored() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("ignored")
-async def test_what_the_tests_start_hears_a_signal_that_they_ignore(shell: Shell) -> None:
+async def test_processes_started_by_tests_do_not_inherit_ignored_signals(shell: Shell) -> None:
     conftest.pytest_configure()
     process = await shell.python("-c", "import signal; print(*map(signal.getsignal, (1, 2)), sep='\\n')")
     first, second = (await shell.finish(process)).out.splitlines()

@@ -155,7 +155,7 @@ def test_the_scale_is_read_from_a_table(call: Call, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("virtually")
-def test_what_was_measured_with_other_settings_is_not_gone_on_with(call: Call, tmp_path: Path) -> None:
+def test_a_table_of_other_settings_is_not_continued(call: Call, tmp_path: Path) -> None:
     table = ("--output", str(tmp_path / "t.csv"))
     call(*SPEEDS, *table).assert_succeeded()
     for options in (("10.255.255.1",), ("sim://", "--fingers", "A")):

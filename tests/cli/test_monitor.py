@@ -124,7 +124,7 @@ def sparkline_of(line: str) -> str:
     return line.rpartition(" mA")[0][-30:-5].strip()
 
 
-async def test_a_fault_is_told_in_words_and_stays_in_the_log(
+async def test_a_fault_is_shown_in_words_and_stays_in_the_log(
     active: Operator, gripper: SimulatedGripper
 ) -> None:
     async with shown(active) as pilot:
@@ -179,7 +179,7 @@ async def test_of_the_currents_between_two_paints_the_highest_is_shown(active: O
         assert "   90 mA" in pilot.app.query_one(Axes).render().plain
 
 
-async def test_another_client_is_told(active: Operator, gripper: SimulatedGripper) -> None:
+async def test_another_client_is_shown(active: Operator, gripper: SimulatedGripper) -> None:
     async with shown(active) as pilot:
         request = list(gripper.request_registers)
         request[1] = 77
@@ -239,7 +239,7 @@ async def test_speed_and_force_by_keys(active: Operator) -> None:
     ("key", "warning"), [("r", "DROPS"), ("l", "OPEN slowly"), ("a", "MOVE"), ("v", "DROPS")]
 )
 @pytest.mark.parametrize("answer", ["n", "escape"])
-async def test_what_is_dangerous_asks_first(
+async def test_dangerous_keys_ask_first(
     key: str, warning: str, answer: str, active: Operator, gripper: SimulatedGripper
 ) -> None:
     requests = active.hand.requests()

@@ -73,9 +73,9 @@ async def test_watch_prints_what_changes(
         assert {line[13:].split()[0] for line in lines} <= {"status", "log"}
         assert any("another client commands" in line for line in lines), "this test is that client"
         gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
-        told: set[str] = set()
-        while not told >= {"state", "fault"}:
-            told.add((await shell.read_line(process))[13:].split()[0])
+        kinds: set[str] = set()
+        while not kinds >= {"state", "fault"}:
+            kinds.add((await shell.read_line(process))[13:].split()[0])
         process.send_signal(signal.SIGTERM)
         assert (await shell.finish(process)).code == 0
 
@@ -123,7 +123,7 @@ async def test_a_reader_that_stops_reading_does_not_hold_up_the_polling(
     assert len(objects) < 500
 
 
-async def test_a_signal_ends_it_although_nobody_reads(
+async def test_a_signal_ends_it_although_its_output_is_not_read(
     server: SimulatorServer, gripper: SimulatedGripper
 ) -> None:
     """Its writer is stuck in a full pipe: the end does not wait for it. Nor does it stop the fingers."""

@@ -74,15 +74,15 @@ def packages_of(extra: str) -> set[str]:
     return found
 
 
-def test_whoever_misses_a_module_is_told_the_extra_that_brings_it() -> None:
+def test_a_missing_module_names_the_extra_that_brings_it() -> None:
     package = {module: names[0] for module, names in packages_distributions().items()}
     sources = [file.read_text() for file in sorted((ROOT / "robotiq_async").rglob("*.py"))]
     needs = {found for source in sources for found in NEED.findall(source)}
     assert {extra for _, extra in needs} == {"fleet", "monitor", "plot", "record", "view", "web"}
     for module, extra in needs:
         assert package[module] in packages_of(extra), f"{extra} does not bring {module}"
-    told = {found for source in sources for found in ADVICE.findall(source)}
-    assert {extra for _, extra in told} == {
+    advised = {found for source in sources for found in ADVICE.findall(source)}
+    assert {extra for _, extra in advised} == {
         "cli",
         "fleet",
         "metrics",
@@ -92,21 +92,21 @@ def test_whoever_misses_a_module_is_told_the_extra_that_brings_it() -> None:
         "view",
         "web",
     }
-    for name, extra in told:
+    for name, extra in advised:
         assert {name, package.get(name, name)} & packages_of(extra), f"{extra} does not bring {name}"
 
 
 def test_the_help_says_which_extra_each_command_needs() -> None:
     lines = (line.split(maxsplit=1) for line in str(build().help).splitlines())
-    told = {words[0]: words[1] for words in lines if len(words) == 2}
+    advised = {words[0]: words[1] for words in lines if len(words) == 2}
     commands = ROOT / "robotiq_async" / "cli" / "commands"
     for file in commands.rglob("*.py"):
         needed = {extra for _, extra in NEED.findall(file.read_text())}
         names = {"recordings": "replay"}
-        assert all(names.get(file.stem, file.stem) in told[extra] for extra in needed - {"plot"}), file
+        assert all(names.get(file.stem, file.stem) in advised[extra] for extra in needed - {"plot"}), file
     for extra, words in {"record": "record replay export plot recover", "plot": "plot measure"}.items():
-        assert set(words.split()) <= set(re.findall(r"\w+", told[extra]))
-    assert "rtu://" in told["serial"]
+        assert set(words.split()) <= set(re.findall(r"\w+", advised[extra]))
+    assert "rtu://" in advised["serial"]
 
 
 def test_the_extra_that_is_a_command_brings_the_command_line() -> None:

@@ -136,9 +136,9 @@ async def test_a_disk_that_is_full_is_one_line(shell: Shell, server: SimulatorSe
     outcome.assert_failed(1, "it.mcap: File too large")
     assert file.stat().st_size == 12_000
     there = [entry for entry in read_recording(file) if entry.topic == "/gripper/status"]
-    told = re.search(r"ended early: at least (\d+) of (\d+) polls are in the file; .*recover", outcome.out)
-    assert told is not None, outcome.out
-    assert 0 < int(told[1]) <= len(there) <= int(told[2])
+    counts = re.search(r"ended early: at least (\d+) of (\d+) polls are in the file; .*recover", outcome.out)
+    assert counts is not None, outcome.out
+    assert 0 < int(counts[1]) <= len(there) <= int(counts[2])
     assert "0 lost" not in outcome.out
 
 
@@ -246,7 +246,7 @@ def test_of_a_broken_one_it_is_said_that_it_is(command: str, grasp: Path, call: 
 
 
 @pytest.mark.parametrize("command", ["plot", "replay --plot", "export"])
-def test_what_is_there_is_replaced_only_if_that_is_said(command: str, grasp: Path, call: Call) -> None:
+def test_an_existing_file_is_replaced_only_with_overwrite(command: str, grasp: Path, call: Call) -> None:
     there = grasp.with_suffix(".csv" if command == "export" else ".svg")
     there.write_text("mine")
     before = set(grasp.parent.iterdir())
@@ -257,7 +257,7 @@ def test_what_is_there_is_replaced_only_if_that_is_said(command: str, grasp: Pat
     assert there.read_text(encoding="utf-8") != "mine"
 
 
-def test_a_name_that_is_no_text_is_shown_all_the_same(grasp: Path, call: Call) -> None:
+def test_a_file_name_that_is_not_text_is_still_shown(grasp: Path, call: Call) -> None:
     there = Path(os.fsdecode(os.fsencode(grasp.parent) + b"/\xff$\\frac{$.mcap"))
     grasp.rename(there)
     assert call("plot", str(there)).out.endswith(".svg\n")
@@ -292,7 +292,7 @@ SHOWS = {
 
 @pytest.mark.parametrize("command", ["replay", "recover", "plot", "export"])
 @pytest.mark.parametrize("content", [None, b"", b"no recording"])
-def test_what_is_no_recording_is_one_line_and_nothing_is_written(
+def test_a_file_that_is_no_recording_gives_one_line_and_writes_nothing(
     command: str, content: bytes | None, tmp_path: Path, call: Call
 ) -> None:
     file = tmp_path / "it.mcap"
@@ -304,7 +304,7 @@ def test_what_is_no_recording_is_one_line_and_nothing_is_written(
 
 
 @pytest.mark.parametrize("command", SHOWS)
-def test_what_is_not_ours_is_refused_in_one_line_and_nothing_is_written(
+def test_a_foreign_recording_is_refused_in_one_line_and_writes_nothing(
     foreign: Callable[..., Path], command: str, call: Call
 ) -> None:
     for topic, (what, data) in itertools.product(SHOWS[command], HOSTILE.items()):
@@ -338,7 +338,7 @@ def test_a_message_of_no_channel_is_one_line(foreign: Callable[..., Path], comma
     call(command, str(foreign(STATE, channel=7))).assert_failed(1, "foreign.mcap: there is no channel 7")
 
 
-def test_what_steers_a_terminal_is_written_out(foreign: Callable[..., Path], call: Call) -> None:
+def test_control_characters_are_escaped(foreign: Callable[..., Path], call: Call) -> None:
     fault = event(kind="fault", fault_code=9, fault=STEERING, description=STEERING)
     outcome = call("replay", str(foreign(fault)))
     assert outcome.out.count("\n") == 1

@@ -123,9 +123,7 @@ def test_the_log_of_an_agent_calls_each_gripper_by_its_name(
     agent.finish(signal.SIGINT)
 
 
-def test_an_agent_whose_list_nobody_reads_serves_all_the_same(
-    call: Call, serving: Callable[..., Beside]
-) -> None:
+def test_an_agent_serves_although_its_output_is_not_read(call: Call, serving: Callable[..., Beside]) -> None:
     """``robotiq-async agent FLEET.toml | true``: it ended, and stopped the fingers."""
     process = serving().process
     assert process.stdout is not None
@@ -157,7 +155,7 @@ async def test_monitor_and_record(shell: Shell, agent: Process, tmp_path: Path) 
     assert (tmp_path / "a.mcap").stat().st_size > 1000
 
 
-def test_nobody_there(call: Call, endpoint: str) -> None:
+def test_nothing_answers(call: Call, endpoint: str) -> None:
     call("status", ADDRESS).assert_failed(1, "cannot connect to zenoh://lab/cell/left")
 
 
@@ -174,11 +172,11 @@ async def test_a_list_and_a_halt(shell: Shell, agent: Process, gripper: Served) 
     assert not gripper.gripper.is_moving
 
 
-def test_a_halt_of_nobody_is_a_failure(call: Call, endpoint: str) -> None:
+def test_a_halt_that_reaches_no_gripper_fails(call: Call, endpoint: str) -> None:
     call("fleet", "halt").assert_failed(1, "nothing was stopped", f"not reached: {endpoint}")
 
 
-async def test_an_agent_that_is_told_to_end_stops_the_fingers(
+async def test_an_agent_that_gets_sigterm_stops_the_fingers(
     shell: Shell, agent: Process, gripper: Served
 ) -> None:
     moving = await shell.start("move", "255", "--yes", "--speed", "0", ADDRESS)
@@ -197,7 +195,7 @@ def test_a_second_agent_is_refused(
     call("agent", str(second)).assert_failed(1, f"another agent serves {ADDRESS}")
 
 
-def test_an_agent_that_waits_for_its_router_says_so_and_can_be_told_to_end(
+def test_an_agent_that_waits_for_its_router_says_so_and_can_be_ended(
     beside: Callable[..., Beside], tmp_path: Path
 ) -> None:
     file, router = tmp_path / "FLEET.toml", free_endpoint()

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tests.cli.conftest import Beside, Call, Shell
 
 
-async def told(process: Process) -> str:
+async def next_line(process: Process) -> str:
     """The next line on its standard error."""
     assert process.stderr is not None
     async with asyncio.timeout(30):
@@ -160,7 +160,7 @@ async def test_troubles_of_several_options(shell: Shell) -> None:
     words = ("--trouble", "delay 0.01; release", "--trouble", "foreign 200")
     process = await shell.start("simulate", "--port", "0", *words)
     address = await shell.read_line(process)
-    lines = [await told(process) for _ in range(3)]
+    lines = [await next_line(process) for _ in range(3)]
     assert lines == [f"robotiq-async: trouble: {each}" for each in ("delay 0.01", "release", "foreign 200")]
     hand = RobotiqHand(address)
     await hand.start(activate=False)
@@ -181,7 +181,7 @@ async def test_it_ends_cleanly_while_a_plan_runs(
 ) -> None:
     process = await shell.start("simulate", "--port", "0", "--trouble", words)
     await shell.read_line(process)
-    assert await told(process) == f"robotiq-async: trouble: {begins}"
+    assert await next_line(process) == f"robotiq-async: trouble: {begins}"
     process.send_signal(number)
     outcome = await shell.finish(process)
     assert (outcome.code, outcome.out, outcome.err) == (0, "", "")

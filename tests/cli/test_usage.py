@@ -259,7 +259,7 @@ def test_any_other_is_named_by_its_full_address(
 
 
 @pytest.mark.parametrize("command", ["monitor --json", "web --port 0", "view --port 0"])
-def test_what_programs_read_stays_what_they_can_read(beside: Callable[..., Beside], command: str) -> None:
+def test_output_for_programs_stays_machine_readable(beside: Callable[..., Beside], command: str) -> None:
     shown = beside(*command.split())
     assert shown.read_error() == f"robotiq-async: {SIMULATED}"
     line = shown.read_line()

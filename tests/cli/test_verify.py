@@ -41,7 +41,7 @@ def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_sent(
     assert not there.gripper.writes
 
 
-def test_nobody_there_is_one_line_and_a_report(call: Call, tmp_path: Path) -> None:
+def test_no_answer_gives_one_line_and_a_report(call: Call, tmp_path: Path) -> None:
     where = tmp_path / "report"
     outcome = call("verify", "127.0.0.1:1", "--up-to", "2", "--yes-to", "2", "--report", str(where))
     outcome.assert_failed(1, "refused")
@@ -66,13 +66,13 @@ def test_it_takes_the_model_as_an_option(call: Call, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("columns", [40, 60, 100])
 @pytest.mark.parametrize("stage", STAGES, ids=lambda stage: str(stage.number))
-def test_a_stage_is_told_within_the_width_of_the_terminal(stage: object, columns: int) -> None:
+def test_a_stage_is_described_within_the_width_of_the_terminal(stage: object, columns: int) -> None:
     text = wrapped(f"{stage.as_text()}\n{AGREE}", columns)  # type: ignore[attr-defined]
     assert all(len(line) < columns for line in text.splitlines())
     assert text.split() == f"{stage.as_text()}\n{AGREE}".split()  # type: ignore[attr-defined]
 
 
-def test_what_moves_is_told_with_all_that_a_person_must_know() -> None:
+def test_a_stage_that_moves_says_how_far_how_fast_and_what_must_be_clear() -> None:
     for stage in STAGES:
         assert stage.moves
         assert stage.lasts
@@ -132,7 +132,7 @@ async def test_enter_begins_and_any_other_key_ends(served: SimulatorServer, tmp_
     assert not served.gripper.writes
 
 
-async def test_what_was_typed_before_the_question_is_no_answer(
+async def test_keys_typed_before_the_question_do_not_answer_it(
     served: SimulatorServer, tmp_path: Path
 ) -> None:
     terminal = at_terminal(served, tmp_path, "--from", "3", "--up-to", "3")
@@ -173,7 +173,7 @@ KEYS: dict[str, Callable[[Terminal], object]] = {
 
 
 @pytest.mark.parametrize("key", KEYS)
-async def test_whatever_the_person_does_stops_the_fingers(
+async def test_every_key_that_interrupts_stops_the_fingers(
     served: SimulatorServer, tmp_path: Path, key: str
 ) -> None:
     terminal = await moves(served, tmp_path)

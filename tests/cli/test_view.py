@@ -29,7 +29,7 @@ async def test_it_prints_where_to_look_and_leaves_the_fingers_alone(
         assert gripper.request_registers == before
 
 
-async def test_a_lost_gripper_is_told_at_once(shell: Shell, server: SimulatorServer) -> None:
+async def test_a_lost_gripper_is_reported_at_once(shell: Shell, server: SimulatorServer) -> None:
     process = await shell.start("view", "--port", "0", server.address)
     await shell.read_line(process)
     server.cut()

@@ -101,7 +101,7 @@ def test_bad_input_is_one_clear_line(
     assert outcome.err.count("\n") == 1
 
 
-async def test_the_demo_waits_until_somebody_looks(shell: Shell) -> None:
+async def test_the_demo_waits_until_the_page_is_opened(shell: Shell) -> None:
     process = await shell.start("demo", "--show")
     lines = [await shell.read_line(process) for _ in range(3)]
     url = next(line.partition(": ")[2] for line in lines if line.startswith("Watch it move: "))

@@ -91,7 +91,7 @@ async def test_a_loop_that_commands_at_every_status(here: Bench, hand: Hand) -> 
 
 @contract
 @pytest.mark.parametrize("waits", [0, 1, 30])
-async def test_what_was_commanded_last_wins_whichever_way(here: Bench, hand: Hand, waits: int) -> None:
+async def test_the_last_command_wins_over_all_calls(here: Bench, hand: Hand, waits: int) -> None:
     for value in range(waits):
         hand.command(position=value)
     hand.command(position=90)
@@ -135,7 +135,7 @@ async def test_nothing_commanded_before_a_halt_comes_after_it(here: Bench, hand:
 
 @contract
 @pytest.mark.parametrize("turns", range(6))
-async def test_a_cancelled_halt_is_sent_all_the_same(here: Bench, hand: Hand, turns: int) -> None:
+async def test_a_cancelled_halt_is_still_sent(here: Bench, hand: Hand, turns: int) -> None:
     await hand.set_position(255, Finger.ALL)
     await here.moves()
     halting = asyncio.create_task(hand.halt())

@@ -34,7 +34,7 @@ async def heard(events: Stream[GripEvent], count: int) -> list[GripEvent]:
         return [await anext(events) for _ in range(count)]
 
 
-async def told(events: Stream[GripEvent], count: int) -> list[tuple[GripChange, Finger]]:
+async def next_changes(events: Stream[GripEvent], count: int) -> list[tuple[GripChange, Finger]]:
     """What the next events tell."""
     return [(event.change, event.finger) for event in await heard(events, count)]
 
@@ -81,7 +81,7 @@ async def test_nothing_there(here: Bench, hand: Hand) -> None:
 
 
 @contract
-async def test_what_stops_a_finger_that_opens_is_not_held(here: Bench, hand: Hand) -> None:
+async def test_a_contact_while_opening_is_not_held(here: Bench, hand: Hand) -> None:
     await hand.move(200, speed=255)
     here.gripper.place_object(A, 100, opening=True)
     opened = await hand.open()
@@ -216,7 +216,7 @@ async def test_a_part_that_slips_and_is_held_again(here: Bench, hand: Hand) -> N
     events = hand.grip_events(A, since=grasp.status)
     here.gripper.place_object(A, position=180)
     await hand.set_force(60)
-    assert await told(events, 2) == [(SLIPPED, A), (GAINED, A)]
+    assert await next_changes(events, 2) == [(SLIPPED, A), (GAINED, A)]
 
 
 @contract
@@ -226,7 +226,7 @@ async def test_opening_releases_the_part_and_a_reset_loses_it(here: Bench, hand:
         grasp = await hand.grasp()
         events = hand.grip_events(since=grasp.status)
         await let_go()
-        assert await told(events, 3) == [(change, A), (change, B), (change, C)]
+        assert await next_changes(events, 3) == [(change, A), (change, B), (change, C)]
         assert not events.take_nowait()
     await hand.activate()
 
@@ -236,7 +236,7 @@ async def test_events_begin_with_the_newest_status_or_the_one_given(here: Bench,
     here.gripper.place_object(A, position=150)
     grasp = await hand.grasp(A)
     await hand.open(A)
-    assert await told(hand.grip_events(A, since=grasp.status), 1) == [(RELEASED, A)]
+    assert await next_changes(hand.grip_events(A, since=grasp.status), 1) == [(RELEASED, A)]
     events = hand.grip_events(A)
     await asyncio.sleep(0.2)
     assert events.take_nowait() is None, "it begins with the newest status"
@@ -247,7 +247,7 @@ async def test_a_finger_that_presses_again_after_a_fault_has_kept_its_grip(here:
     here.gripper.place_object(A, position=60)
     grasping = asyncio.create_task(hand.grasp(speed=0))
     events = hand.grip_events()
-    assert await told(events, 1) == [(GAINED, A)]
+    assert await next_changes(events, 1) == [(GAINED, A)]
     here.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 1.0)
     assert isinstance(await ended(grasping), GripperFaultError)
     await hand.wait_for_state(State.RUNNING_IDLE)
@@ -268,7 +268,7 @@ async def test_the_link_is_lost_and_comes_back(here: Bench, hand: Hand) -> None:
     late = hand.grip_events()
     await here.server.accept()
     for each in (events, late):
-        assert await told(each, 3) == [(LOST, A), (LOST, B), (LOST, C)]
+        assert await next_changes(each, 3) == [(LOST, A), (LOST, B), (LOST, C)]
 
 
 @contract
@@ -278,7 +278,7 @@ async def test_it_begins_before_the_start_and_ends_after_the_stop(here: Bench) -
     here.gripper.place_object(A, position=150)
     async with hand:
         await hand.grasp()
-    assert await told(events, 1) == [(GAINED, A)]
+    assert await next_changes(events, 1) == [(GAINED, A)]
     assert [event async for event in events] == [], "the stop ends no contact"
     closed = here.make().grip_events()
     await closed.aclose()
@@ -295,5 +295,5 @@ async def test_a_cancelled_wait_for_an_event_loses_nothing(here: Bench, hand: Ha
     waiting.cancel()
     await asyncio.wait({waiting})
     await hand.grasp(A)
-    assert await told(events, 1) == [(GAINED, A)]
+    assert await next_changes(events, 1) == [(GAINED, A)]
     assert events.missed == 0

@@ -89,7 +89,7 @@ async def test_one_in_fault_is_left_there(here: Bench) -> None:
 
 
 @contract
-async def test_one_that_is_released_is_left_so(here: Bench) -> None:
+async def test_a_released_gripper_is_left_released(here: Bench) -> None:
     async with here.make() as hand:
         here.gripper.emergency_release()
         await hand.wait_for_state(State.ATR_DONE)
@@ -221,7 +221,7 @@ async def test_stop_before_any_start(here: Bench) -> None:
 
 
 @contract
-async def test_everybody_who_stops_it_waits_until_it_has_stopped(here: Bench, hand: Hand) -> None:
+async def test_every_caller_of_stop_waits_until_the_hand_has_stopped(here: Bench, hand: Hand) -> None:
     await hand.set_position(255)
     await here.moves()
 
@@ -302,7 +302,7 @@ async def test_leaving_by_cancellation_stops_the_fingers(here: Bench) -> None:
 
 
 @contract
-async def test_nobody_there(here: Bench) -> None:
+async def test_nothing_answers(here: Bench) -> None:
     hand = here.make()
     if here.lab is None:
         here.server.refuse()
@@ -316,7 +316,7 @@ async def test_nobody_there(here: Bench) -> None:
 
 
 @contract
-async def test_what_it_was_told_while_it_did_not_run(here: Bench) -> None:
+async def test_calls_before_the_start_are_refused_and_have_no_later_effect(here: Bench) -> None:
     hand = here.make()
     for _ in range(2):
         for call in (*COMMANDS, "wait_for_state"):

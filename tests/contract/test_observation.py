@@ -120,12 +120,12 @@ async def test_timestamps_are_of_this_process_and_only_rise(here: Bench, hand: H
     stamps = [status.timestamp for status in stream.drain()]
     assert len(stamps) > 50
     assert all(before < after for before, after in itertools.pairwise(stamps))
-    for told in (
+    for times in (
         [each.timestamp for each in transitions.drain()],
         [each.timestamp for each in requests.drain()],
     ):
-        assert told == sorted(told)
-        assert began - 0.01 <= told[0] <= told[-1] <= now()
+        assert times == sorted(times)
+        assert began - 0.01 <= times[0] <= times[-1] <= now()
 
 
 @contract

@@ -67,7 +67,7 @@ async def test_it_ends_with_stop(here: Bench) -> None:
 
 
 @contract(active=False)
-async def test_what_waits_when_it_stops_ends(here: Bench, hand: Hand) -> None:
+async def test_a_stop_ends_every_wait(here: Bench, hand: Hand) -> None:
     await hand.activate()
     here.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
     await hand.wait_for_state(State.FAULT)

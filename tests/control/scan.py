@@ -27,30 +27,30 @@ class Outcome:
     """A caller that waits, and its result; a second result is a failure."""
 
     def __init__(self) -> None:
-        self.told: list[object] = []
+        self.answers: list[object] = []
 
     def done(self) -> bool:
-        return bool(self.told)
+        return bool(self.answers)
 
     def set_result(self, result: object) -> None:
-        self.told.append(result)
-        assert len(self.told) == 1, f"told twice: {self.told}"
+        self.answers.append(result)
+        assert len(self.answers) == 1, f"answered twice: {self.answers}"
 
     set_exception = set_result
 
     @property
-    def is_told(self) -> bool:
-        return bool(self.told)
+    def is_answered(self) -> bool:
+        return bool(self.answers)
 
     @property
     def result(self) -> MoveResult:
-        assert isinstance(self.told[0], MoveResult), self.told
-        return self.told[0]
+        assert isinstance(self.answers[0], MoveResult), self.answers
+        return self.answers[0]
 
     @property
     def error(self) -> RobotiqError:
-        assert isinstance(self.told[0], RobotiqError), self.told
-        return self.told[0]
+        assert isinstance(self.answers[0], RobotiqError), self.answers
+        return self.answers[0]
 
 
 class Scan:
@@ -178,7 +178,7 @@ class Scan:
     def moved(self, position: int, axes: Finger = Finger.ABC, **options: int) -> MoveResult:
         """A move, waited for."""
         _, outcome = self.move(position, axes, **options)
-        self.until(lambda: outcome.is_told)
+        self.until(lambda: outcome.is_answered)
         return outcome.result
 
     def command(
@@ -205,7 +205,7 @@ class Scan:
     def halted(self) -> None:
         """A halt, waited for."""
         outcome = self.halt()
-        self.until(lambda: outcome.is_told)
+        self.until(lambda: outcome.is_answered)
 
     def stop(self, *, keep_grip: bool = False) -> None:
         self.controller.stop()

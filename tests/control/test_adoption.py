@@ -1,4 +1,4 @@
-"""What an adopted axis was asked to do, told from what it does."""
+"""What an adopted axis was asked to do, derived from what it does."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def positions(request: Request) -> list[int]:
         ((THERE, THERE, THERE, THERE), (255, 255, 255, 255), (180, 181, 182, 219), (180, 181, 182, 219)),
     ],
 )
-def test_what_a_gripper_at_rest_was_asked(
+def test_the_request_of_an_adopted_gripper_at_rest(
     what: tuple[ObjectStatus, ...], echo: Four, position: Four, expected: Four
 ) -> None:
     assert positions(adopted(gripper(*what, echo=echo, position=position))) == [*expected]
@@ -88,7 +88,7 @@ def test_what_a_gripper_at_rest_was_asked(
         ),
     ],
 )
-def test_what_the_fingers_of_a_moving_gripper_were_asked(
+def test_the_request_of_an_adopted_gripper_in_motion(
     what: tuple[ObjectStatus, ...], echo: Four, first: Four, later: Four, expected: Four
 ) -> None:
     moved = gripper(*what, echo=echo, position=later, at=DIRECTION_WAIT_S)
@@ -154,7 +154,7 @@ def test_an_axis_at_rest_that_contradicts_its_echo_may_show_what_was_before_it(
     assert adoption.is_certain, "it is so, and not late"
 
 
-def test_a_gripper_that_was_never_told_to_go_is_certain_at_once() -> None:
+def test_a_gripper_with_rgto_clear_is_certain_at_once() -> None:
     assert Adoption(status_of(0x31, 0x00)).is_certain
 
 

@@ -13,22 +13,22 @@ from tests.control.scan import Outcome, Scan
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 
 
-def test_what_is_set_between_two_polls_is_one_write_and_the_last_value_wins(scan: Scan) -> None:
+def test_settings_between_two_polls_are_one_write_and_the_last_value_wins(scan: Scan) -> None:
     writes = len(scan.written)
-    told = [scan.command(A, position=value) for value in (10, 20, 30)]
-    told.append(scan.command(B, speed=7))
-    told.append(scan.command(C, force=9))
+    outcomes = [scan.command(A, position=value) for value in (10, 20, 30)]
+    outcomes.append(scan.command(B, speed=7))
+    outcomes.append(scan.command(C, force=9))
     scan.step()
     assert len(scan.written) == writes + 1
     image = scan.last_image
     assert (image.position(A), image.axes[1].speed, image.axes[2].force) == (30, 7, 9)
-    assert [outcome.told for outcome in told] == [[None]] * 5
+    assert [outcome.answers for outcome in outcomes] == [[None]] * 5
 
 
 def test_is_moving_from_the_command_until_the_end(scan: Scan) -> None:
     outcome = scan.command(A, position=200)
     assert scan.controller.is_moving
-    while not outcome.is_told:
+    while not outcome.is_answered:
         scan.step()
     assert scan.controller.is_moving, "acknowledged, but it does not act yet"
     scan.until(lambda: not scan.controller.is_moving)
@@ -69,7 +69,7 @@ def test_the_default_timeout_goes_by_the_speed_an_axis_has_or_is_about_to_get(sc
     assert default_timeout(scan, 241, B) == usual
 
 
-def test_what_cannot_move_has_no_timeout() -> None:
+def test_a_hand_that_cannot_move_has_no_default_timeout() -> None:
     scan = Scan()
     with pytest.raises(ConnectionLostError):
         default_timeout(scan, 241, A)

@@ -32,7 +32,7 @@ def test_priority_codes_neither_raise_nor_lead_to_fault(scan: Scan, code: int) -
     _, outcome = scan.move(255)
     scan.run(0.3)
     scan.gripper.inject_fault(code)
-    scan.until(lambda: outcome.is_told)
+    scan.until(lambda: outcome.is_answered)
     assert scan.state is State.RUNNING_IDLE
     assert outcome.result.positions[A] >= 240
 
@@ -59,7 +59,7 @@ def test_nothing_resumes_when_a_minor_fault_clears(scan: Scan) -> None:
     assert scan.gripper.position(A) == pytest.approx(at, abs=2)
 
 
-def test_a_motion_nobody_awaits_does_not_resume_either(scan: Scan) -> None:
+def test_a_motion_that_is_not_awaited_does_not_resume_either(scan: Scan) -> None:
     scan.command(A, position=255)
     scan.run(0.5)
     scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.5)
@@ -134,15 +134,15 @@ def test_an_axis_that_the_fault_keeps_from_its_last_two_counts_is_held(device_cy
 def test_a_motion_of_ours_does_not_resume_after_a_fault_because_another_client_moved_another_axis(
     scan: Scan,
 ) -> None:
-    _, told = scan.move(200, A)
+    _, outcome = scan.move(200, A)
     scan.run(0.3)
     image = Request.from_registers(scan.gripper.request_registers)
     scan.gripper.write(0, image.with_positions({B: 60}).registers)
     scan.run(0.5)
-    assert not told.is_told, "A is still ours"
+    assert not outcome.is_answered, "A is still ours"
     scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.5)
     scan.run(0.1)
-    assert isinstance(told.error, GripperFaultError)
+    assert isinstance(outcome.error, GripperFaultError)
     at = scan.positions()[A]
     scan.run(5)
     assert scan.positions()[A] <= at + 2
@@ -172,7 +172,7 @@ def test_a_fault_at_the_loss_of_the_activation_does_not_activate(scan: Scan) -> 
     assert len(scan.written) == written
 
 
-def test_what_waits_in_fault_is_not_written_to_a_gripper_that_lost_its_activation(scan: Scan) -> None:
+def test_stops_pending_in_fault_are_not_written_once_the_activation_is_lost(scan: Scan) -> None:
     """A hold or a halt carries rACT = 1: written after a power cycle it would activate."""
     scan.move(255)
     scan.run(0.5)

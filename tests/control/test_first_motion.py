@@ -70,7 +70,7 @@ def test_a_jaw_has_no_such_limits() -> None:
 
 
 @pytest.mark.parametrize(("counts", "follows"), [(TOLERANCE, False), (TOLERANCE + 1, True)])
-def test_what_moves_by_more_than_the_tolerance_follows(counts: int, follows: bool) -> None:
+def test_a_motion_beyond_the_tolerance_counts_as_following(counts: int, follows: bool) -> None:
     status = at()
     first = watching(status, A)
     first.see(status, going(status, A=200), lambda _: True, BEGUN)

@@ -41,7 +41,7 @@ def seen(
     return status_of(byte_0, 0xFC | what, fault, echo=echo, position=positions, at=at)
 
 
-def told(*statuses: RobotiqStatus, watch: GripWatch | None = None) -> list[tuple[GripChange, int]]:
+def changes_in(*statuses: RobotiqStatus, watch: GripWatch | None = None) -> list[tuple[GripChange, int]]:
     """What statuses tell, and how far A has moved then."""
     watch = watch or GripWatch()
     events = [event for status in statuses for event in watch.see(status)]
@@ -56,42 +56,42 @@ def told(*statuses: RobotiqStatus, watch: GripWatch | None = None) -> list[tuple
 def test_a_contact_is_gained(contact: ObjectStatus, request_: int) -> None:
     watch = GripWatch()
     before, after = seen(MOVING, 100, request_), seen(contact, 150, request_)
-    assert told(before, after, after, watch=watch) == [(GAINED, 0)]
+    assert changes_in(before, after, after, watch=watch) == [(GAINED, 0)]
     assert watch.holds == A
 
 
 def test_the_contacts_of_the_first_status_are_where_it_begins() -> None:
     watch = GripWatch()
-    assert told(seen(CLOSING, 150), seen(CLOSING, 150), watch=watch) == []
+    assert changes_in(seen(CLOSING, 150), seen(CLOSING, 150), watch=watch) == []
     assert watch.holds == A
-    assert told(seen(REACHED, 241), watch=watch) == [(LOST, 91)]
+    assert changes_in(seen(REACHED, 241), watch=watch) == [(LOST, 91)]
 
 
 @pytest.mark.parametrize("moved", range(-6, 7))
 def test_an_axis_that_moves_in_contact_slips(moved: int) -> None:
     slips = abs(moved) > SLIP_COUNTS
-    assert told(seen(CLOSING, 150), seen(CLOSING, 150 + moved)) == [(SLIPPED, moved)] * slips
+    assert changes_in(seen(CLOSING, 150), seen(CLOSING, 150 + moved)) == [(SLIPPED, moved)] * slips
 
 
 def test_how_far_it_may_move_can_be_said() -> None:
-    assert told(seen(CLOSING, 150), seen(CLOSING, 152), watch=GripWatch(slip=1)) == [(SLIPPED, 2)]
-    assert told(seen(CLOSING, 150), seen(CLOSING, 160), watch=GripWatch(slip=10)) == []
+    assert changes_in(seen(CLOSING, 150), seen(CLOSING, 152), watch=GripWatch(slip=1)) == [(SLIPPED, 2)]
+    assert changes_in(seen(CLOSING, 150), seen(CLOSING, 160), watch=GripWatch(slip=10)) == []
 
 
 def test_an_axis_that_tries_again_and_gets_nowhere_has_kept_its_grip() -> None:
     watch = GripWatch()
     again = [seen(MOVING, 150), seen(MOVING, 152), seen(CLOSING, 152)]
-    assert told(seen(CLOSING, 150), *again, watch=watch) == []
+    assert changes_in(seen(CLOSING, 150), *again, watch=watch) == []
     assert watch.holds == A
 
 
 def test_an_axis_that_tries_again_and_gets_further_has_slipped() -> None:
     watch = GripWatch()
     on_its_way = [seen(MOVING, position) for position in (150, 153, 160, 170)]
-    assert told(seen(CLOSING, 150), *on_its_way, watch=watch) == [(SLIPPED, 10)]
+    assert changes_in(seen(CLOSING, 150), *on_its_way, watch=watch) == [(SLIPPED, 10)]
     assert watch.holds == Finger(0), "until the gripper says so again"
-    assert told(seen(CLOSING, 172), watch=watch) == [(GAINED, 0)]
-    assert told(seen(CLOSING, 174), seen(CLOSING, 176), watch=watch) == [(SLIPPED, 4)]
+    assert changes_in(seen(CLOSING, 172), watch=watch) == [(GAINED, 0)]
+    assert changes_in(seen(CLOSING, 174), seen(CLOSING, 176), watch=watch) == [(SLIPPED, 4)]
 
 
 HELD, SHORT, INSIDE = seen(CLOSING, 150), seen(CLOSING, 150, 200), seen(OPENING, 60, 0)
@@ -111,7 +111,7 @@ OPENS_LATE = [seen(CLOSING, position, 0) for position in (150, 147, 145, 141)]
         ([HELD, seen(REACHED, 241)], [(LOST, 91)]),
         ([SHORT, seen(MOVING, 160, 200), seen(REACHED, 200, 200)], [(SLIPPED, 10), (LOST, 40)]),
         ([SHORT, seen(REACHED, 200, 200)], [(LOST, 50)]),
-        # It is asked to let go: that is told when the contact ends.
+        # It is asked to let go: the event comes when the contact ends.
         ([HELD, seen(MOVING, 149, 0)], [(RELEASED, -1)]),
         ([HELD, seen(REACHED, 6, 0)], [(RELEASED, -144)]),
         ([HELD, seen(REACHED, 150, 150)], [(RELEASED, 0)]),
@@ -146,14 +146,14 @@ OPENS_LATE = [seen(CLOSING, position, 0) for position in (150, 147, 145, 141)]
     ],
 )
 def test_statuses_tell(statuses: list[RobotiqStatus], changes: list[tuple[GripChange, int]]) -> None:
-    assert told(*statuses) == changes
+    assert changes_in(*statuses) == changes
 
 
 def test_it_may_begin_with_a_status_from_before() -> None:
     watch = GripWatch(since=seen(CLOSING, 150))
     assert watch.holds == A
-    assert told(seen(REACHED, 241), watch=watch) == [(LOST, 91)]
-    assert told(seen(CLOSING, 150), watch=GripWatch(since=seen(REACHED, 6, 6))) == [(GAINED, 0)]
+    assert changes_in(seen(REACHED, 241), watch=watch) == [(LOST, 91)]
+    assert changes_in(seen(CLOSING, 150), watch=GripWatch(since=seen(REACHED, 6, 6))) == [(GAINED, 0)]
 
 
 def test_only_the_axes_that_are_watched_tell() -> None:
@@ -200,7 +200,7 @@ def reports_contact(status: RobotiqStatus) -> bool:
 
 
 @given(STATUSES)
-def test_what_the_gripper_calls_a_contact_is_held_and_what_rests_without_one_is_not(
+def test_an_axis_in_contact_holds_and_one_at_rest_without_contact_does_not(
     statuses: list[RobotiqStatus],
 ) -> None:
     watch = GripWatch(A)
@@ -212,7 +212,7 @@ def test_what_the_gripper_calls_a_contact_is_held_and_what_rests_without_one_is_
 
 
 @given(STATUSES)
-def test_the_events_alone_tell_who_holds(statuses: list[RobotiqStatus]) -> None:
+def test_the_events_alone_say_which_axes_hold(statuses: list[RobotiqStatus]) -> None:
     watch, holds, is_slipping = GripWatch(A), False, False
     for status in [seen(REACHED, 6, 0), *statuses]:
         for event in watch.see(status):
@@ -244,7 +244,9 @@ def test_no_reading_is_too_much_for_it(readings: list[list[int]]) -> None:
 
 
 @given(STATUSES, st.integers(0, 30))
-def test_whoever_misses_some_learns_what_is_left_of_it(statuses: list[RobotiqStatus], missed: int) -> None:
+def test_a_watch_that_misses_statuses_ends_with_the_same_grips(
+    statuses: list[RobotiqStatus], missed: int
+) -> None:
     patient, slow = GripWatch(A), GripWatch(A)
     end = seen(CLOSING, 150) if missed % 2 else seen(REACHED, 241)
     for status in [*statuses, end]:
@@ -335,14 +337,16 @@ def grasp(at_least: int, **outcomes: ObjectStatus) -> GraspResult:
         ({"A": REACHED, "B": REACHED, "C": REACHED}, Finger(0)),
     ],
 )
-def test_what_a_contact_stopped_while_closing_holds(outcomes: dict[str, ObjectStatus], holds: Finger) -> None:
+def test_axes_stopped_by_a_contact_while_closing_hold(
+    outcomes: dict[str, ObjectStatus], holds: Finger
+) -> None:
     for at_least in (1, 2, 3):
         result = grasp(at_least, **outcomes)
         assert result.holds == holds
         assert result.is_held == bool(result) == (holds.bit_count() >= at_least)
 
 
-def test_it_is_told_in_the_words_that_a_person_looks_for() -> None:
+def test_the_repr_of_a_grasp_result() -> None:
     assert repr(grasp(1, A=CLOSING, B=REACHED)) == (
         "<GraspResult held: contact of A, 1 needed; A=150, B=150>"
     )

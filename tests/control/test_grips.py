@@ -42,7 +42,7 @@ def test_a_halted_grip_survives_a_blink_of_the_link(scan: Scan) -> None:
     assert scan.latest.requested_position(B) == 255
 
 
-def test_a_grip_that_is_not_taken_up_again_is_told(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_grip_that_is_not_resumed_is_logged(caplog: pytest.LogCaptureFixture) -> None:
     """The first program let go of rGTO; who comes next cannot know what its fingers were asked."""
     first = started()
     first.gripper.place_object(A | B | C, 150)
@@ -69,7 +69,7 @@ def test_a_grip_that_is_taken_up_again_needs_no_word(scan: Scan, caplog: pytest.
     assert not caplog.messages
 
 
-def test_a_grip_that_is_somewhere_else_by_now_is_none(scan: Scan) -> None:
+def test_an_axis_that_has_moved_since_no_longer_grips(scan: Scan) -> None:
     scan.gripper.place_object(Finger.ABC, 150)
     scan.moved(255)
     scan.halted()

@@ -17,8 +17,8 @@ def test_halt_stops_everything_and_ends_moves(scan: Scan) -> None:
     scan.run(0.5)
     halted = scan.halt()
     assert isinstance(outcome.error, MoveSupersededError)
-    scan.until(lambda: halted.is_told)
-    assert halted.told == [None]
+    scan.until(lambda: halted.is_answered)
+    assert halted.answers == [None]
     assert not scan.gripper.is_moving
     assert not scan.latest.go_echo
 
@@ -31,7 +31,7 @@ def test_a_command_after_a_halt_moves_only_its_own_axes(scan: Scan) -> None:
     scan.step()
     scan.step()
     travel = {axis: scan.gripper.travel(axis) for axis in (B, C, S)}
-    scan.until(lambda: outcome.is_told)
+    scan.until(lambda: outcome.is_answered)
     scan.run(1.0)
     for axis in (B, C, S):
         assert scan.gripper.travel(axis) - travel[axis] <= 1, axis
@@ -46,7 +46,7 @@ def test_a_command_after_a_halt_waits_until_a_slow_gripper_has_stopped() -> None
     _, outcome = scan.move(0, A)
     scan.until(lambda: not scan.latest.go_echo)
     travel = {axis: scan.gripper.travel(axis) for axis in (B, C)}
-    scan.until(lambda: outcome.is_told)
+    scan.until(lambda: outcome.is_answered)
     for axis in (B, C):
         assert scan.gripper.travel(axis) - travel[axis] <= 1, axis
 
@@ -62,7 +62,7 @@ def test_halt_drops_what_was_not_sent_yet(scan: Scan) -> None:
 def test_halt_in_reset_has_nothing_to_do() -> None:
     scan = Scan()
     scan.connect(activate=False)
-    assert scan.halt().told == [None]
+    assert scan.halt().answers == [None]
     scan.run(0.05)
     assert not scan.written
 
@@ -75,14 +75,14 @@ def test_a_halt_does_not_wait_for_an_axis_to_show_its_direction() -> None:
     halted = scan.halt()
     scan.step()
     assert len(scan.written) == 1
-    scan.until(lambda: halted.is_told, 0.05)
-    assert halted.told == [None]
+    scan.until(lambda: halted.is_answered, 0.05)
+    assert halted.answers == [None]
     assert not scan.gripper.is_moving
 
 
 @pytest.mark.parametrize("moving", [True, False])
 @pytest.mark.parametrize("code", [0x09, 0x0A, 0x0E])
-def test_halt_in_fault_is_told_while_the_fault_lasts(scan: Scan, code: int, moving: bool) -> None:
+def test_halt_in_fault_ends_while_the_fault_lasts(scan: Scan, code: int, moving: bool) -> None:
     if moving:
         scan.move(255)
         scan.run(0.5)
@@ -90,8 +90,8 @@ def test_halt_in_fault_is_told_while_the_fault_lasts(scan: Scan, code: int, movi
     scan.run(0.1)
     assert scan.state is State.FAULT
     halted = scan.halt()
-    scan.until(lambda: halted.is_told, 0.7)
-    assert halted.told == [None]
+    scan.until(lambda: halted.is_answered, 0.7)
+    assert halted.answers == [None]
     assert not scan.latest.go_echo
 
 
@@ -103,7 +103,7 @@ def test_a_halt_outlives_a_fault_in_the_same_poll() -> None:
     assert scan.state is State.FAULT
     at = scan.positions()[A]
     scan.run(10)
-    assert halted.told == [None]
+    assert halted.answers == [None]
     assert scan.positions()[A] <= at + 4
 
 
@@ -115,7 +115,7 @@ def test_a_halt_that_the_gripper_forgets_is_written_once_more(scan: Scan, forgot
     halted, before = scan.halt(), len(scan.written)
     scan.forgets = forgotten
     scan.run(1.5)
-    assert halted.told == [None]
+    assert halted.answers == [None]
     assert len(scan.written) - before == 2
     assert scan.written[-1] == scan.written[-2]
     assert scan.gripper.is_moving is (forgotten == 2)

@@ -30,22 +30,22 @@ def test_axes_that_move_are_held_and_their_moves_end(device_cycle: float) -> Non
     at = scan.positions()[A]
     asked = scan.hold(A)
     assert isinstance(held.error, MoveSupersededError)
-    scan.until(lambda: asked.is_told, 0.6)
-    assert asked.told == [None]
-    scan.until(lambda: other.is_told)
+    scan.until(lambda: asked.is_answered, 0.6)
+    assert asked.answers == [None]
+    scan.until(lambda: other.is_answered)
     assert other.result.positions[B] == 200
     assert scan.positions()[A] <= at + 1 + 30 * device_cycle
     assert scan.state is State.RUNNING_IDLE
 
 
-def test_a_hold_is_told_when_it_is_acknowledged(scan: Scan) -> None:
+def test_a_hold_ends_when_it_is_acknowledged(scan: Scan) -> None:
     scan.move(200, A)
     scan.run(0.5)
     written = len(scan.written)
     asked = scan.hold()
     assert scan.state is State.RUNNING_CC
     scan.step()
-    assert (len(scan.written), asked.told, scan.state) == (written + 1, [None], State.RUNNING_IDLE)
+    assert (len(scan.written), asked.answers, scan.state) == (written + 1, [None], State.RUNNING_IDLE)
     scan.run(1.0)
     assert len(scan.written) == written + 1
 
@@ -71,7 +71,7 @@ def test_where_nothing_moves_nothing_is_written(scan: Scan) -> None:
     written = len(scan.written)
     asked = scan.hold()
     scan.step()
-    assert (len(scan.written), asked.told, scan.state) == (written, [None], State.RUNNING_IDLE)
+    assert (len(scan.written), asked.answers, scan.state) == (written, [None], State.RUNNING_IDLE)
 
 
 def test_a_motion_that_was_written_and_does_not_act_yet_is_held() -> None:
@@ -80,17 +80,17 @@ def test_a_motion_that_was_written_and_does_not_act_yet_is_held() -> None:
     scan.step()
     asked = scan.hold(A)
     scan.run(2.0)
-    assert asked.told == [None]
+    assert asked.answers == [None]
     assert scan.positions()[A] <= 10
 
 
-def test_what_was_not_sent_yet_is_dropped(scan: Scan) -> None:
+def test_a_hold_drops_unsent_positions_of_its_axes(scan: Scan) -> None:
     dropped, other = scan.command(A, position=200), scan.command(B, position=100)
     asked = scan.hold(A)
     assert isinstance(dropped.error, MoveSupersededError)
-    scan.until(lambda: asked.is_told)
+    scan.until(lambda: asked.is_answered)
     scan.run(2.0)
-    assert other.told == [None]
+    assert other.answers == [None]
     assert scan.positions()[A] <= 7
     assert scan.positions()[B] == 100
 
@@ -100,35 +100,35 @@ def test_a_command_after_a_hold_moves_again(scan: Scan) -> None:
     scan.run(0.5)
     asked = scan.hold(A)
     again = scan.moved(220, A)
-    assert asked.told == [None]
+    assert asked.answers == [None]
     assert again.positions[A] == 220
 
 
-def test_a_halt_does_for_whoever_waits_for_a_hold(scan: Scan) -> None:
+def test_a_halt_also_ends_a_pending_hold(scan: Scan) -> None:
     scan.move(200, A)
     scan.run(0.5)
     asked, halted = scan.hold(A), scan.halt()
-    scan.until(lambda: halted.is_told, 0.6)
-    assert asked.told == [None]
+    scan.until(lambda: halted.is_answered, 0.6)
+    assert asked.answers == [None]
     assert not scan.gripper.is_moving
 
 
-def test_a_hold_after_a_halt_is_told_too(scan: Scan) -> None:
+def test_a_hold_after_a_halt_ends_too(scan: Scan) -> None:
     scan.move(200, A)
     scan.run(0.5)
     halted, asked = scan.halt(), scan.hold(A)
-    scan.until(lambda: asked.is_told, 0.6)
-    scan.until(lambda: halted.is_told, 0.6)
+    scan.until(lambda: asked.is_answered, 0.6)
+    scan.until(lambda: halted.is_answered, 0.6)
     assert not scan.gripper.is_moving
 
 
 # -- what another client moves -----------------------------------------------------------------------------
 
 
-def test_what_another_client_moves_is_held_too() -> None:
+def test_motion_of_another_client_is_held_too() -> None:
     scan = moved_by_another()
     asked = scan.hold(A)
-    scan.until(lambda: asked.is_told, 0.6)
+    scan.until(lambda: asked.is_answered, 0.6)
     at = scan.positions()
     scan.run(2.0)
     assert scan.positions()[A] <= at[A] + 1
@@ -141,7 +141,7 @@ def test_a_hold_survives_that_another_client_takes_over_before_it_is_written(sca
     asked = scan.hold(A)
     scan.gripper.write(0, going_to(200, speed=0))
     scan.run(0.02)
-    scan.until(lambda: asked.is_told, 0.6)
+    scan.until(lambda: asked.is_answered, 0.6)
     at = scan.positions()[A]
     scan.run(2.0)
     assert scan.positions()[A] <= at + 1
@@ -163,7 +163,7 @@ def test_in_an_activation_a_hold_does_nothing(steps: int) -> None:
     for _ in range(steps):
         scan.step()
     written = len(scan.written)
-    assert scan.hold().told == [None]
+    assert scan.hold().answers == [None]
     scan.until(lambda: scan.state is State.RUNNING_IDLE)
     assert len(scan.written) == max(written, 1)
 
@@ -175,15 +175,15 @@ def test_in_a_release_a_hold_does_nothing(scan: Scan) -> None:
     scan.controller.release()
     scan.step()
     written = len(scan.written)
-    assert scan.hold().told == [None]
+    assert scan.hold().answers == [None]
     scan.until(lambda: scan.state is State.ATR_DONE, 60)
-    assert scan.hold().told == [None]
+    assert scan.hold().answers == [None]
     scan.run(0.1)
     assert len(scan.written) == written
 
 
 @pytest.mark.parametrize("when", ["before", "after"])
-def test_a_hold_is_told_in_a_fault(scan: Scan, when: str) -> None:
+def test_a_hold_ends_in_a_fault(scan: Scan, when: str) -> None:
     scan.move(200, A)
     scan.run(0.5)
     asked = scan.hold(A) if when == "before" else None
@@ -191,8 +191,8 @@ def test_a_hold_is_told_in_a_fault(scan: Scan, when: str) -> None:
     scan.controller.see(scan.status())
     assert scan.state is State.FAULT
     asked = asked or scan.hold(A)
-    scan.until(lambda: asked.is_told, 0.6)
-    assert asked.told == [None]
+    scan.until(lambda: asked.is_answered, 0.6)
+    assert asked.answers == [None]
     at = scan.positions()[A]
     scan.run(3.0)
     assert scan.positions()[A] <= at + 2

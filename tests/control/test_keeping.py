@@ -50,7 +50,7 @@ def test_a_grip_is_kept_and_nothing_is_written(device_cycle: float) -> None:
 
 
 @CYCLES
-def test_what_moves_is_held_and_the_grip_is_kept(device_cycle: float) -> None:
+def test_moving_axes_are_held_and_the_grip_is_kept(device_cycle: float) -> None:
     scan = holding(device_cycle)
     _, moving = scan.move(255, A, speed=0)
     scan.run(0.6)
@@ -249,7 +249,7 @@ def test_replies_that_were_looked_at_late_tell_of_no_rest(caplog: pytest.LogCapt
     assert "the newest status is old" in caplog.text
 
 
-def test_an_activation_of_ours_is_taken_back_all_the_same() -> None:
+def test_an_activation_of_ours_is_still_taken_back() -> None:
     scan = Scan()
     scan.connect()
     scan.run(1.0)
@@ -257,7 +257,7 @@ def test_an_activation_of_ours_is_taken_back_all_the_same() -> None:
     assert not scan.last_image.activate
 
 
-def test_what_does_not_come_to_rest_is_stopped_in_time(caplog: pytest.LogCaptureFixture) -> None:
+def test_axes_that_do_not_come_to_rest_are_stopped_in_time(caplog: pytest.LogCaptureFixture) -> None:
     scan = Scan()
     scan.gripper = Restless(lambda: scan.now, device_cycle=0.2)
     scan.start()

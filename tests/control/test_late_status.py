@@ -20,10 +20,12 @@ CYCLES = pytest.mark.parametrize("device_cycle", [0.005, 0.2])
 FEW_POLLS_S = 6 * POLL_S
 
 
-def ended(scan: Scan, told: Outcome) -> MoveResult:
+def ended(scan: Scan, outcome: Outcome) -> MoveResult:
     """The result of a move, and what it says is so: the hand is not moving, and stays where it is."""
-    scan.until(lambda: told.is_told)
-    result, moves = told.result, [axis for axis in THREE_FINGER.axes if axis in scan.controller.status.moving]  # type: ignore[union-attr]
+    scan.until(lambda: outcome.is_answered)
+    result, status = outcome.result, scan.controller.status
+    assert status is not None
+    moves = [axis for axis in THREE_FINGER.axes if axis in status.moving]
     axes = list(result.outcomes)
     travels = scan.travels()
     assert not set(axes) & set(moves)
@@ -84,9 +86,9 @@ def test_a_move_of_nothing_ends_within_a_few_polls(lag: int, what: str) -> None:
         scan.moved(0 if what == "open" else 100)
     scan.run(1.0)
     target = {"there": 100, "within a count": 101, "latched": 200, "open": 0}[what]
-    _, told = scan.move(target)
-    assert scan.until(lambda: told.is_told) <= FEW_POLLS_S
-    assert ended(scan, told).contacts == (ABC if what == "latched" else Finger(0))
+    _, outcome = scan.move(target)
+    assert scan.until(lambda: outcome.is_answered) <= FEW_POLLS_S
+    assert ended(scan, outcome).contacts == (ABC if what == "latched" else Finger(0))
 
 
 @LAGS
@@ -101,7 +103,7 @@ def test_a_move_that_supersedes_another_ends_where_it_was_sent(lag: int, device_
         result = ended(scan, second)
         assert result.positions == dict.fromkeys((A, B, C), pytest.approx(30, abs=2)), seconds
         assert set(result.outcomes.values()) == {THERE}
-        assert first.is_told
+        assert first.is_answered
 
 
 @LAGS
@@ -136,7 +138,7 @@ def test_a_part_that_is_let_go_of_and_gripped_again_at_once(
 @LAGS
 @CYCLES
 @pytest.mark.parametrize("polls", [1, 3, 8])
-def test_who_was_sent_away_from_a_part_and_back_is_stopped_by_a_hold(
+def test_an_axis_sent_away_from_a_part_and_back_is_stopped_by_a_hold(
     lag: int, device_cycle: float, polls: int
 ) -> None:
     scan = holding(lag, device_cycle)
@@ -172,12 +174,12 @@ def test_a_hold_keeps_a_grip(lag: int, device_cycle: float) -> None:
 @pytest.mark.parametrize("seconds", [0.0, 0.01, 0.03, 0.3])
 def test_a_motion_that_is_held_stops(lag: int, device_cycle: float, seconds: float) -> None:
     scan = ready(lag, device_cycle)
-    _, told = scan.move(255, speed=255)
+    _, outcome = scan.move(255, speed=255)
     scan.step()
     scan.run(seconds)
     scan.hold()
     scan.run(0.5)
-    assert isinstance(told.error, MoveSupersededError)
+    assert isinstance(outcome.error, MoveSupersededError)
     travels = scan.travels()
     scan.run(2.0)
     assert scan.travels() == travels
@@ -195,9 +197,9 @@ def test_two_moves_at_once_end_each_in_its_time(lag: int, device_cycle: float) -
     scan.step()
     _, long = scan.move(200, C, speed=128)
     results = []
-    for told in (short, held, long):
-        scan.until(lambda told=told: told.is_told)  # type: ignore[misc]
-        results.append(told.result)
+    for outcome in (short, held, long):
+        scan.until(lambda outcome=outcome: outcome.is_answered)  # type: ignore[misc]
+        results.append(outcome.result)
     assert [result.positions[axis] for result, axis in zip(results, (A, B, C), strict=True)] == [
         pytest.approx(at, abs=2) for at in (40, 60, 200)
     ]
@@ -208,9 +210,7 @@ def test_two_moves_at_once_end_each_in_its_time(lag: int, device_cycle: float) -
 @LAGS
 @CYCLES
 @pytest.mark.parametrize("after", ["more force", "a halt"])
-def test_who_tries_again_where_the_part_is_gone_sees_that_it_is(
-    lag: int, device_cycle: float, after: str
-) -> None:
+def test_a_second_try_sees_that_the_part_is_gone(lag: int, device_cycle: float, after: str) -> None:
     """It is how a program asks whether a part is still there: the contact of before must not answer."""
     scan = holding(lag, device_cycle)
     if after == "a halt":
@@ -219,8 +219,8 @@ def test_who_tries_again_where_the_part_is_gone_sees_that_it_is(
     scan.gripper.remove_object(ABC)
     if after == "more force":
         scan.run(0.5)
-    _, told = scan.move(254, force=200) if after == "more force" else scan.move(255)
-    assert ended(scan, told).contacts == Finger(0)
+    _, outcome = scan.move(254, force=200) if after == "more force" else scan.move(255)
+    assert ended(scan, outcome).contacts == Finger(0)
 
 
 # -- what cannot be reached --------------------------------------------------------------------------------
@@ -232,10 +232,10 @@ def test_an_axis_at_a_software_limit_ends_when_the_lag_is_over(lag: int) -> None
     scan = ready(lag)
     scan.moved(255, S)
     scan.run(1.0)
-    _, told = scan.move(240, S)
-    took = scan.until(lambda: told.is_told)
+    _, outcome = scan.move(240, S)
+    took = scan.until(lambda: outcome.is_answered)
     assert took == pytest.approx(LAG_S, abs=0.05)
-    assert told.result.outcomes == {S: THERE}
+    assert outcome.result.outcomes == {S: THERE}
 
 
 # -- every reader -----------------------------------------------------------------------------------------
@@ -325,7 +325,7 @@ class Axis(Standstill):
         return self.after(0, 0)
 
 
-def test_what_is_shown_is_known_if_nothing_asked_lately_may_have_shown_it() -> None:
+def test_a_status_is_trusted_unless_an_earlier_request_explains_it() -> None:
     assert Axis().is_known(THERE, 100)
     assert not Axis().is_known(MOVING, 100)
     assert not Axis().is_doubtful(CLOSING, 100)
@@ -351,14 +351,14 @@ def test_nothing_is_known_under_what_does_not_act() -> None:
     assert not axis.is_known(THERE, 100)
 
 
-def test_what_has_been_seen_to_move_does_not_show_what_was_before_its_motion() -> None:
+def test_a_status_after_a_motion_is_not_from_before_it() -> None:
     """What is shown comes in its order; but a motion may be that of a request before, if there was one."""
     assert Axis().asked(0, 255, rested=True).asked(255, 0).seen(MOVING).is_known(CLOSING, 150)
     assert not Axis().asked(0, 255).asked(255, 0).seen(MOVING).is_known(CLOSING, 150)
 
 
 @pytest.mark.parametrize(("position", "doubtful"), [(100, True), (102, True), (103, False), (105, False)])
-def test_who_stands_between_two_requests_may_have_some_counts_to_go(position: int, doubtful: bool) -> None:
+def test_an_axis_between_two_requests_may_have_some_counts_to_go(position: int, doubtful: bool) -> None:
     assert Axis().asked(104, 100).is_doubtful(THERE, position) is doubtful
 
 
@@ -374,7 +374,7 @@ def test_a_contact_that_is_tried_again_is_known_when_the_lag_is_over() -> None:
     st.sampled_from(ObjectStatus),
     st.integers(0, 255),
 )
-def test_whatever_was_asked_is_forgotten_when_the_lag_is_over(
+def test_every_request_is_forgotten_when_the_lag_is_over(
     asked: list[tuple[int | None, bool]], what: ObjectStatus, position: int
 ) -> None:
     axis, before = Axis(), 0

@@ -49,7 +49,7 @@ def test_a_move_beyond_a_limit_ends_with_what_it_reached(
     assert scan.controller.foreign_commands == 0
 
 
-def test_it_is_learned_and_told_once(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_limit_is_learned_and_logged_once(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO)
     scan = echoing()
     for request in (255, 130, 250, 130, 255):
@@ -85,9 +85,9 @@ def test_a_control_loop_beyond_a_limit_commands_alone(device_cycle: float) -> No
     for position in range(254, 120, -2):
         scan.command(S, position=position)
         scan.step()
-    _, told = scan.move(255, S)
-    scan.until(lambda: told.is_told)
-    assert told.result.positions == {S: HIGH}
+    _, outcome = scan.move(255, S)
+    scan.until(lambda: outcome.is_answered)
+    assert outcome.result.positions == {S: HIGH}
     assert scan.controller.foreign_commands == 0
 
 
@@ -95,7 +95,7 @@ def test_two_moves_at_once_one_of_them_beyond_a_limit() -> None:
     scan = echoing()
     _, finger = scan.move(150, A)
     _, scissor = scan.move(255, S)
-    scan.until(lambda: finger.is_told and scissor.is_told)
+    scan.until(lambda: finger.is_answered and scissor.is_answered)
     assert finger.result.positions == {A: 150}
     assert scissor.result.positions == {S: HIGH}
 
@@ -123,12 +123,12 @@ def beside(scan: Scan, **positions: int) -> Registers:
 @pytest.mark.parametrize("polls", [1, 5, 60])
 def test_a_client_that_writes_after_ours_has_shown_is_one(device_cycle: float, polls: int) -> None:
     scan = started(device_cycle)
-    _, told = scan.move(200, S, speed=0)
+    _, outcome = scan.move(200, S, speed=0)
     scan.until(lambda: scan.controller.status is not None and scan.latest.requested_position(S) == 200)
     scan.run(polls * POLL_S)
     scan.gripper.write(0, beside(scan, SCISSOR=180))
-    scan.until(lambda: told.is_told, 2.0)
-    assert isinstance(told.error, MoveSupersededError)
+    scan.until(lambda: outcome.is_answered, 2.0)
+    assert isinstance(outcome.error, MoveSupersededError)
     assert scan.controller.foreign_commands == 1
 
 
@@ -146,35 +146,35 @@ def test_a_client_that_writes_just_after_us_is_one(device_cycle: float, others: 
     scan = started(device_cycle)
     scan.moved(130, S)
     scan.run(1.0)
-    _, told = scan.move(200, S, speed=0)
+    _, outcome = scan.move(200, S, speed=0)
     scan.step()
     scan.gripper.write(0, beside(scan, **others))
     scan.run(1.0)
     assert scan.controller.foreign_commands == 1
     if "SCISSOR" in others:
-        assert isinstance(told.error, MoveSupersededError)
+        assert isinstance(outcome.error, MoveSupersededError)
 
 
 @CYCLES
 def test_a_client_that_takes_the_fingers_just_after_us_is_one(device_cycle: float) -> None:
     """Fingers have a limit only near pinch."""
     scan = started(device_cycle)
-    _, told = scan.move(255)
+    _, outcome = scan.move(255)
     scan.step()
     scan.gripper.write(0, beside(scan, A=100, B=100, C=100))
-    scan.until(lambda: told.is_told, 2.0)
-    assert isinstance(told.error, MoveSupersededError)
+    scan.until(lambda: outcome.is_answered, 2.0)
+    assert isinstance(outcome.error, MoveSupersededError)
     assert scan.controller.foreign_commands == 1
 
 
-def test_who_was_seen_lately_is_the_better_explanation() -> None:
+def test_a_client_seen_lately_explains_the_echo_better() -> None:
     scan = echoing()
     scan.gripper.write(0, beside(scan, A=90))
     scan.run(2.0)
     assert scan.controller.foreign_commands == 1
-    _, told = scan.move(255, S)
-    scan.until(lambda: told.is_told)
-    assert isinstance(told.error, MoveSupersededError)
+    _, outcome = scan.move(255, S)
+    scan.until(lambda: outcome.is_answered)
+    assert isinstance(outcome.error, MoveSupersededError)
     scan.run(ALONE_S + 1)
     scan.moved(130, S)
     scan.run(1.0)
@@ -182,15 +182,15 @@ def test_who_was_seen_lately_is_the_better_explanation() -> None:
 
 
 def test_a_client_that_is_taken_for_a_limit_is_not_undone() -> None:
-    """It wrote within our device cycle, on our axis, on its way: that cannot be told. Nothing moves by it."""
+    """It wrote within our device cycle, on our axis, on its way: as a limit would. Nothing moves by it."""
     scan = started(0.03)
     scan.moved(130, S)
     scan.run(1.0)
-    _, told = scan.move(255, S)
+    _, outcome = scan.move(255, S)
     scan.step()
     scan.gripper.write(0, beside(scan, SCISSOR=180))
-    scan.until(lambda: told.is_told)
-    assert told.result.positions == {S: 180}
+    scan.until(lambda: outcome.is_answered)
+    assert outcome.result.positions == {S: 180}
     travel = scan.gripper.travel(S)
     scan.moved(100, A)
     assert scan.gripper.travel(S) == travel
@@ -217,7 +217,7 @@ BEFORE = Request(activate=True, go=True, axes=(AxisRequest(0),) * 3 + (AxisReque
         ((113, 255, 113, 130), 219, {A: 255, B: 255, C: 255}, True),
     ],
 )
-def test_what_may_be_a_limit(
+def test_which_echoes_may_be_limits(
     shown: tuple[int, ...], position: int, asked: dict[Finger, int], expected: bool
 ) -> None:
     status = status_of(0x39, 0xFF, echo=shown, position=(6, 6, 6, position))
@@ -231,7 +231,7 @@ def test_a_halt_and_a_reset_by_others_are_no_limits(byte_0: int) -> None:
     assert not Limits().suspect(BEFORE, image, status)
 
 
-def test_what_was_not_proven_is_doubted_when_another_client_is_seen() -> None:
+def test_unproven_limits_are_dropped_when_another_client_is_seen() -> None:
     limits, image = Limits(), BEFORE.with_positions({S: 255})
     status = status_of(0x39, 0xFF, echo=(0, 0, 0, 220), position=130)
     assert limits.suspect(BEFORE, image, status)

@@ -89,7 +89,7 @@ def test_a_command_after_a_lost_acknowledgement_waits_until_it_is_known_what_act
     scan.connect(activate=False)  # before the gripper acts on it, if it got it
     pending = scan.command(A, position=50)
     began = scan.now
-    scan.until(lambda: pending.is_told)
+    scan.until(lambda: pending.is_answered)
     assert scan.now - began < 0.5
     scan.until(lambda: not scan.controller.is_moving)
     assert scan.positions()[S] == pytest.approx(200 if arrived else 32, abs=2)
@@ -114,7 +114,7 @@ def test_a_lost_command_does_not_come_back_when_the_gripper_was_busy_at_the_reco
     assert scan.positions()[A] <= 52
 
 
-def test_what_was_adopted_is_not_ours_after_a_blink_of_the_link() -> None:
+def test_an_adopted_request_is_not_ours_after_a_short_link_loss() -> None:
     scan = activated_by_another()
     scan.gripper.place_object(Finger.ABC, 150)
     simple = (AxisRequest(200, 128, 64), AxisRequest(), AxisRequest(), AxisRequest(137))
@@ -167,7 +167,7 @@ def test_a_hold_outlives_what_has_replaced_it_and_was_lost(scan: Scan, how: str)
     assert abs(scan.positions()[A] - at) <= 4
 
 
-def test_a_hold_is_dropped_when_somebody_else_commands_after_the_lost_link(scan: Scan) -> None:
+def test_a_hold_is_dropped_when_another_client_commands_after_the_link_loss(scan: Scan) -> None:
     move, _ = scan.move(200, A, speed=0)
     scan.run(0.5)
     scan.controller.abandon(move)
@@ -231,10 +231,10 @@ def test_a_speed_that_was_not_acknowledged_is_not_taken_for_the_axis_s_own(scan:
 def test_a_move_cancelled_as_its_link_was_lost_is_held_though_it_had_ended(link_is_back: bool) -> None:
     """Its caller never saw the error, and knows nothing of a motion that goes on."""
     scan = started()
-    move, told = scan.move(200, A, speed=0)
+    move, outcome = scan.move(200, A, speed=0)
     scan.run(0.5)
     scan.controller.lost(None)
-    assert isinstance(told.error, ConnectionLostError)
+    assert isinstance(outcome.error, ConnectionLostError)
     if link_is_back:
         scan.come_back(0.05)
     scan.controller.abandon(move, unseen=True)

@@ -124,7 +124,7 @@ AT_REST = status_of(0x39, 0xFF, position=(9, 22, 103, 40))
         (HALTED, hold(Finger.ALL), RESTING, {}, (10, 20, 30, 40)),
     ],
 )
-def test_what_is_not_addressed_stays_or_keeps_its_request(
+def test_axes_not_addressed_stay_or_keep_their_requests(
     base: Request,
     pending: PendingCommand,
     status: RobotiqStatus,
@@ -167,7 +167,7 @@ COMMANDS = st.lists(
 
 
 @given(IMAGES, COMMANDS, MASKS, STATUSES, MASKS, MASKS)
-def test_whatever_is_asked_an_axis_that_nobody_addresses_is_asked_nothing_new_or_to_stay(
+def test_an_axis_not_addressed_keeps_its_request_or_stays(
     base: Request,
     commands: list[tuple[Finger, int | None, int | None, int | None]],
     held: Finger,

@@ -74,7 +74,7 @@ def test_a_move_ends_once_with_the_first_outcome() -> None:
     each.fail(MoveSupersededError("first"))
     each.fail(MoveSupersededError("second"))
     each.end(status_of(0xF9, 0xFF))
-    assert [str(error) for error in outcome.told] == ["first"]
+    assert [str(error) for error in outcome.answers] == ["first"]
 
 
 def test_a_move_that_ended_well_does_not_fail_afterwards() -> None:
@@ -209,7 +209,7 @@ def test_a_move_that_was_not_written_yet_does_not_end() -> None:
     each, outcome = move()
     moves = live(each)
     moves.see(ARRIVED, acts, Finger.ALL, {})
-    assert not outcome.told
+    assert not outcome.answers
     moves.written(1)
     moves.see(ARRIVED, acts, Finger.ALL, {})
     assert outcome.result.positions == {A: 0, B: 0, C: 0}
@@ -221,9 +221,9 @@ def test_a_move_whose_write_does_not_act_yet_does_not_end() -> None:
     moves = live(each)
     moves.written(7)
     moves.see(ARRIVED, lambda number: number < 7, Finger.ALL, {})
-    assert not outcome.told
+    assert not outcome.answers
     moves.see(ARRIVED, lambda number: number <= 7, Finger.ALL, {})
-    assert outcome.is_told
+    assert outcome.is_answered
 
 
 def test_a_move_takes_in_currents_from_its_write_on() -> None:
@@ -236,7 +236,7 @@ def test_a_move_takes_in_currents_from_its_write_on() -> None:
     assert set(outcome.result.peak_current_ma.values()) == {90}
 
 
-def test_what_is_written_later_is_not_what_carried_an_earlier_move() -> None:
+def test_a_later_write_does_not_carry_an_earlier_move() -> None:
     (first, _), (second, _) = move(axes=A), move(axes=B)
     moves = live(first)
     moves.written(1)
@@ -250,18 +250,18 @@ def test_every_move_that_has_arrived_ends_and_the_others_go_on() -> None:
     moves = live(first, second, third)
     moves.written(1)
     moves.see(ARRIVED, acts, Finger.ALL, {})
-    assert one.is_told
-    assert other.is_told
-    assert not goes_on.told
+    assert one.is_answered
+    assert other.is_answered
+    assert not goes_on.answers
     assert moves
 
 
-def test_those_that_an_error_is_for_fail_and_the_others_go_on() -> None:
+def test_an_error_fails_its_moves_and_the_others_go_on() -> None:
     (first, one), (second, other) = move(axes=A), move(axes=B)
     moves = live(first, second)
     moves.fail(MoveSupersededError("A"), lambda move: move.axes is A)
     assert isinstance(one.error, MoveSupersededError)
-    assert not other.told
+    assert not other.answers
     moves.fail(error := MoveSupersededError("all"))
     assert isinstance(other.error, MoveSupersededError)
     assert other.error is not error, "each caller has one of its own"
@@ -274,7 +274,7 @@ def test_a_move_leaves_once() -> None:
     assert moves.remove(each)
     assert not moves.remove(each)
     moves.fail(MoveSupersededError("too late"))
-    assert not outcome.told
+    assert not outcome.answers
 
 
 @pytest.mark.parametrize("how", ["end", "fail"])

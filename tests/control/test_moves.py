@@ -57,7 +57,7 @@ def test_going_there_and_back_quickly_ends_only_when_the_device_has_seen_it(devi
     scan.command(A, position=200)
     scan.step()
     _, outcome = scan.move(100, A)
-    scan.until(lambda: outcome.is_told)
+    scan.until(lambda: outcome.is_answered)
     scan.run(2 * device_cycle)
     assert not scan.gripper.is_moving
     assert scan.gripper.position(A) == pytest.approx(100, abs=2)
@@ -66,7 +66,7 @@ def test_going_there_and_back_quickly_ends_only_when_the_device_has_seen_it(devi
 def test_a_move_ends_although_another_axis_is_commanded_at_every_poll(scan: Scan) -> None:
     _, outcome = scan.move(200, A, speed=255)
     for value in range(2000):
-        if outcome.is_told:
+        if outcome.is_answered:
             break
         scan.command(S, position=value % 200)
         scan.step()
@@ -80,7 +80,7 @@ def test_speed_and_force_do_not_supersede_a_move(scan: Scan) -> None:
     _, outcome = scan.move(255, A, speed=0)
     scan.run(0.5)
     scan.command(A, speed=255, force=3)
-    assert scan.until(lambda: outcome.is_told) < 3
+    assert scan.until(lambda: outcome.is_answered) < 3
     assert outcome.result.outcomes[A] is ObjectStatus.AT_POSITION
 
 
@@ -113,7 +113,7 @@ def test_an_abandoned_move_leaves_the_others_alone(scan: Scan) -> None:
     _, other = scan.move(255, B)
     scan.run(0.5)
     scan.controller.abandon(move)
-    scan.until(lambda: other.is_told)
+    scan.until(lambda: other.is_answered)
     assert other.result.positions[B] >= 240
 
 
@@ -175,19 +175,19 @@ def test_a_superseded_move_that_is_abandoned_later_holds_nothing(scan: Scan) -> 
     move, outcome = scan.move(255, A)
     scan.run(0.3)
     _, second = scan.move(200, A)
-    assert outcome.is_told
+    assert outcome.is_answered
     scan.controller.abandon(move)
-    scan.until(lambda: second.is_told)
+    scan.until(lambda: second.is_answered)
     assert second.result.positions[A] == pytest.approx(200, abs=2)
 
 
-def test_who_waits_for_a_position_is_told_when_a_move_takes_it_over_and_is_given_up(scan: Scan) -> None:
+def test_a_pending_position_is_superseded_by_a_move_that_is_then_cancelled(scan: Scan) -> None:
     waiting, other = scan.command(A, position=50), scan.command(B, position=70)
     move, _ = scan.move(100, A)
     scan.controller.abandon(move)
     scan.run(1)
     assert isinstance(waiting.error, MoveSupersededError)
-    assert other.told == [None]
+    assert other.answers == [None]
     assert scan.positions()[A] < 10
     scan.until(lambda: not scan.controller.is_moving)
     assert abs(scan.positions()[B] - 70) <= 2

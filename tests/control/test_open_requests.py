@@ -1,4 +1,4 @@
-"""What goes out of what callers have asked for, and who is told then: once, with an error of their own."""
+"""Which open requests a write takes, and which callers are answered: once, with an error of their own."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ def test_a_halt_goes_before_what_was_asked_with_it() -> None:
     assert (sent.halting, sent.speeds, sent.positions) == ([halter], {}, {})
     assert (callers.pending.speeds, callers.pending.positions) == ({A: 50}, {B: 100})
     callers.acknowledged(1)
-    assert not setter.is_told
-    assert not halter.is_told, "nothing shows that it acts"
+    assert not setter.is_answered
+    assert not halter.is_answered, "nothing shows that it acts"
 
 
-def test_a_halt_does_for_every_hold_and_is_told_to_who_waits_for_one() -> None:
+def test_a_halt_covers_every_hold_and_answers_its_callers() -> None:
     """The hold alone would leave nothing to write, and no call would end."""
     callers, before, after = OpenRequests(), Outcome(), Outcome()
     callers.hold(A, "", before)
@@ -40,10 +40,10 @@ def test_a_halt_does_for_every_hold_and_is_told_to_who_waits_for_one() -> None:
     sent = callers.take()
     assert (sent.hold, callers.pending.is_empty) == (A | B, True)
     callers.acknowledged(1)
-    assert before.told == after.told == [None]
+    assert before.answers == after.answers == [None]
 
 
-def test_what_was_to_be_held_when_the_link_was_lost_is_given_back() -> None:
+def test_a_link_loss_returns_the_axes_whose_hold_was_not_delivered() -> None:
     """Also where a position or a halt went before it: that is dropped, and a stop is not."""
     callers, holder = OpenRequests(), Outcome()
     callers.hold(A, "", holder)
@@ -56,7 +56,7 @@ def test_what_was_to_be_held_when_the_link_was_lost_is_given_back() -> None:
     assert callers.lost(ConnectionLostError("gone")) == NONE
 
 
-def test_what_fails_on_the_line_is_not_told_again_when_it_is_acknowledged() -> None:
+def test_a_request_that_failed_on_the_line_is_not_answered_again() -> None:
     callers, asking = OpenRequests(), Outcome()
     callers.command(Command(A, 100), asking)
     callers.take()
@@ -73,21 +73,21 @@ def test_a_fault_ends_what_moves_and_not_what_stops() -> None:
     callers.hold(C, "of a move that was given up")
     callers.command(Command(S, None, 50))
     callers.fail_but_stops(GripperFaultError(Fault.COMMUNICATION_NOT_READY))
-    assert not halter.is_told
-    assert not holder.is_told
+    assert not halter.is_answered
+    assert not holder.is_answered
     assert (callers.pending.hold, callers.pending.speeds) == (B, {})
 
 
 # -- callers that wait -------------------------------------------------------------------------------------
 
 
-def test_an_acknowledgement_is_told_as_none() -> None:
+def test_an_acknowledgement_answers_none() -> None:
     callers = [Outcome(), Outcome()]
     resolve(callers)
-    assert [caller.told for caller in callers] == [[None], [None]]
+    assert [caller.answers for caller in callers] == [[None], [None]]
 
 
-def test_a_failure_is_told_to_everybody_with_an_error_and_a_traceback_of_their_own() -> None:
+def test_every_caller_gets_an_error_of_its_own() -> None:
     callers, error = [Outcome(), Outcome()], ConnectionLostError("gone")
     fail(callers, error)
     errors = [caller.error for caller in callers]
@@ -95,12 +95,12 @@ def test_a_failure_is_told_to_everybody_with_an_error_and_a_traceback_of_their_o
     assert len({id(each) for each in (*errors, error)}) == 3
 
 
-def test_who_has_been_told_is_not_told_again() -> None:
+def test_an_answered_caller_is_not_answered_again() -> None:
     caller = Outcome()
     resolve([caller])
     fail([caller], ConnectionLostError("gone"))
     resolve([caller])
-    assert caller.told == [None]
+    assert caller.answers == [None]
 
 
 async def test_a_caller_that_was_cancelled_is_passed_over() -> None:

@@ -75,7 +75,7 @@ def test_our_own_writes_are_never_taken_for_another_client() -> None:
 
 def test_an_old_reply_that_was_looked_at_late_does_not_make_our_write_anothers(scan: Scan) -> None:
     # The loop was held up between the request of a status and its reply: what it shows is as old as that.
-    _, told = scan.move(200, A)
+    _, outcome = scan.move(200, A)
     scan.now += POLL_S
     request = scan.controller.decide(scan.now)
     assert request is not None
@@ -84,9 +84,9 @@ def test_an_old_reply_that_was_looked_at_late_does_not_make_our_write_anothers(s
     asked, shown = scan.now, scan.gripper.status_registers()
     scan.now += 0.6
     scan.controller.see(RobotiqStatus(shown, scan.now, 10_000), asked)
-    scan.until(lambda: told.is_told)
+    scan.until(lambda: outcome.is_answered)
     assert scan.controller.foreign_commands == 0
-    assert abs(told.result.positions[A] - 200) <= 2
+    assert abs(outcome.result.positions[A] - 200) <= 2
 
 
 def test_another_client_is_counted_and_its_requests_are_taken_over(scan: Scan) -> None:
@@ -113,7 +113,7 @@ def test_a_move_that_another_client_leaves_alone_goes_on(scan: Scan) -> None:
     _, ours = scan.move(255, A)
     scan.run(0.3)
     scan.gripper.write(0, image({A: 255, B: 100, S: 137}))
-    scan.until(lambda: ours.is_told)
+    scan.until(lambda: ours.is_answered)
     assert ours.result.positions[A] >= 240
     assert scan.controller.foreign_commands == 1
 
@@ -128,7 +128,7 @@ def test_our_write_that_shows_after_another_clients_is_what_counts() -> None:
     ours = scan.command(A, position=200)
     scan.run(1.0)
     scan.until(lambda: not scan.controller.is_moving)
-    assert ours.told == [None]
+    assert ours.answers == [None]
     assert scan.controller.foreign_commands == 1
     before = scan.travels()
     scan.moved(60, B)
@@ -136,7 +136,7 @@ def test_our_write_that_shows_after_another_clients_is_what_counts() -> None:
     assert moved == {B}
 
 
-def test_a_pending_hold_does_not_stop_who_has_taken_over(scan: Scan) -> None:
+def test_a_pending_hold_does_not_stop_a_client_that_took_over(scan: Scan) -> None:
     move, _ = scan.move(200, A, speed=0)
     scan.run(0.5)
     image = Request.from_registers(scan.gripper.request_registers)

@@ -63,13 +63,13 @@ def test_it_decides_nothing_about_a_gripper_before_it_has_looked_past_it() -> No
 
 
 def test_a_move_goes_on_through_a_loop_that_is_held_up(silent: Scan) -> None:
-    _, told = silent.move(255, speed=0)
+    _, outcome = silent.move(255, speed=0)
     silent.run(1.0)
     for _ in range(4):
         silent.now += 1.2
         silent.step()
-    silent.until(lambda: told.is_told)
-    assert all(position >= 240 for position in told.result.positions.values())
+    silent.until(lambda: outcome.is_answered)
+    assert all(position >= 240 for position in outcome.result.positions.values())
     assert silent.controller.passing_faults == 5, "the start, and each time"
     assert State.FAULT not in [target for _, target, _ in silent.transitions]
 
@@ -92,10 +92,10 @@ def test_on_a_link_so_slow_that_each_read_ends_a_silence_things_are_done() -> No
         scan.now += 1.2
         scan.controller.see(scan.status())
     assert scan.state is State.RUNNING_IDLE
-    told = scan.command(A, position=100)
+    outcome = scan.command(A, position=100)
     scan.now += 1.2
     scan.step()
-    assert told.told == [None]
+    assert outcome.answers == [None]
     assert scan.state is State.RUNNING_IDLE
 
 
@@ -107,7 +107,7 @@ def test_a_reconnect_looks_past_it(silent: Scan) -> None:
 
 
 @pytest.mark.parametrize("how", ["command", "hold", "activate", "reset"])
-def test_what_is_asked_after_a_silence_is_done(silent: Scan, how: str) -> None:
+def test_requests_after_a_silence_are_carried_out(silent: Scan, how: str) -> None:
     silent.run(0.1)
     if how == "activate":
         silent.controller.reset()
@@ -117,7 +117,7 @@ def test_what_is_asked_after_a_silence_is_done(silent: Scan, how: str) -> None:
         case "command":
             silent.moved(100)
         case "hold":
-            assert silent.hold().told == []
+            assert silent.hold().answers == []
             silent.step()
         case "activate":
             silent.controller.activate()
@@ -137,7 +137,7 @@ def test_a_grip_is_kept_after_a_silence(silent: Scan) -> None:
     assert silent.gripper.grips == B | C
 
 
-def test_it_is_told_once(silent: Scan, caplog: pytest.LogCaptureFixture) -> None:
+def test_it_is_logged_once(silent: Scan, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO)
     silent.controller.passing_faults = 0
     for _ in range(3):
@@ -150,13 +150,13 @@ def test_it_is_told_once(silent: Scan, caplog: pytest.LogCaptureFixture) -> None
 # -- what lasts --------------------------------------------------------------------------------------------
 
 
-def test_one_that_lasts_is_a_fault_after_some_reads(silent: Scan) -> None:
-    _, told = silent.move(255)
+def test_a_lasting_0x09_is_a_fault_after_some_reads(silent: Scan) -> None:
+    _, outcome = silent.move(255)
     silent.run(0.5)
     silent.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 2.0)
-    took = silent.until(lambda: told.is_told)
+    took = silent.until(lambda: outcome.is_answered)
     assert took <= (LASTS_READS + 1) * POLL_S
-    assert isinstance(told.error, GripperFaultError)
+    assert isinstance(outcome.error, GripperFaultError)
     assert silent.state is State.FAULT
     assert silent.controller.passing_faults == 1, "that of the start"
 
@@ -169,14 +169,14 @@ def test_under_one_that_lasts_nothing_is_begun(silent: Scan, how: str) -> None:
         silent.until(lambda: silent.state is State.RESET)
     silent.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.5)
     written = len(silent.written)
-    told = None
+    outcome = None
     if how == "activate":
         silent.controller.activate()
     else:
-        told = silent.command(A, position=100)
+        outcome = silent.command(A, position=100)
     silent.until(lambda: silent.state is State.FAULT, 0.1)
     assert len(silent.written) == written
-    assert told is None or isinstance(told.error, GripperFaultError)
+    assert outcome is None or isinstance(outcome.error, GripperFaultError)
 
 
 def test_a_hold_and_a_halt_do_not_wait_for_it(silent: Scan) -> None:
@@ -190,7 +190,7 @@ def test_a_hold_and_a_halt_do_not_wait_for_it(silent: Scan) -> None:
         assert len(silent.written) == written + 1
 
 
-def test_one_that_lasts_at_the_start_leaves_the_hand_in_fault() -> None:
+def test_a_lasting_0x09_at_the_start_leaves_the_hand_in_fault() -> None:
     scan = quiet()
     scan.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 2.0)
     scan.connect()
@@ -220,12 +220,12 @@ def test_it_does_not_clear_another_fault(silent: Scan) -> None:
 )
 def test_it_takes_some_reads_and_some_time_without_a_silence(at: list[float], shown: list[bool]) -> None:
     passing = PassingFault()
-    told = []
+    seen = []
     for time in at:
         judged = passing.see(status_of(0x31, 0xFF, 0x09, at=time), time)
-        told.append(passing.is_shown)
+        seen.append(passing.is_shown)
         assert (judged.fault is Fault.NONE) == passing.is_shown
-    assert told == shown
+    assert seen == shown
 
 
 @pytest.mark.parametrize("code", [0x00, 0x05, 0x0A, 0x0C, 0x0E])

@@ -89,15 +89,15 @@ def test_holds_and_halts_drop_positions_and_nothing_else(
     assert pending.speeds == pending.forces == settings
 
 
-def test_who_waits_for_an_axis_that_is_held_is_told_and_nobody_else() -> None:
+def test_a_hold_fails_only_the_callers_that_move_its_axes() -> None:
     pending, held, other, setting = PendingCommand(), Outcome(), Outcome(), Outcome()
     pending.merge(Command(A, 100), held)
     pending.merge(Command(B, 100), other)
     pending.merge(Command(A, None, 50), setting)
     pending.merge_hold(A, SUPERSEDED)
     assert isinstance(held.error, MoveSupersededError)
-    assert not other.told
-    assert not setting.told
+    assert not other.answers
+    assert not setting.answers
 
 
 @pytest.mark.parametrize(
@@ -124,7 +124,7 @@ def test_a_pending_command_knows_whether_there_is_something_to_write(
 # -- who waits ---------------------------------------------------------------------------------------------
 
 
-def test_who_waits_for_a_speed_goes_on_waiting_though_a_halt_drops_the_position_of_another() -> None:
+def test_a_halt_drops_positions_and_leaves_pending_speeds() -> None:
     """The speed stays on the pending and is delivered: its caller must not hear MoveSupersededError."""
     pending, for_speed, for_position = PendingCommand(), Outcome(), Outcome()
     pending.merge(Command(A, None, 50), for_speed)
@@ -132,16 +132,16 @@ def test_who_waits_for_a_speed_goes_on_waiting_though_a_halt_drops_the_position_
     pending.merge_halt(Outcome(), SUPERSEDED)
     assert pending.speeds == {A: 50}
     assert isinstance(for_position.error, MoveSupersededError)
-    assert not for_speed.told
+    assert not for_speed.answers
     assert pending.waiters == [for_speed]
 
 
-def test_who_waits_for_a_hold_goes_on_waiting_when_a_position_replaces_it() -> None:
+def test_a_position_replaces_a_hold_and_its_caller_still_waits() -> None:
     pending, holder = PendingCommand(), Outcome()
     pending.merge_hold(A, SUPERSEDED, holder)
     pending.merge(Command(A, 100))
     assert pending.waiters == [holder]
-    assert not holder.is_told
+    assert not holder.is_answered
 
 
 def test_every_caller_of_halt_is_kept() -> None:
@@ -154,18 +154,18 @@ def test_every_caller_of_halt_is_kept() -> None:
 # -- telling -----------------------------------------------------------------------------------------------
 
 
-def test_everybody_who_waits_is_told_of_a_failure_with_an_error_of_their_own() -> None:
+def test_a_failure_gives_every_caller_an_error_of_its_own() -> None:
     pending, callers, halter = PendingCommand(), [Outcome(), Outcome()], Outcome()
     pending.merge(Command(A, 100), callers[0])
     pending.merge(Command(A, None, 50), callers[1])
     pending.halting = [halter]
     pending.fail(LOST)
-    errors = [each.told[0] for each in (*callers, halter)]
+    errors = [each.answers[0] for each in (*callers, halter)]
     assert all(isinstance(error, ConnectionLostError) for error in errors)
     assert len({id(error) for error in errors}) == 3
 
 
-def test_who_waits_for_the_acknowledgement_alone_does_not_include_who_halts() -> None:
+def test_callers_of_halt_do_not_wait_for_the_acknowledgement_alone() -> None:
     """A halt ends when the gripper shows that it has stopped."""
     pending, callers = PendingCommand(), [Outcome(), Outcome()]
     pending.merge(Command(A, 100), callers[0])

@@ -30,7 +30,7 @@ class RandomUse(RuleBasedStateMachine):
         self.asked: set[Finger] = set()
         """Axes that were ever addressed by a position since the last activation."""
         self.travel = {axis: self.scan.gripper.travel(axis) for axis in self.model.axes}
-        self.told: list[tuple[Move | None, Outcome]] = []
+        self.outcomes: list[tuple[Move | None, Outcome]] = []
 
     def teardown(self) -> None:
         """Whatever was going on, a stop that keeps a grip leaves nothing going."""
@@ -49,7 +49,7 @@ class RandomUse(RuleBasedStateMachine):
     def move(self, axes: Finger, position: int, speed: int | None) -> None:
         axes = axes & self.model.all_axes or JAW
         self.asked |= {axis for axis in self.model.axes if axis in axes}
-        self.told.append(self.scan.move(position, axes, speed=speed))
+        self.outcomes.append(self.scan.move(position, axes, speed=speed))
 
     @rule(axes=masks, position=st.none() | values, force=values)
     @precondition(lambda self: self.running)
@@ -57,26 +57,28 @@ class RandomUse(RuleBasedStateMachine):
         axes = axes & self.model.all_axes or JAW
         if position is not None:
             self.asked |= {axis for axis in self.model.axes if axis in axes}
-        self.told.append((None, self.scan.command(axes, position=position, force=force)))
+        self.outcomes.append((None, self.scan.command(axes, position=position, force=force)))
 
     @rule(which=st.integers(0, 1000))
-    @precondition(lambda self: any(move is not None and not told.is_told for move, told in self.told))
+    @precondition(
+        lambda self: any(move is not None and not outcome.is_answered for move, outcome in self.outcomes)
+    )
     def cancel(self, which: int) -> None:
-        live = [move for move, told in self.told if move is not None and not told.is_told]
+        live = [move for move, outcome in self.outcomes if move is not None and not outcome.is_answered]
         move = live[which % len(live)]
         self.scan.controller.abandon(move)
-        self.told = [each for each in self.told if each[0] is not move]
+        self.outcomes = [each for each in self.outcomes if each[0] is not move]
 
     @rule(axes=masks)
     @precondition(lambda self: self.running)
     def hold(self, axes: Finger) -> None:
         axes = axes & self.model.all_axes or JAW
-        self.told.append((None, self.scan.hold(axes)))
+        self.outcomes.append((None, self.scan.hold(axes)))
 
     @rule()
     @precondition(lambda self: self.running)
     def halt(self) -> None:
-        self.told.append((None, self.scan.halt()))
+        self.outcomes.append((None, self.scan.halt()))
 
     @rule(seconds=st.sampled_from([0.005, 0.01, 0.05, 0.3, 3.0]))
     def wait(self, seconds: float) -> None:
@@ -94,7 +96,7 @@ class RandomUse(RuleBasedStateMachine):
             self.scan.step(answer=False)
         if self.scan.state is not State.DISCONNECTED:
             self.scan.controller.lost(None)
-        assert all(told.is_told for _, told in self.told), "a caller waits for ever"
+        assert all(outcome.is_answered for _, outcome in self.outcomes), "a caller waits for ever"
         writes = len(self.scan.gripper.writes)
         self.scan.now += away
         self.scan.connect(activate=False)
@@ -108,7 +110,7 @@ class RandomUse(RuleBasedStateMachine):
         self.scan.run(0.02)  # 0x09 is one when it lasts
         assert self.scan.state is State.FAULT
         self.scan.run(1.0)
-        assert all(told.is_told for _, told in self.told), "a caller waits for ever"
+        assert all(outcome.is_answered for _, outcome in self.outcomes), "a caller waits for ever"
         at = {axis: self.scan.gripper.position(axis) for axis in self.model.axes}
         contacts = self.scan.latest.contacts
         self.scan.gripper.clear_faults()
@@ -126,10 +128,10 @@ class RandomUse(RuleBasedStateMachine):
         self.scan.until(lambda: not self.scan.controller.is_moving, 60)
         self.scan.run(0.6)  # what has no echo is given half a second to act
         assert not self.scan.gripper.is_moving
-        for move, told in self.told:
-            assert told.is_told
-            if move is not None and isinstance(told.told[0], MoveResult):
-                assert ObjectStatus.IN_MOTION not in told.result.outcomes.values()
+        for move, outcome in self.outcomes:
+            assert outcome.is_answered
+            if move is not None and isinstance(outcome.answers[0], MoveResult):
+                assert ObjectStatus.IN_MOTION not in outcome.result.outcomes.values()
 
     @invariant()
     def only_addressed_axes_have_moved(self) -> None:

@@ -106,7 +106,7 @@ def test_an_activation_needs_a_reset_gripper_and_a_release_one_that_is_not(
 
 
 @pytest.mark.parametrize("shown", [READY, RUNNING, BUSY, FAULTY, RELEASED, RESET])
-def test_a_reset_begins_whatever_the_gripper_shows(shown: RobotiqStatus) -> None:
+def test_a_reset_begins_for_any_status(shown: RobotiqStatus) -> None:
     """An emergency is not weighed."""
     assert first(reset, shown).activate is False
 

@@ -74,7 +74,7 @@ def test_before_anything_is_known_every_axis_has_the_settings_of_the_hand() -> N
     assert shadow.base == Request(axes=(AxisRequest(0, 128, 64),) * 4)
 
 
-def test_what_a_gripper_shows_when_it_is_found_is_not_ours_but_settled(shadow: Shadow) -> None:
+def test_the_first_image_shown_is_not_ours_but_settled(shadow: Shadow) -> None:
     assert shadow.base == image(100, speed=128, force=64)
     assert shadow.ours == NO_AXES
     assert not shadow.may_begin_to_move
@@ -171,7 +171,7 @@ def test_our_write_that_shows_after_another_clients_is_gone_on_from(ours: Shadow
     assert ours.doubt is None
 
 
-def test_who_writes_again_and_again_does_not_make_us_wait_again_and_again(shadow: Shadow) -> None:
+def test_a_client_that_keeps_writing_does_not_delay_us_anew(shadow: Shadow) -> None:
     """A moving axis is given its time once, or nothing of ours would ever be written."""
     for n in range(10):
         at = 2.0 + n * DIRECTION_WAIT_S / 5
@@ -185,9 +185,7 @@ def test_who_writes_again_and_again_does_not_make_us_wait_again_and_again(shadow
 
 
 @pytest.mark.parametrize(("position", "axes"), [(200, Finger.ALL), (77, NO_AXES)])
-def test_what_shows_when_the_link_is_back_is_ours_if_we_wrote_it(
-    ours: Shadow, position: int, axes: Finger
-) -> None:
+def test_an_image_of_ours_shown_after_a_link_loss_is_ours(ours: Shadow, position: int, axes: Finger) -> None:
     ours.lost()
     ours.returned(ours.shown(shows(position, 9.0), 9.0))
     assert ours.base == image(position)
@@ -195,7 +193,7 @@ def test_what_shows_when_the_link_is_back_is_ours_if_we_wrote_it(
     assert ours.doubt is None
 
 
-def test_what_was_adopted_is_not_ours_after_the_link_was_lost(shadow: Shadow) -> None:
+def test_an_adopted_request_is_not_ours_after_a_link_loss(shadow: Shadow) -> None:
     """Under simple control B and C echo 0: taken for our own image, it would have let go."""
     shadow.lost()
     shadow.returned(shadow.shown(shows(100, 2.0), 2.0))
@@ -246,7 +244,7 @@ def gripping(ours: Shadow, status: RobotiqStatus = HALTED) -> Finger:
     return ours.axes.grips.held(status, ours.base)
 
 
-def test_what_gripped_when_rgto_was_last_set_still_does(ours: Shadow) -> None:
+def test_axes_that_gripped_when_rgto_was_set_still_grip(ours: Shadow) -> None:
     ours.axes.see(GRIP, ours.now)
     assert gripping(ours, GRIP) == A | B | S
     ours.axes.see(status_of(0x31, 0xFF, echo=200, position=150), ours.now)
@@ -258,7 +256,7 @@ def test_an_axis_that_is_somewhere_else_by_now_does_not_grip(ours: Shadow) -> No
     assert gripping(ours, status_of(0x31, 0xFF, position=(150, 6, 6, 152))) == A | S
 
 
-def test_a_grip_by_another_request_than_the_one_in_force_is_none(ours: Shadow) -> None:
+def test_a_grip_by_a_request_no_longer_in_force_does_not_count(ours: Shadow) -> None:
     """A motion that was halted must not come back because the axis had gripped."""
     ours.axes.see(GRIP, ours.now)
     ours.write(image(200).with_positions({A: 20}), moved=NO_AXES)

@@ -79,11 +79,11 @@ def test_stop_does_not_take_back_an_activation_that_never_arrived_and_that_other
 
 
 def test_the_shutdown_clears_rgto_and_changes_nothing_else(scan: Scan) -> None:
-    _, told = scan.move(200, A, speed=7, force=9)
+    _, outcome = scan.move(200, A, speed=7, force=9)
     scan.run(0.5)
     before = scan.last_image
     scan.stop()
-    assert isinstance(told.error, NotStartedError)
+    assert isinstance(outcome.error, NotStartedError)
     assert scan.last_image == replace(before, go=False)
 
 
@@ -99,7 +99,7 @@ def test_the_shutdown_leaves_what_another_client_has_just_asked(scan: Scan) -> N
     assert not scan.last_image.go
 
 
-def test_a_shutdown_that_nobody_answers_is_over_when_its_time_is(scan: Scan) -> None:
+def test_a_shutdown_without_an_answer_ends_in_time(scan: Scan) -> None:
     scan.controller.stop()
     scan.controller.shut_down()
     scan.controller.stopped()

@@ -47,7 +47,7 @@ def path_to(target: State) -> list[Trigger]:
 
 
 class Recorded:
-    """A machine that has walked to a state, and the changes it has told since."""
+    """A machine that has walked to a state, and the changes it has reported since."""
 
     def __init__(self, state: State) -> None:
         self.changes: list[tuple[State, State, Trigger]] = []
@@ -187,7 +187,7 @@ def test_a_verdict_is_named_after_the_error_it_means() -> None:
             assert type(refusal(trigger, state)).__name__ == verdict.value, (state, trigger)
 
 
-def test_a_fault_that_nobody_has_seen_is_refused_all_the_same() -> None:
+def test_a_refusal_in_fault_needs_no_status() -> None:
     error = refusal(Trigger.ASK_COMMAND, State.FAULT)
     assert isinstance(error, GripperFaultError)
     assert error.fault is Fault.NONE
@@ -215,14 +215,14 @@ def test_a_machine_begins_disconnected_and_tells_a_change_when_it_has_happened()
 
 
 @pytest.mark.parametrize("state", State)
-def test_what_was_about_to_be_sent_has_been_delivered_and_nothing_else_has(state: State) -> None:
+def test_delivered_advances_only_the_states_that_send(state: State) -> None:
     machine = Recorded(state).machine
     machine.delivered()
     expected = ANSWERS[state, Trigger.DELIVERED]
     assert machine.state is (expected if isinstance(expected, State) else state)
 
 
-def test_commands_coming_and_going_are_for_the_curious_and_other_changes_for_everybody(
+def test_commands_are_logged_for_debugging_and_other_changes_as_info(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     with caplog.at_level(logging.DEBUG, logger="robotiq_async"):

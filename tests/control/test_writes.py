@@ -288,7 +288,7 @@ def test_a_history_of_writes(name: str) -> None:
     ],
     ids=["positions", "go", "activation", "one axis"],
 )
-def test_what_was_never_written_is_foreign(status: RobotiqStatus) -> None:
+def test_an_echo_that_was_never_written_is_foreign(status: RobotiqStatus) -> None:
     history = History()
     history.write(image(50), 0.9)
     assert history.look(status) is None
@@ -309,7 +309,7 @@ def test_a_long_life_does_not_make_the_history_remember_more() -> None:
     assert len(history._writes) <= WINDOW_S * 10 + 2
 
 
-def test_what_is_shown_may_differ_from_the_image_that_is_taken_for_it() -> None:
+def test_an_adopted_image_may_differ_from_its_echo() -> None:
     """Simple control: B, C and the scissor echo 0 and are asked for something else."""
     history = WriteHistory()
     history.lost()

@@ -99,13 +99,13 @@ async def at_the_prompt(python: str, code: str, folder: Path) -> str:
     [(page, each) for page, code in CODE.items() for each in code if "def test_" not in each.text],
     ids=lambda value: named(value) or f"line {value.line}",
 )
-async def test_what_is_for_the_prompt(page: Path, block: Block) -> None:
+async def test_code_for_the_prompt_runs(page: Path, block: Block) -> None:
     # Some name files of the clone.
     await at_the_prompt(environment(requirements(read(page))), block.text, ROOT)
 
 
 @pytest.mark.parametrize("page", WITH_TESTS, ids=named)
-async def test_what_is_for_pytest(page: Path, tmp_path: Path) -> None:
+async def test_code_for_pytest_runs(page: Path, tmp_path: Path) -> None:
     tests = [block for block in CODE[page] if "def test_" in block.text]
     for number, block in enumerate(tests):
         (tmp_path / f"test_{number}.py").write_text(block.text, encoding="utf-8")

@@ -70,14 +70,14 @@ def event(index: int, what: dict[str, Any]) -> dict[str, Any]:
     return {"index": index, **what}
 
 
-def told(what: dict[str, Any]) -> dict[str, Any]:
+def parsed(what: dict[str, Any]) -> dict[str, Any]:
     return {"mark": NAME.mark, "epoch": EPOCH, "events": [what], "status": MESSAGE.pack().hex()}
 
 
 BEGUN: Final = Transition(State.RUNNING_IDLE, State.RUNNING_CC, Trigger.ASK_COMMAND, 811.5)
 MOVE: Final = call(7, position=100, fingers=1, speed=None, force=None, timeout=None)
 EXAMPLES: Final = [
-    told(event(38, transition_fields(BEGUN))),
+    parsed(event(38, transition_fields(BEGUN))),
     event(39, request_fields(SentRequest(IMAGE, 811.53125, acknowledged=True))),
     event(40, {"kind": "lease", "number": 3, "holder": LABEL, "reason": "granted"}),
     event(41, {"kind": "conflict", "key": NAME.key("alive", "77")}),
@@ -126,7 +126,7 @@ def test_every_state_has_its_number() -> None:
     ]
 
 
-async def test_an_event_is_told_as_the_page_has_it() -> None:
+async def test_an_event_is_published_as_documented() -> None:
     network = Network()
     heard: list[bytes] = []
     network.bus("client").subscribe(NAME.key("*"), lambda _, payload: heard.append(payload))

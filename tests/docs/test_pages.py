@@ -190,6 +190,6 @@ def test_quoted_messages_are_the_librarys() -> None:
     assert [piece for piece in pieces if not is_from(piece, known)] == []
 
 
-def test_a_message_that_the_library_does_not_have_is_told_apart() -> None:
+def test_a_message_the_library_does_not_have_is_recognized() -> None:
     assert is_from("a hand runs on", source())
     assert not is_from("your gripper is on fire", source())

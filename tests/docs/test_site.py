@@ -37,7 +37,7 @@ def test_every_picture_is_on_a_page() -> None:
     assert [path.name for path in pictures if f"{path.parent.name}/{path.name}" not in shown] == []
 
 
-def test_what_makes_the_site_is_not_on_it() -> None:
+def test_sources_of_the_site_are_not_published() -> None:
     assert not [source for source in places() if source.endswith(".py") or source.startswith("docs/site/")]
     assert places()["docs/decisions/one-owner.md"] == "decisions/one-owner.md"
 
@@ -115,7 +115,7 @@ def test_every_public_name_is_described(module: object) -> None:
     assert {*module.__all__} <= names  # type: ignore[attr-defined]
 
 
-def test_what_is_described_exists_once() -> None:
+def test_every_documented_name_exists_and_is_listed_once() -> None:
     assert len(DESCRIBED) == len(set(DESCRIBED))
     assert [name for name in DESCRIBED if pkgutil.resolve_name(name) is None] == []
 
@@ -181,7 +181,7 @@ FOREIGN = [
 ]
 
 
-def test_what_would_come_from_another_host_is_found(site: Path) -> None:
+def test_resources_from_another_host_are_found(site: Path) -> None:
     for line in FOREIGN:
         (site / "index.html").write_text(GOOD.replace("</body>", f"{line}</body>"), encoding="utf-8")
         (problem,) = check.problems(site)

@@ -143,7 +143,7 @@ async def cuts(world: World) -> None:
 
 
 async def other_acquires(world: World) -> None:
-    assert await world.other.do(told(world.other.hand.acquire())) == "ControlLost held"
+    assert await world.other.do(ending(world.other.hand.acquire())) == "ControlLost held"
 
 
 async def other_takes(world: World) -> None:
@@ -210,7 +210,7 @@ class Doing:
     goes_on: bool = True
 
     def begin(self, work: Coroutine[Any, Any, Any]) -> None:
-        self.call = self.world.holder.host.create_task(told(work))
+        self.call = self.world.holder.host.create_task(ending(work))
 
     async def loop(self) -> None:
         """A control loop: each of its commands has a position and a speed of its own."""
@@ -366,7 +366,7 @@ def lease_of(world: World) -> str:
     return "lease back" if False in holder.had_control else "lease kept"
 
 
-async def told(work: Coroutine[Any, Any, Any]) -> str:
+async def ending(work: Coroutine[Any, Any, Any]) -> str:
     """How a call ends, in the words of the table."""
     try:
         await work
@@ -383,7 +383,7 @@ async def works(world: World) -> None:
     """The halt of anybody is heard and does what it says; then the hand is as good as new."""
     holder, other = world.holder, world.other
     at = world.now()
-    heard = await other.do(told(other.hand.halt()))
+    heard = await other.do(ending(other.hand.halt()))
     assert heard == "done", heard
     assert world.now() - at < 1.0
     assert not world.gripper.is_moving

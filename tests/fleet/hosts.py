@@ -171,7 +171,7 @@ class _Gate:
         self._host, self._protocol = host, protocol
 
     def connection_made(self, transport: Any) -> None:
-        pass  # the host's own part has been told
+        pass  # the host's own part has the error
 
     def data_received(self, data: bytes) -> None:
         self._host.call_soon(self._protocol.data_received, data)

@@ -100,7 +100,7 @@ async def move(endpoint: str) -> None:
     """Move left slowly, and say what became of it."""
     async with RemoteHand(address("left", endpoint)) as hand:
         moving = asyncio.ensure_future(hand.move(255, Finger.A, speed=0))
-        while not hand.is_moving:  # noqa: ASYNC110  # told by the statuses, which are awaited nowhere here
+        while not hand.is_moving:  # noqa: ASYNC110  # shown by the statuses, which are awaited nowhere here
             await asyncio.sleep(0.01)
         say("moving")
         try:

@@ -49,7 +49,7 @@ print(Agent.__name__)
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_what_is_no_name(name: str) -> None:
+def test_malformed_names_are_refused(name: str) -> None:
     with pytest.raises(ValueError, match=r"site must be 1\.\.64"):
         check_name("site", name)
     with pytest.raises(ValueError, match=r"1\.\.64"):
@@ -62,7 +62,7 @@ def test_what_is_no_name(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [None, 3, b"a", ["a"]])
-def test_what_is_no_string(name: object) -> None:
+def test_names_that_are_not_strings_are_refused(name: object) -> None:
     with pytest.raises(TypeError, match="host must be a string"):
         check_name("host", name)
     for parse in (GripperName.parse, parse_remote_address):
@@ -100,7 +100,7 @@ def test_a_scheme_is_a_scheme_in_capitals_too() -> None:
     "key",
     ["", "robotiq/v1/a/b/c", "robotiq/v2/a/b/c/feed", "x/v1/a/b/c/feed", "robotiq/v1/a/*/c/feed"],
 )
-def test_what_is_no_key(key: str) -> None:
+def test_malformed_keys_are_refused(key: str) -> None:
     with pytest.raises(ValueError, match=r"not a key|must be"):
         GripperName.of_key(key)
 
@@ -133,7 +133,7 @@ def test_options() -> None:
     assert not parse_remote_address(f"{PLAIN}?insecure=0")[1].insecure
 
 
-def test_what_the_address_does_not_say_the_environment_does(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_environment_fills_in_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(CONNECT_VARIABLE, "tls/a:1,tls/b:2")
     monkeypatch.setenv(KEYS_VARIABLE, "/keys")
     assert default_route() == Route(("tls/a:1", "tls/b:2"), Path("/keys"))
@@ -143,7 +143,7 @@ def test_what_the_address_does_not_say_the_environment_does(monkeypatch: pytest.
 
 
 @pytest.mark.parametrize("value", ["", ","])
-def test_an_empty_environment_is_none(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
+def test_an_empty_environment_counts_as_unset(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
     monkeypatch.setenv(CONNECT_VARIABLE, value)
     monkeypatch.setenv(KEYS_VARIABLE, "")
     assert default_route() == Route()
@@ -175,7 +175,7 @@ def test_malformed(address: str) -> None:
     ("address", "remote"),
     [(PLAIN, True), ("ZENOH://", True), ("tcp://a", False), ("zenoh:/a", False), (3, False), (None, False)],
 )
-def test_which_is_remote(address: object, remote: bool) -> None:
+def test_which_addresses_are_remote(address: object, remote: bool) -> None:
     assert is_remote(address) is remote
 
 
@@ -195,7 +195,7 @@ def test_on_this_machine_nothing_is_needed() -> None:
 
 
 @pytest.mark.parametrize("endpoint", OPEN)
-def test_beyond_it_somebody_must_say_so(endpoint: str) -> None:
+def test_listening_beyond_this_machine_must_be_confirmed(endpoint: str) -> None:
     with pytest.raises(ValueError, match="is open to everyone on that network"):
         check([LOOPBACK[0], endpoint], has_keys=False)
     assert check([endpoint], has_keys=False, insecure=True) == (endpoint,)
@@ -225,14 +225,14 @@ def test_with_keys_everything_is_encrypted(endpoint: str) -> None:
         "tcp/127.0.0.1:7447\n",
     ],
 )
-def test_what_is_no_endpoint_of_ours(endpoint: str) -> None:
+def test_malformed_endpoints_are_refused(endpoint: str) -> None:
     """What stands behind a # goes before the rest of zenoh's configuration."""
     for options in ({"has_keys": True}, {"has_keys": False}, {"has_keys": False, "insecure": True}):
         with pytest.raises(ValueError, match=r"must be tcp/HOST:PORT, tls/HOST:PORT or quic/HOST:PORT"):
             check([endpoint], **options)
 
 
-def test_what_is_no_text() -> None:
+def test_an_endpoint_must_be_text() -> None:
     with pytest.raises(TypeError, match="got 7447"):
         check([7447], has_keys=False)
 
@@ -246,7 +246,7 @@ def test_the_names_are_there_without_zenoh_and_cryptography() -> None:
 
 
 @pytest.mark.parametrize("use", ['RemoteHand("zenoh://lab/cell/left")', 'Fleet("lab")'])
-def test_what_needs_zenoh_names_the_extra_that_brings_it(use: str) -> None:
+def test_without_zenoh_the_error_names_the_extra(use: str) -> None:
     program = f"""\
 import asyncio, sys
 

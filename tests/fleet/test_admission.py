@@ -65,7 +65,7 @@ def test_for_another_run_of_the_agent() -> None:
             one.check_meant(replace(call, epoch=epoch))
 
 
-def test_of_somebody_else_or_under_another_lease() -> None:
+def test_of_another_client_or_under_another_lease() -> None:
     one, call = admission()
     for other in (
         replace(call, client="ben"),
@@ -230,7 +230,7 @@ def accepted(ask: Callable[..., object], *arguments: object) -> bool:
 # -- lease -------------------------------------------------------------------------------------------------
 
 
-def test_it_is_nobody_s_at_first() -> None:
+def test_a_new_lease_has_no_holder() -> None:
     lease = Lease()
     assert lease.holder is None
     assert lease.number == 0
@@ -278,14 +278,14 @@ def test_all_together_have_one_as_well() -> None:
     assert len(budget._each) <= 1000
 
 
-def test_a_client_is_told_by_what_it_says() -> None:
+def test_each_client_has_its_own_budget() -> None:
     questions = Questions(lambda: 1.0)
     payloads = [Call(LEFT.base, "one").pack(), b'{"client":"one"}', b"", b"{}", b'{"client": 3}', b"\xff"]
     for payload, left in zip(payloads, (EACH, 0, EACH, 0, 0, 0), strict=True):
         assert sum(questions.allow(payload) for _ in range(FLOOD)) == left
 
 
-def test_what_is_dropped_is_said_once_in_a_while(caplog: pytest.LogCaptureFixture) -> None:
+def test_dropped_questions_are_logged_now_and_then(caplog: pytest.LogCaptureFixture) -> None:
     at = 1.0
     questions = Questions(lambda: at)
     with caplog.at_level(logging.WARNING):

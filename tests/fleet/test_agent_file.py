@@ -143,7 +143,7 @@ def test_two_grippers_behind_one_gateway_and_any_number_of_simulated_ones(tmp_pa
         ("site = " + "[" * 5000, ["not TOML"]),
     ],
 )
-def test_a_bad_file_is_told_in_one_line(text: str, words: list[str], tmp_path: Path) -> None:
+def test_a_bad_file_is_reported_in_one_line(text: str, words: list[str], tmp_path: Path) -> None:
     with pytest.raises(AgentFileError) as caught:
         read(tmp_path, text)
     message = str(caught.value)
@@ -152,7 +152,7 @@ def test_a_bad_file_is_told_in_one_line(text: str, words: list[str], tmp_path: P
         assert word in message
 
 
-def test_a_gripper_on_a_serial_line_gets_its_defaults_unless_told(tmp_path: Path) -> None:
+def test_a_gripper_on_a_serial_line_gets_the_defaults_of_the_line(tmp_path: Path) -> None:
     line = '[grippers.left]\naddress = "rtu+tcp://192.168.1.20:54321"\nread_function = 4\n'
     grippers = read(tmp_path, f'site = "lab"\n{line}').grippers
     assert grippers["left"].poll_interval == 0.015
@@ -161,7 +161,7 @@ def test_a_gripper_on_a_serial_line_gets_its_defaults_unless_told(tmp_path: Path
     assert grippers["left"].read_function == 4
 
 
-def test_a_line_that_is_not_certain_is_not_told(tmp_path: Path) -> None:
+def test_an_uncertain_line_number_is_left_out(tmp_path: Path) -> None:
     """The search takes what stands in a text of several lines for keys."""
     port = '[grippers.left]\naddress = """rtu:///dev/\nspeed = 3\n/x"""\nspeed = 300\n'
     with pytest.raises(AgentFileError, match=r"FLEET\.toml, in \[grippers\.left\]: speed"):

@@ -38,7 +38,7 @@ def authority(tmp_path: Path) -> Path:
     return folder
 
 
-def test_what_is_where(authority: Path) -> None:
+def test_which_files_an_authority_makes(authority: Path) -> None:
     agent = issue(authority, "cell-1", Role.AGENT, hosts=["cell-1.lab", "192.168.1.20"])
     bob = issue(authority, "bob", Role.OPERATE)
     names = sorted(str(path.relative_to(authority)) for path in contents(authority))
@@ -136,7 +136,7 @@ def test_nothing_is_overwritten(authority: Path) -> None:
         ("cell-1", (), 36501, r"1\.\.36500"),
     ],
 )
-def test_what_cannot_be_leaves_no_trace(
+def test_a_refused_certificate_leaves_no_files(
     authority: Path, name: str, hosts: tuple[str, ...], days: int, words: str
 ) -> None:
     before = contents(authority)
@@ -178,7 +178,7 @@ def test_an_authority_that_is_not_there_or_broken(authority: Path, tmp_path: Pat
         ("agent = []", "'agent'"),
     ],
 )
-def test_a_bad_access_list_is_told(text: str, words: str, tmp_path: Path) -> None:
+def test_a_bad_access_list_is_reported(text: str, words: str, tmp_path: Path) -> None:
     file = tmp_path / "access.toml"
     file.write_text(text, encoding="utf-8")
     with pytest.raises(ValueError, match=words):

@@ -20,7 +20,7 @@ from robotiq_async.fleet.wire.envelope import Call
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.values.errors import AgentError, ControlLostError
 from robotiq_async.values.request import Request as Image
-from tests.fleet.cell import told
+from tests.fleet.cell import ending
 from tests.fleet.lab import LEFT, Garbling, Lab, Spoiling, lab
 from tests.fleet.world import World, world
 from tests.virtual import inside, until
@@ -29,7 +29,7 @@ from tests.virtual import inside, until
 
 
 @inside(lab)
-async def test_who_was_cut_off_does_not_come_back_after_a_halt_of_the_next_holder(
+async def test_a_client_that_was_cut_off_does_not_reacquire_after_the_next_holder_halts(
     here: Lab, hand: RemoteHand
 ) -> None:
     """Only a halt of a client that had not held the lease barred the one before."""
@@ -45,7 +45,7 @@ async def test_who_was_cut_off_does_not_come_back_after_a_halt_of_the_next_holde
 
 
 @inside(world)
-async def test_its_own_halt_bars_nobody(here: World) -> None:
+async def test_a_halt_of_the_holder_bars_no_client(here: World) -> None:
     here.cut(here.holder)
     await asyncio.sleep(2)
     here.mend(here.holder)
@@ -74,7 +74,7 @@ async def test_one_lost_renewal_does_not_lose_the_lease(here: Lab, lost: int, ke
 
 
 @inside(lab)
-async def test_whoever_lost_the_lease_notices_although_the_agent_does_not_understand_the_question(
+async def test_a_lost_lease_is_noticed_from_an_answer_that_cannot_be_read(
     here: Lab,
 ) -> None:
     """The question ended in a TypeError, and the hand took itself for the one that commands."""
@@ -145,7 +145,7 @@ async def test_an_agent_that_is_ending_refuses_and_says_so(here: Lab, reader: Re
 
 
 @inside(lab)
-async def test_the_holders_secret_is_told_to_nobody(here: Lab, reader: RemoteHand) -> None:
+async def test_the_secret_of_the_holder_is_not_sent(here: Lab, reader: RemoteHand) -> None:
     async with here.client("first"):
         answer = await here.answer("info", Call(LEFT.base, "stranger").pack())
         assert b'"client"' not in answer.pack()
@@ -183,7 +183,7 @@ async def test_a_client_that_was_cut_off_does_not_come_back_after_an_interventio
     async def loop() -> None:
         """A program that goes on as soon as it may."""
         while True:
-            await told(hand.move(200, Finger.A, speed=0))
+            await ending(hand.move(200, Finger.A, speed=0))
             await asyncio.sleep(0.05)
 
     looping = here.holder.host.create_task(loop())
@@ -207,7 +207,7 @@ async def test_a_client_that_was_cut_off_does_not_come_back_after_an_interventio
     assert not hand.is_in_control
     assert here.gripper.travel(Finger.A) == stood
     word = "halted" if what == "halt" else "taken"
-    assert await here.holder.do(told(hand.set_speed(9))) == f"ControlLost {word}"
+    assert await here.holder.do(ending(hand.set_speed(9))) == f"ControlLost {word}"
     looping.cancel()
     await here.holder.do(hand.acquire())
     await here.holder.do(hand.move(60, Finger.A))
@@ -227,7 +227,7 @@ async def test_without_a_record_no_client_comes_back_by_itself(
     assert ("the record of the lease cannot be read" in caplog.text) is (record is not None)
     await asyncio.sleep(3)
     assert not here.holder.hand.is_in_control
-    assert await here.holder.do(told(here.holder.hand.set_speed(9))) == "ControlLost restarted"
+    assert await here.holder.do(ending(here.holder.hand.set_speed(9))) == "ControlLost restarted"
     await here.holder.do(here.holder.hand.acquire())
 
 
@@ -290,7 +290,7 @@ async def test_a_record_of_before_a_restart_of_the_machine_says_nothing(
     assert FileRecords(tmp_path).read(LEFT) is None, "what cannot be read is unknown"
 
 
-async def test_what_cannot_be_kept_takes_the_old_one_away(
+async def test_a_record_that_cannot_be_written_removes_the_old_one(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     """An old record would let back in who must not come."""
@@ -335,7 +335,7 @@ def test_where_the_files_are(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
 
 
 @inside(world, records=None)
-async def test_an_agent_without_records_serves_all_the_same(here: World) -> None:
+async def test_an_agent_serves_without_records(here: World) -> None:
     await here.holder.do(here.holder.hand.move(30, Finger.A))
     here.cut(here.holder)
     await asyncio.sleep(2)

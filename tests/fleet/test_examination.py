@@ -1,4 +1,4 @@
-"""What is wrong with my connection to an agent? Each ailment is found, and told with what to do."""
+"""What is wrong with my connection to an agent? Each ailment is found, and reported with what to do."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ HEALTHY = [
 
 
 async def findings(address: str, bus: MemoryBus | None = None) -> dict[str, Finding]:
-    told: list[Finding] = []
-    await examine_remote(address, told.append, bus=bus)
-    assert all(finding.advice for finding in told if finding.level is not Level.GOOD)
-    return {finding.what: finding for finding in told}
+    found: list[Finding] = []
+    await examine_remote(address, found.append, bus=bus)
+    assert all(finding.advice for finding in found if finding.level is not Level.GOOD)
+    return {finding.what: finding for finding in found}
 
 
 def levels(found: dict[str, Finding]) -> set[Level]:
@@ -73,7 +73,7 @@ async def test_a_healthy_one(here: Lab) -> None:
 
 
 @inside(lab)
-async def test_whoever_commands_keeps_the_lease(here: Lab, hand: RemoteHand) -> None:
+async def test_an_examination_leaves_the_holder_its_lease(here: Lab, hand: RemoteHand) -> None:
     examining = asyncio.create_task(examined(here))
     for _ in range(4):
         await hand.move(100, Finger.A)
@@ -93,7 +93,7 @@ async def test_a_gripper_of_another_name(here: Lab) -> None:
 
 
 @virtual
-async def test_nobody_at_all() -> None:
+async def test_no_agent_at_all() -> None:
     found = await findings(str(LEFT), Network().bus("doctor"))
     assert list(found) == ["address", "agent"]
     assert "robotiq-async agent" in found["agent"].advice
@@ -185,7 +185,7 @@ async def test_one_whose_statuses_are_not_heard() -> None:
 
 
 @virtual
-async def test_one_that_does_not_answer() -> None:
+async def test_an_agent_that_does_not_answer() -> None:
     found = await examined_beside(None)
     assert list(found) == ["address", "agent", "access"]
     assert found["access"].level is Level.BAD
@@ -216,15 +216,15 @@ def authority(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def examined_keys(folder: Path, *, days: float = 0) -> dict[str, Finding]:
-    told: list[Finding] = []
+    found: list[Finding] = []
     try:
-        examine_keys(folder, told.append, now=datetime.now(UTC) + timedelta(days=days))
+        examine_keys(folder, found.append, now=datetime.now(UTC) + timedelta(days=days))
     except GiveUpError:
-        assert told[-1].level is Level.BAD
-    return {finding.what: finding for finding in told}
+        assert found[-1].level is Level.BAD
+    return {finding.what: finding for finding in found}
 
 
-def test_what_a_certificate_is_for(authority: Path) -> None:
+def test_the_role_of_a_certificate(authority: Path) -> None:
     found = examined_keys(authority / "operate-bob")
     assert "bob: may watch, halt and command" in found["role"].found
     assert levels(found) == {Level.GOOD}
@@ -232,7 +232,7 @@ def test_what_a_certificate_is_for(authority: Path) -> None:
     assert found["role"].level is Level.BAD
 
 
-def test_one_that_ends_soon_and_one_that_has_ended(authority: Path) -> None:
+def test_a_certificate_that_expires_soon_and_one_that_has_expired(authority: Path) -> None:
     found = examined_keys(authority / "halt-panel")
     assert "panel: may watch and halt," in found["role"].found
     assert found["certificate"].level is Level.DOUBT
@@ -281,7 +281,7 @@ async def hang_up(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None
     writer.close()
 
 
-async def test_nobody_listens() -> None:
+async def test_nothing_listens() -> None:
     async with listening(hang_up) as where:
         pass
     found = await findings(f"{LEFT}?connect=tcp/{where}")
@@ -295,7 +295,7 @@ async def test_a_name_that_does_not_exist() -> None:
     assert "spelling" in found["port"].advice
 
 
-async def test_somebody_without_certificates(authority: Path) -> None:
+async def test_a_listener_without_certificates(authority: Path) -> None:
     async with listening(hang_up) as where:
         found = await findings(f"{LEFT}?connect=tls/{where}&keys={authority / 'operate-bob'}")
     assert found["port"].level is Level.GOOD

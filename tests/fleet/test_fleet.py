@@ -21,7 +21,7 @@ AHEAD = 5000.0
 
 
 def summary(stamp: float, age: object = 0.0, **fields: Any) -> bytes:
-    told = {
+    usual = {
         "to": LEFT.base,
         "epoch": 7,
         "stamp": stamp,
@@ -33,7 +33,7 @@ def summary(stamp: float, age: object = 0.0, **fields: Any) -> bytes:
         "problem": "",
         "address": "tcp://192.168.1.11:502",
     }
-    return json.dumps(told | fields).encode()
+    return json.dumps(usual | fields).encode()
 
 
 def seen_at(summaries: Summaries, payload: bytes, arrival: float) -> Any:
@@ -52,7 +52,7 @@ def test_the_age_counts_from_when_the_agent_saw_the_gripper() -> None:
     assert seen_at(summaries, summary(16.0, None), 16.0 + AHEAD) is None, "it has not been read yet"
 
 
-def test_one_that_was_overtaken_shows_nothing_and_another_run_has_a_clock_of_its_own() -> None:
+def test_an_overtaken_summary_is_dropped_and_each_run_has_its_own_clock() -> None:
     summaries = Summaries()
     assert seen_at(summaries, summary(10.0), 10.0 + AHEAD) == 10.0 + AHEAD
     assert summaries.read(summary(9.0, state="FAULT"), 10.1 + AHEAD) is None
@@ -79,7 +79,7 @@ def test_one_that_was_overtaken_shows_nothing_and_another_run_has_a_clock_of_its
         b"[" * 3000,
     ],
 )
-def test_what_is_none_is_refused(payload: bytes) -> None:
+def test_malformed_summaries_are_refused(payload: bytes) -> None:
     with pytest.raises(ProtocolError, match="a summary that cannot be read"):
         Summaries().read(payload, 1.0)
 

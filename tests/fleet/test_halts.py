@@ -17,7 +17,7 @@ from robotiq_async.fleet.remote.stops import until_answered
 from robotiq_async.fleet.wire.envelope import Answer, Call
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.values.errors import AgentError, NotAllowedError, NotAllStoppedError, RobotiqStateError
-from tests.fleet.cell import ask, move_slowly, told
+from tests.fleet.cell import ask, ending, move_slowly
 from tests.fleet.lab import LEFT, Garbling, Lab, Spoiling, lab
 from tests.fleet.world import World, motions, world
 from tests.grippers import Restless
@@ -50,7 +50,7 @@ async def test_a_halt_that_failed_is_not_counted_as_one(here: World) -> None:
             await fleet.halt_all()
         assert failed.value.outcomes[GripperName("lab", "cell", "right")] == "stopped"
         assert failed.value.outcomes[LEFT].startswith("refused: ")
-        assert await here.other.do(told(here.other.hand.halt())) == "ConnectionLost"
+        assert await here.other.do(ending(here.other.hand.halt())) == "ConnectionLost"
         await here.servers["left"].start()
 
 
@@ -123,7 +123,7 @@ async def test_an_answer_to_another_request_confirms_no_halt(here: Lab) -> None:
 
 
 @inside(world)
-async def test_what_was_asked_before_a_halt_does_not_go_out_after_it(here: World) -> None:
+async def test_commands_before_a_halt_are_not_written_after_it(here: World) -> None:
     hand = here.holder.hand
     here.network.delay("holder", "agent", 0.05)
 
@@ -189,7 +189,7 @@ async def cut_off(hand: RemoteHand) -> None:
 
 
 @inside(world)
-async def test_what_moves_is_held_as_soon_as_the_gripper_is_reached_again(here: World) -> None:
+async def test_moving_axes_are_held_once_the_gripper_is_reached_again(here: World) -> None:
     """The lease ends while the agent has lost its gripper, which goes on to its target."""
     await move_slowly(here)
     await here.servers["left"].stop()
@@ -285,15 +285,13 @@ async def test_a_grip_is_kept_when_the_lease_is_given_back(here: Lab, hand: Remo
 
 
 @inside(lab, kind=Restless)
-async def test_what_does_not_come_to_rest_is_halted(here: Lab, hand: RemoteHand) -> None:
+async def test_axes_that_do_not_come_to_rest_are_halted(here: Lab, hand: RemoteHand) -> None:
     await hand.release(keep_grip=True)
     assert not here.local.status.go_echo
 
 
 @inside(lab, kind=Restless)
-async def test_what_does_not_come_to_rest_is_left_to_whoever_commands_it_by_then(
-    here: Lab, hand: RemoteHand
-) -> None:
+async def test_axes_that_do_not_come_to_rest_are_left_to_the_next_holder(here: Lab, hand: RemoteHand) -> None:
     releasing = asyncio.create_task(hand.release(keep_grip=True))
     await asyncio.sleep(0.1)
     async with here.client("next"):

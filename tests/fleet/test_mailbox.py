@@ -67,7 +67,7 @@ async def test_the_news_of_many_are_gathered() -> None:
 
 
 @virtual
-async def test_what_is_urgent_is_not_kept_waiting_nor_does_it_overtake() -> None:
+async def test_urgent_messages_do_not_wait_and_do_not_overtake() -> None:
     postman = Postman()
     await postman.bring_many(every=0.0001)
     await asyncio.sleep(2 * GATHER_S)
@@ -110,7 +110,7 @@ async def test_letters_of_another_thread() -> None:
     assert postman.opened == list(range(1000))
 
 
-def test_a_loop_that_has_been_closed_is_told_nothing() -> None:
+def test_a_closed_loop_gets_no_messages() -> None:
     async def make() -> Mailbox:
         return Mailbox()
 
@@ -129,7 +129,7 @@ async def test_a_halt_comes_before_a_flood() -> None:
 
 
 @virtual
-async def test_what_is_too_much_is_dropped_but_no_answer(caplog: pytest.LogCaptureFixture) -> None:
+async def test_excess_messages_are_dropped_but_answers_are_not(caplog: pytest.LogCaptureFixture) -> None:
     postman = Postman()
     for number in range(MOST + 10):
         postman.bring(number, Kind.REQUEST)
@@ -177,7 +177,7 @@ def test_answers_go_out_in_their_order_and_then_it_ends() -> None:
     assert sent == list(range(100))
 
 
-def test_whoever_does_not_read_holds_up_nobody_and_too_much_is_dropped_in_the_thread() -> None:
+def test_a_client_that_does_not_read_delays_no_other_and_excess_replies_are_dropped() -> None:
     """A dropped question is reported to its client, as slow as an answer: it held up the loop."""
     reply_sender, read = ReplySender(), threading.Event()
     sent, dropped_in = list[int](), set[threading.Thread]()
@@ -196,7 +196,7 @@ def test_whoever_does_not_read_holds_up_nobody_and_too_much_is_dropped_in_the_th
     assert threading.current_thread() not in dropped_in
 
 
-def test_one_that_was_never_used_ends_at_once() -> None:
+def test_an_unused_sender_ends_at_once() -> None:
     reply_sender = ReplySender()
     reply_sender.close()
     reply_sender.join(PATIENCE_S)

@@ -151,7 +151,7 @@ def test_garbage(data: bytes) -> None:
     st.dictionaries(st.sampled_from(["kind", "message", "state", "allowed", "fault", "status"]), GARBAGE)
     | GARBAGE
 )
-def test_an_answer_with_an_error_that_is_none(error: Any) -> None:
+def test_an_answer_with_a_malformed_error(error: Any) -> None:
     answer = unpack_answer(
         json.dumps({"version": 1, "to": "a", "number": 1, "epoch": 1, "value": 3, "error": error}).encode()
     )
@@ -178,14 +178,14 @@ def test_an_answer_with_an_error_that_is_none(error: Any) -> None:
     ],
     ids=lambda data: repr(data[:20]),
 )
-def test_what_is_huge_deep_or_nothing(data: bytes) -> None:
+def test_huge_deep_or_empty_messages_are_refused(data: bytes) -> None:
     for read in (unpack_call, unpack_answer):
         with pytest.raises((ProtocolError, AgentError)):
             read(data)
 
 
 @pytest.mark.parametrize("seen", ["1" + "0" * 400, "1e999", "-1e999", "NaN", "true", '"1"', "null"])
-def test_a_time_that_is_none(seen: str) -> None:
+def test_a_malformed_time_is_refused(seen: str) -> None:
     text = Call("a", "me", seen=0.125).pack().decode().replace("0.125", seen)
     with pytest.raises(ProtocolError):
         unpack_call(text.encode())
@@ -340,7 +340,7 @@ def test_garbage_is_a_protocol_error(what: str, fields: Any) -> None:
 
 
 @given(MESSAGES)
-def test_what_is_packed_is_unpacked(message: StatusMessage) -> None:
+def test_packing_and_unpacking_keep_a_message(message: StatusMessage) -> None:
     data = message.pack()
     assert len(data) == SIZE == 60
     assert unpack(data) == message

@@ -86,9 +86,9 @@ def test_an_answer_that_overtakes_takes_no_reader_s_status_away() -> None:
     overtaking = here.mirror.status
     for sequence in (2, 3, 4):
         here.receive(10.0 + (sequence - 1) / 10, sequence)
-    told = list(here.statuses.drain())
-    assert [status.sequence for status in told] == [1, 2, 3, 4]
-    assert told[-1] is overtaking
+    items = list(here.statuses.drain())
+    assert [status.sequence for status in items] == [1, 2, 3, 4]
+    assert items[-1] is overtaking
     assert here.mirror.status is overtaking
 
 
@@ -127,7 +127,7 @@ def test_another_run_of_the_agent() -> None:
     here.receive(10.1, 1, epoch=2, events=3, state=BUSY)
     assert here.sequences() == [70, 71, 72], "sequences go on"
     assert here.mirror.stamp == 10.1
-    assert here.mirror.events == 3, "what happened before is not told again"
+    assert here.mirror.events == 3, "earlier events are not reported again"
     assert here.changes() == [
         (State.DISCONNECTED, IDLE),
         (IDLE, State.DISCONNECTED),
@@ -165,13 +165,13 @@ def test_silence_and_the_end_of_it() -> None:
     assert here.mirror.status is not None, "the last status stays"
     here.receive(13.0, 2)
     assert (here.mirror.state, here.mirror.is_silent) == (IDLE, False)
-    told = list(here.transitions.drain())
-    assert [each.trigger for each in told] == [Trigger.SEEN_READY, Trigger.LINK_LOST, Trigger.SEEN_READY]
-    assert [each.timestamp for each in told] == [1010.0, 1012.0, 1013.0]
+    items = list(here.transitions.drain())
+    assert [each.trigger for each in items] == [Trigger.SEEN_READY, Trigger.LINK_LOST, Trigger.SEEN_READY]
+    assert [each.timestamp for each in items] == [1010.0, 1012.0, 1013.0]
     assert here.entered.count(State.DISCONNECTED) >= 1
 
 
-def test_what_happened_in_a_silence_is_told_after_it_and_in_its_order() -> None:
+def test_events_during_a_silence_are_reported_after_it_in_order() -> None:
     here = Bench()
     here.receive(10.0, 1, state=BUSY, events=1)
     here.mirror.fall_silent(1012.0)
@@ -189,7 +189,7 @@ def test_what_happened_in_a_silence_is_told_after_it_and_in_its_order() -> None:
     ]
 
 
-def test_after_the_end_nothing_changes_any_more() -> None:
+def test_after_the_end_nothing_changes() -> None:
     here = Bench()
     here.receive(10.0, 1)
     here.mirror.shut_down(State.DO_SHUTDOWN, Trigger.ASK_STOP, 1011.0)
@@ -224,7 +224,7 @@ def test_events_wait_for_those_before_them() -> None:
     assert here.changes()[1:] == [(IDLE, BUSY), (BUSY, IDLE), (IDLE, BUSY)]
 
 
-def test_those_that_the_agent_has_forgotten_leave_no_gap() -> None:
+def test_events_the_agent_no_longer_has_leave_no_gap() -> None:
     here = Bench()
     here.receive(10.0, 1)
     here.mirror.skip_events(100)
@@ -293,12 +293,12 @@ def test_timestamps_only_rise_and_are_never_ahead(steps: list[tuple[float, float
         here.mirror.receive_events([event(sequence + 1, source, target, stamp - 0.9 * interval)])
         assert here.mirror.status is not None
         assert here.mirror.status.timestamp <= arrival + 1e-6
-    for told in (
+    for items in (
         [status.timestamp for status in here.statuses.drain()],
         [each.timestamp for each in here.transitions.drain()],
     ):
-        assert told == sorted(told)
-        assert not told or told[-1] <= arrival + 1e-6
+        assert items == sorted(items)
+        assert not items or items[-1] <= arrival + 1e-6
 
 
 @given(
@@ -306,12 +306,14 @@ def test_timestamps_only_rise_and_are_never_ahead(steps: list[tuple[float, float
     st.lists(st.booleans(), min_size=8, max_size=8),
     st.lists(st.floats(0, 1), min_size=8, max_size=8),
 )
-def test_in_whatever_order_they_come(order: list[int], in_turn: list[bool], delays: list[float]) -> None:
+def test_statuses_in_any_order_are_reported_in_order(
+    order: list[int], in_turn: list[bool], delays: list[float]
+) -> None:
     here = Bench()
     for sequence in order:
         here.receive(10.0 + sequence / 100, sequence, in_turn=in_turn[sequence], delay=delays[sequence])
-    told = list(here.statuses.drain())
-    assert all(before.sequence < after.sequence for before, after in itertools.pairwise(told))
-    assert all(before.timestamp <= after.timestamp for before, after in itertools.pairwise(told))
+    items = list(here.statuses.drain())
+    assert all(before.sequence < after.sequence for before, after in itertools.pairwise(items))
+    assert all(before.timestamp <= after.timestamp for before, after in itertools.pairwise(items))
     assert here.mirror.status is not None
     assert here.mirror.status.sequence == 7

@@ -95,7 +95,7 @@ async def test_a_subscription_that_is_too_wide_and_a_key_without_a_rule_are_sile
         assert not any(event.is_set() for event in (all_of_one, other))
 
 
-async def test_who_is_not_in_the_list_gets_in_and_gets_nothing(keys: Path) -> None:
+async def test_a_client_not_in_the_list_connects_and_gets_nothing(keys: Path) -> None:
     async with line() as here:
         publish = (await here.answering(keys / "agent-cell")).publish
         eve, alice = await here.client(keys / "operate-eve"), await here.client(keys / "read-alice")
@@ -124,7 +124,7 @@ async def test_wildcards_open_nothing(keys: Path) -> None:
             assert await bob.bus.ask(key, b"?", timeout=1.0, urgency=Urgency.COMMAND) is None, key
 
 
-async def test_nobody_publishes_answers_or_is_present_in_place_of_an_agent(keys: Path) -> None:
+async def test_no_client_can_act_as_an_agent(keys: Path) -> None:
     """Not even for clients in zenoh's sense, for whom the agent would carry on what others say."""
     async with line() as here:
         agent = await here.answering(keys / "agent-cell")
@@ -192,7 +192,7 @@ async def test_a_client_does_not_pass_for_an_agent_nor_one_host_for_another(keys
         assert [client.connected.is_set() for client in clients] == [False, False, True]
 
 
-async def test_with_an_empty_list_nobody_may_anything(tmp_path: Path) -> None:
+async def test_an_empty_list_denies_everything(tmp_path: Path) -> None:
     make_authority(tmp_path)
     agent, bob = issue(tmp_path, "cell", Role.AGENT), issue(tmp_path, "bob", Role.OPERATE)
     (agent / ACCESS).write_text("", encoding="utf-8")
@@ -276,7 +276,7 @@ async def test_a_fleet_is_halted_in_the_role_for_it(keys: Path) -> None:
 # -- without keys ------------------------------------------------------------------------------------------
 
 
-async def test_idle_connections_keep_nobody_out() -> None:
+async def test_idle_connections_keep_no_client_out() -> None:
     """300 of them, by a client that only opens them, kept new clients out for 12 s."""
     async with line(protocol="tcp", patience=8) as here:
         agent = await here.agent_bus()

@@ -123,7 +123,7 @@ async def test_an_agent_is_killed_and_the_next_one_holds(site: Site) -> None:
         await hand.move(0, Finger.A, speed=255)
 
 
-async def test_a_frozen_reader_holds_up_nobody(site: Site) -> None:
+async def test_a_frozen_reader_delays_no_other(site: Site) -> None:
     await site.start_agent()
     reader = await site.start("read", says="reading")
     loop = asyncio.get_running_loop()

@@ -9,7 +9,7 @@ import pytest
 from robotiq_async import ConnectionLostError, Finger, RobotiqError, State
 from robotiq_async.simulator.physics.gripper import Write
 from robotiq_async.values.request import Request
-from tests.fleet.cell import move_slowly, told
+from tests.fleet.cell import ending, move_slowly
 from tests.fleet.lab import LEFT, Garbling, Lab, lab
 from tests.fleet.world import POLL_S, World, motions, world
 from tests.virtual import LATENCY_S, inside, virtual
@@ -59,7 +59,7 @@ async def test_nothing_from_before_a_suspension_is_carried_out() -> None:
     async with world(asleep=lambda: slept) as here:
         here.network.keeps_links = True
         here.cut(here.holder, back=False)
-        going = asyncio.create_task(told(here.holder.do(here.holder.hand.move(200, Finger.A, speed=0))))
+        going = asyncio.create_task(ending(here.holder.do(here.holder.hand.move(200, Finger.A, speed=0))))
         await asyncio.sleep(0.3)
         slept = 3600.0
         here.mend(here.holder)
@@ -86,7 +86,7 @@ async def test_a_suspended_laptop_commands_nothing_from_before(
             number += 1
             await asyncio.sleep(0.01)
 
-    looping = host.create_task(told(loop()))
+    looping = host.create_task(ending(loop()))
     await asyncio.sleep(0.5)
     (host.freeze if keeps_links else lambda: here.freeze(host))()
     await asyncio.sleep(seconds)
@@ -147,7 +147,7 @@ async def test_a_status_of_a_former_run_brings_nothing_back(here: World) -> None
 
 
 @inside(lab)
-async def test_what_another_run_of_the_agent_says_acknowledges_nothing(here: Lab) -> None:
+async def test_answers_of_another_run_acknowledge_nothing(here: Lab) -> None:
     bus = Garbling(here.network.bus("client"), epoch=5)
     async with here.client_over(bus) as hand:
         for verb, ask in (("cmd/set_speed", hand.set_speed(9)), ("cmd/move", hand.move(30))):

@@ -102,7 +102,7 @@ async def test_numbers_rise_in_the_order_of_the_calls() -> None:
 
 
 @virtual
-async def test_what_waits_is_sent_before_what_is_asked_for_after_it() -> None:
+async def test_waiting_commands_are_sent_before_later_requests() -> None:
     async with slow_network(0.1) as (here, _, hand):
         for value in range(20):
             hand.command(position=value)
@@ -113,7 +113,7 @@ async def test_what_waits_is_sent_before_what_is_asked_for_after_it() -> None:
 
 @virtual
 @pytest.mark.parametrize("how", ["halt", "release", "take"])
-async def test_what_waits_goes_with_the_lease_or_a_halt(how: str) -> None:
+async def test_waiting_commands_are_dropped_with_the_lease_or_a_halt(how: str) -> None:
     async with slow_network(0.1) as (here, bus, hand):
         for value in range(100, 120):
             hand.command(position=value)
@@ -256,7 +256,7 @@ async def test_a_burst_of_moves_of_which_many_are_lost(here: Lab, seed: int) -> 
 
 
 @inside(lab)
-async def test_what_comes_later_does_not_take_the_place_of_what_was_lost(here: Lab) -> None:
+async def test_a_later_command_does_not_replace_a_lost_one(here: Lab) -> None:
     """It was refused as overtaken, or never heard of again."""
     bus = Spoiling(here.network.bus("client"), spoils=first_copy_of(0, 2))
     async with here.client_over(bus) as hand:
@@ -342,7 +342,7 @@ async def test_sixty_four_hands_at_once_again_and_again() -> None:
             assert loop.time() - begun < PROMISE_S
             ended.update(type(each).__name__ for each in outcomes)
         assert ended["NoneType"] / ended.total() > 0.99, ended
-        assert set(ended) <= {"NoneType", "ControlLostError"}, "told that nothing was done"
+        assert set(ended) <= {"NoneType", "ControlLostError"}, "the error says that nothing was done"
         await asyncio.gather(*(hand.stop() for hand in clients))
 
 

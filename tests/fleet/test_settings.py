@@ -71,7 +71,7 @@ async def test_an_agent_that_was_started_anew_moves_with_what_was_asked_of_the_f
 
 
 @inside(world)
-async def test_what_is_asked_for_by_a_move_and_by_axis_counts_too(here: World) -> None:
+async def test_settings_of_a_move_and_of_single_axes_count_too(here: World) -> None:
     hand = here.holder.hand
     await here.holder.do(hand.move(5, A, speed=200, force=7))
     await here.holder.do(hand.set_speed(3, Finger.B))
@@ -106,7 +106,7 @@ async def test_it_is_given_again_until_the_gripper_has_it(here: World) -> None:
 
 
 @inside(lab)
-async def test_it_is_given_again_after_somebody_else_has_set_another(here: Lab, hand: RemoteHand) -> None:
+async def test_settings_are_restored_after_another_client_changed_them(here: Lab, hand: RemoteHand) -> None:
     await hand.set_force(5)
     async with here.client("other", control=False) as other:
         await other.take()
@@ -134,7 +134,9 @@ async def test_it_is_given_again_after_somebody_else_has_set_another(here: Lab, 
         ("set_speed", {"fingers": "x"}, {}),
     ],
 )
-def test_what_a_command_sets(name: str, arguments: dict[str, Any], settings: dict[Any, int]) -> None:
+def test_which_settings_a_command_sets(
+    name: str, arguments: dict[str, Any], settings: dict[Any, int]
+) -> None:
     assert settings_of(name, arguments) == settings
     assert read_settings(settings_fields(settings)) == settings
 
@@ -143,7 +145,7 @@ def test_what_a_command_sets(name: str, arguments: dict[str, Any], settings: dic
     "fields",
     [None, [], {"1": 3}, {"16": {"speed": 3}}, {"0": {"speed": 1}}, {"1": {"speed": True}}, {"x": {}}],
 )
-def test_settings_that_are_none(fields: object) -> None:
+def test_malformed_settings_are_refused(fields: object) -> None:
     with pytest.raises((TypeError, ValueError)):
         read_settings(fields)
 
@@ -162,7 +164,7 @@ async def test_a_lease_with_settings_that_are_none_is_refused(here: Lab, reader:
 
 
 @inside(world)
-async def test_what_is_asked_for_anew_goes_before_what_was_asked_before(here: World) -> None:
+async def test_new_settings_override_restored_ones(here: World) -> None:
     hand = here.holder.hand
     await here.holder.do(hand.set_speed(10))
     await here.holder.do(hand.set_force(5))
@@ -173,7 +175,7 @@ async def test_what_is_asked_for_anew_goes_before_what_was_asked_before(here: Wo
     assert (found[-1].axes[1].speed, found[-1].axes[1].force) == GENTLE
 
 
-def test_what_was_never_asked_for_is_not_given() -> None:
+def test_settings_never_asked_for_are_not_sent() -> None:
     settings = Settings()
     assert not settings.fields
     settings.note("cmd/move", Call("", "", number=2, arguments={"position": 9, "fingers": 1, "speed": 3}))

@@ -80,7 +80,7 @@ async def test_a_caller_hears_at_once_that_the_hand_was_stopped(here: Lab, hand:
 @pytest.mark.parametrize("second", STOPS)
 @pytest.mark.parametrize("first", STOPS)
 @inside(lab)
-async def test_the_strongest_stop_counts_whoever_asks_first(
+async def test_the_strongest_stop_counts_in_any_order(
     here: Lab, hand: RemoteHand, first: str, second: str, between: float
 ) -> None:
     """A gentler one that is under way does not leave rGTO set."""
@@ -217,7 +217,7 @@ async def test_a_stronger_end_beside_a_gentle_release_wins(here: Lab, hand: Remo
 
 
 @inside(lab)
-async def test_a_stronger_end_leaves_whoever_has_come_after_alone(here: Lab) -> None:
+async def test_a_stronger_stop_leaves_the_next_holder_alone(here: Lab) -> None:
     async with here.client("next", control=False) as other:
         hand = here.client()
         await hand.start()
@@ -293,7 +293,9 @@ async def test_an_ending_agent_takes_no_request(here: Lab, hand: RemoteHand) -> 
 
 
 @inside(lab)
-async def test_what_was_let_in_just_before_does_not_go_out_after_it(here: Lab, hand: RemoteHand) -> None:
+async def test_requests_admitted_just_before_the_end_are_not_written_after_it(
+    here: Lab, hand: RemoteHand
+) -> None:
     writes = len(here.gripper.writes)
     for each in every_motion(hand):
         if "lease" not in each.key:

@@ -52,7 +52,7 @@ async def test_the_answer_of_the_one_that_commands_counts_and_not_the_quicker_re
 
 
 @inside(lab)
-async def test_whoever_is_told_by_two_says_so_and_begins_no_command(
+async def test_a_client_that_hears_two_agents_says_so_and_commands_nothing(
     here: Lab, reader: RemoteHand, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with another(here) as other:
@@ -128,7 +128,7 @@ async def test_the_halt_of_all_stops_a_second_one_whose_link_comes_up_late(here:
 
 
 @inside(lab)
-async def test_a_second_agent_of_a_host_is_refused_whatever_it_serves(here: Lab) -> None:
+async def test_a_second_agent_of_a_host_is_refused_for_any_gripper(here: Lab) -> None:
     for name, words in (("left", "serves zenoh://lab/cell/left already"), ("right", "a host of its own")):
         agent = Agent("lab", "cell", {name: RobotiqHand("sim://")}, here.network.bus(f"second {name}"))
         with pytest.raises(AgentError, match=words):
@@ -177,7 +177,7 @@ async def test_without_one_that_decides_it_is_the_last(
 async def test_of_two_agents_that_start_at_once_one_stays(here: World) -> None:
     await here.agent.end()
     here.agents.clear()
-    here.network.part("one", "two")  # a router that has not told yet
+    here.network.part("one", "two")  # a router that has not reported it yet
     here.network.loop.call_later(0.4, here.network.join, "one", "two")
 
     async def start(name: str) -> str:

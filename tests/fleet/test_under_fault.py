@@ -7,7 +7,7 @@ import asyncio
 import pytest
 
 from robotiq_async import Finger
-from tests.fleet.cell import PHASES, TARGET, TROUBLES, Cell, Doing, cells, moving, outcome, told
+from tests.fleet.cell import PHASES, TARGET, TROUBLES, Cell, Doing, cells, ending, moving, outcome
 from tests.fleet.world import World, world
 from tests.virtual import inside
 
@@ -40,7 +40,7 @@ async def test_a_halt_in_the_midst(here: World, trouble: str) -> None:
     going_on = asyncio.create_task(TROUBLES[trouble](here))
     await asyncio.sleep(HALTED_AFTER_S)
     at = here.now()
-    heard = await here.other.do(told(here.other.hand.halt()))
+    heard = await here.other.do(ending(here.other.hand.halt()))
     assert here.now() - at <= 2.5
     if heard == "done":
         assert not here.gripper.is_moving

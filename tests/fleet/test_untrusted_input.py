@@ -51,7 +51,7 @@ OTHERS = StatusMessage(LEFT.mark + 1, 2, 3.0, State.RUNNING_IDLE, 4, False, 5, F
 
 @inside(lab)
 @pytest.mark.parametrize(("verb", "arguments"), STRANGE)
-async def test_from_who_holds_the_lease(here: Lab, hand: RemoteHand, verb: str, arguments: Any) -> None:
+async def test_from_the_holder_of_the_lease(here: Lab, hand: RemoteHand, verb: str, arguments: Any) -> None:
     assert hand._session is not None
     writes = len(here.gripper.writes)
     call = hand._session.call(arguments)
@@ -68,7 +68,7 @@ async def test_from_who_holds_the_lease(here: Lab, hand: RemoteHand, verb: str, 
     "request_", [b"", b"{}", b"[1", b"null", b"\xff", json.dumps({"version": 9}).encode()]
 )
 @pytest.mark.parametrize("verb", ["info", "lease", "halt", "cmd/move"])
-async def test_that_are_none(here: Lab, hand: RemoteHand, verb: str, request_: bytes) -> None:
+async def test_malformed_requests(here: Lab, hand: RemoteHand, verb: str, request_: bytes) -> None:
     with pytest.raises((ProtocolError, AgentError)):
         (await here.answer(verb, request_)).outcome(instantly)
     await hand.move(20, 1)
@@ -140,7 +140,7 @@ async def test_a_request_for_another_gripper_is_refused(here: World) -> None:
 
 
 @inside(lab)
-async def test_what_a_client_calls_itself(
+async def test_labels_of_clients_are_made_printable(
     here: Lab, reader: RemoteHand, caplog: pytest.LogCaptureFixture
 ) -> None:
     assert reader._session is not None
@@ -148,8 +148,8 @@ async def test_what_a_client_calls_itself(
     for verb, number in (("lease", 1), ("halt", 2), ("lease", 3)):
         call = Call(LEFT.base, "eve", 0, 0, number, seen, {"what": "acquire", "label": NAME})
         (await here.answer(verb, call.pack())).outcome(instantly)
-    told = await reader._session.ask("info", timeout=1.0)
-    assert told["holder"].isprintable(), "who shows it elsewhere may not look at it first"
+    info = await reader._session.ask("info", timeout=1.0)
+    assert info["holder"].isprintable(), "who shows it elsewhere may not look at it first"
     with pytest.raises(ControlLostError) as refused:
         await reader.acquire()
     assert "eve" in str(refused.value)
@@ -159,7 +159,7 @@ async def test_what_a_client_calls_itself(
 
 
 @pytest.mark.parametrize("kind", ["ControlLostError", "ConnectFailedError", "of the future\n", "ValueError"])
-def test_what_an_agent_says_of_a_failure(kind: str) -> None:
+def test_error_messages_of_an_agent_are_made_printable(kind: str) -> None:
     fields = {"kind": kind, "message": "a\nb\x1b", "reason": "\n", "address": "\r", "state": None}
     error = read_error(fields, instantly)
     for words in (str(error), *map(str, vars(error).values())):

@@ -41,7 +41,7 @@ def test_options(option: str, value: Any) -> None:
 
 @pytest.mark.parametrize("address", ["rtu:///dev/ttyUSB0", "rtu+tcp://127.0.0.1:54321"])
 @pytest.mark.parametrize("unit", [0, 248, 255])
-def test_units_that_nobody_has_on_a_line(address: str, unit: int) -> None:
+def test_reserved_unit_ids_on_a_serial_line(address: str, unit: int) -> None:
     with pytest.raises(ValueError, match=rf"device_id must be in 1\.\.247, got {unit}"):
         RobotiqHand(address, device_id=unit)
 

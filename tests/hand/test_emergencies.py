@@ -74,7 +74,7 @@ async def test_halts_and_resets_at_once_all_end(hand: RobotiqHand, gripper: Simu
     assert not gripper.is_moving
 
 
-async def test_a_release_that_another_client_ends_with_an_activation_is_told_at_once(
+async def test_a_release_ended_by_an_activation_of_another_client_fails_at_once(
     hand: RobotiqHand, gripper: SimulatedGripper, clock: Clock
 ) -> None:
     """It waited out its 60 s when the reset fell between two polls."""

@@ -68,7 +68,7 @@ async def test_a_stream_is_neither_opened_nor_read_in_another_loop(hand: Robotiq
                 await asyncio.to_thread(call)
 
 
-async def test_who_waits_in_another_loop_for_a_start_is_told(server: SimulatorServer) -> None:
+async def test_a_reader_that_waits_in_another_loop_gets_an_error(server: SimulatorServer) -> None:
     hand = RobotiqHand(server.address)
     stream = hand.statuses()
     waiting = threading.Event()
@@ -181,7 +181,7 @@ class TestClosedLoop:
         asyncio.run(again())
         assert hand.state is State.SHUTDOWN
 
-    def test_what_is_left_of_the_first_start_leaves_the_second_alone(self, address: str) -> None:
+    def test_remains_of_the_first_start_leave_the_second_alone(self, address: str) -> None:
         """The task of the closed loop is ended by the garbage collector, whenever that comes."""
         hand = abandoned(address)
 

@@ -96,7 +96,7 @@ async def test_a_control_loop_beside_a_stop_is_refused_at_once(
 
 @TURNS
 @pytest.mark.parametrize("options", [{}, {"halt": False}, {"keep_grip": True}], ids=str)
-async def test_what_was_not_sent_yet_is_dropped_and_its_callers_hear_of_it_at_once(
+async def test_unsent_requests_are_dropped_and_their_callers_get_an_error_at_once(
     hand: RobotiqHand,
     server: SimulatorServer,
     gripper: SimulatedGripper,
@@ -207,7 +207,7 @@ STOPS = {"leave": {"halt": False}, "keep": {"keep_grip": True}, "halt": {}}
 @pytest.mark.parametrize("between", [0.0, 0.0005, 0.003, 0.02, 0.1])
 @pytest.mark.parametrize("second", STOPS)
 @pytest.mark.parametrize("first", STOPS)
-async def test_the_strongest_stop_counts_whoever_asks_first(
+async def test_the_strongest_stop_counts_in_any_order(
     hand: RobotiqHand, gripper: SimulatedGripper, first: str, second: str, between: float
 ) -> None:
     """With a gentler one under way, stop() returned with rGTO set, and the fingers went on."""
@@ -315,7 +315,7 @@ class WatchedLine(VirtualLine):
         super().carry(sender, data)
 
 
-async def test_what_waits_for_the_silence_of_a_serial_line_is_not_sent_after_a_stop(
+async def test_an_image_that_waits_for_the_silence_of_the_line_is_not_sent_after_a_stop(
     gripper: SimulatedGripper, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """1.75 ms lay between the decision and the wire: an image that began a motion left after stop()."""
@@ -333,7 +333,7 @@ async def test_what_waits_for_the_silence_of_a_serial_line_is_not_sent_after_a_s
 
 @pytest.mark.parametrize("turns", range(8))
 @pytest.mark.parametrize("options", [{}, {"halt": False}, {"keep_grip": True}], ids=str)
-async def test_what_a_transport_object_is_given_was_decided_before_the_stop(
+async def test_a_transport_object_gets_no_image_decided_before_the_stop(
     turns: int, options: dict[str, bool]
 ) -> None:
     """Its calls are made in a task of their own: an image was decided one turn before the stop, and left."""

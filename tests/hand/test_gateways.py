@@ -31,7 +31,7 @@ REFUSALS = [
 
 
 @pytest.mark.parametrize(("code", "means"), REFUSALS)
-async def test_a_gateway_that_refuses_to_write_is_told_so(
+async def test_a_gateway_that_refuses_to_write_is_named_in_the_error(
     gateway: SimulatorServer, code: int, means: str
 ) -> None:
     async with RobotiqHand(gateway.address) as hand:
@@ -65,7 +65,7 @@ async def test_a_command_while_the_link_is_opened_again_says_why(gateway: Simula
             hand.command(position=100)
 
 
-async def test_a_gateway_that_writes_fewer_registers_is_told_so(gateway: SimulatorServer) -> None:
+async def test_a_gateway_that_writes_fewer_registers_is_named_in_the_error(gateway: SimulatorServer) -> None:
     def shorten(reply: bytes) -> list[tuple[float, bytes]]:
         return [(0.0, reply[:-1] + b"\x06" if reply[7] == 16 else reply)]
 

@@ -109,7 +109,7 @@ async def test_a_reconnect_after_a_silence_goes_on() -> None:
 # -- an activation that takes its time ---------------------------------------------------------------------
 
 
-async def test_an_activation_may_take_half_a_minute_and_is_told_on_the_way(
+async def test_an_activation_may_take_half_a_minute_and_logs_its_progress(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     caplog.set_level(logging.INFO)
@@ -118,11 +118,11 @@ async def test_an_activation_may_take_half_a_minute_and_is_told_on_the_way(
     async with RobotiqHand(slow) as hand:
         assert hand.state is State.RUNNING_IDLE
         assert 25 < now() - began < ACTIVATION_TIMEOUT_S
-    told = [record.getMessage() for record in caplog.records if "so far" in record.getMessage()]
-    assert len(told) == int((now() - began) // TOLD_EVERY_S)
-    assert "activating, 12 s so far" in told[2]
+    logged = [record.getMessage() for record in caplog.records if "so far" in record.getMessage()]
+    assert len(logged) == int((now() - began) // TOLD_EVERY_S)
+    assert "activating, 12 s so far" in logged[2]
     await asyncio.sleep(100)
-    assert len(told) == caplog.text.count("so far"), "the end is the end"
+    assert len(logged) == caplog.text.count("so far"), "the end is the end"
 
 
 async def test_at_the_limit_an_activation_goes_on_and_can_be_waited_for_again() -> None:
@@ -137,7 +137,7 @@ async def test_at_the_limit_an_activation_goes_on_and_can_be_waited_for_again() 
     await hand.stop()
 
 
-async def test_who_leaves_before_its_end_takes_it_back() -> None:
+async def test_an_activation_that_times_out_is_taken_back() -> None:
     slow = Wire(speedup=4.2 / 50)
     with pytest.raises(ActivationTimeoutError):
         await RobotiqHand(slow).start()
@@ -224,7 +224,7 @@ async def test_a_gripper_that_waits_for_its_activation_is_reset_and_activated(re
     await hand.stop()
 
 
-async def test_one_that_never_comes_back_is_reset_twice_and_left_to_a_person() -> None:
+async def test_a_gripper_that_never_recovers_is_reset_twice_and_left_to_a_person() -> None:
     stopped = await pressed(Wire())
     hand = RobotiqHand(stopped)
     await hand.start(activate=False)

@@ -47,7 +47,7 @@ async def test_a_gripper_that_comes_in_time_is_started(trouble: Trouble, activat
 
 @pytest.mark.parametrize("trouble", ABSENT, ids=lambda trouble: trouble.kind)
 @pytest.mark.parametrize("wait", [0.0, 0.3, 10.0])
-async def test_one_that_does_not_come_is_told_and_leaves_nothing_running(
+async def test_a_gripper_that_does_not_come_gives_an_error_and_leaves_nothing_running(
     trouble: Trouble, wait: float
 ) -> None:
     async with world() as here:
@@ -126,7 +126,7 @@ async def test_statuses_and_transitions_may_be_waited_for_meanwhile() -> None:
 
 
 @pytest.mark.parametrize("reconnect", [True, False, ReconnectPolicy(max_delay=0.2, give_up_after=0.5)])
-async def test_the_wait_is_that_of_the_start_whatever_becomes_of_a_lost_link(
+async def test_wait_counts_for_the_start_and_not_for_a_link_loss_later(
     reconnect: bool | ReconnectPolicy,
 ) -> None:
     async with world(reconnect=reconnect) as here:
@@ -137,11 +137,11 @@ async def test_the_wait_is_that_of_the_start_whatever_becomes_of_a_lost_link(
         await starting
 
 
-async def test_why_it_waits_is_told_once(caplog: pytest.LogCaptureFixture) -> None:
+async def test_the_reason_of_the_wait_is_logged_once(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.WARNING, "robotiq_async")
     async with world() as here, here.server.fault_injector.making(Trouble("refuse")):
         with pytest.raises(ConnectFailedError):
             await here.hand.start(wait=20.0)
-    told = [each.getMessage() for each in caplog.records if "no gripper yet" in each.getMessage()]
-    assert len(told) == 1
-    assert "20 s" in told[0]
+    logged = [each.getMessage() for each in caplog.records if "no gripper yet" in each.getMessage()]
+    assert len(logged) == 1
+    assert "20 s" in logged[0]

@@ -23,10 +23,10 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 A = Finger.A
 
 
-async def test_a_listener_is_told_what_the_streams_are(hand: RobotiqHand) -> None:
-    told: list[Any] = []
+async def test_a_listener_gets_the_items_of_all_streams(hand: RobotiqHand) -> None:
+    heard: list[Any] = []
     statuses, transitions, requests = hand.statuses(1000), hand.transitions(), hand.requests()
-    remove = hand.add_listener(told.append)
+    remove = hand.add_listener(heard.append)
     await hand.move(60, A)
     await hand.stop()
     remove()
@@ -35,9 +35,9 @@ async def test_a_listener_is_told_what_the_streams_are(hand: RobotiqHand) -> Non
         (Transition, [*transitions.drain()]),
         (SentRequest, [*requests.drain()]),
     ):
-        assert [each for each in told if type(each) is kind] == items, kind
-    first = next(index for index, each in enumerate(told) if isinstance(each, SentRequest))
-    asked, *between, delivered, request = told[: first + 1]
+        assert [each for each in heard if type(each) is kind] == items, kind
+    first = next(index for index, each in enumerate(heard) if isinstance(each, SentRequest))
+    asked, *between, delivered, request = heard[: first + 1]
     assert (asked.target, delivered.target) == (State.RUNNING_CC, State.RUNNING_IDLE)
     assert {type(each) for each in between} == {RobotiqStatus}
     assert request.acknowledged
@@ -78,18 +78,18 @@ async def test_a_command_of_a_listener_goes_out_in_the_same_turn(
     hand: RobotiqHand, server: SimulatorServer
 ) -> None:
     """It is decided on the status that the listener was called with."""
-    told: list[object] = []
+    heard: list[object] = []
 
     def listen(item: object) -> None:
-        told.append(item)
-        if len(told) == 1:
+        heard.append(item)
+        if len(heard) == 1:
             hand.command(A, position=100)
 
     remove = hand.add_listener(listen)
     await hand.wait_for_state(State.RUNNING_CC)
     await hand.wait_for_state(State.RUNNING_IDLE)
     remove()
-    kinds = [type(each) for each in told[:4]]
+    kinds = [type(each) for each in heard[:4]]
     assert kinds[0] is RobotiqStatus
     assert kinds.count(RobotiqStatus) == 1, "no other status came between"
     assert SentRequest in kinds
@@ -169,7 +169,7 @@ async def coroutine(item: object) -> None:
 
 
 @pytest.mark.parametrize("callback", [None, 3, coroutine], ids=["None", "3", "coroutine"])
-def test_what_is_no_plain_function_is_refused(callback: Any) -> None:
+def test_only_plain_functions_are_accepted(callback: Any) -> None:
     with pytest.raises(TypeError, match="callback must be a plain function"):
         RobotiqHand().add_listener(callback)
 

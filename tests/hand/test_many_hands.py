@@ -108,18 +108,18 @@ async def test_inside_its_task_the_other_is_stopped(cell: Cell, group: Group) ->
 
 
 @GROUPS
-async def test_what_is_caught_inside_its_task_concerns_nobody_else(cell: Cell, group: Group) -> None:
-    told: list[str] = []
+async def test_an_error_caught_inside_its_task_leaves_the_others_alone(cell: Cell, group: Group) -> None:
+    results: list[str] = []
 
     async def work(hand: RobotiqHand) -> None:
         try:
             async with hand:
-                told.append(f"{hand.name}: {(await hand.close(speed=0)).positions[THREE_FINGER.axes[0]]}")
+                results.append(f"{hand.name}: {(await hand.close(speed=0)).positions[THREE_FINGER.axes[0]]}")
         except RobotiqError as error:
-            told.append(error.hand)
+            results.append(error.hand)
 
     await group(lambda: work(cell.left), lambda: work(cell.right), cell.pull_the_plug)
-    assert told == ["right", "left: 241"]
+    assert results == ["right", "left: 241"]
 
 
 async def test_a_halt_of_all_reaches_those_that_can_be_reached(cell: Cell) -> None:

@@ -52,7 +52,7 @@ async def named(server: SimulatorServer, clock: Clock) -> AsyncIterator[RobotiqH
 
 
 @pytest.mark.parametrize("name", ["left", "linke Hand, Zelle 3", "x" * LONGEST_NAME, "左"])
-def test_what_it_was_named_it_is_called(name: str) -> None:
+def test_a_name_is_kept_and_shown(name: str) -> None:
     hand = RobotiqHand("tcp://192.168.1.11", name=name)
     assert (hand.name, hand.address) == (name, "tcp://192.168.1.11:502")
     assert repr(hand) == f"<RobotiqHand {name} tcp://192.168.1.11:502 DISCONNECTED>"
@@ -68,7 +68,7 @@ def test_without_a_name_it_is_called_by_its_address() -> None:
 @pytest.mark.parametrize(
     "name", ["", " ", " left", "left\n", "le\tft", "\x1b[2J", "a\u202eb", "x" * 65, "\ud800"]
 )
-def test_what_is_no_name_is_a_value_error(name: str) -> None:
+def test_a_malformed_name_is_a_value_error(name: str) -> None:
     with pytest.raises(
         ValueError, match=r"name must be None or a text of 1\.\.64 printable characters"
     ) as caught:
@@ -77,12 +77,12 @@ def test_what_is_no_name_is_a_value_error(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [7, b"left", Finger.A, ["left"]])
-def test_what_is_no_text_is_a_type_error(name: Any) -> None:
+def test_a_name_that_is_not_text_is_a_type_error(name: Any) -> None:
     with pytest.raises(TypeError, match="name must be None or a text"):
         RobotiqHand(name=name)
 
 
-async def test_what_is_told_of_it_has_its_name(named: RobotiqHand) -> None:
+async def test_published_fields_carry_the_name(named: RobotiqHand) -> None:
     for fields in (reading_fields(named), state_fields(named, 0.0)):
         assert (fields["name"], fields["address"]) == (NAME, named.address)
 
@@ -143,7 +143,7 @@ async def failed(task: asyncio.Task[Any], kind: type[RobotiqError]) -> RobotiqEr
     return error
 
 
-async def test_what_waits_is_told_the_name(
+async def test_errors_of_waiting_calls_carry_the_name(
     named: RobotiqHand, gripper: SimulatedGripper, server: SimulatorServer
 ) -> None:
     assert_tells(await failed(await waiting(named, timeout=0.01), MoveTimeoutError))
@@ -173,7 +173,7 @@ async def test_what_waits_is_told_the_name(
 
 @pytest.mark.parametrize("ends", ["lost link", "stop"])
 @pytest.mark.parametrize("call", ["set_speed", "hold", "halt", "reset", "activate", "atr", "recover"])
-async def test_what_waits_for_an_answer_is_told_the_name(
+async def test_errors_of_calls_that_wait_for_an_answer_carry_the_name(
     call: str, ends: str, named: RobotiqHand, gripper: SimulatedGripper, server: SimulatorServer
 ) -> None:
     if call in ("atr", "recover"):

@@ -29,7 +29,7 @@ async def test_one_gripper_has_one_hand(hand: RobotiqHand, server: SimulatorServ
     assert len(server.gripper.writes) == writes
 
 
-async def test_this_hand_is_told_that_it_is_this_hand(hand: RobotiqHand) -> None:
+async def test_the_error_says_when_it_is_the_same_hand(hand: RobotiqHand) -> None:
     with pytest.raises(InvalidStateError, match=r"this hand runs on .* already: stop\(\) it first$"):
         await hand.start()
 
@@ -46,7 +46,7 @@ async def test_two_grippers_behind_one_gateway_have_two_hands(server: SimulatorS
         assert four.state is State.RUNNING_IDLE
 
 
-async def test_a_serial_port_has_one_hand_whatever_the_unit_id(tmp_path: Path) -> None:
+async def test_a_serial_port_has_one_hand_for_all_unit_ids(tmp_path: Path) -> None:
     with SerialLine(tmp_path) as line:
         async with (
             SerialSimulatorServer(line.far, SimulatedGripper(speedup=20)),

@@ -209,7 +209,7 @@ def test_a_malformed_option_of_a_simulated_gripper_is_named_with_its_range(query
 
 
 @pytest.mark.parametrize("address", [None, 502, b"tcp://host", Path("/dev/ttyUSB0")], ids=repr)
-def test_what_is_not_a_string_is_a_type_error(address: object) -> None:
+def test_an_address_that_is_not_a_string_is_a_type_error(address: object) -> None:
     message = refusal(address, TypeError)
     assert "address must be a string" in message
     assert repr(address) in message

@@ -96,6 +96,6 @@ def test_a_device_is_known_by_its_number(tmp_path: Path) -> None:
     os.close(master)
 
 
-def test_a_socket_is_one_place_whatever_is_spoken_there() -> None:
+def test_a_socket_is_one_place_for_all_protocols() -> None:
     assert place("rtu+tcp://localhost:54321") == place("tcp://127.0.0.1:54321")
     assert place("rtu+tcp://localhost:54321") != place("rtu+tcp://localhost:54322")

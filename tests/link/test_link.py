@@ -197,7 +197,7 @@ async def test_an_unanswered_write_is_sent_once() -> None:
         assert [request[7] for request in scripted.requests] == [16, 4, 4]
 
 
-async def test_what_nobody_asked_for_spoils_the_link() -> None:
+async def test_bytes_without_a_request_break_the_link() -> None:
     async with linked() as (transport, scripted):
         assert await transport.read() == REGISTERS
         scripted.writers[-1].write(good(scripted.requests[-1]))
@@ -378,7 +378,7 @@ async def test_no_address_of_a_name_can_be_reached(resolved: Callable[..., None]
             await to_the_host(transport).open()
 
 
-async def test_a_name_that_nobody_knows_is_told() -> None:
+async def test_an_unknown_host_name_is_reported() -> None:
     address = parse_address("nowhere.invalid")
     transport = ModbusTransport(address, TCP_REGISTERS, connect_timeout=5.0, response_timeout=0.1)
     with pytest.raises(ConnectFailedError, match=r"nowhere\.invalid:502: the name cannot be resolved: \w"):

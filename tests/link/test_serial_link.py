@@ -248,7 +248,9 @@ async def test_the_rest_of_a_damaged_answer_is_no_part_of_the_next(
     assert await reading == (len(device.requests),) * 8
 
 
-async def test_who_talks_all_the_time_is_given_up(transport: ModbusTransport, device: Device) -> None:
+async def test_a_device_that_never_falls_silent_is_given_up(
+    transport: ModbusTransport, device: Device
+) -> None:
     device.spoil = lambda reply: b"\xff" + reply[:0]
     reading = asyncio.ensure_future(transport.read())
     began = asyncio.get_running_loop().time()
@@ -283,7 +285,7 @@ async def test_cancelled_while_the_line_falls_silent(transport: ModbusTransport,
     assert not transport.is_open
 
 
-async def test_reads_asked_again_are_told_once_in_a_while(
+async def test_repeated_reads_are_logged_now_and_then(
     transport: ModbusTransport, device: Device, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.WARNING, "robotiq_async")
@@ -325,13 +327,13 @@ async def test_a_burst_between_two_requests_is_found_out(
     ("device", "why"),
     [("/dev/ttyNOWHERE", MISSING), ("/dev/null", NO_PORT), ("/tmp", NO_PORT), (__file__, NO_PORT)],
 )
-async def test_what_is_no_port_is_told_from_what_is_not_there(device: str, why: str) -> None:
+async def test_a_path_that_is_no_port_and_one_that_does_not_exist_differ(device: str, why: str) -> None:
     with pytest.raises(ConnectFailedError) as caught:
         await unopened(device).open()
     assert str(caught.value) == f"cannot connect to rtu://{device}: {why}"
 
 
-async def test_a_port_of_another_program_is_told(tmp_path: Path) -> None:
+async def test_a_port_of_another_program_is_reported(tmp_path: Path) -> None:
     with (
         SerialLine(tmp_path) as line,
         serial.Serial(str(line.near), exclusive=True),

@@ -56,7 +56,7 @@ async def test_calls_are_made_in_order_and_in_one_task(worker: Worker) -> None:
     assert len(set(tasks)) == 1
 
 
-async def test_what_a_call_raises_is_raised(worker: Worker) -> None:
+async def test_errors_of_a_call_are_raised(worker: Worker) -> None:
     async def fail() -> None:
         raise KeyError("why")
 
@@ -111,7 +111,7 @@ async def test_a_call_that_does_not_end_is_not_waited_for_and_nothing_is_made_me
     assert made == ["end"]
 
 
-async def test_whoever_is_cancelled_gives_up_the_call(worker: Worker) -> None:
+async def test_a_cancelled_caller_gives_up_the_call(worker: Worker) -> None:
     waiting = asyncio.create_task(worker.call(never, 10.0))
     await asyncio.sleep(0.1)
     waiting.cancel()

@@ -10,7 +10,7 @@ from tests.release.canary import news, pinned
 from tests.release.environments import FailedError, run
 
 
-def test_a_program_that_fails_is_told_with_what_it_printed() -> None:
+def test_a_failed_program_is_reported_with_its_output() -> None:
     with pytest.raises(FailedError, match=r"ended with 3:\nwords"):
         run(sys.executable, "-c", "print('words'); raise SystemExit(3)")
     assert run(sys.executable, "-c", "raise SystemExit(3)", code=3) == ""
@@ -21,7 +21,7 @@ def test_a_program_is_lent_no_modules(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "/nowhere" not in run(sys.executable, "-c", "import sys; print(sys.path)")
 
 
-def test_what_is_newer_than_the_constraints_is_named() -> None:
+def test_versions_newer_than_the_constraints_are_named() -> None:
     (version,) = pinned()["pymodbus"]
     assert news([f"pymodbus=={version}", "anyio==99.0", "stranger==1.0"]) == [
         f"anyio {next(iter(pinned()['anyio']))} -> 99.0",

@@ -314,8 +314,8 @@ async def test_diagnoses_of_a_fault(
 ) -> None:
     gripper.inject_fault(fault)
     await connection.hand.wait_for_state(State.FAULT)
-    _, told = diagnose(connection.hand, now())
-    assert (told.level, told.message) == (level, fault.description)
+    _, shown = diagnose(connection.hand, now())
+    assert (shown.level, shown.message) == (level, fault.description)
     text = json.loads(status_text(connection.hand, takes_commands=True))
     status = RobotiqStatus.from_registers(
         text["registers"], timestamp=text["timestamp"], sequence=text["sequence"]
@@ -329,8 +329,8 @@ async def test_without_a_link_nothing_is_known(connection: Connection, server: S
     link, gripper = diagnose(connection.hand, now())
     assert link.level is Level.ERROR
     assert (gripper.level, gripper.message, gripper.values) == (Level.STALE, "unknown: the link is down", {})
-    told = json.loads(status_text(connection.hand, takes_commands=False))
-    assert told == {"state": "DISCONNECTED", "connected": False, "takes_commands": False}
+    shown = json.loads(status_text(connection.hand, takes_commands=False))
+    assert shown == {"state": "DISCONNECTED", "connected": False, "takes_commands": False}
     fresh = RobotiqHand("tcp://192.0.2.1")
     assert diagnose(fresh, 0.0)[1].level is Level.STALE
     assert "fault" not in json.loads(status_text(fresh, takes_commands=False))

@@ -58,7 +58,7 @@ def test_the_limits_are_inside_those_of_both_urdfs() -> None:
 
 
 @given(st.integers(6, 255), st.integers(15, 232))
-def test_what_is_inside_anyway_is_left_alone(finger: int, scissor: int) -> None:
+def test_angles_within_range_are_not_changed(finger: int, scissor: int) -> None:
     status = reading(finger, finger, finger, scissor)
     assert positions(status) == pytest.approx(joint_angles(status), abs=1e-4)
 
@@ -155,7 +155,7 @@ def test_a_joint_state_of_a_jaw_sent_back_leads_there(
         (["finger_1_joint_1"], [-0.0005], [(0, C)]),  # others round, too
     ],
 )
-def test_what_a_goal_asks_of_the_axes(
+def test_the_targets_of_a_goal(
     names: Sequence[str], angles: Sequence[float], counts: list[tuple[int, Finger]]
 ) -> None:
     assert targets(names, angles).counts == tuple(counts)
@@ -198,7 +198,7 @@ def test_the_prefix_is_taken_off() -> None:
         ([], [0.1, 0.2], "one position is needed, got 2"),
     ],
 )
-def test_what_a_goal_cannot_ask(names: Sequence[str], angles: Sequence[float], reason: str) -> None:
+def test_goals_that_are_refused(names: Sequence[str], angles: Sequence[float], reason: str) -> None:
     with pytest.raises(GoalError) as refused:
         targets(names, angles)
     assert reason in str(refused.value)

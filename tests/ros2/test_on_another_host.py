@@ -59,7 +59,7 @@ async def test_a_goal_and_its_cancellation(here: Lab, connection: Connection) ->
     assert not connection.hand.is_in_control  # type: ignore[attr-defined]
 
 
-async def test_what_a_goal_moved_is_held_when_the_agent_has_its_gripper_back(
+async def test_axes_moved_by_a_goal_are_held_when_the_agent_has_its_gripper_back(
     here: Lab, connection: Connection
 ) -> None:
     slow = replace(SETTINGS, speed=0)

@@ -51,7 +51,7 @@ def test_the_defaults_will_do() -> None:
         ("joint_prefix", "left <&", "joint_prefix may have letters, digits, _ . / and -, got 'left <&'"),
     ],
 )
-def test_what_will_not_do_is_told(name: str, value: object, reason: str) -> None:
+def test_bad_parameters_are_refused_with_the_reason(name: str, value: object, reason: str) -> None:
     with pytest.raises(ValueError, match=re.escape(reason)):
         check_parameter(name, value)
 

@@ -29,16 +29,16 @@ async def test_a_timer_goes_on_until_it_is_cancelled_and_skips_what_a_hold_up_ha
     assert not errors
 
 
-async def test_a_hand_that_was_stopped_does_not_matter_and_anything_else_is_told_once() -> None:
+async def test_a_stopped_hand_is_ignored_and_any_other_error_is_reported_once() -> None:
     errors: list[Exception] = [NotStartedError("the hand was stopped"), ValueError("not expected")]
-    told: list[BaseException] = []
+    reported: list[BaseException] = []
 
     def fail() -> None:
         raise errors[0] if len(errors) == 1 else errors.pop(0)
 
-    Timer(0.1, fail, told.append)
+    Timer(0.1, fail, reported.append)
     await asyncio.sleep(1)
-    assert told == errors
+    assert reported == errors
 
 
 @pytest.mark.parametrize(("rate", "jitter"), [(50, 0.0), (50, 0.0008), (200, 0.0004), (1, 0.001)])

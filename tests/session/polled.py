@@ -39,7 +39,7 @@ class Published(Channel[T]):
 
 
 class Polled:
-    """A poller with what it owns, and what it has told."""
+    """A poller with what it owns, and what it has published."""
 
     def __init__(self, policy: ReconnectPolicy | None, *, activate: bool = False) -> None:
         self.wire = Wire()

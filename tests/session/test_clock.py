@@ -81,7 +81,7 @@ def test_now_is_the_running_loop_s() -> None:
 
 
 @pytest.mark.parametrize("factory", LOOPS)
-def test_what_a_hand_tells_of_times_belongs_together(
+def test_all_times_of_a_hand_are_of_one_clock(
     factory: Callable[[], asyncio.AbstractEventLoop], caplog: pytest.LogCaptureFixture
 ) -> None:
     async def main() -> None:
@@ -105,9 +105,9 @@ def test_what_a_hand_tells_of_times_belongs_together(
                 await hand.reset()
             seen = list(statuses.drain())
             changes = list(transitions.drain())
-            told: list[RobotiqStatus | Transition | SentRequest] = [*seen, *changes, *requests.drain()]
+            items: list[RobotiqStatus | Transition | SentRequest] = [*seen, *changes, *requests.drain()]
             after = now()
-        assert all(before <= each.timestamp <= after for each in told)
+        assert all(before <= each.timestamp <= after for each in items)
         times = [each.timestamp for each in changes]
         assert times == sorted(times)
         asked, was_reset = (

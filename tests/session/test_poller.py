@@ -53,7 +53,7 @@ async def test_a_status_is_read_before_anything_is_written_and_the_write_follows
     assert here.counters.writes == 1
 
 
-async def test_a_halt_does_not_wait_for_the_tick_and_shifts_none(here: Polled) -> None:
+async def test_a_halt_does_not_wait_for_the_tick_and_shifts_no_tick(here: Polled) -> None:
     await here.polls(3)
     here.controller.command(Command(Finger.A, 200))
     await here.polls(3)
@@ -75,7 +75,7 @@ async def test_a_halt_does_not_wait_for_the_tick_and_shifts_none(here: Polled) -
     assert all(period == pytest.approx(POLL_S) for period in whole)
 
 
-async def test_what_is_no_stop_waits_for_the_tick(here: Polled) -> None:
+async def test_a_request_that_is_no_stop_waits_for_the_tick(here: Polled) -> None:
     await here.polls(3)
     before = here.statuses[-1].timestamp
     here.controller.command(Command(Finger.A, 200))
@@ -84,7 +84,7 @@ async def test_what_is_no_stop_waits_for_the_tick(here: Polled) -> None:
     assert here.statuses[-1].timestamp == pytest.approx(before + POLL_S)
 
 
-async def test_what_is_decided_is_decided_on_what_the_gripper_has_just_shown(here: Polled) -> None:
+async def test_decisions_use_the_status_just_read(here: Polled) -> None:
     """Another client resets it between two polls: a command that was waiting would activate it again."""
     await here.polls(3)
     here.controller.command(Command(Finger.A, 100))
@@ -149,7 +149,7 @@ async def test_in_a_loop_that_is_always_held_up_something_is_written_in_the_end(
 
 
 @pytest.mark.parametrize(
-    ("failing", "error", "told"),
+    ("failing", "error", "expected"),
     [
         ("open", ConnectFailedError("wire", "refused"), ConnectFailedError),
         ("open", ProtocolError("no gripper"), ProtocolError),
@@ -158,13 +158,13 @@ async def test_in_a_loop_that_is_always_held_up_something_is_written_in_the_end(
         ("read", ProtocolError("no gripper"), ProtocolError),
     ],
 )
-async def test_a_first_contact_that_fails_is_told_and_ends_the_task(
-    failing: str, error: RobotiqConnectionError, told: type[RobotiqConnectionError]
+async def test_a_failed_first_contact_is_reported_and_ends_the_task(
+    failing: str, error: RobotiqConnectionError, expected: type[RobotiqConnectionError]
 ) -> None:
     here = Polled(ReconnectPolicy())
     here.wire.failing[failing] = error
     here.start()
-    with pytest.raises(told) as caught:
+    with pytest.raises(expected) as caught:
         await here.poller.connected
     assert caught.value is error or caught.value.__cause__ is error
     await here.end()

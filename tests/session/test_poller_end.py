@@ -46,7 +46,7 @@ async def test_a_stronger_stop_ends_one_that_keeps_a_grip(here: Polled) -> None:
     assert not here.requests[-1].request.go
 
 
-async def test_what_is_to_be_held_at_the_end_is_told_before_anything_is_read(here: Polled) -> None:
+async def test_a_final_hold_is_written_before_anything_is_read(here: Polled) -> None:
     """A gripper that hears and is not heard holds, too."""
     await moves(here)
 
@@ -99,7 +99,7 @@ async def test_a_link_that_is_down_is_tried_once_more_at_the_end() -> None:
 
 
 @pytest.mark.parametrize("silent", ["read", "write", "open"])
-async def test_the_end_comes_in_time_also_when_nobody_answers(
+async def test_the_end_comes_in_time_without_any_answer(
     here: Polled, silent: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.WARNING, "robotiq_async")

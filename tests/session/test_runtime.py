@@ -37,7 +37,7 @@ async def test_a_scope_that_is_cancelled_waits_too() -> None:
         raise AssertionError("the scope is cancelled")
 
 
-async def test_what_the_work_raises_stays_with_it() -> None:
+async def test_an_error_of_the_work_stays_with_it() -> None:
     work: asyncio.Future[int] = asyncio.get_running_loop().create_future()
     work.set_exception(ZeroDivisionError())
     await wait_shielded(work)
@@ -50,7 +50,7 @@ async def test_a_thread_gives_its_result_or_its_error() -> None:
         await in_a_thread(lambda: int("x"))
 
 
-async def test_nobody_waits_for_a_thread_that_is_stuck() -> None:
+async def test_a_stuck_thread_is_not_waited_for() -> None:
     stuck = threading.Event()
     work = in_a_thread(stuck.wait)
     with pytest.raises(TimeoutError):

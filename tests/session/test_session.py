@@ -74,7 +74,7 @@ async def test_a_first_contact_that_fails_is_the_end() -> None:
     assert session.is_over
 
 
-async def test_who_waits_when_a_session_ends_is_told_why(session: Session) -> None:
+async def test_callers_that_wait_when_a_session_ends_get_the_reason(session: Session) -> None:
     state = asyncio.create_task(session.reach({State.FAULT}, None, what="never"))
     position = asyncio.create_task(
         session.answered(lambda waiter: session.controller.command(Command(Finger.A, 100), waiter))
@@ -88,7 +88,9 @@ async def test_who_waits_when_a_session_ends_is_told_why(session: Session) -> No
     assert [each.target async for each in stream][-2:] == [State.DO_SHUTDOWN, State.SHUTDOWN]
 
 
-async def test_who_waits_when_a_hand_gives_up_on_its_link_is_told_why(session: Session, wire: Wire) -> None:
+async def test_callers_that_wait_when_the_link_is_given_up_get_the_reason(
+    session: Session, wire: Wire
+) -> None:
     state = asyncio.create_task(session.reach({State.FAULT}, None, what="never"))
     stream = session._channels.statuses.open(1)
     wire.failing["read"] = wire.failing["open"] = LOST
@@ -102,7 +104,7 @@ async def test_who_waits_when_a_hand_gives_up_on_its_link_is_told_why(session: S
         session.check_running()
 
 
-async def test_who_waits_when_the_task_fails_is_told_too(caplog: pytest.LogCaptureFixture) -> None:
+async def test_callers_that_wait_when_the_task_fails_get_an_error(caplog: pytest.LogCaptureFixture) -> None:
     """A bug must not leave anybody waiting for ever."""
     async with running() as (_, session):
         state = asyncio.create_task(session.reach({State.FAULT}, None, what="never"))
@@ -140,7 +142,7 @@ class TestClosedLoop:
         gc.collect()
 
     @pytest.mark.parametrize("state", [State.RUNNING_IDLE, State.DO_SHUTDOWN, State.SHUTDOWN])
-    def test_what_is_left_of_it_leaves_the_next_run_alone(self, state: State) -> None:
+    def test_remains_of_a_closed_loop_leave_the_next_run_alone(self, state: State) -> None:
         """When the old task was thrown away, it shut down the state of the hand under the new one."""
         here, session = in_a_loop_that_is_closed(state)
 

@@ -30,7 +30,7 @@ def asking(session: Session) -> Awaitable[None]:
     return session.answered(lambda waiter: session.controller.command(Command(Finger.A, 100), waiter))
 
 
-async def test_who_asks_is_answered_when_the_gripper_has_acknowledged_or_refused_at_once() -> None:
+async def test_a_request_ends_with_the_acknowledgement_or_is_refused_at_once() -> None:
     async with running() as (here, session):
         await asking(session)
         assert here.wire.calls.count("write") == 1
@@ -40,7 +40,7 @@ async def test_who_asks_is_answered_when_the_gripper_has_acknowledged_or_refused
         assert "write" not in here.wire.calls
 
 
-async def test_who_asks_is_told_that_the_link_went_down_before_the_acknowledgement() -> None:
+async def test_a_request_fails_if_the_link_goes_down_before_the_acknowledgement() -> None:
     async with running(policy=ReconnectPolicy()) as (here, session):
         here.wire.failing["write"] = LOST
         with pytest.raises(ConnectionLostError, match="before this was done: unplugged") as caught:
@@ -80,13 +80,13 @@ async def test_a_state_that_means_it_will_not_come_is_an_error(session: Session,
         await reaching
 
 
-async def test_nobody_waits_for_what_was_refused(session: Session) -> None:
+async def test_a_refused_request_leaves_no_waiter(session: Session) -> None:
     with pytest.raises(NotActivatedError):
         await session.reach({State.WF_ATR}, 1.0, what="", ask=refuse)
     assert not session._waiters._waiters
 
 
-async def test_nobody_is_left_who_waits_after_a_cancellation(session: Session) -> None:
+async def test_a_cancellation_leaves_no_waiter(session: Session) -> None:
     reaching = asyncio.create_task(session.reach({State.ATR_DONE}, 9.0, what=""))
     activating = asyncio.create_task(session.activated(session.controller.activate))
     await asyncio.sleep(0.1)
@@ -156,7 +156,7 @@ async def test_the_next_status_is_one_that_was_not_there_before(session: Session
         await waiting
 
 
-async def test_who_waits_for_the_next_status_is_told_of_a_lost_link() -> None:
+async def test_a_wait_for_the_next_status_fails_with_the_link() -> None:
     """A stream of statuses waits out a lost link; who wants to know what the gripper does now does not."""
     async with running(policy=ReconnectPolicy()) as (here, session):
         here.wire.failing["read"] = here.wire.failing["open"] = LOST
@@ -168,7 +168,7 @@ async def test_who_waits_for_the_next_status_is_told_of_a_lost_link() -> None:
 # -- what is reported of it --------------------------------------------------------------------------------
 
 
-async def test_changes_of_state_are_told_and_faults_are_counted(session: Session, wire: Wire) -> None:
+async def test_changes_of_state_are_published_and_faults_are_counted(session: Session, wire: Wire) -> None:
     stream = session._channels.transitions.open(None)
     for _ in range(2):
         wire.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY, 0.1)

@@ -21,7 +21,7 @@ def waiters() -> StateWaiters:
     return StateWaiters()
 
 
-async def test_what_is_waited_for_comes_before_what_fails(waiters: StateWaiters) -> None:
+async def test_a_state_both_awaited_and_failing_counts_as_reached(waiters: StateWaiters) -> None:
     with waiters.watching({State.RESET}, {State.RESET: lost}) as reached:
         waiters.reached(State.RESET)
         assert await reached is State.RESET
@@ -45,7 +45,7 @@ async def test_a_failure_ends_every_wait_with_an_error_of_its_own(waiters: State
     assert outcomes[0] is not outcomes[1]
 
 
-async def test_who_has_been_told_is_not_told_again(waiters: StateWaiters) -> None:
+async def test_an_answered_caller_is_not_answered_again(waiters: StateWaiters) -> None:
     with waiters.watching({State.RESET}, {State.FAULT: lost}) as reached:
         waiters.reached(State.RESET)
         waiters.reached(State.FAULT)
@@ -67,14 +67,14 @@ async def test_two_callers_with_the_same_wish_leave_one_by_one(waiters: StateWai
         assert await stays is State.RESET
 
 
-async def test_who_was_cancelled_is_passed_over(waiters: StateWaiters) -> None:
+async def test_a_cancelled_waiter_is_passed_over(waiters: StateWaiters) -> None:
     with waiters.watching({State.RESET}, {}) as cancelled, waiters.watching({State.RESET}, {}) as reached:
         cancelled.cancel()
         waiters.reached(State.RESET)
         assert await reached is State.RESET
 
 
-async def test_an_error_nobody_fetches_is_not_complained_about(waiters: StateWaiters) -> None:
+async def test_an_error_that_is_not_fetched_is_not_reported_by_asyncio(waiters: StateWaiters) -> None:
     """The caller may have been cancelled at the same moment."""
     complaints: list[object] = []
     asyncio.get_running_loop().set_exception_handler(lambda _, context: complaints.append(context))

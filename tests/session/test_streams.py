@@ -305,7 +305,7 @@ async def closed(channel: Channel[int]) -> object:
         *(in_a_group, cancelled_and_the_task_is_kept, begun_and_never_awaited, closed),
     ],
 )
-async def test_a_stream_that_nobody_holds_is_forgotten_at_once(
+async def test_a_dropped_stream_is_forgotten_at_once(
     channel: Channel[int], leave: Callable[[Channel[int]], Awaitable[object]]
 ) -> None:
     kept = [await leave(channel) for _ in range(10)]
@@ -330,7 +330,7 @@ def test_a_stream_that_another_thread_drops_takes_no_other_with_it(channel: Chan
     assert held(channel) == 0
 
 
-async def test_a_waiting_reader_is_not_forgotten_though_nobody_keeps_its_task(channel: Channel[int]) -> None:
+async def test_a_waiting_reader_is_kept_although_its_task_is_not_referenced(channel: Channel[int]) -> None:
     """The loop holds its tasks weakly; what will wake one has to hold it."""
     # Python complains of a pending task that is destroyed; that is not what is asked here.
     asyncio.get_running_loop().set_exception_handler(lambda *_: None)
@@ -346,7 +346,7 @@ async def test_a_waiting_reader_is_not_forgotten_though_nobody_keeps_its_task(ch
 # -- other loops -------------------------------------------------------------------------------------------
 
 
-async def test_a_reader_whose_loop_was_closed_holds_up_nobody(channel: Channel[int]) -> None:
+async def test_a_reader_whose_loop_was_closed_delays_no_other(channel: Channel[int]) -> None:
     """It waits in a loop that was closed without cancelling its tasks."""
 
     def leave_one_behind() -> asyncio.Task[None]:
@@ -366,7 +366,7 @@ async def test_a_reader_whose_loop_was_closed_holds_up_nobody(channel: Channel[i
 
 
 @pytest.mark.parametrize("debug", [False, True])
-async def test_a_reader_in_the_loop_of_another_thread_harms_nobody(
+async def test_a_reader_in_the_loop_of_another_thread_does_no_harm(
     channel: Channel[int], debug: bool
 ) -> None:
     """In debug mode the loop refuses to be called from another thread."""
@@ -414,7 +414,7 @@ async def test_a_derived_stream_gives_what_is_made_of_each_item(channel: Channel
     assert await rest(plain) == [1]
 
 
-async def test_a_derived_stream_that_was_closed_makes_nothing_any_more(channel: Channel[int]) -> None:
+async def test_a_closed_derived_stream_makes_nothing(channel: Channel[int]) -> None:
     seen: list[int] = []
     stream = channel.derive(noting(seen))
     channel.push(1)
@@ -439,7 +439,7 @@ def listeners() -> Listeners:
     return Listeners()
 
 
-def test_each_is_told_everything_in_its_order(listeners: Listeners) -> None:
+def test_each_listener_gets_every_item_in_order(listeners: Listeners) -> None:
     one: list[object] = []
     other: list[object] = []
     listeners.add(one.append)
@@ -449,63 +449,63 @@ def test_each_is_told_everything_in_its_order(listeners: Listeners) -> None:
     assert (one, other) == ([1, 2], [2])
 
 
-def test_one_that_is_removed_is_told_no_more(listeners: Listeners) -> None:
-    told: list[object] = []
-    remove = listeners.add(told.append)
-    remove_other = listeners.add(told.append)
+def test_a_removed_listener_gets_no_more_items(listeners: Listeners) -> None:
+    heard: list[object] = []
+    remove = listeners.add(heard.append)
+    remove_other = listeners.add(heard.append)
     remove()
     remove()
     listeners.tell(1)
-    assert told == [1], "the same function was added twice"
+    assert heard == [1], "the same function was added twice"
     remove_other()
     listeners.tell(2)
-    assert told == [1]
+    assert heard == [1]
 
 
-def test_one_that_is_removed_by_another_is_not_told_any_more(listeners: Listeners) -> None:
-    told: list[object] = []
+def test_a_listener_removed_by_another_gets_no_more_items(listeners: Listeners) -> None:
+    heard: list[object] = []
     listeners.add(lambda _: remove())
-    remove = listeners.add(told.append)
+    remove = listeners.add(heard.append)
     listeners.tell(1)
-    assert told == []
+    assert heard == []
 
 
 def test_one_may_remove_itself_and_add_others(listeners: Listeners) -> None:
-    told: list[object] = []
+    heard: list[object] = []
 
     def once(item: object) -> None:
-        told.append(item)
+        heard.append(item)
         remove()
-        listeners.add(told.append)
+        listeners.add(heard.append)
 
     remove = listeners.add(once)
     listeners.tell(1)
     listeners.tell(2)
-    assert told == [1, 2]
+    assert heard == [1, 2]
 
 
-def test_what_a_listener_brings_about_is_told_after_what_it_was_told(listeners: Listeners) -> None:
-    told: list[object] = []
+def test_an_item_caused_by_a_listener_comes_after_the_present_one(listeners: Listeners) -> None:
+    heard: list[object] = []
     listeners.add(lambda item: listeners.tell("then") if item == "first" else None)
-    listeners.add(told.append)
+    listeners.add(heard.append)
     listeners.tell("first")
-    assert told == ["first", "then"]
+    assert heard == ["first", "then"]
 
 
 @pytest.mark.parametrize("error", [ValueError("no"), asyncio.CancelledError()], ids=repr)
-def test_one_that_raises_is_logged_once_and_hurts_nobody(
+def test_a_listener_that_raises_is_logged_once_and_removed(
     listeners: Listeners, caplog: pytest.LogCaptureFixture, error: BaseException
 ) -> None:
-    told: list[object] = []
+    heard: list[object] = []
 
     def fail(_: object) -> None:
         raise error
 
     listeners.add(fail)
-    listeners.add(told.append)
+    listeners.add(heard.append)
     listeners.tell(1)
     listeners.tell(2)
-    assert told == [1, 2]
+    assert heard == [1, 2]
     (record,) = caplog.records
     assert record.levelno == logging.ERROR
     assert record.exc_info is not None
@@ -513,11 +513,11 @@ def test_one_that_raises_is_logged_once_and_hurts_nobody(
 
 
 def test_an_interrupt_is_not_held_back_and_telling_goes_on_afterwards(listeners: Listeners) -> None:
-    told: list[object] = []
+    heard: list[object] = []
     errors = [KeyboardInterrupt()]
 
     def interrupted(item: object) -> None:
-        told.append(item)
+        heard.append(item)
         if errors:
             raise errors.pop()
 
@@ -525,4 +525,4 @@ def test_an_interrupt_is_not_held_back_and_telling_goes_on_afterwards(listeners:
     with pytest.raises(KeyboardInterrupt):
         listeners.tell(1)
     listeners.tell(2)
-    assert told == [1, 2]
+    assert heard == [1, 2]

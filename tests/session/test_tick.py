@@ -245,7 +245,7 @@ def test_a_loop_comes_while_others_of_other_threads_come_and_go(what: str) -> No
 
 
 @pytest.mark.skipif(not LINUX, reason="timerfd is Linux's")
-def test_what_a_loop_leaves_that_is_closed_without_a_word_is_given_back() -> None:
+def test_ticks_of_a_closed_loop_release_the_shared_timer() -> None:
     def abandon() -> Tick:
         loop = asyncio.new_event_loop()
         tick = loop.run_until_complete(begun())

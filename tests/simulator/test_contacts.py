@@ -100,7 +100,7 @@ def test_a_contact_latches_when_its_object_gives_way_or_is_gone(holding: Bench) 
 
 
 @pytest.mark.parametrize("how", ["more force", "rGTO", "the other side and back"])
-def test_what_ends_a_contact_lets_the_axis_go_on_when_the_object_is_gone(holding: Bench, how: str) -> None:
+def test_an_axis_goes_on_when_its_contact_ends_and_the_object_is_gone(holding: Bench, how: str) -> None:
     holding.gripper.remove_object(Finger.A)
     if how == "more force":
         holding.go({Finger.A: 200}, force=101)

@@ -50,7 +50,7 @@ def test_a_slower_motion_draws_less(individual: Bench) -> None:
 
 @pytest.mark.parametrize("force", [0, 128, 255])
 @pytest.mark.parametrize("soft", [0, 40])
-def test_what_is_held_draws_nothing(active: Bench, force: int, soft: int) -> None:
+def test_axes_that_hold_draw_no_current(active: Bench, force: int, soft: int) -> None:
     active.gripper.place_object(Finger.ABC, 150, soft=soft)
     active.close(force=force)
     assert active.words == (0xB9, 0xEA)

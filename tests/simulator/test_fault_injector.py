@@ -49,11 +49,11 @@ MISFITS = {
 
 @asynccontextmanager
 async def carried_out(
-    server: SimulatorServer, words: str, told: list[str]
+    server: SimulatorServer, words: str, announced: list[str]
 ) -> AsyncIterator[asyncio.Task[None]]:
-    """A plan that is under way, with what it has told."""
+    """A plan that is under way, with what it has announced."""
     plan = asyncio.create_task(
-        server.fault_injector.run(plan_of(words), lambda trouble: told.append(str(trouble)))
+        server.fault_injector.run(plan_of(words), lambda trouble: announced.append(str(trouble)))
     )
     try:
         yield plan
@@ -251,7 +251,7 @@ async def test_a_multiplexer_hands_late_replies_to_the_next_client(server: Simul
         assert await is_answered(client), "nothing comes twice"
 
 
-async def test_a_multiplexer_hands_a_late_reply_to_whoever_is_connected_then(server: SimulatorServer) -> None:
+async def test_a_multiplexer_sends_a_late_reply_to_the_next_client(server: SimulatorServer) -> None:
     await server.fault_injector.begin(Trouble("multiplexer"))
     began = now()
     await ask_and_go(server, write(5))
@@ -416,7 +416,7 @@ async def test_an_idle_gripper_loses_its_activation(server: SimulatorServer, cli
 @pytest.mark.parametrize(
     ("silent", "is_reset"), [(Trouble("silence"), True), (Trouble("drop", lasts=9), False)]
 )
-async def test_what_is_not_heard_is_no_request(
+async def test_requests_that_are_not_heard_do_not_count(
     server: SimulatorServer, client: RawClient, silent: Trouble, is_reset: bool
 ) -> None:
     await activate(server)
@@ -450,7 +450,7 @@ async def test_the_least_patient_of_two_counts(server: SimulatorServer) -> None:
 # Beginning and ending.
 
 
-async def test_what_is_over_stays_over(server: SimulatorServer) -> None:
+async def test_a_trouble_that_has_ended_stays_ended(server: SimulatorServer) -> None:
     begun = await server.fault_injector.begin(Trouble("fault", 9))
     await server.fault_injector.end(begun)
     server.gripper.inject_fault(14)
@@ -474,7 +474,9 @@ async def test_a_block_that_fails_ends_its_trouble(server: SimulatorServer) -> N
         ("wrong-checksum", ValueError, "wrong-checksum does not fit a simulator on tcp"),
     ],
 )
-async def test_what_cannot_begin_changes_nothing(kind: str, error: type[Exception], message: str) -> None:
+async def test_a_trouble_that_cannot_begin_changes_nothing(
+    kind: str, error: type[Exception], message: str
+) -> None:
     server = SimulatorServer()
     with pytest.raises(error, match=message):
         await server.fault_injector.begin(Trouble(kind))
@@ -482,7 +484,7 @@ async def test_what_cannot_begin_changes_nothing(kind: str, error: type[Exceptio
     assert server.gripper.is_powered
 
 
-def test_what_fits_which_link() -> None:
+def test_which_troubles_fit_which_link() -> None:
     servers = SimulatorServer(), SerialSimulatorServer("/dev/ttyFAR"), RtuOverTcpSimulatorServer()
     for kind, server in itertools.product(KINDS, servers):
         if kind not in MISFITS[server.link]:
@@ -495,10 +497,10 @@ def test_what_fits_which_link() -> None:
 
 async def test_of_a_plan_that_does_not_fit_nothing_begins() -> None:
     server = SerialSimulatorServer("/dev/ttyFAR")
-    told: list[Trouble] = []
+    announced: list[Trouble] = []
     with pytest.raises(ValueError, match="refuse does not fit a simulator on rtu"):
-        await server.fault_injector.run(plan_of("fault 9; refuse at 10"), told.append)
-    assert told == []
+        await server.fault_injector.run(plan_of("fault 9; refuse at 10"), announced.append)
+    assert announced == []
     assert server.fault_injector.ongoing == ()
     assert status(server).fault is Fault.NONE
 
@@ -510,10 +512,10 @@ async def test_each_at_its_time_and_for_as_long_as_it_says(
     server: SimulatorServer, client: RawClient
 ) -> None:
     began = now()
-    told: list[tuple[float, Trouble]] = []
+    announced: list[tuple[float, Trouble]] = []
     plan = plan_of("silence at 5 for 2; fault at 6 for 9; drop for 1")
     carrying_out = asyncio.create_task(
-        server.fault_injector.run(plan, lambda trouble: told.append((now() - began, trouble)))
+        server.fault_injector.run(plan, lambda trouble: announced.append((now() - began, trouble)))
     )
     seen = []
     for _ in range(17):
@@ -523,7 +525,7 @@ async def test_each_at_its_time_and_for_as_long_as_it_says(
     # A second each: the drop, four quiet ones, two of silence, and the fault.
     expected = [(False, none)] + [(True, none)] * 4 + [(False, none), (False, fault)]
     assert seen == expected + [(True, fault)] * 8 + [(True, none)] * 2
-    assert told == [(0, plan[2]), (5, plan[0]), (6, plan[1])]
+    assert announced == [(0, plan[2]), (5, plan[0]), (6, plan[1])]
     assert server.fault_injector.ongoing == ()
     await carrying_out
 
@@ -540,10 +542,10 @@ async def test_a_plan_is_over_when_its_last_trouble_is(
 
 async def test_again_and_again(server: SimulatorServer) -> None:
     began = now()
-    told: list[float] = []
+    announced: list[float] = []
     carrying_out = asyncio.create_task(
         server.fault_injector.run(
-            plan_of("power-cut at 1 for 2 every 10"), lambda _: told.append(now() - began)
+            plan_of("power-cut at 1 for 2 every 10"), lambda _: announced.append(now() - began)
         )
     )
     powered = []
@@ -551,24 +553,24 @@ async def test_again_and_again(server: SimulatorServer) -> None:
         await asyncio.sleep(began + second + 0.5 - now())
         powered.append(server.gripper.is_powered)
     assert [second for second, is_on in enumerate(powered) if not is_on] == [1, 2, 11, 12, 21, 22, 31, 32]
-    assert told == pytest.approx([1, 11, 21, 31])
+    assert announced == pytest.approx([1, 11, 21, 31])
     await cancelled(carrying_out)
 
 
 async def test_once_and_again_and_what_has_met_nothing_does_not_pile_up(
     server: SimulatorServer, client: RawClient
 ) -> None:
-    told: list[str] = []
-    async with carried_out(server, "drop every 10", told):
+    announced: list[str] = []
+    async with carried_out(server, "drop every 10", announced):
         answered = []
         for pause in (5, 10, 95):
             await asyncio.sleep(pause)
             answered += [await is_answered(client) for _ in range(3)]
     assert answered == [False, True, True] * 3
-    assert told == ["drop every 10"] * 12
+    assert announced == ["drop every 10"] * 12
 
 
-async def test_it_is_told_before_it_begins(server: SimulatorServer) -> None:
+async def test_a_trouble_is_announced_before_it_begins(server: SimulatorServer) -> None:
     seen = []
     await server.fault_injector.run(plan_of("fault 9 for 1"), lambda _: seen.append(status(server).fault))
     assert seen == [Fault.NONE]
@@ -595,19 +597,19 @@ async def test_a_plan_that_is_cancelled_ends_its_troubles(words: str) -> None:
 
 
 @pytest.mark.parametrize("words", ["refuse at 60", "refuse for 1 every 60", "refuse for 1 at 1 every 60"])
-async def test_what_has_not_begun_when_the_plan_is_cancelled_never_begins(
+async def test_troubles_not_begun_when_the_plan_is_cancelled_never_begin(
     server: SimulatorServer, words: str
 ) -> None:
-    told: list[str] = []
-    async with carried_out(server, words, told):
+    announced: list[str] = []
+    async with carried_out(server, words, announced):
         await asyncio.sleep(30)
-    begun = len(told)
+    begun = len(announced)
     await asyncio.sleep(100)
-    assert len(told) == begun
+    assert len(announced) == begun
     assert await is_let_in(server)
 
 
-async def test_a_port_that_somebody_took_meanwhile(server: SimulatorServer) -> None:
+async def test_a_port_that_was_taken_meanwhile(server: SimulatorServer) -> None:
     plan = asyncio.create_task(server.fault_injector.run(plan_of("refuse for 10; fault 9; slow-device 3")))
     await asyncio.sleep(5)
     other = await asyncio.get_running_loop().create_server(asyncio.Protocol, "127.0.0.1", server.port)

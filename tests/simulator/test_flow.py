@@ -106,7 +106,7 @@ def line() -> Iterator[Line]:
     line.close()
 
 
-async def test_replies_that_nobody_takes_from_a_serial_line_are_lost(line: Line) -> None:
+async def test_replies_that_are_not_read_from_a_serial_line_are_lost(line: Line) -> None:
     answered = 0
 
     def policy(reply: bytes) -> list[tuple[float, bytes]]:

@@ -176,7 +176,7 @@ def test_a_limit_is_echoed_in_place_of_the_request(individual: Bench) -> None:
         assert individual.status.requested_position(Finger.SCISSOR) == shown
 
 
-def test_what_is_a_stop_and_no_limit_is_echoed_as_asked(individual: Bench) -> None:
+def test_a_stop_is_echoed_as_asked_and_not_as_a_limit(individual: Bench) -> None:
     individual.gripper.habits = Habits(echoes_limits=True)
     individual.close()
     assert [individual.status.requested_position(axis) for axis in THREE_FINGER.axes] == [255, 255, 255, 232]
@@ -288,7 +288,7 @@ def test_any_image_with_ract_wakes_it(individual: Bench, changes: dict[str, bool
     assert individual.gripper.position(Finger.A) == 200
 
 
-def test_what_moves_goes_on_while_it_is_asleep_and_can_be_stopped(individual: Bench) -> None:
+def test_a_motion_goes_on_while_asleep_and_can_be_stopped(individual: Bench) -> None:
     individual.go({Finger.A: 200})
     individual.gripper.is_asleep = True
     individual.wait(0.2)
@@ -386,7 +386,7 @@ def test_a_grip_that_stays_ends_with_the_power_and_with_a_new_request(individual
         ("opens_without_rics", 1, TypeError),
     ],
 )
-def test_values_that_are_none(name: str, value: Any, error: type[Exception]) -> None:
+def test_malformed_habits_are_refused(name: str, value: Any, error: type[Exception]) -> None:
     with pytest.raises(error, match=f"{name} must be"):
         Habits(**{name: value})
 

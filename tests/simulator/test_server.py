@@ -209,7 +209,7 @@ async def test_a_request_in_single_bytes(client: RawClient) -> None:
 
 
 @pytest.mark.parametrize("junk", ["0001 0001 0006 02 04 0000 0008", "0001 0000 0000 02", "0001 0000 ffff 02"])
-async def test_what_is_no_modbus_ends_the_connection(client: RawClient, junk: str) -> None:
+async def test_bytes_that_are_not_modbus_end_the_connection(client: RawClient, junk: str) -> None:
     client.writer.write(bytes.fromhex(junk))
     async with asyncio.timeout(5):
         assert await client.reader.read() == b""
@@ -265,7 +265,7 @@ async def test_a_port_that_is_taken(server: SimulatorServer) -> None:
     assert not other.is_running
 
 
-async def test_a_host_that_can_be_none() -> None:
+async def test_an_impossible_host() -> None:
     with pytest.raises(OSError, match="cannot be resolved"):
         await SimulatorServer(host="a" * 64).start()
 
@@ -377,7 +377,7 @@ async def test_after_a_power_cycle_a_trouble_that_lasts_goes_on(server: Simulato
         assert (await again.read_status()).is_reset
 
 
-async def test_a_gripper_without_power_answers_nobody(server: SimulatorServer, client: RawClient) -> None:
+async def test_a_gripper_without_power_does_not_answer(server: SimulatorServer, client: RawClient) -> None:
     server.gripper.power_off()
     client.writer.write(client.frame(b"\x06\x00\x01\x12\x34"))
     async with raw_client(server) as other:

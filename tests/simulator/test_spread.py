@@ -50,7 +50,7 @@ def test_open_and_closed_read_what_real_ones_read(make_bench: Callable[..., Benc
 
 
 @pytest.mark.parametrize("axis", THREE_FINGER.axes)
-def test_who_waits_for_the_position_that_was_asked_for_may_wait_for_ever(real: Bench, axis: Finger) -> None:
+def test_a_real_axis_may_rest_beside_its_target(real: Bench, axis: Finger) -> None:
     """111 was asked and 112 reached, 208 and 210 (TAMS): past it, by up to two (manual); some it meets."""
     beside = set()
     for position in (111, 208, 60, *range(100, 200, 10), *range(105, 45, -10)):
@@ -61,7 +61,7 @@ def test_who_waits_for_the_position_that_was_asked_for_may_wait_for_ever(real: B
     assert beside == {0, 1, 2}
 
 
-def test_what_is_done_again_ends_in_the_same_way(make_bench: Callable[..., Bench]) -> None:
+def test_a_seed_repeats_a_run_exactly(make_bench: Callable[..., Bench]) -> None:
     ends = []
     for seed in (4, 4, 5):
         bench = one_of(make_bench, seed)
@@ -73,7 +73,7 @@ def test_what_is_done_again_ends_in_the_same_way(make_bench: Callable[..., Bench
     assert ends[:3] == ends[3:6] != ends[6:]
 
 
-def test_what_is_asked_to_stay_stays(real: Bench) -> None:
+def test_an_axis_asked_to_stay_does_not_creep(real: Bench) -> None:
     """A hand tells axes that it does not address to stay at their reading; it must not make them creep."""
     real.reach(111)
     before = [real.gripper.travel(axis) for axis in THREE_FINGER.axes]

@@ -151,7 +151,7 @@ def test_words_that_are_refused_say_why(words: str, message: str) -> None:
         parse_troubles(words)
 
 
-def test_on_means_nothing_where_no_reply_is_meant() -> None:
+def test_on_is_refused_for_troubles_that_are_no_replies() -> None:
     for kind, direction in itertools.product(set(KINDS) - {*REPLIES, "wrong-echo"}, ["read", "write"]):
         with pytest.raises(ValueError, match=f"^'on {direction}' means nothing for {kind}$"):
             parse_troubles(f"{kind} on {direction}")
@@ -176,7 +176,7 @@ def test_a_condition_is_not_for_once() -> None:
         ({"lasts": 1, "every": "5"}, "every must be seconds in 0.001..86400.0, got '5'"),
     ],
 )
-def test_what_is_no_number_is_refused(options: dict[str, Any], message: str) -> None:
+def test_options_that_are_not_numbers_are_refused(options: dict[str, Any], message: str) -> None:
     with pytest.raises(TypeError, match=f"^{re.escape(message)}$"):
         Trouble("delay", **options)
 
@@ -218,7 +218,7 @@ def test_the_values() -> None:
         assert isinstance(kind.value, int) == (name in WHOLE), name
 
 
-def test_conditions_last_for_ever_and_events_happen_once() -> None:
+def test_conditions_last_until_ended_and_events_happen_once() -> None:
     for_ever = dict.fromkeys([*CONDITIONS, "delay", "pieces", "silence"], INF)
     events = ["late", "drop", "wrong-echo", "reset", "close", "foreign", "release"]
     for kind, duration in (for_ever | dict.fromkeys(events, 0)).items():
@@ -233,7 +233,7 @@ def test_conditions_last_for_ever_and_events_happen_once() -> None:
         *(("wrong-echo", False, True), ("wrong-echo on write", False, True)),
     ],
 )
-def test_what_replies_it_is_about(words: str, read: bool, write: bool) -> None:
+def test_which_replies_a_trouble_affects(words: str, read: bool, write: bool) -> None:
     (trouble,) = parse_troubles(words)
     assert (trouble.is_about(write=False), trouble.is_about(write=True)) == (read, write)
 

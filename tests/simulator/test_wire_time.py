@@ -152,7 +152,9 @@ async def test_how_often_a_hand_polls(
 
 
 @virtual
-async def test_a_line_as_slow_as_bluetooth_works_when_told(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_line_as_slow_as_bluetooth_works_with_the_right_timeouts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     loop, cable = asyncio.get_running_loop(), VirtualLine(monkeypatch)
     gripper = SimulatedGripper(loop.time)
     async with SerialSimulatorServer(cable.FAR, gripper) as server:

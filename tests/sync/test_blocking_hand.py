@@ -54,7 +54,7 @@ def test_explicit_start_and_stop_and_again(wire: Wire) -> None:
     assert wire.writes() == 0
 
 
-def test_what_it_is_made_with_is_checked_at_once() -> None:
+def test_arguments_of_the_constructor_are_checked_at_once() -> None:
     with pytest.raises(ValueError, match=r"speed must be in 0\.\.255, got 256"):
         RobotiqHand("sim://", speed=256)
     assert not loop_threads()
@@ -99,7 +99,7 @@ def test_a_command_is_sent_and_not_waited_for(hand: RobotiqHand, wire: Wire) -> 
     assert hand.is_moving
 
 
-def test_it_says_who_it_is(hand: RobotiqHand) -> None:
+def test_the_repr_of_a_hand(hand: RobotiqHand) -> None:
     assert repr(hand) == f"<RobotiqHand {hand.address} RUNNING_IDLE>"
 
 
@@ -140,7 +140,7 @@ def test_transitions_and_requests_may_be_opened_before_the_start(wire: Wire) -> 
     assert list(requests) == []
 
 
-def test_what_is_there_already_is_taken_without_waiting(hand: RobotiqHand) -> None:
+def test_items_that_are_there_are_taken_without_waiting(hand: RobotiqHand) -> None:
     requests = hand.requests()
     assert requests.take_nowait() is None
     hand.set_position(100, A)
@@ -224,19 +224,19 @@ async def test_another_event_loop_may_run_in_the_thread_that_calls(wire: Wire) -
 
 
 def test_a_listener_may_command_but_not_wait(hand: RobotiqHand, wire: Wire) -> None:
-    told: list[object] = []
+    heard: list[object] = []
 
     def listen(item: object) -> None:
-        if isinstance(item, RobotiqStatus) and not told:
-            told.append(threading.current_thread())
+        if isinstance(item, RobotiqStatus) and not heard:
+            heard.append(threading.current_thread())
             hand.command(A, position=120)
             with pytest.raises(RuntimeError, match="would wait for itself") as caught:
                 hand.move(3)
-            told.append(caught.value)
+            heard.append(caught.value)
 
     remove = hand.add_listener(listen)
-    until(lambda: len(told) == 2 and wire.targets()[0] == 120)
-    assert told[0] is loop_threads()[0]
+    until(lambda: len(heard) == 2 and wire.targets()[0] == 120)
+    assert heard[0] is loop_threads()[0]
     remove()
 
 

@@ -55,8 +55,8 @@ def test_hands_that_were_not_stopped_are_stopped_together(caplog: pytest.LogCapt
     stops = [wire.writes() - written for wire, written in zip(wires, before, strict=True)]
     assert stops[0] in (1, 2), "a stop that comes soon after another write is repeated"
     assert stops[1:] == [0, 0]
-    told = [record.message for record in caplog.records if "still running at exit" in record.message]
-    assert len(told) == 2
+    logged = [record.message for record in caplog.records if "still running at exit" in record.message]
+    assert len(logged) == 2
     caller._stop_all()
 
 
@@ -77,7 +77,7 @@ def test_a_hand_that_the_program_has_dropped_is_stopped_too(wire: Wire) -> None:
     assert not caller._IN_USE
 
 
-def test_what_is_in_use_is_forgotten_when_it_ends(wire: Wire) -> None:
+def test_a_hand_in_use_is_forgotten_when_it_ends(wire: Wire) -> None:
     hand = RobotiqHand(wire)
     for begin in (lambda: hand.start(activate=False), hand.halt, lambda: hand.move(256)):
         with contextlib.suppress(NotStartedError, ValueError):
@@ -136,7 +136,7 @@ class TestFork:
         assert wire.writes() == written
         hand.set_position(30)
 
-    def test_one_that_does_not_run_may_be_started_in_the_child(self, hand: RobotiqHand) -> None:
+    def test_a_hand_that_does_not_run_may_be_started_in_the_child(self, hand: RobotiqHand) -> None:
         assert hand.is_activated
         other = RobotiqHand(Wire())
 

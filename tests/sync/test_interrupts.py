@@ -59,7 +59,7 @@ def test_a_move_is_held_and_the_hand_goes_on(hand: RobotiqHand, wire: Wire, inte
     hand.set_position(200, A)
 
 
-def test_what_moves_is_held_whatever_is_waited_for(hand: RobotiqHand, wire: Wire, interrupt: Striker) -> None:
+def test_moving_axes_are_held_in_every_wait(hand: RobotiqHand, wire: Wire, interrupt: Striker) -> None:
     hand.set_speed(0)
     hand.set_position(255, B)
     wait_and_be_struck(hand, interrupt)
@@ -67,9 +67,7 @@ def test_what_moves_is_held_whatever_is_waited_for(hand: RobotiqHand, wire: Wire
     assert wire.targets()[1] < 100
 
 
-def test_what_was_asked_and_not_sent_yet_begins_no_more(
-    hand: RobotiqHand, wire: Wire, interrupt: Striker
-) -> None:
+def test_an_unsent_request_never_begins(hand: RobotiqHand, wire: Wire, interrupt: Striker) -> None:
     """Ctrl-C came before it was written, as on a slow link: the fingers began to move after it."""
     is_caught = threading.Event()
 
@@ -105,7 +103,7 @@ def test_a_grip_is_kept(hand: RobotiqHand, wire: Wire, interrupt: Striker) -> No
     assert hand.status.requested_position(A) == 255
 
 
-def test_who_only_looks_writes_nothing(wire: Wire, interrupt: Striker) -> None:
+def test_a_hand_that_only_watches_writes_nothing(wire: Wire, interrupt: Striker) -> None:
     hand = adopting(wire)
     before = wire.writes()
     wait_and_be_struck(hand, interrupt)
@@ -151,7 +149,7 @@ def test_a_release_goes_on(hand: RobotiqHand, wire: Wire, interrupt: Striker) ->
     hand.wait_for_state(State.ATR_DONE, timeout=PATIENCE)
 
 
-def test_a_stop_ends_all_the_same(wire: Wire, interrupt: Striker) -> None:
+def test_a_stop_still_ends(wire: Wire, interrupt: Striker) -> None:
     hand = RobotiqHand(wire)
     hand.start()
     hand.set_speed(0)
@@ -181,7 +179,7 @@ def test_a_hand_that_had_just_started_is_stopped(wire: Wire) -> None:
     assert hand.state is State.SHUTDOWN
 
 
-def test_wherever_it_strikes_the_hand_is_watched_on(
+def test_polling_goes_on_wherever_the_interrupt_strikes(
     hand: RobotiqHand, wire: Wire, interrupt: Striker
 ) -> None:
     """A lock that the main thread holds when it is struck would keep the event loop for ever."""

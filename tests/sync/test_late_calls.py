@@ -169,7 +169,7 @@ def test_a_hold_of_what_another_client_moves_counts_as_commanding(wire: Wire) ->
     hand.stop()
 
 
-def test_what_a_hand_has_commanded_counts_until_its_next_start(hand: RobotiqHand, wire: Wire) -> None:
+def test_has_commanded_lasts_until_the_next_start(hand: RobotiqHand, wire: Wire) -> None:
     hand.set_position(100, Finger.A)
     assert hand._caller.has_commanded
     hand.stop()

@@ -17,19 +17,19 @@ def warnings(caplog: pytest.LogCaptureFixture) -> list[str]:
     """What a hand that is used warns of."""
     with caplog.at_level(logging.WARNING), RobotiqHand("sim://?speedup=50", name="left") as hand:
         hand.move(40)
-    told = [record.getMessage() for record in caplog.records]
+    logged = [record.getMessage() for record in caplog.records]
     caplog.clear()
-    return told
+    return logged
 
 
-async def test_it_is_told_once_a_hand(caplog: pytest.LogCaptureFixture) -> None:
+async def test_it_is_logged_once_per_hand(caplog: pytest.LogCaptureFixture) -> None:
     for _ in range(2):
-        told = [each for each in warnings(caplog) if WORDS in each]
-        assert len(told) == 1
-        assert told[0].startswith("left: ")
+        logged = [each for each in warnings(caplog) if WORDS in each]
+        assert len(logged) == 1
+        assert logged[0].startswith("left: ")
 
 
-def test_without_a_loop_nothing_is_told(caplog: pytest.LogCaptureFixture) -> None:
+def test_without_a_loop_nothing_is_logged(caplog: pytest.LogCaptureFixture) -> None:
     assert warnings(caplog) == []
 
 

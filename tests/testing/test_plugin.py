@@ -95,7 +95,7 @@ def test_anyios_plugin_alone_is_enough(run: Run) -> None:
     run(TESTS.format(marks=marks), "-p", "no:asyncio", "-k", "grasp").assert_outcomes(passed=1, deselected=2)
 
 
-def test_the_wrong_places_are_told(run: Run) -> None:
+def test_wrong_places_are_reported(run: Run) -> None:
     pytest.importorskip("trio")
     result = run(
         """
@@ -150,13 +150,13 @@ def test_a_trio_test_gets_no_hand(run: Run, pytester: pytest.Pytester, ini: str)
     assert "robotiq_server lives in asyncio's event loop, and trio runs this test" in result.stdout.str()
 
 
-def test_a_coroutine_that_nobody_runs_gets_no_hand(run: Run) -> None:
+def test_a_coroutine_test_without_a_plugin_gets_no_hand(run: Run) -> None:
     result = run("async def test_it(robotiq_hand): pass", ini="asyncio_mode = strict")
     result.assert_outcomes(errors=1)
     assert "mark it with pytest.mark.anyio" in result.stdout.str()
 
 
-def test_without_anybody_who_runs_coroutines_it_says_so(run: Run) -> None:
+def test_without_an_async_plugin_the_error_says_so(run: Run) -> None:
     result = run("async def test_it(robotiq_hand): pass", "-p", "no:asyncio", "-p", "no:anyio")
     assert "mark it with pytest.mark.anyio, or with pytest.mark.asyncio where" in result.stdout.str()
 

@@ -154,9 +154,7 @@ async def test_a_gripper_that_came_back_reset_stands_still(active: Operator, ser
     assert STOPPED in await active.leave()
 
 
-async def test_what_was_refused_does_not_count_with_what_comes_after(
-    active: Operator, gripper: SimulatedGripper
-) -> None:
+async def test_a_refused_move_does_not_count_as_moved(active: Operator, gripper: SimulatedGripper) -> None:
     with pytest.raises(ValueError, match="position"):
         await active.move(300, Finger.A)
     await active.set_force(3)
@@ -175,7 +173,7 @@ async def test_steps_of_the_speed_add_up(active: Operator) -> None:
     assert active.speed == DEFAULT_SPEED + 48
 
 
-async def test_what_was_cancelled_may_have_moved(active: Operator) -> None:
+async def test_a_cancelled_move_counts_as_moved(active: Operator) -> None:
     with pytest.raises(TimeoutError):
         async with asyncio.timeout(0):
             await active.move(200, Finger.A)

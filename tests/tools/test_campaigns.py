@@ -198,7 +198,7 @@ async def test_an_interrupted_campaign_goes_on_where_it_was(tmp_path: Path) -> N
     assert speed_campaign(file, step=85, runs=2).left == []
 
 
-async def test_what_does_not_fit_the_table_is_refused_and_not_written(tmp_path: Path) -> None:
+async def test_a_reading_beyond_the_table_is_refused_and_not_written(tmp_path: Path) -> None:
     file, reading = tmp_path / "table.csv", 100_001
 
     async def measure(value: int, number: int) -> int:

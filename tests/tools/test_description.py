@@ -173,7 +173,7 @@ def test_a_quaternion_turns_as_its_matrix(rpy: Vector) -> None:
     assert (2 * (x * z - y * w), 2 * (y * z + x * w)) == pytest.approx(pose.rotation[2][:2], abs=1e-9)
 
 
-def test_an_axis_of_any_length_will_do_but_for_none() -> None:
+def test_an_axis_may_have_any_length_but_zero() -> None:
     third = turned((3, 3, 3), 2 * pi / 3)
     assert third.apply((1, 0, 0)) == pytest.approx((0, 1, 0))
     assert third.quaternion == pytest.approx((0.5, 0.5, 0.5, 0.5))
@@ -191,11 +191,11 @@ def test_an_axis_of_any_length_will_do_but_for_none() -> None:
         ('<robot><link name="a"><visual/></link></robot>', "a visual without geometry"),
     ],
 )
-def test_what_is_no_description_is_refused(text: str, words: str) -> None:
+def test_malformed_descriptions_are_refused(text: str, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         HandModel.parse(text)
 
 
-def test_a_link_without_a_pad_has_none() -> None:
+def test_a_link_without_a_pad_is_an_error() -> None:
     with pytest.raises(KeyError, match="palm has no pad"):
         MODEL.pad("palm")

@@ -1,4 +1,4 @@
-"""What is wrong with my connection? Each ailment is found, and told with what to do."""
+"""What is wrong with my connection? Each ailment is found, and reported with what to do."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ HEALTHY = [*REACHED, "model", "activation", "fault"]
 
 
 async def findings(address: str, *, seconds: float = 30.0, **options: Any) -> dict[str, Finding]:
-    told: list[Finding] = []
+    found: list[Finding] = []
     async with asyncio.timeout(seconds):
-        await examine(parse_address(address), told.append, **options)
-    assert all(finding.advice for finding in told if finding.level is not Level.GOOD)
-    return {finding.what: finding for finding in told}
+        await examine(parse_address(address), found.append, **options)
+    assert all(finding.advice for finding in found if finding.level is not Level.GOOD)
+    return {finding.what: finding for finding in found}
 
 
 async def helps(address: str, **options: Any) -> None:
@@ -142,7 +142,7 @@ def test_a_name_of_several_addresses(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found["other clients"].level is Level.GOOD
 
 
-async def test_nobody_listens() -> None:
+async def test_nothing_listens() -> None:
     async with SimulatorServer() as server:
         address = server.address
     found = await findings(address)
@@ -268,14 +268,14 @@ async def test_a_line_that_loses_bytes() -> None:
 def test_how_long_an_adapter_keeps_what_it_hears(kept: int, level: Level, tmp_path: Path) -> None:
     (tmp_path / "ttyUSB7").mkdir()
     (tmp_path / "ttyUSB7" / "latency_timer").write_text(f"{kept}\n", encoding="ascii")
-    told: list[Finding] = []
-    report_adapter(parse_address("rtu:///dev/ttyUSB7"), told.append, tmp_path)
-    (finding,) = told
+    found: list[Finding] = []
+    report_adapter(parse_address("rtu:///dev/ttyUSB7"), found.append, tmp_path)
+    (finding,) = found
     assert finding.level is level
     assert f"{kept} ms" in finding.found
     assert (f"tee {tmp_path}/ttyUSB7/latency_timer" in finding.advice) is (level is Level.DOUBT)
-    report_adapter(parse_address("rtu:///dev/ttyS0"), told.append, tmp_path)
-    assert told == [finding], "a port without an adapter"
+    report_adapter(parse_address("rtu:///dev/ttyS0"), found.append, tmp_path)
+    assert found == [finding], "a port without an adapter"
 
 
 @pytest.mark.parametrize("words", ["drop", "wrong-function"])

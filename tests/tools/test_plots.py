@@ -50,7 +50,7 @@ def test_currents_over_time_are_drawn_near_the_usual_force_values(
     assert [int(each.split()[1]) for each in words(picture) if each.startswith("force ")] == drawn
 
 
-def test_what_happens_is_written_above_the_curves(tmp_path: Path) -> None:
+def test_events_are_written_above_the_curves(tmp_path: Path) -> None:
     axis = {"position": 6, "requested_position": 0, "current_ma": 0}
     status = {str(each.name): axis for each in THREE_FINGER.axes}
     long = "X" * 2 * LONGEST

@@ -104,8 +104,8 @@ async def test_an_event_has_the_time_of_what_it_tells(
     entries = [entry for entry in read_recording(file) if entry.is_json]
     offsets = {entry.nanoseconds - round(entry.fields["timestamp"] * 1e9) for entry in entries}
     assert max(offsets) - min(offsets) < 1000, "nanoseconds: all go by one clock"
-    told = {entry.fields["timestamp"] for entry in entries if entry.fields.get("kind") == "transition"}
-    assert {each.timestamp for each in transitions.drain()} == told
+    times = {entry.fields["timestamp"] for entry in entries if entry.fields.get("kind") == "transition"}
+    assert {each.timestamp for each in transitions.drain()} == times
     (fault,) = [entry.fields for entry in entries if entry.fields.get("kind") == "fault"]
     shown = next(entry.fields for entry in entries if entry.fields.get("fault_code") == 9)
     assert fault["timestamp"] == shown["timestamp"]
@@ -178,7 +178,7 @@ async def test_rosbags_opens_a_recording_for_ros_2(of_ros: tuple[Path, Recorder]
 
 
 @pytest.mark.parametrize("frame", ["", "a", "palm", "the hand's own frame"])
-def test_whatever_the_frame_is_called_the_numbers_are_where_they_belong(frame: str) -> None:
+def test_frames_of_any_length_leave_the_numbers_aligned(frame: str) -> None:
     numbers = [[float(10 * row + at) for at in range(11)] for row in range(3)]
     data = JointStateEncoder(frame).encode(1_700_000_000_123_456_789, *numbers)
     message: Any = get_typestore(Stores.ROS2_JAZZY).deserialize_cdr(data, SCHEMA_NAME)

@@ -102,7 +102,7 @@ def test_a_chunk_that_would_fill_the_memory_is_refused(
     assert "\n" not in str(caught.value)
 
 
-def test_what_stands_before_a_bomb_is_read_and_saved(file: Path) -> None:
+def test_messages_before_a_decompression_bomb_are_read_and_saved(file: Path) -> None:
     write(file, CHANNEL, message(json.dumps(EVENT).encode()), chunk(b"", "zstd", 2**63))
     entries = read_recording(file)
     assert next(entries).fields == EVENT
@@ -163,7 +163,7 @@ NOT_OURS = {
 
 
 @pytest.mark.parametrize("what", NOT_OURS)
-def test_what_is_no_json_object_is_refused_in_one_line(file: Path, what: str) -> None:
+def test_a_message_that_is_no_json_object_is_refused_in_one_line(file: Path, what: str) -> None:
     write(file, CHANNEL, message(NOT_OURS[what]))
     (entry,) = read_recording(file)
     with pytest.raises(RecordingError, match=r"it\.mcap: a message on '/gripper/event'") as caught:

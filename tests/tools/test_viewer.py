@@ -94,7 +94,7 @@ async def test_joint_states_are_read_by_another_implementation(hand: RobotiqHand
     assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == nanoseconds
 
 
-async def test_whoever_comes_late_is_told_the_state(hand: RobotiqHand, server: SimulatorServer) -> None:
+async def test_a_late_client_gets_the_state(hand: RobotiqHand, server: SimulatorServer) -> None:
     """A gripper that is lost tells nothing more; its state is published once a second all the same."""
     await lose_link(server, hand)
     async with viewed(hand) as client:
@@ -102,7 +102,7 @@ async def test_whoever_comes_late_is_told_the_state(hand: RobotiqHand, server: S
         await client.until(lambda: bool(client.received))
         state = client.objects("/gripper/state")[0]
         assert state["state"] == "DISCONNECTED"
-        assert "fault" not in state, "what is not known is not told"
+        assert "fault" not in state, "unknown is left out"
         assert state["polls"] == hand.statistics.polls
         await server.accept()
         await client.until(lambda: client.objects("/gripper/state")[-1]["state"] == "RUNNING_IDLE")
@@ -118,11 +118,11 @@ async def test_the_hand_can_be_drawn(hand: RobotiqHand) -> None:
     message: Any = store.deserialize_cdr(data, "std_msgs/msg/String")
     model = HandModel.parse(message.data)
     placed = {model.root: (0.0, 0.0, 0.0)}
-    told = {each["child_frame_id"]: each for each in one.objects("/tf")[-1]["transforms"]}
-    assert {(each["parent_frame_id"], child) for child, each in told.items()} == {
+    shown = {each["child_frame_id"]: each for each in one.objects("/tf")[-1]["transforms"]}
+    assert {(each["parent_frame_id"], child) for child, each in shown.items()} == {
         (joint.parent, joint.child) for joint in model.joints
     }
-    assert len(placed | told) == len(model.links)
+    assert len(placed | shown) == len(model.links)
 
 
 # -- beginning and end--------------------------------------------------------------------------------------
@@ -133,10 +133,10 @@ async def test_viewers_are_offered_nothing_to_call(hand: RobotiqHand) -> None:
         await one.subscribe("/gripper/status")
         await one.until(lambda: len(one.received) >= 20)
         assert one.services == {}
-        assert one.told[0]["capabilities"] == []
+        assert one.messages[0]["capabilities"] == []
 
 
-async def test_nothing_that_concerns_viewers_delays_the_stop() -> None:
+async def test_viewers_do_not_delay_the_stop() -> None:
     gripper = active_gripper(speedup=2)
     async with SimulatorServer(gripper) as server:
         hand = RobotiqHand(server.address)
@@ -184,15 +184,15 @@ async def test_a_hand_that_is_started_again_is_shown_again(server: SimulatorServ
         await one.until(lambda: one.objects("/gripper/state")[-1]["state"] == "SHUTDOWN")
 
 
-async def test_the_state_is_told_when_it_changes(hand: RobotiqHand, gripper: SimulatedGripper) -> None:
+async def test_the_state_is_published_when_it_changes(hand: RobotiqHand, gripper: SimulatedGripper) -> None:
     async with viewed(hand) as one:
         await one.subscribe("/gripper/state")
         await one.until(lambda: bool(one.received))
         gripper.inject_fault(Fault.SCISSOR_BLOCKED)
         await hand.wait_for_state(State.FAULT)
-        told = asyncio.get_running_loop().time()
+        faulted_at = asyncio.get_running_loop().time()
         await one.until(lambda: one.objects("/gripper/state")[-1].get("fault_code") == 14)
-        assert asyncio.get_running_loop().time() - told < 0.5
+        assert asyncio.get_running_loop().time() - faulted_at < 0.5
         assert one.objects("/gripper/state")[-1]["description"] == Fault.SCISSOR_BLOCKED.description
 
 

@@ -67,14 +67,14 @@ def test_an_integer_passes_exactly_when_it_is_within_its_range(value: int, low: 
 
 
 @pytest.mark.parametrize("value", [-1, 256, 10**30])
-def test_what_does_not_fit_into_a_byte_is_a_value_error(value: int) -> None:
+def test_a_value_beyond_a_byte_is_a_value_error(value: int) -> None:
     assert (check_byte("force", 0), check_byte("force", 255)) == (0, 255)
     with refused(ValueError, f"force must be in 0..255, got {value}"):
         check_byte("force", value)
 
 
 @pytest.mark.parametrize("value", NOT_INTEGERS, ids=repr)
-def test_what_is_not_an_integer_is_a_type_error(value: object) -> None:
+def test_a_value_that_is_not_an_integer_is_a_type_error(value: object) -> None:
     with refused(TypeError, f"speed must be an int in 0..255, got {value!r}"):
         check_byte("speed", value)
     with refused(TypeError, f"fingers must be a Finger mask or an int in 1..15, got {value!r}"):
@@ -135,12 +135,12 @@ def test_eight_registers_become_a_tuple_of_plain_integers(block: list[int]) -> N
 
 
 @pytest.mark.parametrize("register", [1.0, True, np.float64(1), "1", None], ids=repr)
-def test_what_is_no_register_is_a_type_error(register: Any) -> None:
+def test_a_register_that_is_not_an_integer_is_a_type_error(register: Any) -> None:
     with refused(TypeError, f"registers[2] must be an int in 0..65535, got {register!r}"):
         reg.check_registers([0, 0, register, 0, 0, 0, 0, 0])
 
 
-def test_what_is_not_eight_registers_of_sixteen_bits_is_a_value_error() -> None:
+def test_other_than_eight_registers_of_sixteen_bits_is_a_value_error() -> None:
     for count in (0, 7, 9):
         with pytest.raises(ValueError, match=f"expected 8 of them, got {count}"):
             reg.check_registers([0] * count)
@@ -165,7 +165,7 @@ def test_seconds_outside_the_range_are_a_value_error(value: float) -> None:
 
 
 @pytest.mark.parametrize("value", REAL, ids=repr)
-def test_a_time_out_above_zero_passes_as_a_float_and_none_as_none(value: float) -> None:
+def test_a_timeout_above_zero_becomes_a_float_and_none_stays_none(value: float) -> None:
     assert check_timeout("timeout", value) == value
     assert type(check_timeout("timeout", value)) is float
     assert check_timeout("timeout", None) is None
@@ -178,7 +178,7 @@ def test_a_time_out_that_is_not_above_zero_is_a_value_error(value: float) -> Non
 
 
 @pytest.mark.parametrize("value", NO_NUMBERS, ids=repr)
-def test_what_is_not_a_number_of_seconds_is_a_type_error(value: object) -> None:
+def test_seconds_that_are_not_a_number_are_a_type_error(value: object) -> None:
     with refused(TypeError, f"poll_interval must be seconds in 0.01..5.0, got {value!r}"):
         check_seconds("poll_interval", value, 0.01, 5.0)
     with refused(TypeError, f"timeout must be None or seconds above 0, got {value!r}"):

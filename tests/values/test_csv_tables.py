@@ -45,7 +45,7 @@ def refusal(file: Path, text: str, layout: Layout = SPEED) -> str:
         )
     )
 )
-def test_what_was_written_is_read(
+def test_a_table_is_read_as_it_was_written(
     tmp_path_factory: pytest.TempPathFactory, table: dict[int, tuple[int, ...]]
 ) -> None:
     file = tmp_path_factory.mktemp("runs") / "table.csv"
@@ -98,7 +98,7 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
         read_table(tmp_path / "latin", SPEED)
 
 
-def test_what_a_spreadsheet_writes_is_read(file: Path) -> None:
+def test_tables_of_spreadsheets_are_read(file: Path) -> None:
     file.write_bytes(b"\xef\xbb\xbfspeed_value,run_1_ms\r\n0, 10\r\n")
     assert read_table(file, SPEED) == {0: (10,)}
 

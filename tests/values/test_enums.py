@@ -89,7 +89,7 @@ def test_an_unassigned_code_is_a_fault_with_a_number_for_a_name(code: int) -> No
 
 
 @pytest.mark.parametrize("value", [16, -1, "NONE", None, 1.5])
-def test_what_does_not_fit_into_four_bits_is_no_fault_code(value: object) -> None:
+def test_a_code_beyond_four_bits_is_no_fault(value: object) -> None:
     with pytest.raises(ValueError, match="not a valid Fault"):
         Fault(value)  # type: ignore[arg-type]
 

@@ -60,13 +60,13 @@ def test_any_eight_registers_can_be_read_and_only_their_reserved_bits_are_lost(
 
 
 @pytest.mark.parametrize(("name", "value"), [("position", -1), ("speed", 256), ("force", -1)])
-def test_what_does_not_fit_into_a_byte_is_never_encoded(name: str, value: int) -> None:
+def test_a_value_beyond_a_byte_is_never_encoded(name: str, value: int) -> None:
     axis = dataclasses.replace(AxisRequest(), **{name: value})
     with pytest.raises(ValueError, match=f"value {value} does not fit"):
         _ = Request(axes=(AxisRequest(), axis, AxisRequest(), AxisRequest())).registers
 
 
-def test_what_is_not_eight_registers_is_refused() -> None:
+def test_other_than_eight_registers_is_refused() -> None:
     with pytest.raises(ValueError, match="registers"):
         Request.from_registers([0] * 7)
 

@@ -153,7 +153,7 @@ def test_the_repr_shows_what_a_person_looks_for_first() -> None:
 
 
 @pytest.mark.parametrize("read", PER_AXIS)
-def test_what_is_not_one_axis_is_refused(read: Callable[[RobotiqStatus, object], object]) -> None:
+def test_a_mask_of_several_axes_is_refused(read: Callable[[RobotiqStatus, object], object]) -> None:
     with pytest.raises(ValueError, match="finger must be one of"):
         read(status_of(0x31), Finger.ABC)
     with pytest.raises(TypeError, match="finger must be one Finger"):
@@ -169,6 +169,6 @@ def test_an_axis_may_be_given_as_its_number() -> None:
     ("registers", "error"),
     [([0] * 7, ValueError), ([0x10000] + [0] * 7, ValueError), ([0.0] * 8, TypeError)],
 )
-def test_what_is_not_eight_registers_is_refused(registers: list[int], error: type[Exception]) -> None:
+def test_other_than_eight_registers_is_refused(registers: list[int], error: type[Exception]) -> None:
     with pytest.raises(error, match="registers"):
         RobotiqStatus.from_registers(registers)

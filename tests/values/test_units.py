@@ -63,7 +63,7 @@ REFUSED: dict[str, tuple[str, str, tuple[float, ...]]] = {
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_is_out_of_range_is_refused_in_the_unit(name: str) -> None:
+def test_values_out_of_range_are_refused_in_the_unit(name: str) -> None:
     method, words, outside = REFUSED[name]
     for value in (*outside, float("nan"), "3", True):
         error = ValueError if isinstance(value, float | int) and value is not True else TypeError
@@ -72,7 +72,7 @@ def test_what_is_out_of_range_is_refused_in_the_unit(name: str) -> None:
 
 
 @pytest.mark.parametrize("units", [THESIS, NOMINAL])
-def test_the_limits_that_are_told_are_accepted(units: Units) -> None:
+def test_the_limits_in_the_error_are_accepted(units: Units) -> None:
     for name, (method, *_) in REFUSED.items():
         with pytest.raises(ValueError, match=f"{name} must be") as caught:
             getattr(units, method)(**{name: 1e6})
@@ -96,7 +96,7 @@ def test_counts_are_refused_as_counts(call: Any) -> None:
         call(3.0)
 
 
-def test_where_the_figures_come_from_is_told() -> None:
+def test_the_repr_names_the_source_of_the_figures() -> None:
     assert repr(THESIS) == (
         "<Units 0..155 mm (nominal), 15.46..73.16 mm/s (thesis, table A1.1), "
         "labels 15..60 N (nominal (manual))>"
@@ -143,7 +143,7 @@ def test_they_are_by_the_owners_calibrations(tmp_path: Path) -> None:
             hand.units.label_n(10)
 
 
-def test_what_is_no_calibration_is_refused() -> None:
+def test_objects_that_are_no_calibration_are_refused() -> None:
     with pytest.raises(TypeError, match="speeds must be a SpeedCalibration, got None"):
         Units(None)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="forces must be a ForceCalibration, got 30"):

@@ -72,7 +72,7 @@ class Helper:
 
     def __init__(self, server: SimulatorServer) -> None:
         self.asked: list[str] = []
-        self.told: list[str] = []
+        self.said: list[str] = []
         self.alarms: list[str] = []
         self.has_stopped = False
         self.before: Callable[[str], object] = lambda _: None
@@ -81,7 +81,7 @@ class Helper:
 
     def tell(self, words: str) -> None:
         assert not self._server.gripper.is_moving, f"said while fingers move: {words}"
-        self.told.append(words)
+        self.said.append(words)
 
     def alarm(self, words: str) -> None:
         self.alarms.append(words)

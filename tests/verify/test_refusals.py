@@ -107,7 +107,7 @@ async def test_a_program_that_was_killed_in_a_full_stroke() -> None:
         helper.before = lambda words: False if words == LEFT_SET else None
         report = await from_stage_2(server, helper)
         assert report.why == "declined"
-        assert "rGTO is set" in helper.told[-1]
+        assert "rGTO is set" in helper.said[-1]
 
         assert (await from_stage_2(server, agreed=2)).why == "refused"
 
@@ -179,7 +179,7 @@ async def run_alone(address: str) -> Report:
     return await Runner(Plan(parse_address(address), lengths=SHORT), helper, Roll(), lambda _: None).run()
 
 
-async def test_nobody_there() -> None:
+async def test_nothing_answers() -> None:
     report = await run_alone("127.0.0.1:1")
     assert (report.why, report.stages) == ("refused", [0])
 
@@ -205,7 +205,7 @@ async def test_another_model_is_refused_with_the_names_that_fit() -> None:
 
 
 @pytest.mark.parametrize("number", range(10))
-async def test_what_is_not_agreed_to_is_not_done(number: int) -> None:
+async def test_a_stage_without_consent_is_not_run(number: int) -> None:
     async with served(active=number > 3) as server:
         helper = Helper(server)
         helper.before = lambda words: False if words.startswith(f"Stage {number}:") else None

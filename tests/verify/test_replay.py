@@ -158,7 +158,7 @@ def test_a_frame_that_was_changed_by_hand_is_listed_and_no_other(
     assert len({each.seconds for each in found}) == 1
 
 
-def test_what_the_decoder_understands_otherwise_is_listed(short: Path, tmp_path: Path) -> None:
+def test_fields_that_decode_differently_are_listed(short: Path, tmp_path: Path) -> None:
     seen = [0]
 
     def change(topic: str, fields: dict[str, Any]) -> None:

@@ -123,8 +123,8 @@ async def test_no_address_host_or_user_is_in_it(tmp_path: Path, trouble: str) ->
         await server.fault_injector.begin(Trouble(trouble))
         report = await running
         await folder.end(report)
-        told = f"{report.words} {[check.found for check in report.checks.values()]}"
-        assert server.address in told, "nothing was to be hidden"
+        said = f"{report.words} {[check.found for check in report.checks.values()]}"
+        assert server.address in said, "nothing was to be hidden"
     files = [(tmp_path / name).read_text() for name in (JSON, PAGE)]
     files += [entry.data.decode() for entry in read_recording(tmp_path / NAME)]
     for text in files:
@@ -133,7 +133,7 @@ async def test_no_address_host_or_user_is_in_it(tmp_path: Path, trouble: str) ->
         assert not re.search(rf"\b{re.escape(getpass.getuser())}\b", text.replace("/root", ""))
 
 
-def test_what_is_hidden_is_hidden_everywhere() -> None:
+def test_the_address_is_hidden_everywhere() -> None:
     scrub = Scrubber(parse_address("tcp://Gripper-7.example:5020")).clean
     text = "cannot connect to tcp://gripper-7.example:5020: gripper-7.example does not answer"
     assert "gripper-7" not in scrub(text)
@@ -231,16 +231,16 @@ EVERY = {
 def test_the_lines_to_paste_are_taken(tmp_path: Path, model: Model) -> None:
     report = report_with(**EVERY)
     report.model = model
-    told = {name: text.replace("ADDRESS", "tcp://192.0.2.1") for name, text in lines(report).items()}
-    hand = eval(told["Python"], {"RobotiqHand": RobotiqHand})
+    said = {name: text.replace("ADDRESS", "tcp://192.0.2.1") for name, text in lines(report).items()}
+    hand = eval(said["Python"], {"RobotiqHand": RobotiqHand})
     assert isinstance(hand, RobotiqHand)
     assert hand.model is model
     file = tmp_path / "FLEET.toml"
-    file.write_text('site = "lab"\n' + told["FLEET.toml"])
+    file.write_text('site = "lab"\n' + said["FLEET.toml"])
     settings = read_agent_file(file).grippers["NAME"]
     assert settings.model is model
     assert {name: getattr(settings, name) for name in EVERY} == EVERY
-    given = dict(re.findall(r"-p (\w+):=(\S+)", told["ROS 2"]))
+    given = dict(re.findall(r"-p (\w+):=(\S+)", said["ROS 2"]))
     assert given.pop("address") == "tcp://192.0.2.1"
     assert given.pop("model", None) == (None if model is THREE_FINGER else "2f85")
     assert given
@@ -248,7 +248,7 @@ def test_the_lines_to_paste_are_taken(tmp_path: Path, model: Model) -> None:
         check_parameter(name, type(PARAMETERS[name].default)(float(value)))
     for name in EVERY.keys() - given:
         assert name not in PARAMETERS
-        assert name in told["ROS 2"]
+        assert name in said["ROS 2"]
     assert f"Checked as a {model}, link tcp." in page(report)
 
 

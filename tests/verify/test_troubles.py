@@ -102,7 +102,7 @@ async def with_trouble(
 
 
 @pytest.mark.parametrize(("trouble", "stage", "cell"), EVENTS)
-async def test_what_happens_in_a_stage_ends_it(trouble: str, stage: int, cell: str) -> None:
+async def test_a_trouble_in_a_stage_ends_it(trouble: str, stage: int, cell: str) -> None:
     async with served(active=stage > 3) as server:
         helper = Helper(server)
         report, cue = await with_trouble(server, helper, trouble, stage)

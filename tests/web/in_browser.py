@@ -168,7 +168,7 @@ async def seen(hand: RobotiqHand, *, moving: bool, go: bool = True, within: floa
 # -- what it shows -----------------------------------------------------------------------------------------
 
 
-async def test_it_loads_and_asks_nobody_else(browser: Browser, stage: Stage) -> None:
+async def test_the_page_loads_and_asks_no_other_host(browser: Browser, stage: Stage) -> None:
     await browser.says("state", "ready")
     assert await browser.says("fault", "no fault")
     await browser.says("statistics", "polls")
@@ -182,7 +182,7 @@ async def test_it_loads_and_asks_nobody_else(browser: Browser, stage: Stage) -> 
     assert "token" not in await browser.run("return location.href")
 
 
-async def test_whoever_follows_a_link_gets_in(window: Browser, stage: Stage) -> None:
+async def test_following_a_link_opens_the_page(window: Browser, stage: Stage) -> None:
     """In a terminal in the browser, or from the file that --open writes: cookies may stay at home then."""
     await window.open(f"data:text/html,<a id=link href='{stage.page.url}'>here</a>")
     await window.do(lambda: window.driver.find_element("id", "link").click())
@@ -218,7 +218,7 @@ async def test_a_page_says_that_it_draws_no_sibling(window: Browser) -> None:
         assert not await window.do(window.find("pinch").is_displayed)
 
 
-async def test_what_it_holds_is_drawn_and_what_touches_glows(browser: Browser, stage: Stage) -> None:
+async def test_the_part_is_drawn_and_touching_pads_glow(browser: Browser, stage: Stage) -> None:
     await browser.until(lambda: browser.link("finger_1_link_3"))
     assert not await browser.run(VISIBLE, "bar")
     stage.gripper.place_object(Finger.ABC, position=90)
@@ -230,7 +230,7 @@ async def test_what_it_holds_is_drawn_and_what_touches_glows(browser: Browser, s
     await browser.until(lambda: not browser.driver.execute_script(VISIBLE, "bar"))
 
 
-async def test_what_it_shows_of_a_gripper_that_dies_and_comes_back(browser: Browser, stage: Stage) -> None:
+async def test_the_page_of_a_gripper_that_is_lost_and_comes_back(browser: Browser, stage: Stage) -> None:
     await browser.says("state", "ready")
     stage.server.refuse()
     stage.server.cut()
@@ -296,7 +296,7 @@ async def test_a_halt_is_not_under_a_question_that_is_open(browser: Browser, sta
     await browser.until(lambda: not browser.has("yes-reset"))
 
 
-async def test_what_is_dangerous_is_asked_about(browser: Browser, hand: RobotiqHand) -> None:
+async def test_dangerous_actions_ask_first(browser: Browser, hand: RobotiqHand) -> None:
     await browser.click("reset")
     await browser.until(lambda: browser.find("yes-reset").is_displayed())
     assert hand.state is State.RUNNING_IDLE
@@ -432,9 +432,9 @@ async def test_a_browser_that_comes_back_shows_what_is_newest(browser: Browser, 
     await browser.run("window.socket.io.engine.close()")
     stage.pace.set(FAST)
     await moving
-    told = await browser.run("return window.robotiqTime")
+    shown = await browser.run("return window.robotiqTime")
     for _ in range(4):  # the first is among what it missed, or after it
-        told = await browser.until(partial(told_after, browser, told))
+        shown = await browser.until(partial(shown_after, browser, shown))
     assert browser.find("state").text == "ready"
 
 
@@ -445,9 +445,9 @@ ws.onmessage = (event) => { window.lost ||= event.data.includes('"moving"'); };
 """
 
 
-def told_after(browser: Browser, time: float) -> float | Literal[False]:
-    told: float = browser.driver.execute_script("return window.robotiqTime")
-    return told > time and told
+def shown_after(browser: Browser, time: float) -> float | Literal[False]:
+    shown: float = browser.driver.execute_script("return window.robotiqTime")
+    return shown > time and shown
 
 
 @pytest.mark.skipif(os.name != "posix", reason="stops a process")

@@ -97,14 +97,14 @@ def test_the_host_must_be_ours(host: str, fine: bool) -> None:
     "origin",
     ["http://evil.example", "http://127.0.0.1:80", "http://127.0.0.1", "null", "", f"https://{HERE}"],
 )
-def test_a_foreign_origin_is_refused_whatever_it_has(method: str, origin: str) -> None:
+def test_a_foreign_origin_is_refused_even_with_the_cookie(method: str, origin: str) -> None:
     rules = access()
     asked = head(rules, f"{rules.settings.folder}/x", method, cookie=cookie(rules), origin=origin)
     assert rules.judge(asked) is Verdict.WRONG_ORIGIN
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "OPTIONS", ""])
-def test_what_changes_something_or_stays_open_has_an_origin(method: str) -> None:
+def test_requests_that_change_something_or_stay_open_need_an_origin(method: str) -> None:
     rules = access()
     inside = f"{rules.settings.folder}/x"
     assert rules.judge(head(rules, inside, method, cookie=cookie(rules))) is Verdict.WRONG_ORIGIN
@@ -152,7 +152,7 @@ def test_settings_travel_as_a_line_and_show_no_secret() -> None:
 
 
 @pytest.mark.virtual_time
-async def test_whoever_tries_passwords_holds_up_nobody_who_sits_elsewhere() -> None:
+async def test_guessing_passwords_delays_no_other_host() -> None:
     """A wrong one takes a second, and the next from there waits for it: others do not."""
     tries = [asyncio.create_task(entered("198.51.100.7", f"guess {n}")) for n in range(50)]
     await asyncio.sleep(0.5)
@@ -193,7 +193,7 @@ async def test_a_form_that_never_ends_is_not_waited_for() -> None:
 
 
 @pytest.mark.virtual_time
-async def test_two_origins_are_none() -> None:
+async def test_two_origins_count_as_none() -> None:
     answers: list[MutableMapping[str, object]] = []
 
     async def send(message: MutableMapping[str, object]) -> None:

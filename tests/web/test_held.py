@@ -96,7 +96,7 @@ def test_a_finger_that_met_nothing_stands_where_its_position_says() -> None:
 @pytest.mark.parametrize(
     ("met", "is_bar"), [(0b11_11_11_10, False), (0b11_10_10_11, True), (0b10_11_11_11, False)]
 )
-def test_what_only_one_side_met_is_drawn_before_it(met: int, is_bar: bool) -> None:
+def test_a_part_met_on_one_side_is_drawn_before_it(met: int, is_bar: bool) -> None:
     status = holding(70, met=met)
     angles, thing = grasp(MODEL, status)
     assert tuple(angles[name] for name in JOINTS) == joint_angles(status)
@@ -111,5 +111,5 @@ def test_nothing_is_held() -> None:
     assert tuple(angles[name] for name in JOINTS) == joint_angles(status)
 
 
-def test_what_was_met_while_opening_is_not_held() -> None:
+def test_a_part_met_while_opening_is_not_held() -> None:
     assert grasp(MODEL, holding(60, met=0b11_01_01_01))[1] is None

@@ -62,7 +62,7 @@ async def test_a_command_is_carried_out_and_answered(hand: RobotiqHand) -> None:
 
 
 @pytest.mark.parametrize(("name", "hand"), [("explode", 0), ("close", 1), ("close", -1)])
-async def test_what_there_is_not_is_refused(name: str, hand: int) -> None:
+async def test_unknown_actions_and_hands_are_refused(name: str, hand: int) -> None:
     pages = Pages(FakeHand())
     pages.do(name, hand=hand)
     answer = await pages.answer()
@@ -121,9 +121,7 @@ MOVING: tuple[tuple[str, dict[str, Any]], ...] = (
 
 
 @pytest.mark.parametrize("ago", [FRESH_S + 0.1, 1e9, -1.0])
-async def test_what_was_asked_for_too_long_ago_moves_nothing_but_a_halt_is_never_too_old(
-    hand: RobotiqHand, ago: float
-) -> None:
+async def test_late_requests_move_nothing_but_a_halt_is_never_too_late(hand: RobotiqHand, ago: float) -> None:
     """Whether it waited in the browser, on the network, or for this loop, which something had held up."""
     await assert_only_a_halt(Pages(hand), hand, "arrived too late", ago=ago)
 
@@ -245,16 +243,16 @@ async def test_a_silence_is_a_gap_in_the_curves_and_no_line(hand: RobotiqHand) -
     assert [sample.positions is None for sample in shown.samples] == [False, True, False]
 
 
-def test_an_answer_goes_to_whoever_asked() -> None:
+def test_an_answer_goes_to_the_page_that_asked() -> None:
     said: list[dict[str, Any]] = []
-    told: list[tuple[bool, str]] = []
+    answers: list[tuple[bool, str]] = []
     mirror = Mirror(("here",), control=True, say=said.append)
-    mirror.ask("page", 0, "close", {}, lambda ok, words: told.append((ok, words)), at=1.0)
+    mirror.ask("page", 0, "close", {}, lambda ok, words: answers.append((ok, words)), at=1.0)
     number = said[0]["do"]["number"]
     answer = {"number": number, "ok": True, "words": "A"}
     for _ in range(2):
         mirror.hear(json.dumps({"hands": [], "answers": [answer]}).encode())
-    assert told == [(True, "A")]
+    assert answers == [(True, "A")]
 
 
 # -- the process -------------------------------------------------------------------------------------------
@@ -288,7 +286,7 @@ async def test_a_process_that_dies_is_noticed_and_its_motions_are_held() -> None
 # -- in touch ----------------------------------------------------------------------------------------------
 
 
-def test_what_a_browser_sends_back_may_be_anything() -> None:
+def test_any_heartbeat_of_a_browser_is_tolerated() -> None:
     heartbeat, now = Heartbeat(), monotonic()
     assert heartbeat.heard(now) == now
     nothing: tuple[object, ...] = (None, "now", [now], True, {}, now + 60, -1, float("nan"), float("-inf"))
@@ -300,7 +298,7 @@ def test_a_browser_is_lost_once_and_found_again() -> None:
     assert not heartbeat.check()
     heartbeat._newest -= LOST_S + 1
     assert heartbeat.check()
-    assert not heartbeat.check(), "told once"
+    assert not heartbeat.check(), "reported once"
     heartbeat.heard(monotonic() - LOST_S - 1)
     assert heartbeat.is_lost, "what it sent was long under way"
     heartbeat.heard(monotonic())
@@ -320,7 +318,7 @@ def test_a_browser_that_comes_back_has_caught_up_when_it_knows_a_time_since() ->
     assert not heartbeat.has_caught_up(), "what it missed is still to come"
     heartbeat.heard(monotonic())
     assert heartbeat.has_caught_up()
-    assert not heartbeat.has_caught_up(), "told once"
+    assert not heartbeat.has_caught_up(), "reported once"
 
 
 def test_a_process_of_the_page_without_settings_ends_and_leaves_no_folder(tmp_path: Path) -> None:

@@ -34,7 +34,7 @@ async def test_move_with_everything(operator: Operator) -> None:
     assert operator.has_moved
 
 
-async def test_move_moves_the_fingers_unless_told_otherwise(operator: Operator) -> None:
+async def test_move_moves_the_fingers_by_default(operator: Operator) -> None:
     await call(operator, "move", position=60)
     status = operator.hand.status
     assert [status.requested_position(axis) for axis in Finger.ABC] == [60] * 3
@@ -53,7 +53,7 @@ async def test_speed_and_force_of_all_axes_or_some(operator: Operator, what: str
 
 @pytest.mark.parametrize("name", [name for name, action in ACTIONS.items() if action.warning])
 @pytest.mark.parametrize("confirm", [False, 1, "true"])
-async def test_what_is_dangerous_has_to_be_confirmed(operator: Operator, name: str, confirm: object) -> None:
+async def test_dangerous_services_must_be_confirmed(operator: Operator, name: str, confirm: object) -> None:
     requests = operator.hand.requests()
     with pytest.raises(ValueError, match=f"{name} needs confirm = true: "):
         await call(operator, name, confirm=confirm)

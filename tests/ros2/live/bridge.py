@@ -16,7 +16,7 @@ from robotiq_async.ros2.node.bridge import Bridge, ClosedError
 from tests.ros2.live.processes import PATIENCE_S
 
 
-async def test_what_is_asked_begins_in_the_order_in_which_it_was_asked() -> None:
+async def test_calls_begin_in_their_order() -> None:
     """Also if the loop was held up meanwhile: a cancel does not overtake its goal."""
     bridge, order = Bridge(asyncio.get_running_loop(), None), []
 
@@ -36,7 +36,7 @@ async def test_what_is_asked_begins_in_the_order_in_which_it_was_asked() -> None
     assert order == ["goal", "cancel", "another goal"]
 
 
-async def test_what_is_asked_is_answered_and_nothing_crosses_after_the_end() -> None:
+async def test_calls_are_answered_and_none_crosses_after_the_end() -> None:
     context = Context()
     rclpy.init(context=context)
     executor = SingleThreadedExecutor(context=context)
@@ -47,13 +47,13 @@ async def test_what_is_asked_is_answered_and_nothing_crosses_after_the_end() -> 
         raise ValueError("no")
 
     async def ask() -> None:
-        told: list[object] = [await bridge.ask(asyncio.sleep(0, "well"))]
+        results: list[object] = [await bridge.ask(asyncio.sleep(0, "well"))]
         with pytest.raises(ValueError, match="no"):
             await bridge.ask(fail())
         bridge.close()
         with pytest.raises(ClosedError):
             await bridge.ask(fail())
-        answers.set_result(told)
+        answers.set_result(results)
 
     executor.create_task(ask)
     thread = threading.Thread(target=executor.spin, daemon=True)

@@ -37,7 +37,7 @@ asyncio.run(main())
 """
 
 
-def told(what: str, seconds: list[float]) -> None:
+def print_figures(what: str, seconds: list[float]) -> None:
     """A line of a table."""
     figures = f"p50 {median(seconds) * 1e3:.1f} ms, max {max(seconds) * 1e3:.1f} ms"
     print(f"{what} (n={len(seconds)}): {figures}", flush=True)  # noqa: T201
@@ -70,8 +70,8 @@ def accepted(client: Client) -> float:
 
 def latencies(address: str) -> None:
     with active(address) as (process, client):
-        told("goal to accepted", [accepted(client) for _ in range(100)])
-        told(
+        print_figures("goal to accepted", [accepted(client) for _ in range(100)])
+        print_figures(
             "the same, while another one is under way", [timed(lambda: client.move(0.3)) for _ in range(100)]
         )
         ended = []
@@ -81,12 +81,12 @@ def latencies(address: str) -> None:
             goal.cancel()
             assert goal.ends()[0] == CANCELED
             ended.append(time.perf_counter() - began)
-        told("cancel to CANCELED, which says that the hold was acknowledged", ended)
+        print_figures("cancel to CANCELED, which says that the hold was acknowledged", ended)
         halts = []
         for _ in range(20):
             under_way(client)
             halts.append(timed(lambda: client.call("halt")))
-        told("halt of moving fingers to its answer", halts)
+        print_figures("halt of moving fingers to its answer", halts)
         goal = under_way(client)
         began = time.perf_counter()
         process.send(signal.SIGINT)
@@ -107,7 +107,7 @@ def stillness() -> None:
             goal.cancel()
             goal.ends()
             held.append(simulator.read("writes")[-1].time - began + 0.005)
-    told("cancel to still, by the gripper's clock (its cycle of 5 ms included)", held)
+    print_figures("cancel to still, by the gripper's clock (its cycle of 5 ms included)", held)
 
 
 # -- what it costs ------------------------------------------------------------------------------------------

@@ -51,8 +51,8 @@ def test_a_life(simulator: Simulator) -> None:
         assert client.change("deactivate")
         assert client.change("cleanup")
         assert client.state() == "unconfigured"
-        told = json.loads(client.status().wait(new=False).data)  # what is kept for new subscribers
-        assert told == {"state": "SHUTDOWN", "connected": False, "takes_commands": False}
+        shown = json.loads(client.status().wait(new=False).data)  # what is kept for new subscribers
+        assert shown == {"state": "SHUTDOWN", "connected": False, "takes_commands": False}
         assert client.change("configure")
         process.prints("connected to", times=2)
         assert client.change("shutdown")
@@ -61,7 +61,7 @@ def test_a_life(simulator: Simulator) -> None:
         assert process.ends() == 0
 
 
-def test_who_only_looks_leaves_the_fingers_alone(simulator: Simulator) -> None:
+def test_a_node_that_only_watches_leaves_the_fingers_alone(simulator: Simulator) -> None:
     with node(address=simulator.address) as process, Client() as client:
         assert client.change("configure")
         client.joint_states().wait()
