@@ -11,7 +11,7 @@ from robotiq_async import Finger, State
 from tests.adversity.world import World
 
 A = Finger.A
-NOBODY = Finger(0)
+NO_AXES = Finger(0)
 TARGET = 200
 
 Call = Callable[[], Awaitable[Any]]
@@ -112,13 +112,13 @@ async def keeping(world: World) -> Call:
 
 
 PHASES = (
-    Phase("connecting", connecting, NOBODY, 5.0),
+    Phase("connecting", connecting, NO_AXES, 5.0),
     Phase("activating", activating, Finger.ALL, 25.0),
-    Phase("idle", idle, NOBODY, 0.0),
+    Phase("idle", idle, NO_AXES, 0.0),
     Phase("command pending", command_pending, A, 1.0, on_write=True),
     Phase("moving", moving, A, 25.0),
-    Phase("holding", holding, NOBODY, 0.0),
-    Phase("resetting", resetting, NOBODY, 5.0, on_write=True),
+    Phase("holding", holding, NO_AXES, 0.0),
+    Phase("resetting", resetting, NO_AXES, 5.0, on_write=True),
     Phase("releasing", releasing, Finger.ALL, 65.0),
     Phase("stopping", stopping, A, 2.0, on_write=True),
     Phase("keeping a grip", keeping, A, 2.0, on_write=True),

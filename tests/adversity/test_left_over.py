@@ -35,7 +35,7 @@ async def ask_and_go(world: World) -> None:
 
 
 @contextlib.contextmanager
-def nobody_else_moves(world: World) -> Iterator[None]:
+def no_other_axis_moves(world: World) -> Iterator[None]:
     before = world.travels()
     yield
     after = world.travels()
@@ -49,7 +49,7 @@ async def test_a_left_over_reply_moves_no_axis_that_was_not_addressed(here: Worl
     async with here.server.fault_injector.making(Trouble("multiplexer", 0.03)):
         await ask_and_go(here)
         await send(here, 40, 137)
-        with nobody_else_moves(here):
+        with no_other_axis_moves(here):
             with contextlib.suppress(RobotiqConnectionError):
                 await here.hand.start(activate=False)
                 await here.hand.set_position(60, A)
@@ -66,7 +66,7 @@ async def test_after_what_was_left_over_the_next_start_finds_the_gripper(here: W
         with pytest.raises(ProtocolError, match="without a request"):
             await here.hand.start(activate=False)
         await here.hand.start(activate=False)
-        with nobody_else_moves(here):
+        with no_other_axis_moves(here):
             assert (await here.hand.move(60, A, speed=255)).positions[A] == pytest.approx(60, abs=2)
         here.check_no_stale_status()
 
@@ -98,6 +98,6 @@ async def test_no_status_is_older_than_a_reply_may_be(here: World, late: float) 
         with pytest.raises(ConnectionLostError):
             await here.hand.set_position(0, A)
     await here.hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
-    with nobody_else_moves(here):
+    with no_other_axis_moves(here):
         await here.hand.move(60, A, speed=255)
     here.check_no_stale_status()

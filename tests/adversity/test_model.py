@@ -24,7 +24,7 @@ from tests.adversity.world import MODEL, World, world
 from tests.register_words import only_holds
 from tests.virtual import VirtualLoop
 
-ALL, NOBODY = Finger.ALL, Finger(0)
+ALL, NO_AXES = Finger.ALL, Finger(0)
 masks = st.integers(1, 15).map(Finger)
 values = st.integers(0, 255)
 LINK_TROUBLES = [
@@ -301,7 +301,7 @@ class LiveUse(RuleBasedStateMachine):
         assert self.hand.statistics.foreign_commands <= self.foreign
 
     def at_rest(self) -> None:
-        self.may_move = NOBODY
+        self.may_move = NO_AXES
         self.travels = self.world.travels()
 
     @invariant()

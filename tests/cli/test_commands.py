@@ -209,7 +209,7 @@ async def test_a_reader_that_has_had_enough(shell: Shell, server: SimulatorServe
 def test_no_command_complains_when_its_reader_has_gone(command: str, call: Call, virtually: None) -> None:
     """Those whose output is for programs name the gripper on standard error."""
     named = "robotiq-async: Simulated gripper sim://\n" if "--json" in command else ""
-    with nobody_reads():
+    with output_is_not_read():
         assert call(*command.split()) == Outcome(1, "", named)
 
 
@@ -219,7 +219,7 @@ def test_the_demo_without_the_command_line_does_not_either(
     monkeypatch.setattr(sys, "argv", ["demo.py"])
     handler = signal.getsignal(signal.SIGTERM)
     try:
-        with nobody_reads():
+        with output_is_not_read():
             assert _program().main() == 1
     finally:
         signal.signal(signal.SIGTERM, handler)
@@ -227,7 +227,7 @@ def test_the_demo_without_the_command_line_does_not_either(
 
 
 @contextmanager
-def nobody_reads() -> Iterator[None]:
+def output_is_not_read() -> Iterator[None]:
     """Standard output is a pipe whose other end has been closed."""
     reading, writing = os.pipe()
     os.close(reading)

@@ -29,7 +29,7 @@ MOVING = {
     "measure speed": (*COMMAND_LINE, "measure", "speed", "--no-plot"),
     "measure force": (*COMMAND_LINE, "measure", "force", "--no-plot"),
 }
-NOBODY = "tcp://127.0.0.1:1"
+NO_GRIPPER = "tcp://127.0.0.1:1"
 """A command that connects to it ends with 1."""
 ELSEWHERE = """
 import os, sys
@@ -64,8 +64,8 @@ def written(file: Path) -> str:
 
 @pytest.mark.parametrize("command", [each for each in MOVING if each != "demo.py"])
 def test_without_a_terminal_nothing_is_sent(call: Call, file: Path, command: str) -> None:
-    outcome = call(*MOVING[command][len(COMMAND_LINE) :], NOBODY, stdin=b"y\n")
-    outcome.assert_failed(2, "--yes", NOBODY)
+    outcome = call(*MOVING[command][len(COMMAND_LINE) :], NO_GRIPPER, stdin=b"y\n")
+    outcome.assert_failed(2, "--yes", NO_GRIPPER)
     assert outcome.out == ""
     assert list(file.parent.iterdir()) == []
 

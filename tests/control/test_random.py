@@ -124,7 +124,7 @@ class RandomUse(RuleBasedStateMachine):
     @rule()
     @precondition(lambda self: self.running)
     def everything_comes_to_rest(self) -> None:
-        self.scan.step()  # an object taken away sets axes in motion without anybody's command
+        self.scan.step()  # an object taken away sets axes in motion without a command
         self.scan.until(lambda: not self.scan.controller.is_moving, 60)
         self.scan.run(0.6)  # what has no echo is given half a second to act
         assert not self.scan.gripper.is_moving
@@ -142,7 +142,7 @@ class RandomUse(RuleBasedStateMachine):
                 assert self.scan.gripper.travel(axis) == self.travel[axis], f"{axis!r} moved"
 
     @invariant()
-    def nobody_else_was_seen(self) -> None:
+    def no_other_client_was_seen(self) -> None:
         assert not hasattr(self, "scan") or self.scan.controller.foreign_commands == 0
 
     @invariant()

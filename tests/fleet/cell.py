@@ -380,7 +380,7 @@ async def ending(work: Coroutine[Any, Any, Any]) -> str:
 
 
 async def works(world: World) -> None:
-    """The halt of anybody is heard and does what it says; then the hand is as good as new."""
+    """A halt of any client is carried out; then the hand is as good as new."""
     holder, other = world.holder, world.other
     at = world.now()
     heard = await other.do(ending(other.hand.halt()))

@@ -48,7 +48,7 @@ class Host(_Loop):
     def thaw(self) -> None:
         """SIGCONT."""
         self.is_frozen = False
-        # In one go, with no turn of anybody else's in between: they are all due.
+        # In one go, with no turn of another task in between: they are all due.
         for _ in range(len(self._due)):
             self._run(self._due.popleft())
 

@@ -29,7 +29,7 @@ from tests.virtual import VirtualLoop, inside, virtual
 @inside(world)
 async def test_a_second_halt_is_not_dropped_as_a_duplicate(here: World) -> None:
     """strands-labs/robots 1617. The very same request, once more, stops what has been set going since."""
-    halt = Call(LEFT.base, "somebody", number=1)
+    halt = Call(LEFT.base, "stranger", number=1)
     for _ in range(2):
         call = await move_slowly(here)
         assert await ask(here.other, "halt", halt) is None

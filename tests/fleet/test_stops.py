@@ -274,7 +274,7 @@ def every_motion(hand: RemoteHand) -> Iterator[Asked]:
         ("recover", {}),
     ):
         yield Asked(f"cmd/{name}", session.call(arguments))
-    yield Asked("lease", session.call({"what": "take", "label": "somebody"}))
+    yield Asked("lease", session.call({"what": "take", "label": "stranger"}))
 
 
 @inside(lab)
@@ -301,7 +301,7 @@ async def test_requests_admitted_just_before_the_end_are_not_written_after_it(
         if "lease" not in each.key:
             here.agent._receive(each)
     here.serving.cancel()
-    here.agent._receive(Asked("info", Call(LEFT.base, "somebody")))
+    here.agent._receive(Asked("info", Call(LEFT.base, "stranger")))
     await asyncio.wait({here.serving})
     assert not going(here, writes)
 

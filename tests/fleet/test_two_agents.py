@@ -138,7 +138,7 @@ async def test_a_second_agent_of_a_host_is_refused_for_any_gripper(here: Lab) ->
         pass
 
 
-CALL = Call(LEFT.base, "somebody", epoch=7, number=3)
+CALL = Call(LEFT.base, "stranger", epoch=7, number=3)
 
 
 @pytest.mark.parametrize(

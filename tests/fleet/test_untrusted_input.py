@@ -120,7 +120,7 @@ async def test_arguments_that_do_not_fit_leave_nothing_behind(here: Lab, hand: R
 @inside(world)
 async def test_a_request_under_a_wildcard_is_refused(here: World, key: str) -> None:
     call = await move_slowly(here)
-    refused = await ask(here.other, "halt", Call(LEFT.base, "somebody", number=1), key)
+    refused = await ask(here.other, "halt", Call(LEFT.base, "stranger", number=1), key)
     assert refused is not None
     assert here.gripper.is_moving
     await here.holder.do(here.holder.hand.halt())
@@ -130,7 +130,7 @@ async def test_a_request_under_a_wildcard_is_refused(here: World, key: str) -> N
 @inside(world)
 async def test_a_request_for_another_gripper_is_refused(here: World) -> None:
     """It came under the wrong key."""
-    right = Call(GripperName("lab", "cell", "right").base, "somebody", number=1)
+    right = Call(GripperName("lab", "cell", "right").base, "stranger", number=1)
     refused = await ask(here.other, "lease", right)
     assert "right" in str(refused)
     assert here.holder.hand.is_in_control

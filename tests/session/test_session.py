@@ -105,7 +105,7 @@ async def test_callers_that_wait_when_the_link_is_given_up_get_the_reason(
 
 
 async def test_callers_that_wait_when_the_task_fails_get_an_error(caplog: pytest.LogCaptureFixture) -> None:
-    """A bug must not leave anybody waiting for ever."""
+    """A bug must not leave a caller waiting for ever."""
     async with running() as (_, session):
         state = asyncio.create_task(session.reach({State.FAULT}, None, what="never"))
         await asyncio.sleep(0)

@@ -301,7 +301,7 @@ async def test_dangerous_actions_ask_first(browser: Browser, hand: RobotiqHand) 
     await browser.until(lambda: browser.find("yes-reset").is_displayed())
     assert hand.state is State.RUNNING_IDLE
 
-    def insist() -> bool:  # a question takes no yes before anybody can have read it, nor one that is too late
+    def insist() -> bool:  # a question takes no yes before it can have been read, nor one that is too late
         with contextlib.suppress(WebDriverException):
             browser.find("yes-reset" if browser.has("yes-reset") else "reset").click()
         return hand.state is State.RESET

@@ -125,7 +125,7 @@ async def test_of_many_hands_no_tile_has_a_scene(page: PageServer) -> None:
 
 
 async def test_headers_without_end_are_not_kept(page: PageServer) -> None:
-    """Anybody who reaches the port can send them."""
+    """Any client that reaches the port can send them."""
     parts = urlsplit(page.url)
     _, writer = await asyncio.open_connection(parts.hostname, parts.port)
     writer.write(b"GET / HTTP/1.1\r\n")

@@ -111,7 +111,7 @@ class Connection(asyncio.Protocol):
         Who sends a thousand at once does not keep the loop: each turn has one. A gripper without power does
         not even hear them.
         """
-        if self._endpoint.answers_nobody:
+        if not self._endpoint.gripper.is_powered:
             self._inbox.clear()
         while not self._goes_on and not self._is_full and self.is_active():
             try:

@@ -150,11 +150,6 @@ class SimulatorEndpoint(ABC):
         if client in self.connections:
             self.connections.remove(client)
 
-    @property
-    def answers_nobody(self) -> bool:
-        """Whether the gripper is without power."""
-        return not self.gripper.is_powered
-
     @abstractmethod
     def take(self, inbox: bytearray) -> Frame | None:
         """Cut the next request out of what has arrived."""
