@@ -70,10 +70,15 @@ def test_an_axis_at_its_limit_rests_and_is_left_alone() -> None:
     assert scan.last_image.go
 
 
-def test_an_axis_that_a_part_keeps_from_its_limit_is_in_contact() -> None:
+@pytest.mark.parametrize("position", [180, HIGH - 1])
+def test_an_axis_that_a_part_keeps_from_its_limit_is_in_contact_and_proves_no_limit(
+    position: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
     scan = echoing()
-    scan.gripper.place_object(S, 180)
+    scan.gripper.place_object(S, position)
     assert scan.moved(255, S).contacts == S
+    assert "its limit" not in caplog.text
 
 
 @CYCLES

@@ -248,6 +248,13 @@ def test_a_lease_goes_on_where_the_last_run_ended() -> None:
         assert following.holder is None
 
 
+def test_the_newest_intervention_says_why_a_lease_is_not_reacquired() -> None:
+    lease = Lease()
+    for client, reason in (("a", "halted"), ("b", "taken")):
+        lease.intervene(client, reason)
+        assert lease.why_not_again(0) == reason
+
+
 def test_a_lease_remembers_a_bounded_number_of_runs() -> None:
     record: dict[str, Any] = Lease(run=0).record
     for run in range(1, 200):

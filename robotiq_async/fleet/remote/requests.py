@@ -115,9 +115,8 @@ class Requests:
         self.fall_silent()
 
     async def close(self) -> None:
-        self._has_ended = True
-        if not self._closed.done():
-            self._closed.set_result(None)
+        """End the requests that :meth:`end` has left, and wait for their ends."""
+        self._closed.set_result(None)
         pending = list(self._pending)
         for posted in pending:
             posted.end()
