@@ -9,6 +9,7 @@ import os
 import signal
 import socket
 import sys
+import time
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from types import FrameType
@@ -23,6 +24,9 @@ from .output.messages import forget, forwarded_warnings, tell
 
 _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 SUCCESS, FAILURE, WRONG_USAGE, SIGNALLED = 0, 1, 2, 128
+INSIST_S = 10.0
+"""Seconds after the first signal in which a further Ctrl-C is ignored. A stop takes 2 s at most, a report of
+verify a few more."""
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -81,16 +85,19 @@ def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | No
 class _Signals:
     """The first SIGINT, SIGTERM or SIGHUP (a closed terminal) ends the command.
 
-    A second SIGINT has its ordinary effect. A second one of the others is ignored: closing a terminal sends
-    several, and none of them may prevent the first from stopping the fingers.
+    Further ones are ignored: closing a terminal sends several, a person may press Ctrl-C again and again, and
+    none of them may prevent the first from stopping the fingers. Only a SIGINT that comes more than
+    ``insist_s`` seconds later has its ordinary effect.
 
     In the event loop the signal is a cancellation, so that leaving ``async with`` stops the fingers;
     elsewhere it is a KeyboardInterrupt. While the loop is being set up the signal is only noted: asyncio
     could not handle an exception there.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, insist_s: float = INSIST_S) -> None:
         self.received = 0
+        self._insist_s = insist_s
+        self._received_at = 0.0
         self._end: Callable[[], object] = _interrupt
 
     def __enter__(self) -> Self:
@@ -130,10 +137,11 @@ class _Signals:
             await work
 
     def _handle(self, number: int, _frame: FrameType | None) -> None:
-        for each, before in self._previous.items():
-            signal.signal(each, before if each == signal.SIGINT else _ignore)
-        self.received = number
-        self._end()
+        if not self.received:
+            self.received, self._received_at = number, time.monotonic()
+            self._end()
+        elif number == signal.SIGINT and time.monotonic() - self._received_at > self._insist_s:
+            _interrupt()
 
 
 @contextmanager
@@ -155,10 +163,6 @@ def _awake(loop: asyncio.AbstractEventLoop) -> Iterator[None]:
         finally:
             signal.set_wakeup_fd(before)
             loop.remove_reader(reading)
-
-
-def _ignore(_number: int, _frame: FrameType | None) -> None:
-    pass  # the first signal has started the end
 
 
 def _interrupt() -> None:

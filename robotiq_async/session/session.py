@@ -109,7 +109,8 @@ class Session:
         try:
             await wait_shielded(self._task)
         finally:
-            self._end(self._task)
+            if self._task.done():  # not if a second Ctrl-C has broken the event loop
+                self._end(self._task)
 
     def abandon(self) -> None:
         """End a run whose event loop was closed. Its callers' futures belong to that loop: leave them."""

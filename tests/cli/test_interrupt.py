@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import os
 import signal
 from asyncio.subprocess import Process
@@ -10,10 +12,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.cli.run import _Signals
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.values.request import Request
 from tests import conftest
-from tests.grippers import until
+from tests.grippers import active_gripper, until
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Shell
@@ -83,6 +86,30 @@ async def test_a_move_in_its_activation(shell: Shell) -> None:
         await interrupted(shell, process)
         assert not server.gripper.is_moving
         assert not Request.from_registers(server.gripper.request_registers).activate
+
+
+async def test_further_signals_do_not_keep_the_first_from_stopping_the_fingers(shell: Shell) -> None:
+    """A third Ctrl-C within half a second broke the event loop, and the fingers went on."""
+    async with SimulatorServer(active_gripper(speedup=1)) as server:
+        await server.fault_injector.begin(Trouble("delay", 0.3))
+        process = await shell.start("move", "255", "--speed", "0", "--yes", server.address)
+        await until(lambda: server.gripper.is_moving, within=30)
+        for _ in range(4):
+            process.send_signal(signal.SIGINT)
+            await asyncio.sleep(0.1)  # as fast as a person presses keys
+        (await shell.finish(process)).assert_failed(130, "interrupted")
+        assert_fingers_stopped(server)
+
+
+def test_a_late_ctrl_c_ends_a_command_that_does_not_end() -> None:
+    async def deaf() -> None:
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGINT)
+            with contextlib.suppress(asyncio.CancelledError):
+                await asyncio.sleep(60)
+
+    with _Signals(insist_s=0.0) as signals, pytest.raises(KeyboardInterrupt):
+        signals.run(deaf())
 
 
 ASLEEP = """

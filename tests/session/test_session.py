@@ -210,3 +210,12 @@ async def begins_and_ends(here: Run) -> None:
     session = here.session()
     await session.connected()
     await session.stop(halt=False)
+
+
+async def test_an_interrupt_during_a_stop_is_raised(session: Session) -> None:
+    """The third Ctrl-C in asyncio.run ended in InvalidStateError."""
+    stopping = session.stop(halt=True)
+    stopping.send(None)
+    with pytest.raises(KeyboardInterrupt):
+        stopping.throw(KeyboardInterrupt())
+    await session.ended()
