@@ -159,17 +159,19 @@ async def test_a_key_that_answers_no_question_is_refused(tmp_path: Path) -> None
         assert b"declined" in terminal.out
 
 
-KEYS: dict[str, Callable[[Terminal], object]] = {
-    "space": lambda terminal: terminal.press(" "),
-    "Enter": lambda terminal: terminal.press("\n"),
-    "Ctrl-Z": lambda terminal: terminal.press("\x1a"),
-    "Ctrl-backslash": lambda terminal: terminal.press("\x1c"),
-    "Ctrl-S": lambda terminal: terminal.press("\x13"),
-    "Ctrl-D": lambda terminal: terminal.press("\x04"),
-    "Ctrl-C": lambda terminal: terminal.press("\x03"),
-    "SIGTERM": lambda terminal: terminal.kill(signal.SIGTERM),
-    "closed": lambda terminal: terminal.hang_up(),
+KEYS: dict[str, tuple[int, Callable[[Terminal], object]]] = {
+    "space": (1, lambda terminal: terminal.press(" ")),
+    "Enter": (1, lambda terminal: terminal.press("\n")),
+    "Ctrl-Z": (1, lambda terminal: terminal.press("\x1a")),
+    "Ctrl-backslash": (1, lambda terminal: terminal.press("\x1c")),
+    "Ctrl-S": (1, lambda terminal: terminal.press("\x13")),
+    "Ctrl-D": (1, lambda terminal: terminal.press("\x04")),
+    "Ctrl-C": (130, lambda terminal: terminal.press("\x03")),
+    "Ctrl-C, again and again": (130, lambda terminal: terminal.press("\x03" * 5)),
+    "SIGTERM": (143, lambda terminal: terminal.kill(signal.SIGTERM)),
+    "closed": (129, lambda terminal: terminal.hang_up()),
 }
+"""Each with the exit code."""
 
 
 @pytest.mark.parametrize("key", KEYS)
@@ -177,9 +179,10 @@ async def test_every_key_that_interrupts_stops_the_fingers(
     served: SimulatorServer, tmp_path: Path, key: str
 ) -> None:
     terminal = await moves(served, tmp_path)
-    KEYS[key](terminal)
+    code, press = KEYS[key]
+    press(terminal)
     await stood(served)
-    assert await terminal.end() != 0
+    assert await terminal.end() == code
     text = (tmp_path / "report" / "report.json").read_text()
     assert '"why": "interrupted"' in text or '"why": "stopped"' in text
 

@@ -27,6 +27,7 @@ from robotiq_async.tools.verify.files import JSON, NAME, PAGE, Folder, Recording
 from robotiq_async.tools.verify.recorded_link import Frame
 from robotiq_async.tools.verify.report import SCHEMA, lines, page, sentences
 from tests.docs.pages import read, table
+from tests.register_words import status_of
 from tests.verify.people import SHORT, Helper, Roll, served, threads, verified
 
 HARDWARE = read("hardware.md")
@@ -174,11 +175,20 @@ async def test_a_full_disk_ends_the_run_after_the_stage(tmp_path: Path) -> None:
             failure = await folder.end(report)
         assert report.why == "disk"
         assert failure
+        assert folder._why_no_pictures.startswith("the recording has failed")
         assert report.stages == report.entered
         assert len(report.stages) < 10
         assert not server.gripper.is_moving
         assert not server.gripper.status_registers()[0] & 0x0800
     assert list(read_recording(tmp_path / NAME)), "what was written before is lost"
+
+
+async def test_a_report_that_cannot_be_written_leaves_no_part_of_it(tmp_path: Path) -> None:
+    folder = Folder(tmp_path, parse_address("192.0.2.1"))
+    with full_disk(100), pytest.raises(OSError, match="large"):
+        folder.save(report_with())
+    assert {path.name for path in tmp_path.iterdir()} == {NAME}  # noqa: ASYNC240
+    await folder.recording.end()
 
 
 @pytest.mark.virtual_time
@@ -213,7 +223,8 @@ async def test_after_each_stage_the_report_is_on_the_disk(tmp_path: Path) -> Non
 
 def report_with(**options: float) -> Report:
     check = Check("read.registers", Verdict.DIFFERS, "as found", "so it goes", options)
-    return Report("tcp", stages=[0, 1, 2], entered=[0, 1, 2], checks={check.name: check}, why="done")
+    found, stages = status_of(0x31), [0, 1, 2]
+    return Report("tcp", stages=stages, entered=stages[:], checks={check.name: check}, why="done", last=found)
 
 
 EVERY = {
@@ -257,7 +268,7 @@ def test_three_sentences_for_every_ending(why: str) -> None:
     report = report_with()
     report.why, report.words = why, "so it was"
     usable, known, wanted = sentences(report)
-    is_bad = why in ("fault", "envelope", "time", "foreign", "deviation", "inactive")
+    is_bad = why in ("fault", "envelope", "time", "foreign", "deviation", "inactive", "unstopped")
     assert usable.startswith("Do not use" if is_bad else "So far nothing speaks against")
     assert is_bad or usable.endswith("It has not moved yet.")
     assert "not finished: stage 3, 4, 5, 6, 7, 8, 9" in known
@@ -268,6 +279,21 @@ def test_three_sentences_for_every_ending(why: str) -> None:
     usable, _, wanted = sentences(Report("tcp", stages=[0], entered=[0], why="done"))
     assert usable.startswith("Nothing is known about the gripper")
     assert wanted == "There is nothing to send yet."
+
+
+@pytest.mark.parametrize("why", ENDINGS)
+def test_a_stop_that_was_not_confirmed_is_the_first_sentence(why: str) -> None:
+    """After "THE FINGERS MAY STILL MOVE" the report said that nothing speaks against using the gripper."""
+    report = report_with()
+    report.why, report.words, report.last = why, "so it was", None
+    assert sentences(report)[0].startswith("THE FINGERS MAY STILL MOVE: the last rGTO = 0 was not confirmed")
+    assert "THE FINGERS MAY STILL MOVE" in page(report)
+
+
+def test_a_stage_that_was_not_finished_is_named() -> None:
+    usable, _, wanted = sentences(Report("tcp", entered=[4], why="stopped", last=status_of(0x31)))
+    assert usable == "Too little is known about the gripper yet: stage 4 was not finished."
+    assert "if this end surprises you" in wanted
 
 
 def test_only_a_whole_run_says_that_the_gripper_can_be_used() -> None:

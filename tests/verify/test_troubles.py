@@ -57,15 +57,16 @@ class Cue(Roll):
 
     def __init__(self, count: int, act: Callable[[], object]) -> None:
         super().__init__()
-        self._left = count
+        self.kept = 0
+        self._count = count
         self._act = act
         self._at = 0
 
     def keep(self, frame: object) -> None:
         super().keep(frame)  # type: ignore[arg-type]
         if self.stages:
-            self._left -= 1
-            if self._left == 0:
+            self.kept += 1
+            if self.kept == self._count:
                 self._at = len(self.frames)
                 self._act()
 
@@ -127,6 +128,25 @@ async def test_a_key_stops_a_gripper_that_forgets_writes_and_shows_them_late(sta
         assert not any(rGTO.read(image) for image in cue.written_after())
         assert report.last is not None
         assert not report.last.go_echo
+
+
+async def test_a_stage_whose_stop_is_not_confirmed_ends_the_run() -> None:
+    """It counted as done, and the command ended with 0."""
+    async with served(active=True) as server:
+        whole = Cue(10_000, lambda: None)
+        await verified(server, roll=whole, first=5, last=5)
+    async with served(active=True) as server:
+        helper, injector = Helper(server), server.fault_injector
+        begun: list[asyncio.Future[object]] = []
+        # The last two frames are rGTO = 0 and the status that shows it.
+        cue = Cue(
+            whole.kept - 2, lambda: begun.append(asyncio.ensure_future(injector.begin(Trouble("silence"))))
+        )
+        report = await verified(server, helper, cue, first=5)
+        await asyncio.gather(*begun)
+    assert (report.why, report.entered, report.stages) == ("unstopped", [5], [])
+    assert report.last is None
+    assert helper.alarms == [UNREACHED.format("rGTO = 0 could not be sent")]
 
 
 async def test_an_alarm_is_withdrawn_when_the_gripper_answers_again() -> None:

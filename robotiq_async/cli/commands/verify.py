@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Mapping
-from contextlib import AsyncExitStack, asynccontextmanager
+from collections.abc import Mapping
+from contextlib import AsyncExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from ...link.address import Address as GripperAddress
 from ...link.address import is_remote, parse_address
 from ...runtime.concurrency import wait_shielded
 from ...values.model import model_of
@@ -93,7 +92,12 @@ async def verify(
     print(gripper_words(address), flush=True)
     async with AsyncExitStack() as stack:
         if parsed.kind == "sim":
-            parsed = parse_address(await stack.enter_async_context(_simulated(parsed)))
+            from ...link.sim_transport import new_gripper
+            from ...simulator import SimulatorServer
+
+            gripper = new_gripper(parsed.simulation, model_of(parsed.model))
+            server = await stack.enter_async_context(SimulatorServer(gripper))
+            parsed = parse_address(server.address)
         with usage():
             plan = Plan(parsed, first=from_, last=last, agreed=agreed, label=label)
         try:
@@ -105,55 +109,45 @@ async def verify(
         await _run(plan, person, folder)
 
 
-@asynccontextmanager
-async def _simulated(address: GripperAddress) -> AsyncIterator[str]:
-    from ...link.sim_transport import new_gripper
-    from ...simulator import SimulatorServer
-
-    async with SimulatorServer(new_gripper(address.simulation, model_of(address.model))) as server:
-        yield server.address
-
-
 async def _run(plan: Plan, person: Person, folder: Folder) -> None:
     from ...tools.verify import Runner
 
     runner = Runner(plan, person, folder.recording, folder.save)
+    report = runner.report
     try:
         await runner.run()
     finally:
-        ending = asyncio.ensure_future(_end(runner.report, folder))
-        await wait_shielded(ending)
-        ending.result()
-    if runner.report.why != "done":
-        raise CommandError(f"{runner.report.why}: {runner.report.words}; see {folder.path}")
+        ending = asyncio.ensure_future(folder.end(report))
+        try:
+            await wait_shielded(ending)
+        finally:
+            failure = ending.result()
+            where = f"the report in {folder.path} is not complete: {failure}" if failure else str(folder.path)
+            with suppress(OSError):  # the terminal is gone
+                _print_summary(report, where)
+    if failure or report.why != "done":
+        raise CommandError(f"{report.why}: {report.words.rstrip('.')}; {'' if failure else 'see '}{where}")
 
 
-async def _end(report: Report, folder: Folder) -> None:
-    """Write the report and print a summary, also if the report cannot be written."""
+def _print_summary(report: Report, where: str) -> None:
     from ...tools.verify.report import lines, sentences
 
-    failure = await folder.end(report)
     print(wrapped("\n" + "\n".join(sentences(report))), flush=True)
     for check in report.differing:
         print(wrapped(f"  {check.name} differs: {check.found}. {check.follows}"), flush=True)
     print("\n" + "\n\n".join(lines(report).values()), flush=True)
-    if failure:
-        raise CommandError(f"the report in {folder.path} is not complete: {failure}")
-    print(f"\n{folder.path}", flush=True)
+    print(f"\n{where}", flush=True)
 
 
 class Unattended:
     """In place of a person, for stages that were agreed to beforehand and move nothing."""
 
-    @property
-    def has_stopped(self) -> bool:
-        return False
+    has_stopped = False
 
     def tell(self, words: str) -> None:
         print(words, flush=True)
 
-    def alarm(self, words: str) -> None:
-        print(words, flush=True)
+    alarm = tell
 
     async def consents(self, words: str) -> bool:
         print(words, flush=True)

@@ -130,6 +130,7 @@ ENDINGS: Final = {
     "foreign": "the gripper echoes a request that this program did not write",
     "inactive": "the stage needs an active gripper",
     "deviation": "a safety check differs",
+    "unstopped": "rGTO = 0 was not confirmed: the fingers may still move",
     "disk": "the report cannot be written",
 }
 """By the word in the report."""

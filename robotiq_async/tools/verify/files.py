@@ -170,11 +170,15 @@ class Folder:
     def _write(self, name: str, text: str) -> None:
         """Write a file, whole or not at all."""
         partial = self.path / f".{name}.part"
-        with open(partial, "w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(self.path / name)
+        try:
+            with open(partial, "w", encoding="utf-8") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+            partial.replace(self.path / name)
+        except OSError:
+            partial.unlink(missing_ok=True)
+            raise
 
     async def end(self, report: Report) -> str:
         """Write all that is left; why that failed, or nothing."""
@@ -188,6 +192,9 @@ class Folder:
         return self.recording.failure
 
     def _draw(self, report: Report) -> None:
+        if self.recording.failure:
+            self._why_no_pictures = f"the recording has failed: {self.recording.failure}"
+            return
         try:
             from .pictures import draw  # noqa: PLC0415  # matplotlib takes a second
         except ImportError as error:

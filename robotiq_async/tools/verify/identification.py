@@ -27,7 +27,8 @@ async def find(bench: Bench) -> None:
         answering = await find_gripper(bench.address, registers_of(bench.address), findings.append)
     except GiveUpError:
         last = findings[-1]
-        raise EndError("refused", f"{last.what}: {last.found}. {last.advice}") from None
+        end = "" if last.found.endswith("?") else "."
+        raise EndError("refused", f"{last.what}: {last.found}{end} {last.advice}") from None
     await answering.link.close()
     bench.registers = answering.registers
     bench.link = bench.another_link(answering.registers)

@@ -178,6 +178,8 @@ def _fingers(model: Model) -> list[Finger]:
 def _strokes(axes: tuple[Axes, ...], segment: Segment) -> bool:
     (axis,) = axes
     found = list(_closings(segment))
+    if not found:
+        return False
     for began, until, request in found:
         inside = [
             (seconds - began, status) for seconds, status in segment.statuses if began <= seconds < until
@@ -186,7 +188,7 @@ def _strokes(axes: tuple[Axes, ...], segment: Segment) -> bool:
         axis.plot([seconds for seconds, _ in inside], means, label=f"speed {request.axes[0].speed}")
     axis.set_ylabel("mean position of the fingers")
     axis.legend()
-    return bool(found)
+    return True
 
 
 def _closings(segment: Segment) -> Iterator[tuple[float, float, Request]]:

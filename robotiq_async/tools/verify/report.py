@@ -91,9 +91,10 @@ class Report:
         }
 
 
-UNUSABLE: Final = ("fault", "envelope", "time", "foreign", "deviation", "inactive")
+UNUSABLE: Final = ("fault", "envelope", "time", "foreign", "deviation", "inactive", "unstopped")
 """Endings that must be understood before the gripper is relied on."""
 NOT_JUDGED: Final = ("refused", "link")
+DO_NOT_USE: Final = "Do not use this gripper with robotiq_async until the cause is known"
 WITHOUT_ROS: Final = ("activation_timeout", "request_address", "status_address")
 """Options that are no parameters of the ROS node."""
 
@@ -105,12 +106,16 @@ def sentences(report: Report) -> tuple[str, str, str]:
 
 def _usable(report: Report) -> str:
     words = report.words.rstrip(".")
+    if report.last is None and any(number >= HARMLESS for number in report.entered):
+        return f"THE FINGERS MAY STILL MOVE: the last rGTO = 0 was not confirmed ({words}). {DO_NOT_USE}."
     if report.why in UNUSABLE:
-        return f"Do not use this gripper with robotiq_async until the cause is known: {words}."
+        return f"{DO_NOT_USE}: {words}."
     if report.why in NOT_JUDGED and 2 not in report.stages:
         return f"Whether this gripper can be used could not be judged: {words}."
+    if not any(report.entered):
+        return "Nothing is known about the gripper yet: no stage after 0 has begun."
     if not any(report.stages):
-        return "Nothing is known about the gripper yet: only this computer was checked."
+        return f"Too little is known about the gripper yet: stage {report.entered[-1]} was not finished."
     how = "as it is: no check differs"
     if report.options:
         how = "with " + ", ".join(f"{name}={value:g}" for name, value in report.options.items())
@@ -141,8 +146,10 @@ def _to_report(report: Report) -> str:
         differ = "differs" if len(names) == 1 else "differ"
         found = f"{', '.join(names)} {differ} from what the library assumes"
         return f"Please send the folder with an issue: {found}."
-    if not any(report.stages):
+    if not any(report.entered):
         return "There is nothing to send yet."
+    if not any(report.stages):
+        return "Please send the folder with an issue if this end surprises you."
     return "Please send the folder with an issue: a gripper without differences is worth knowing, too."
 
 

@@ -124,6 +124,8 @@ class Runner:
         finally:
             if stage.number >= HARMLESS:
                 await self._stop(image)
+        if stage.number >= HARMLESS and self.report.last is None:
+            raise EndError("unstopped", f"rGTO = 0 was not confirmed at the end of stage {stage.number}")
         self.report.stages.append(stage.number)
         self._bench.is_active = stage.number > HARMLESS
         try:
@@ -186,5 +188,7 @@ class Runner:
         if written.activate and shown is not None and not shown.is_activated:
             written = replace(written, activate=False)
         stopping = asyncio.ensure_future(stop_fingers(link, written, self._person.alarm))
-        await wait_shielded(stopping)
-        self.report.last = stopping.result()
+        try:
+            await wait_shielded(stopping)
+        finally:
+            self.report.last = stopping.result()
