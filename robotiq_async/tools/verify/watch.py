@@ -6,7 +6,7 @@ Every look can end the stage. What ends it raises; the runner then stops the fin
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final, Protocol
 
 from ...values.enums import Fault, Finger
@@ -48,6 +48,28 @@ STILL_S: Final = 0.15
 """An axis rests once it has not moved for this long: the slowest takes 43 ms for a count (thesis, A1.1)."""
 LIMITS: Final = 20, 225
 """A request beyond may be echoed as a software limit (drivers keep the scissor within 15..232)."""
+
+
+class Rest:
+    """Follows some axes, all unless they are named.
+
+    Attributes:
+        positions: where they were last.
+        moved_at: when a position changed last, in the loop's time.
+    """
+
+    def __init__(self, axes: Sequence[Finger] = ()) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._axes = axes
+        self.positions: list[int] = []
+        self.moved_at = self._loop.time()
+
+    def lasts(self, status: RobotiqStatus, seconds: float) -> bool:
+        """Take in a status; returns whether no axis has moved for some seconds."""
+        positions = [status.position(axis) for axis in self._axes or status.model.axes]
+        if positions != self.positions:
+            self.positions, self.moved_at = positions, self._loop.time()
+        return self._loop.time() - self.moved_at >= seconds
 
 
 class Watch:
@@ -109,17 +131,8 @@ class Watch:
 
     async def until_still(self, seconds: float) -> RobotiqStatus | None:
         """Read until no axis has moved for a while; None if one still moves after some seconds."""
-        positions: list[int] = []
-        since = self._loop.time()
-
-        def is_at_rest(status: RobotiqStatus) -> bool:
-            nonlocal positions, since
-            now = [status.position(axis) for axis in status.model.axes]
-            if now != positions:
-                positions, since = now, self._loop.time()
-            return self._loop.time() - since >= STILL_S
-
-        return await self.until(is_at_rest, seconds)
+        rest = Rest()
+        return await self.until(lambda status: rest.lasts(status, STILL_S), seconds)
 
     async def pause(self, seconds: float) -> None:
         """Send nothing for some seconds; the person can still stop the stage."""

@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 
 from ....values.model import THREE_FINGER, Model
 from ..bench import Bench
+from ..catalogue import HARMLESS
 from . import first_motions, full_strokes, loss, reading, soak, soft_part, stopping, writing
 
 
@@ -21,9 +22,17 @@ class Stage(NamedTuple):
     how_fast: str  # how fast
     clear: str  # what must be clear
     lasts: str  # how long it takes
-    is_moving: bool = True  # whether fingers move
-    needs_active: bool = True  # whether the gripper must be active before
     jaw_moves: str = ""  # what moves of a gripper with a jaw, if that is something else
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether fingers move."""
+        return self.number > HARMLESS
+
+    @property
+    def needs_active(self) -> bool:
+        """Whether the gripper must be active before."""
+        return self.number > ACTIVATION
 
     def as_text(self, model: Model = THREE_FINGER) -> str:
         """What a person reads before it."""
@@ -38,19 +47,18 @@ class Stage(NamedTuple):
         return "\n".join([*lines, f"  takes:    {self.lasts}"])
 
 
+ACTIVATION: Final = 3  # the stage that activates
 _NOTHING: Final = ("nothing", "", "", "")
 _WAY: Final = "the fingers' whole way, and the way of what they could push; no hand, no cable"
 _SLOWEST: Final = "the slowest speed (20 to 30 mm/s by the manuals), the weakest force"
 
 STAGES: Final = (
-    Stage(0, "this computer", reading.host, *_NOTHING, "1 s", is_moving=False, needs_active=False),
-    Stage(1, "reading only", reading.reading, *_NOTHING, "3 minutes", is_moving=False, needs_active=False),
+    Stage(0, "this computer", reading.host, *_NOTHING, "1 s"),
+    Stage(1, "reading only", reading.reading, *_NOTHING, "3 minutes"),
     Stage(
         *(2, "writing with rGTO = 0", writing.writing),
         "nothing should; stay clear: this is what the stage checks",
         *("", "", "", "20 s"),
-        is_moving=False,
-        needs_active=False,
     ),
     Stage(
         *(3, "activation", first_motions.activation),
@@ -59,7 +67,6 @@ STAGES: Final = (
         "the gripper's own pace; no option sets it",
         _WAY,
         "5 to 30 s",
-        needs_active=False,
         jaw_moves="THE JAW; what is held falls",
     ),
     Stage(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from dataclasses import replace
 from typing import Final
 
@@ -13,7 +12,7 @@ from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError, Figure
 from ..motions import in_place, resting_envelope
-from ..watch import Watch
+from ..watch import Rest, Watch
 
 SECONDS: Final = 180.0
 SPEEDS: Final = (0, 64, 255)
@@ -54,23 +53,20 @@ async def _fingers_to(
 
 
 async def _stroke(watch: Watch, image: Request, axes: tuple[Finger, ...]) -> tuple[RobotiqStatus, float]:
-    loop = asyncio.get_running_loop()
-    began = moved = await watch.write(image)
-    at: list[int] = []
+    began = await watch.write(image)
+    rest = Rest(axes)
 
-    def is_at_rest(status: RobotiqStatus) -> bool:
-        nonlocal at, moved
-        positions = [status.position(axis) for axis in axes]
-        if positions != at:
-            at, moved = positions, loop.time()
-        rests = all(status.finger_status(axis) is not ObjectStatus.IN_MOTION for axis in axes)
-        return status.echo == image.echo and rests and loop.time() - moved >= 0.5
+    def is_over(status: RobotiqStatus) -> bool:
+        # Where limits are echoed, the scissor's echo does not show the end: two seconds of rest do.
+        if rest.lasts(status, 2.0):
+            return True
+        stands = all(status.finger_status(axis) is not ObjectStatus.IN_MOTION for axis in axes)
+        return status.echo == image.echo and stands and rest.lasts(status, 0.5)
 
-    # Where limits are echoed, the scissor's echo does not show the end: two seconds of rest do.
-    status = await watch.until(lambda now: is_at_rest(now) or loop.time() - moved >= 2.0, STROKE_S)
+    status = await watch.until(is_over, STROKE_S)
     if status is None:
         raise EndError("time", f"a stroke did not finish within {STROKE_S:g} s")
-    return status, moved - began
+    return status, rest.moved_at - began
 
 
 async def _scissor(bench: Bench, watch: Watch, home: int) -> None:

@@ -73,11 +73,10 @@ async def _client(bench: Bench) -> None:
     await bench.link.open()
     status = await watch.look()
     where = status.position(Finger.A)
-    if are_near(status, far, MARGIN):
-        bench.as_assumed("loss.client", f"{bench.first} continued to {where}")
-    else:
-        follows = "It stops when it loses its client, which is safer than assumed."
-        bench.differs("loss.client", f"{bench.first} stopped at {where}, asked {far[Finger.A]}", follows)
+    went_on = are_near(status, far, MARGIN)
+    found = f"continued to {where}" if went_on else f"stopped at {where}, asked {far[Finger.A]}"
+    follows = "It stops when it loses its client, which is safer than assumed."
+    bench.judge("loss.client", went_on, f"{bench.first} {found}", follows)
     await _first_motion(bench, watch, image, home)
 
 
@@ -163,13 +162,11 @@ def _faults(statuses: list[RobotiqStatus]) -> list[Figure]:
 
 async def _cable(bench: Bench) -> None:
     statuses, answered = await _back(bench)
-    faults = _faults(statuses)
-    if statuses[-1].is_activated:
-        words = f"answered after {answered:.1f} s, still active"
-        bench.as_assumed("loss.cable", words, seconds=answered, faults=faults)
-    else:
-        follows = "After a break of the link the next start activates the gripper: it MOVES and lets go."
-        bench.differs("loss.cable", "the activation was lost", follows, seconds=answered, faults=faults)
+    stays = statuses[-1].is_activated
+    found = f"answered after {answered:.1f} s, still active" if stays else "the activation was lost"
+    follows = "After a break of the link the next start activates the gripper: it MOVES and lets go."
+    bench.judge("loss.cable", stays, found, follows, seconds=answered, faults=_faults(statuses))
+    if not stays:
         raise EndError("inactive", "the activation was lost while the cable was out")
 
 

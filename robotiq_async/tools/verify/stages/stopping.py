@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
@@ -13,7 +12,7 @@ from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError
 from ..motions import MARGIN, are_near, go, in_place, motion_envelope
-from ..watch import Watch
+from ..watch import Rest, Watch
 
 SECONDS: Final = 90.0
 SPEED: Final = 64
@@ -63,31 +62,22 @@ async def _halt(bench: Bench, watch: Watch, away: Request, home: dict[Finger, in
 
 async def _stop(bench: Bench, watch: Watch, image: Request, status: RobotiqStatus) -> tuple[int, float]:
     """Write an image that stops; counts that a finger still goes, and seconds until the last moves."""
-    loop = asyncio.get_running_loop()
-    before = {finger: status.position(finger) for finger in bench.fingers}
-    began = moved = loop.time()
+    rest = Rest(bench.fingers)
+    began = rest.moved_at
+    rest.positions = before = [status.position(finger) for finger in bench.fingers]
     await watch.write(image)
-    at = before
-
-    def is_at_rest(now: RobotiqStatus) -> bool:
-        nonlocal at, moved
-        positions = {finger: now.position(finger) for finger in bench.fingers}
-        if positions != at:
-            at, moved = positions, loop.time()
-        return loop.time() - moved >= 0.3
-
-    await watch.until(is_at_rest, 4.0)
-    return max(abs(at[finger] - before[finger]) for finger in bench.fingers), moved - began
+    await watch.until(lambda now: rest.lasts(now, 0.3), 4.0)
+    counts = max(abs(at - was) for at, was in zip(rest.positions, before, strict=True))
+    return counts, rest.moved_at - began
 
 
 async def _resume(bench: Bench, watch: Watch, away: Request, far: dict[Finger, int]) -> None:
     await watch.write(away)
-    if await watch.until(lambda status: are_near(status, far, MARGIN), LEG_S) is None:
-        where = [watch.last.position(finger) for finger in bench.fingers] if watch.last else []
-        follows = "No option is needed: a hand writes new requests after a stop. Please report this."
-        bench.differs("stop.resume", f"stays at {where} with rGTO set again", follows)
-    else:
-        bench.as_assumed("stop.resume", "continues to its target")
+    resumes = await watch.until(lambda status: are_near(status, far, MARGIN), LEG_S) is not None
+    where = [watch.last.position(finger) for finger in bench.fingers] if watch.last else []
+    found = "continues to its target" if resumes else f"stays at {where} with rGTO set again"
+    follows = "No option is needed: a hand writes new requests after a stop. Please report this."
+    bench.judge("stop.resume", resumes, found, follows)
     await watch.until_still(2.0)
 
 
@@ -117,9 +107,5 @@ async def _hold(bench: Bench, watch: Watch, image: Request, home: dict[Finger, i
     here = {finger: status.position(finger) for finger in bench.fingers}
     counts, seconds = await _stop(bench, watch, replace(image, go=True).with_positions(here), status)
     words = f"within {counts} counts, {1000 * seconds:.0f} ms"
-    if counts <= COUNTS:
-        bench.as_assumed("stop.hold", words, counts=counts, seconds=seconds)
-    else:
-        bench.differs(
-            "stop.hold", words, "hold() stops too late: use halt(). Please report this.", counts=counts
-        )
+    follows = "hold() stops too late: use halt(). Please report this."
+    bench.judge("stop.hold", counts <= COUNTS, words, follows, counts=counts, seconds=seconds)
