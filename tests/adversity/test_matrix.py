@@ -25,11 +25,6 @@ FORGETTING = {
     # The other client's write comes too soon after ours, and is the one that is forgotten.
     ("tcp", "moving", "foreign 128"): "done → RUNNING_IDLE",
     ("rtu", "moving", "foreign 128"): "done → RUNNING_IDLE",
-    # The one stop that gets through comes too soon after the motion, and its reply takes too long.
-    ("tcp", "stopping", "multiplexer for 60"): "done, fingers went on → SHUTDOWN",
-    ("tcp", "stopping", "multiplexer 0.5 for 60"): "done, fingers went on → SHUTDOWN",
-    # The same, and nothing can be read after it: a stop is not repeated blindly, it might activate.
-    ("tcp", "stopping", "function-3-only for 60"): "done, fingers went on → SHUTDOWN",
 }
 """What comes of a cell on a gripper that forgets writes (``make habits``), where that is something else."""
 
@@ -41,6 +36,8 @@ def kind_of(cell: Cell) -> str:
 def expected(cell: Cell, model: Model) -> str:
     if len(model.axes) == 1 and cell.phase.name == "keeping a grip":
         lets_go = kind_of(cell) in LETS_GO or (cell.link, cell.trouble) in CONNECTION_LOST
+        # A lag that grows shows the closing once more: an axis that moves is held where it is.
+        lets_go = lets_go or kind_of(cell) == "status-lag" in {habit.kind for habit in HABITS}
         return f"done, {'let go' if lets_go else 'kept'} → SHUTDOWN"
     forgets = any(habit.kind == "write-spacing" for habit in HABITS)
     other = FORGETTING.get((cell.link, cell.phase.name, cell.trouble)) if forgets else None
