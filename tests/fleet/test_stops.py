@@ -6,18 +6,22 @@ import asyncio
 import logging
 from collections.abc import Iterator
 from contextlib import suppress
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
 from robotiq_async import ConnectionLostError, Finger, NotStartedError, RobotiqError, State
+from robotiq_async.fleet.agent.requests import Request as Served
+from robotiq_async.fleet.agent.requests import Requests
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import Call, unpack_answer
+from robotiq_async.runtime.log import Log
 from robotiq_async.values.errors import ControlLostError
 from robotiq_async.values.request import Request
 from tests.contract.bench import COMMANDS, called
 from tests.fleet.lab import LEFT, Lab, lab
-from tests.virtual import inside, until
+from tests.virtual import inside, until, virtual
 
 A = Finger.A
 STOPS: dict[str, dict[str, bool]] = {"leave": {"halt": False}, "keep": {"keep_grip": True}, "halt": {}}
@@ -338,3 +342,13 @@ async def test_a_lease_that_comes_with_the_end_is_not_kept(here: Lab) -> None:
     with pytest.raises(RobotiqError):
         await acquiring
     assert not hand.is_in_control
+
+
+@virtual
+async def test_what_does_not_end_with_the_agent_is_cancelled_and_answered_before_the_end() -> None:
+    asked = Asked("cmd/move", Call(LEFT.base, "client", number=1))
+    publisher = SimpleNamespace(status_message=lambda: b"")
+    requests = Requests(cast("Any", publisher), 1, Log("left"), lambda _: None)
+    requests.start(Served("move", Call(LEFT.base, "client", number=1), asked), asyncio.sleep(60))
+    await requests.end()
+    assert asked.answers, "nobody waits for it any more"
