@@ -249,3 +249,13 @@ def test_unproven_limits_are_dropped_when_another_client_is_seen() -> None:
     assert limits.alias(image) == (True, True, 0, 0, 0, 220)
     limits.forget(image, image.echo)
     assert limits.alias(image) is None
+
+
+@pytest.mark.parametrize(("asked", "limit"), [(255, 220), (0, 20)])
+def test_a_request_at_a_limit_does_not_refute_it_and_one_beyond_does(asked: int, limit: int) -> None:
+    limits, beyond, at = Limits(), BEFORE.with_positions({S: asked}), BEFORE.with_positions({S: limit})
+    assert limits.suspect(BEFORE, beyond, status_of(0x39, 0xFF, echo=(0, 0, 0, limit), position=130))
+    limits.forget(at, at.echo)
+    assert limits.alias(beyond) == at.echo
+    limits.forget(beyond, beyond.echo)
+    assert limits.alias(beyond) is None

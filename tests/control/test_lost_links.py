@@ -167,6 +167,19 @@ def test_a_hold_outlives_what_has_replaced_it_and_was_lost(scan: Scan, how: str)
     assert abs(scan.positions()[A] - at) <= 4
 
 
+def test_a_lost_hold_is_dropped_when_the_gripper_comes_back_reset(scan: Scan) -> None:
+    move, _ = scan.move(200, A, speed=0)
+    scan.run(0.5)
+    scan.controller.abandon(move)
+    scan.controller.lost(None)
+    assert scan.controller.has_undelivered_stop
+    scan.gripper.write(0, [0x0000])
+    scan.now += 0.5
+    scan.controller.see(scan.status())
+    assert scan.state is State.RESET
+    assert not scan.controller.has_undelivered_stop
+
+
 def test_a_hold_is_dropped_when_another_client_commands_after_the_link_loss(scan: Scan) -> None:
     move, _ = scan.move(200, A, speed=0)
     scan.run(0.5)
