@@ -280,6 +280,9 @@ class Controller:
         if before is State.DISCONNECTED and condition is Trigger.SEEN_RESET and self.activates:
             self._begin_activation(Trigger.ACTIVATES)
             return
+        if self._requests.halting and condition in (Trigger.SEEN_RESET, Trigger.SEEN_BUSY):
+            self._take_back_activation()
+            return
         self.machine.fire(condition)
         after = self.machine.state
         if after is not before and before in _COMMANDED and after not in RUNNING:
@@ -459,6 +462,14 @@ class Controller:
             self._take_over(status)
         if self._activating:
             self._see_activation(status)
+
+    def _take_back_activation(self) -> None:
+        """Another client has reset the gripper just before a halt, whose rACT activates it then."""
+        error = NotActivatedError("the gripper was reset when halt() came: an activation by it is taken back")
+        self.machine.log.warning("%s", error)
+        self.machine.fire(Trigger.ASK_RESET)
+        self._requests.fail(error)
+        self._begin(reset(self._at_rest))
 
     def _see_activation(self, status: RobotiqStatus) -> None:
         condition = classify(status)

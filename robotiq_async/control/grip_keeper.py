@@ -83,7 +83,7 @@ class GripKeeper:
         last = image_to_stop(status)
         if last is not None:
             self._log.warning("rGTO is cleared, and no grip is kept: %s", doubt)
-            yield from stop_fingers(last)
+            yield from stop_fingers(last, status)
 
     def _trouble(self, status: RobotiqStatus) -> str:
         """Why the condition of the gripper forbids it; empty for no reason."""

@@ -35,21 +35,22 @@ def activation(at_rest: Image) -> Sequence:
 
     Raises:
         GripperFaultError: the activation ended in a major fault.
-        NotActivatedError: the gripper was reset after the activation had begun.
+        NotActivatedError: the gripper was reset after the activation had begun, or does not show it.
     """
     status = yield None
     if classify(status) is not Trigger.SEEN_RESET:
         return
     status = yield replace(at_rest(status), activate=True, release=False)
-    begun = False
+    asked, begun = status.timestamp, False
     while classify(status) is not Trigger.SEEN_READY:
         if status.fault.severity is Severity.MAJOR:
             raise GripperFaultError(status.fault)
-        # The first statuses may be from before the write: a reset counts only after the activation showed.
-        if begun and classify(status) is Trigger.SEEN_RESET:
-            raise NotActivatedError(
-                "the gripper was reset while it activated (power cycle, or another client)"
-            )
+        # The first statuses may be from before the write: until the activation shows, a reset counts only if
+        # it lasts. The gripper may have forgotten the write, or another client may have taken it back.
+        is_sure = begun or status.timestamp - asked > WINDOW_S
+        if is_sure and classify(status) is Trigger.SEEN_RESET:
+            why = "was reset while it activated" if begun else "does not show the activation"
+            raise NotActivatedError(f"the gripper {why} (power cycle, or another client)")
         begun = begun or status.activation_echo
         status = yield None
 
@@ -57,7 +58,10 @@ def activation(at_rest: Image) -> Sequence:
 def reset(at_rest: Image) -> Sequence:
     """Clear rACT and wait for gACT = 0 and gIMC = 0. This clears faults and releases the part."""
     status = yield None
-    image = replace(at_rest(status), activate=False, release=False)
+    yield from _until_reset(replace(at_rest(status), activate=False, release=False))
+
+
+def _until_reset(image: Request) -> Sequence:
     status = yield image
     while classify(status) is not Trigger.SEEN_RESET:
         status = yield image if status.activation_echo else None
@@ -99,11 +103,15 @@ def shutdown(last_image: Callable[[RobotiqStatus], Request | None]) -> Sequence:
     status = yield None
     last = last_image(status)
     if last is not None:
-        yield from stop_fingers(last)
+        yield from stop_fingers(last, status)
 
 
-def stop_fingers(last: Request) -> Sequence:
-    """Write the last image, repeatedly if need be, until the gripper echoes it."""
+def stop_fingers(last: Request, status: RobotiqStatus) -> Sequence:
+    """Write the last image, repeatedly if need be, until the gripper echoes it.
+
+    ``status`` is the one that it was made from.
+    """
+    was_active = classify(status) is Trigger.SEEN_READY
     status = yield last
     while status.echo != last.echo:
         # A gripper that was reset meanwhile is at rest, and this image would activate it.
@@ -111,3 +119,6 @@ def stop_fingers(last: Request) -> Sequence:
         if is_being_reset and classify(status) is Trigger.SEEN_RESET:
             return
         status = yield None if is_being_reset else last
+    if was_active and last.activate and classify(status) is Trigger.SEEN_BUSY:
+        # Another client has reset the gripper just before, and this image has activated it.
+        yield from _until_reset(replace(last, activate=False))

@@ -38,6 +38,18 @@ def test_an_activation_is_called_off_when_others_have_activated_meanwhile() -> N
     assert scan.latest.contacts == Finger.ABC
 
 
+def test_an_activation_that_never_shows_fails_and_can_be_tried_again() -> None:
+    """The gripper forgets the write, or another client takes it back: the hand waited in WF_ACTIVATION."""
+    scan = Scan()
+    scan.connect(activate=False)
+    scan.forgets = 1
+    scan.controller.activate()
+    scan.until(lambda: scan.state is State.RESET, 1.5)
+    assert len(scan.written) == 1, "it is not sent again by itself"
+    scan.controller.activate()
+    scan.until(lambda: scan.state is State.RUNNING_IDLE)
+
+
 def test_a_halt_right_after_an_activation_that_was_called_off_lets_nothing_go() -> None:
     """It was made from an image in which rACT had never been set, and so reset the gripper."""
     scan = Scan()

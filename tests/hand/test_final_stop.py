@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from collections.abc import Sequence
 
 import anyio
 import pytest
 
-from robotiq_async import Finger, NotStartedError, RobotiqHand, State
+from robotiq_async import Fault, Finger, NotActivatedError, NotStartedError, RobotiqHand, State
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
 from robotiq_async.values.registers import Registers
-from robotiq_async.values.request import Request
+from robotiq_async.values.request import AxisRequest, Request
 from tests.contract.bench import COMMANDS, called
 from tests.fake_transport import Wire
 from tests.grippers import activate_beforehand
@@ -372,3 +373,67 @@ async def test_a_transport_object_gets_no_image_decided_before_the_stop(
     await until(lambda: bool(stopping))
     await stopping[0]
     assert not late
+
+
+@pytest.mark.parametrize("poll_s", [0.005, 0.1])
+@pytest.mark.parametrize("call", ["halt", "stop"])
+async def test_a_stop_just_after_another_client_has_reset_the_gripper_activates_nothing(
+    server: SimulatorServer, gripper: SimulatedGripper, call: str, poll_s: float
+) -> None:
+    """Its rACT was a rising edge: all fingers opened and closed to their stops, after the call."""
+    hand = RobotiqHand(server.address, poll_interval=poll_s)
+    await hand.start()
+    await hand.move(120)
+    await anext(hand.statuses())
+    gripper.write(0, [0] * 8)
+    await asyncio.sleep(poll_s / 2)
+    before = gripper.travel(A)
+    with contextlib.suppress(NotActivatedError):
+        await getattr(hand, call)()
+    await asyncio.sleep(2)
+    assert gripper.travel(A) - before < 100 * (poll_s + 0.05), "count a second at the pace of an activation"
+    assert not gripper.is_moving
+    assert not gripper.request_registers[0] & 0x0100
+    await hand.stop()
+
+
+@pytest.mark.parametrize("how", ["cancelled", "given up", "ended with the loop"])
+async def test_a_hand_that_has_only_looked_writes_nothing_at_its_end(
+    server: SimulatorServer, gripper: SimulatedGripper, how: str
+) -> None:
+    """It cleared rGTO, and stopped what another client moves."""
+    await activate_beforehand(gripper)
+    gripper.write(0, Request(activate=True, go=True, axes=(AxisRequest(255, 0, 0),) * 4).registers)
+    writes = len(gripper.writes)
+    hand = RobotiqHand(server.address, reconnect=False)
+    starting = asyncio.create_task(hand.start(activate=False))
+    if how == "cancelled":
+        gripper.inject_fault(
+            Fault.COMMUNICATION_NOT_READY
+        )  # it reads on, until it is known whether that lasts
+        await until(lambda: hand.statistics.polls > 0)
+        starting.cancel()
+        await asyncio.wait({starting})
+    else:
+        await starting
+        if how == "given up":
+            server.cut()
+        else:
+            (poller,) = (each for each in asyncio.all_tasks() if "poller" in each.get_name())
+            poller.cancel()
+        await hand.wait_for_state(State.SHUTDOWN, timeout=3)
+    assert len(gripper.writes) == writes
+    assert gripper.request_registers[0] & 0x0800
+
+
+async def test_a_hand_that_keeps_grips_keeps_one_when_its_task_is_cancelled(
+    server: SimulatorServer, gripper: SimulatedGripper
+) -> None:
+    """As a program does that cancels all tasks: their order decided whether the part fell."""
+    gripper.place_object(Finger.ABC, 120)
+    async with RobotiqHand(server.address, keep_grip=True) as hand:
+        await hand.grasp()
+        (poller,) = (each for each in asyncio.all_tasks() if "poller" in each.get_name())
+        poller.cancel()
+        await asyncio.wait({poller})
+    assert gripper.grips == Finger.ABC
