@@ -175,7 +175,7 @@ class RobotiqHand(Hand):
             await session.ended()  # stop() was called meanwhile, and with its own arguments
             raise
         except BaseException:
-            await self.stop()
+            await self.stop(halt=session.counters.has_begun_to_write)  # else another client moves the fingers
             raise
 
     async def _stop(self, halt: bool, keep_grip: bool) -> None:

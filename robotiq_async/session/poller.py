@@ -93,8 +93,8 @@ class Poller:
         self.why_lost: RobotiqConnectionError | None = None
         self._stopping = False
         self._end_by = math.inf
-        self._ending = Ending.HALT
-        """The strongest requested so far; a task that ends by itself stops the fingers."""
+        self._ending = Ending.LEAVE
+        """The strongest requested so far."""
         self._opener = Opener(self._connect, options)
         self._polling: anyio.CancelScope | None = None
         self._tick = Tick(options.poll_interval)
@@ -329,14 +329,15 @@ class Poller:
     async def _finish(self) -> None:
         """Stop the fingers if there is time, then disconnect."""
         if not self._stopping:
-            self._refuse_requests()
+            # The link was given up, or the task was cancelled. A hand that has only looked leaves the fingers
+            # to the client that moves them.
+            has_written = self._counters.has_begun_to_write
+            self.request_stop(halt=has_written, keep_grip=self._options.keep_grip)
         try:
             await self._end_motion_and_close()
         finally:
             if not self._loop.is_closed():
                 self._tick.close()
-                self._controller.stopped()
-                self._channels.publish_changes()
 
     async def _end_motion_and_close(self) -> None:
         """Stop and close; again if a stronger stop is requested during this, or while the link closes."""

@@ -65,8 +65,8 @@ class Session:
         self.is_over = True  # until the poller task runs
         self._loop = asyncio.get_running_loop()
         self.machine = machine
-        machine.why_down = None
         self._claim()
+        machine.why_down = None
         self.controller = Controller(
             machine,
             options.speed,
@@ -143,7 +143,9 @@ class Session:
         """The task has ended: no caller may wait for it. Called by the task and by :meth:`ended`."""
         if self.is_over:
             return
-        self._release()
+        self._release()  # before SHUTDOWN is published: a reader of it may start a hand
+        self.controller.stopped()
+        self._channels.publish_changes()
         failure: Callable[[], RobotiqError] | None = None
         if not task.cancelled() and (bug := task.exception()) is not None:
             self.options.log.critical("the task that owns the link failed", exc_info=bug)

@@ -79,7 +79,7 @@ class Polled:
         """Wait for the end; it comes in time whatever happens."""
         async with asyncio.timeout(within):
             await asyncio.wait({self.task})
-        assert self.machine.state is State.SHUTDOWN
+        assert self.machine.state is State.DO_SHUTDOWN
         assert self.wire.calls[-1] == "close"
         self.task.result()
 

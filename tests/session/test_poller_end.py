@@ -151,6 +151,6 @@ async def test_a_bug_does_not_keep_the_fingers_from_being_stopped() -> None:
     here.at_next_status = bug
     await asyncio.wait({here.task})
     assert isinstance(here.task.exception(), ZeroDivisionError)
-    assert here.machine.state is State.SHUTDOWN
+    assert here.machine.state is State.DO_SHUTDOWN
     assert not here.wire.gripper.is_moving
     assert not here.wire.is_open

@@ -18,6 +18,7 @@ from robotiq_async.values.errors import (
     InvalidStateError,
     NotStartedError,
 )
+from robotiq_async.values.events import Transition
 from tests.fake_transport import LOST, Wire
 from tests.session.sessions import Run, running
 from tests.virtual import VirtualLoop, run
@@ -37,6 +38,28 @@ async def test_an_address_has_one_session_at_a_time(session: Session) -> None:
     again = Run().session()
     await again.connected()
     await again.stop(halt=False)
+
+
+async def test_in_shutdown_the_address_is_free() -> None:
+    """Who waited for SHUTDOWN and started a hand in that turn was told that one runs."""
+    async with running() as (here, session):
+        began: list[Session] = []
+
+        def begin(item: object) -> None:
+            if isinstance(item, Transition) and item.target is State.SHUTDOWN:
+                began.append(Run().session())
+
+        remove = here.channels.listeners.add(begin)
+        await session.stop(halt=False)
+        remove()
+    await began[0].stop(halt=False)
+
+
+async def test_a_refused_session_keeps_the_reason_why_the_link_is_down(session: Session) -> None:
+    session.machine.why_down = LOST
+    with pytest.raises(InvalidStateError, match="this hand runs"):
+        Session(session.options, session.machine, session._channels, activate=False)
+    assert session.machine.why_down is LOST
 
 
 async def test_a_session_that_could_not_begin_leaves_the_address_free() -> None:
@@ -123,9 +146,8 @@ async def test_callers_that_wait_when_the_task_fails_get_an_error(caplog: pytest
 @pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning")
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 class TestClosedLoop:
-    @pytest.mark.parametrize("state", [State.RUNNING_IDLE, State.DO_SHUTDOWN, State.SHUTDOWN])
+    @pytest.mark.parametrize("state", [State.RUNNING_IDLE, State.DO_SHUTDOWN])
     def test_it_counts_as_over_once_it_is_abandoned(self, state: State) -> None:
-        """In SHUTDOWN the task had ended, but its end was not seen yet: the next start failed."""
         here, session = in_a_loop_that_is_closed(state)
         assert session.lost_its_loop
         with pytest.raises(NotStartedError, match="was closed"):
