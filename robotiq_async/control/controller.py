@@ -181,9 +181,7 @@ class Controller:
         Raises:
             RobotiqError: not possible now.
         """
-        if self.machine.fire(trigger, self.status):
-            self._requests.fail(MoveSupersededError(f"{trigger.value} took over"))
-            self._begin(reset(self._at_rest))
+        self._begin_reset(trigger, MoveSupersededError(f"{trigger.value} took over"))
 
     def release(self) -> None:
         """Begin an automatic release.
@@ -422,6 +420,12 @@ class Controller:
 
     # -- sequences -------------------------------------------------------------------------------------
 
+    def _begin_reset(self, trigger: Trigger, error: RobotiqError) -> None:
+        """Reset; ``error`` is what the callers get whose requests end with it."""
+        if self.machine.fire(trigger, self.status):
+            self._requests.fail(error)
+            self._begin(reset(self._at_rest))
+
     def _begin_activation(self, trigger: Trigger) -> None:
         if self.machine.fire(trigger, self.status):
             self._activating = True
@@ -467,9 +471,7 @@ class Controller:
         """Another client has reset the gripper just before a halt, whose rACT activates it then."""
         error = NotActivatedError("the gripper was reset when halt() came: an activation by it is taken back")
         self.machine.log.warning("%s", error)
-        self.machine.fire(Trigger.ASK_RESET)
-        self._requests.fail(error)
-        self._begin(reset(self._at_rest))
+        self._begin_reset(Trigger.ASK_RESET, error)
 
     def _see_activation(self, status: RobotiqStatus) -> None:
         condition = classify(status)

@@ -56,7 +56,7 @@ async def outcome(world: World, phase: Phase, words: str) -> str:
         kind, bound = words.split()[0], phase.bound
         if kind == "e-stop" and phase.name == "connecting":
             bound += STALLED_S  # connected in time, start() waits for an activation that makes no progress
-        ending = _noticed(world) if task is None else await _told(task, before.time + bound)
+        ending = _noticed(world) if task is None else await _ending_of(task, before.time + bound)
         await _rest(world, (*SETTLED, *STUCK) if kind == "e-stop" else SETTLED)
         state = world.hand.state
         if phase.name == "keeping a grip":
@@ -121,7 +121,7 @@ async def _begun(world: World, call: Call) -> Call:
     return lambda: task
 
 
-async def _told(task: asyncio.Future[object], deadline: float) -> str:
+async def _ending_of(task: asyncio.Future[object], deadline: float) -> str:
     """What the caller got."""
     try:
         async with asyncio.timeout_at(deadline):

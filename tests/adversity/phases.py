@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from robotiq_async import Finger, State
+from robotiq_async.values.enums import NO_AXES
 from tests.adversity.world import World
 
 A = Finger.A
-NO_AXES = Finger(0)
 TARGET = 200
 
 Call = Callable[[], Awaitable[Any]]

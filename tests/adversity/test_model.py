@@ -18,13 +18,14 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from robotiq_async import JAW, Fault, Finger, MoveResult, ObjectStatus, RobotiqError, State
 from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.simulator import Trouble
+from robotiq_async.values.enums import NO_AXES
 from robotiq_async.values.model import TWO_FINGER_85, Model
 from robotiq_async.values.request import Request
 from tests.adversity.world import MODEL, World, world
 from tests.register_words import only_holds
 from tests.virtual import VirtualLoop
 
-ALL, NO_AXES = Finger.ALL, Finger(0)
+ALL = Finger.ALL
 masks = st.integers(1, 15).map(Finger)
 values = st.integers(0, 255)
 LINK_TROUBLES = [

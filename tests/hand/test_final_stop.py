@@ -35,6 +35,11 @@ def images_since(gripper: SimulatedGripper, count: int) -> list[Request]:
     return [Request.from_registers(write.registers) for write in gripper.writes[count:]]
 
 
+def poller_task() -> asyncio.Task[object]:
+    (task,) = (task for task in asyncio.all_tasks() if task.get_name() == "robotiq_async poller")
+    return task
+
+
 async def slow(server: SimulatorServer, turn: float) -> None:
     """Answer late from now on, and wait for a moment of a cycle."""
     server.policy = lambda frame: [(LATENCY_S, frame)]
@@ -292,7 +297,7 @@ async def test_the_fingers_are_stopped_when_the_loop_is_torn_down(
     hand: RobotiqHand, server: SimulatorServer
 ) -> None:
     await hand.set_position(255)
-    (poller,) = [task for task in asyncio.all_tasks() if task.get_name() == "robotiq_async poller"]
+    poller = poller_task()
     poller.cancel()
     await asyncio.wait({poller})
     assert not server.gripper.is_moving
@@ -391,7 +396,9 @@ async def test_a_stop_just_after_another_client_has_reset_the_gripper_activates_
     with contextlib.suppress(NotActivatedError):
         await getattr(hand, call)()
     await asyncio.sleep(2)
-    assert gripper.travel(A) - before < 100 * (poll_s + 0.05), "count a second at the pace of an activation"
+    assert gripper.travel(A) - before < 100 * (poll_s + 0.05), (
+        "counts, at 100 a second as an activation moves"
+    )
     assert not gripper.is_moving
     assert not gripper.request_registers[0] & 0x0100
     await hand.stop()
@@ -408,9 +415,7 @@ async def test_a_hand_that_has_only_looked_writes_nothing_at_its_end(
     hand = RobotiqHand(server.address, reconnect=False)
     starting = asyncio.create_task(hand.start(activate=False))
     if how == "cancelled":
-        gripper.inject_fault(
-            Fault.COMMUNICATION_NOT_READY
-        )  # it reads on, until it is known whether that lasts
+        gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)  # the start reads on: it may pass
         await until(lambda: hand.statistics.polls > 0)
         starting.cancel()
         await asyncio.wait({starting})
@@ -419,8 +424,7 @@ async def test_a_hand_that_has_only_looked_writes_nothing_at_its_end(
         if how == "given up":
             server.cut()
         else:
-            (poller,) = (each for each in asyncio.all_tasks() if "poller" in each.get_name())
-            poller.cancel()
+            poller_task().cancel()
         await hand.wait_for_state(State.SHUTDOWN, timeout=3)
     assert len(gripper.writes) == writes
     assert gripper.request_registers[0] & 0x0800
@@ -433,7 +437,7 @@ async def test_a_hand_that_keeps_grips_keeps_one_when_its_task_is_cancelled(
     gripper.place_object(Finger.ABC, 120)
     async with RobotiqHand(server.address, keep_grip=True) as hand:
         await hand.grasp()
-        (poller,) = (each for each in asyncio.all_tasks() if "poller" in each.get_name())
+        poller = poller_task()
         poller.cancel()
         await asyncio.wait({poller})
     assert gripper.grips == Finger.ABC

@@ -41,7 +41,7 @@ async def test_an_address_has_one_session_at_a_time(session: Session) -> None:
 
 
 async def test_in_shutdown_the_address_is_free() -> None:
-    """Who waited for SHUTDOWN and started a hand in that turn was told that one runs."""
+    """A start in the turn of SHUTDOWN was refused: the address still had its owner."""
     async with running() as (here, session):
         began: list[Session] = []
 

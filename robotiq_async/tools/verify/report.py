@@ -33,6 +33,11 @@ class Report:
     last: RobotiqStatus | None = None  # the newest after the fingers were stopped; None if none came
     label: str = ""  # what the user wants it to be called
 
+    @property
+    def is_unstopped(self) -> bool:
+        """Whether a stage has written, and the rGTO = 0 at its end was not confirmed."""
+        return self.last is None and any(number >= HARMLESS for number in self.entered)
+
     def complete(self) -> None:
         """Note as inconclusive the checks that a stage has not reached."""
         for name, assumption in checks_of(self.model).items():
@@ -106,7 +111,7 @@ def sentences(report: Report) -> tuple[str, str, str]:
 
 def _usable(report: Report) -> str:
     words = report.words.rstrip(".")
-    if report.last is None and any(number >= HARMLESS for number in report.entered):
+    if report.is_unstopped:
         return f"THE FINGERS MAY STILL MOVE: the last rGTO = 0 was not confirmed ({words}). {DO_NOT_USE}."
     if report.why in UNUSABLE:
         return f"{DO_NOT_USE}: {words}."

@@ -124,7 +124,7 @@ class Runner:
         finally:
             if stage.number >= HARMLESS:
                 await self._stop(image)
-        if stage.number >= HARMLESS and self.report.last is None:
+        if self.report.is_unstopped:
             raise EndError("unstopped", f"rGTO = 0 was not confirmed at the end of stage {stage.number}")
         self.report.stages.append(stage.number)
         self._bench.is_active = stage.number > HARMLESS

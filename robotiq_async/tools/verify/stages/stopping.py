@@ -63,8 +63,8 @@ async def _halt(bench: Bench, watch: Watch, away: Request, home: dict[Finger, in
 async def _stop(bench: Bench, watch: Watch, image: Request, status: RobotiqStatus) -> tuple[int, float]:
     """Write an image that stops; counts that a finger still goes, and seconds until the last moves."""
     rest = Rest(bench.fingers)
-    began = rest.moved_at
-    rest.positions = before = [status.position(finger) for finger in bench.fingers]
+    rest.lasts(status, 0.3)  # from here on
+    began, before = rest.moved_at, rest.positions
     await watch.write(image)
     await watch.until(lambda now: rest.lasts(now, 0.3), 4.0)
     counts = max(abs(at - was) for at, was in zip(rest.positions, before, strict=True))
