@@ -36,7 +36,7 @@ from .requests.pending import Command
 from .requests.shadow import NEVER, RequestShadow, Whose
 from .sequences import Sequence, activation, automatic_release, reset, shutdown
 from .state_machine import RUNNING, StateMachine
-from .triggers import classify
+from .triggers import classify, is_activating
 from .waiters import Waiter
 
 _COMMANDED: Final = RUNNING | {State.FAULT}
@@ -278,7 +278,7 @@ class Controller:
         if before is State.DISCONNECTED and condition is Trigger.SEEN_RESET and self.activates:
             self._begin_activation(Trigger.ACTIVATES)
             return
-        if self._requests.halting and condition in (Trigger.SEEN_RESET, Trigger.SEEN_BUSY):
+        if self._requests.halting and (condition is Trigger.SEEN_RESET or is_activating(status)):
             self._take_back_activation()
             return
         self.machine.fire(condition)

@@ -21,7 +21,7 @@ from ..values.errors import GripperFaultError, NotActivatedError
 from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .requests.writes import WINDOW_S
-from .triggers import classify
+from .triggers import classify, is_activating
 
 Sequence = Generator[Request | None, RobotiqStatus, None]
 Image = Callable[[RobotiqStatus], Request]
@@ -119,6 +119,6 @@ def stop_fingers(last: Request, status: RobotiqStatus) -> Sequence:
         if is_being_reset and classify(status) is Trigger.SEEN_RESET:
             return
         status = yield None if is_being_reset else last
-    if was_active and last.activate and classify(status) is Trigger.SEEN_BUSY:
+    if was_active and last.activate and is_activating(status):
         # Another client has reset the gripper just before, and this image has activated it.
         yield from _until_reset(replace(last, activate=False))

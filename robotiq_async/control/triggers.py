@@ -19,6 +19,11 @@ def classify(status: RobotiqStatus) -> Trigger:
     return _classify(registers[0] >> 8, registers[1] >> 8 & 0x0F, status.model)
 
 
+def is_activating(status: RobotiqStatus) -> bool:
+    """Whether an activation is under way. A change of mode is busy as well, and keeps what the hand holds."""
+    return classify(status) is Trigger.SEEN_BUSY and status.initialization is Initialization.ACTIVATING
+
+
 @cache
 def _classify(activation: int, fault: int, model: Model) -> Trigger:
     """``activation`` is the byte with gACT and gIMC, ``fault`` is gFLT."""

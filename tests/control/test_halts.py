@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from robotiq_async import Fault, Finger, MoveSupersededError, State
+from robotiq_async.values.enums import Initialization, Mode
 from robotiq_async.values.model import THREE_FINGER
+from robotiq_async.values.request import Request
 from tests.control.other_client import image, moved_by_another, used_by_another
 from tests.control.scan import Scan, started
 
@@ -119,3 +123,26 @@ def test_a_halt_that_the_gripper_forgets_is_written_once_more(scan: Scan, forgot
     assert len(scan.written) - before == 2
     assert scan.written[-1] == scan.written[-2]
     assert scan.gripper.is_moving is (forgotten == 2)
+
+
+@pytest.mark.parametrize("how", ["halt", "stop"])
+def test_a_stop_in_a_change_of_mode_of_another_client_resets_nothing(how: str) -> None:
+    """It is busy as an activation is; a reset would drop the part."""
+    scan = started()
+    scan.moved(100)
+    now = Request.from_registers(scan.gripper.request_registers)
+    scan.gripper.write(0, replace(now, mode=Mode.WIDE, individual_scissor=False).registers)
+    scan.now += 0.02
+    if how == "halt":
+        scan.halt()
+        image = scan.controller.decide(scan.now)
+        assert image is not None
+        scan.gripper.write(0, image.registers)
+        scan.controller.acknowledged(scan.now)
+        scan.step()
+        assert scan.latest.initialization is Initialization.CHANGING_MODE
+        scan.run(1)
+    else:
+        scan.stop()
+    assert all(Request.from_registers(registers).activate for registers in scan.written[1:])
+    assert scan.latest.activation_echo
