@@ -136,6 +136,53 @@ def test_our_write_that_shows_after_another_clients_is_what_counts() -> None:
     assert moved == {B}
 
 
+SLOW_CYCLES = pytest.mark.parametrize("device_cycle", [0.02, 0.05, 0.2])
+
+
+@SLOW_CYCLES
+@pytest.mark.parametrize("before_ours", [0.0, 0.005, 0.01])
+@pytest.mark.parametrize("between", [0.005, 0.01])
+def test_a_halt_that_another_client_overtakes_stays_a_halt(
+    device_cycle: float, before_ours: float, between: float
+) -> None:
+    """Two writes of ours act after the other client's: the newer one, a halt, is what the gripper has."""
+    scan = started(device_cycle)
+    scan.moved(7)
+    scan.run(1.0)
+    scan.gripper.write(0, image({A: 90}))
+    scan.run(before_ours)
+    scan.command(A, position=250)
+    scan.run(between)
+    scan.halt()
+    scan.run(1.0)
+    assert not scan.gripper.is_moving
+    assert not scan.controller.is_moving
+    before = scan.travels()
+    scan.command(B, position=60)
+    scan.run(3.0)
+    assert {axis for axis, travel in scan.travels().items() if travel != before[axis]} == {B}
+
+
+@SLOW_CYCLES
+@pytest.mark.parametrize("before_ours", [0.0, 0.005, 0.01])
+@pytest.mark.parametrize("between", [0.005, 0.01])
+def test_two_writes_that_another_client_overtakes_leave_what_they_have_asked(
+    device_cycle: float, before_ours: float, between: float
+) -> None:
+    scan = started(device_cycle)
+    scan.moved(60)
+    scan.run(1.0)
+    scan.gripper.write(0, image({A: 60, B: 150, C: 60, S: 137}))
+    scan.run(before_ours)
+    scan.command(A, position=200)
+    scan.run(between)
+    scan.command(C, position=30)
+    scan.run(3.0)
+    before = scan.travels()
+    scan.moved(80, A)
+    assert {axis for axis, travel in scan.travels().items() if travel != before[axis]} == {A}
+
+
 def test_a_pending_hold_does_not_stop_a_client_that_took_over(scan: Scan) -> None:
     move, _ = scan.move(200, A, speed=0)
     scan.run(0.5)

@@ -210,7 +210,8 @@ class RequestShadow:
         elif whose is Whose.ADOPTED and self._adoption is not None:
             self._adoption.see(status, self.now)
         elif whose is Whose.OLDER and self._shown is not None:
-            self._image, self._adoption = self._writes.newest_that_shows_like(self._shown), None
+            newest = self._writes.newest_overtaken() or self._writes.newest_that_shows_like(self._shown)
+            self._image, self._adoption = newest, None
 
     def restart(self, status: RobotiqStatus) -> bool:
         """A sequence has ended: the gripper has its last image, and no other write is under way.

@@ -194,6 +194,17 @@ class WriteHistory:
             write.image, write.echo = write.image.with_positions(limits), echo
         write.alias = None
 
+    def newest_overtaken(self) -> Request | None:
+        """The newest write after the one that shows that was overtaken by another client's.
+
+        The gripper acknowledged it and takes writes in order: once an older one of ours shows, it has this one.
+        """
+        shown = 0 if self._shown is None else self._shown.number
+        overtaken = [
+            each.image for each in self._writes if each.phase is Phase.OVERTAKEN and each.number > shown
+        ]
+        return overtaken[-1] if overtaken else None
+
     def newest_that_shows_like(self, image: Request) -> Request:
         """The newest image that has arrived for certain and has the same echo as this one.
 
