@@ -10,11 +10,13 @@ from robotiq_async import JAW, Finger, MoveResult, ObjectStatus, State
 from robotiq_async.control.motion import Move
 from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.values.model import THREE_FINGER, TOLERANCE, TWO_FINGER_85, Model
+from tests.control.other_client import image
 from tests.control.scan import Outcome, Scan
 from tests.register_words import only_holds
 
 masks = st.integers(1, 15).map(Finger)
 values = st.integers(0, 255)
+PAUSES = st.sampled_from([0.0, 0.005, 0.01, 0.05])
 
 
 class RandomUse(RuleBasedStateMachine):
@@ -154,5 +156,51 @@ class RandomUse(RuleBasedStateMachine):
             assert image.registers == self.scan.written[-1]
 
 
+class BesideAnotherClient(RuleBasedStateMachine):
+    """Two clients write as they like; once all has come to rest, a command moves the axes that it names."""
+
+    @initialize(device_cycle=st.sampled_from([0.005, 0.02, 0.05, 0.2]))
+    def begin(self, device_cycle: float) -> None:
+        self.scan = Scan(device_cycle=device_cycle, speed=255)
+        self.scan.start()
+
+    @rule(positions=st.tuples(values, values, values, values), go=st.booleans(), seconds=PAUSES)
+    def another_client_writes(
+        self, positions: tuple[int, int, int, int], go: bool, seconds: float
+    ) -> None:
+        asked = dict(zip(THREE_FINGER.axes, positions, strict=True))
+        self.scan.gripper.write(0, image(asked, go=go))
+        self.scan.run(seconds)
+
+    @rule(axes=masks, position=values, seconds=PAUSES)
+    def command(self, axes: Finger, position: int, seconds: float) -> None:
+        self.scan.command(axes, position=position)
+        self.scan.run(seconds)
+
+    @rule(seconds=PAUSES)
+    def halt(self, seconds: float) -> None:
+        self.scan.halt()
+        self.scan.run(seconds)
+
+    @rule(axes=masks, seconds=PAUSES)
+    def hold(self, axes: Finger, seconds: float) -> None:
+        self.scan.hold(axes)
+        self.scan.run(seconds)
+
+    @rule(axes=masks, position=values)
+    def a_command_at_rest_moves_the_axes_that_it_names(self, axes: Finger, position: int) -> None:
+        self.scan.run(1.0)
+        self.scan.until(lambda: not self.scan.gripper.is_moving, 60)
+        self.scan.run(0.3)
+        assert not self.scan.controller.is_moving
+        before = self.scan.travels()
+        self.scan.command(axes, position=position)
+        self.scan.run(0.5)
+        moved = {axis for axis, travel in self.scan.travels().items() if travel != before[axis]}
+        assert all(axis in axes for axis in moved), f"{moved} moved"
+
+
+TestBesideAnotherClient = BesideAnotherClient.TestCase
+TestBesideAnotherClient.settings = settings(max_examples=settings().max_examples // 2, stateful_step_count=12)
 TestRandomUse = RandomUse.TestCase
 TestRandomUse.settings = settings(max_examples=settings().max_examples // 2, stateful_step_count=15)
