@@ -81,6 +81,7 @@ class FakeHand(Hand):
             outcomes={axis: status.finger_status(axis) for axis in axes},
             positions={axis: status.position(axis) for axis in axes},
             contacts=status.contacts & axes,
+            reached=axes,
             duration=0.0,
             peak_current_ma=dict.fromkeys(axes, 0),
             status=status,

@@ -56,7 +56,6 @@ from robotiq_async.tools.verify.catalogue import EndError
 from robotiq_async.tools.web.settings import PageSettings
 from robotiq_async.values.calibration import ForceCalibration, SpeedCalibration
 from robotiq_async.values.calibration.csv_tables import SPEED, TableError
-from robotiq_async.values.errors import MoveIgnoredError
 from robotiq_async.values.frozen_mapping import FrozenMapping
 from robotiq_async.values.model import HAND_E
 from robotiq_async.values.registers import TCP_REGISTERS, gDT
@@ -73,6 +72,7 @@ def result(**changes: object) -> MoveResult:
         "outcomes": {A: ObjectStatus.CONTACT_CLOSING, B: ObjectStatus.AT_POSITION},
         "positions": {A: 150, B: 200},
         "contacts": A,
+        "reached": B,
         "duration": 1.25,
         "peak_current_ma": {A: 310, B: 150},
         "status": status_of(0xB9, 0xEA, at=12.5, sequence=7),
@@ -141,7 +141,6 @@ ERRORS: list[Exception] = [
     GripperFaultError(Fault.SCISSOR_BLOCKED),
     GripperFaultError(Fault(0x0C), "as told"),
     MoveTimeoutError("too slow", status_of(0x39, 0xC0)),
-    MoveIgnoredError("asleep", status_of(0xF9, 0xFF)),
     ConnectFailedError("tcp://192.168.1.11:502", "refused"),
     ControlLostError("another client commands the gripper", "held"),
     NotAllStoppedError("not stopped", {LEFT: "no answer"}, ["tls/cell-2:7447"]),
@@ -300,6 +299,7 @@ def test_values_of_one_axis_are_listed_below_its_name() -> None:
     assert result().as_dict()["A"] == {
         "outcome": "CONTACT_CLOSING",
         "position": 150,
+        "reached": False,
         "peak_current_ma": 310,
     }
     assert "C" not in result().as_dict(), "it was not addressed"

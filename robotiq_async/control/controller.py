@@ -17,7 +17,6 @@ from ..values.enums import NO_AXES, Finger, Severity, State, Trigger
 from ..values.errors import (
     ConnectionLostError,
     GripperFaultError,
-    MoveIgnoredError,
     MoveSupersededError,
     NotActivatedError,
     NotStartedError,
@@ -26,7 +25,6 @@ from ..values.errors import (
 from ..values.model import THREE_FINGER, Model
 from ..values.request import Request
 from ..values.status import RobotiqStatus
-from .first_motion import IGNORED_S, FirstMotion
 from .grip_keeper import GripKeeper
 from .motion import Move
 from .open_requests import OpenRequests
@@ -86,8 +84,7 @@ class Controller:
         self._warned = NEVER
         self._closing_time = closing_time
         self._shadow = RequestShadow(speed, force, model, log=machine.log)
-        self._requests = OpenRequests()
-        self._first_motion = FirstMotion()
+        self._requests = OpenRequests(machine.log)
         self._step = 0
         """The number of the last write of a sequence: its next status must show the effect. 0 for none."""
         self._activating = False
@@ -296,11 +293,9 @@ class Controller:
             self._requests.see_halt(status, self._shadow.acts)
         if after in RUNNING:
             self._shadow.axes.see(status, self._shadow.now)
-            arrived = self._shadow.axes.resting
-            if self._first_motion.is_watched:
-                arrived &= ~self._see_first_motion(status)
             if self._requests.moves:
-                self._requests.moves.see(status, self._shadow.acts, arrived, self._shadow.axes.limited)
+                axes = self._shadow.axes
+                self._requests.moves.see(status, self._shadow.acts, axes.resting, axes.limited)
 
     @property
     def is_undecided(self) -> bool:
@@ -380,7 +375,6 @@ class Controller:
             self._grip_keeper.warn_of_lost_grips(status, sent.moved)
         self._note_early_stop(image, now, stops=sent.halting is not None)
         number = shadow.writing(image, sent.moved, now)
-        self._first_motion.written(number, sent.moved, status)
         if sent.positions:
             self._requests.moves.written(number)
         return image
@@ -456,7 +450,6 @@ class Controller:
     def _after_sequence(self, status: RobotiqStatus) -> None:
         if self._step:
             is_ours = self._shadow.restart(status)
-            self._first_motion.over()
         else:  # the sequence had nothing to do and has written nothing
             self._activating, whose = False, self._shadow.identify()
             is_ours = whose is not Whose.FOREIGN
@@ -512,29 +505,10 @@ class Controller:
     def _return(self, status: RobotiqStatus) -> None:
         """The link is back: go on from the image that the gripper shows, or adopt it."""
         self._shadow.returned(status)
-        self._first_motion.connected()
         if self.machine.state is State.FAULT and status.activation_echo:
             # As when a fault begins: no motion may resume when it clears.
             self._hold_on_return = Finger.ALL
         self._hold_what_was_lost()
-
-    def _see_first_motion(self, status: RobotiqStatus) -> Finger:
-        """Return the axes that do not follow the first motion on a new link, and fail their moves in time."""
-        still, is_ignored = self._first_motion.see(
-            status, self._shadow.base, self._shadow.acts, self._shadow.now
-        )
-        if is_ignored:
-            error = MoveIgnoredError(
-                f"the gripper acknowledged and echoed a motion of {still}, and nothing has moved for "
-                f"{IGNORED_S:g} s: it may not follow on a new connection. Try it again; if that is ignored, "
-                "too, call reset() and activate()",
-                status,
-            )
-            self.machine.log.warning("%s", error)
-            self._requests.moves.fail(error, lambda move: bool(move.axes & still))
-            # These axes must not start if the gripper wakes up later.
-            self._requests.hold(still, "the fingers are held")
-        return still
 
     def _hold_what_was_lost(self) -> None:
         """Hold the axes whose hold was not delivered, unless another client moves them now."""

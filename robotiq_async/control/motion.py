@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import reduce
+from operator import or_
 from typing import Final
 
-from ..values.enums import Finger
+from ..runtime.log import Log, log
+from ..values.enums import NO_AXES, Finger, ObjectStatus
 from ..values.errors import ConnectionLostError, RobotiqError
 from ..values.move_result import MoveResult
 from ..values.status import RobotiqStatus
@@ -66,19 +69,25 @@ class Move:
         """
         return self.axes in arrived and not status.moving & self.axes and self.is_under(status, limited)
 
-    def end(self, status: RobotiqStatus) -> None:
+    def end(self, status: RobotiqStatus) -> MoveResult:
+        result = self._result(status)
         if not self._waiter.done():
-            self._waiter.set_result(self._result(status))
+            self._waiter.set_result(result)
+        return result
 
     def fail(self, error: RobotiqError) -> None:
         self.was_lost = isinstance(error, ConnectionLostError)
         fail([self._waiter], error)
 
     def _result(self, status: RobotiqStatus) -> MoveResult:
+        reached = (
+            axis for axis in self._peak if status.model.has_reached(self.position, status.position(axis))
+        )
         return MoveResult(
             outcomes={axis: status.finger_status(axis) for axis in self._peak},
             positions={axis: status.position(axis) for axis in self._peak},
             contacts=status.contacts & self.axes,
+            reached=reduce(or_, reached, NO_AXES),
             duration=status.timestamp - self._started,
             peak_current_ma=self._peak,
             status=status,
@@ -88,8 +97,10 @@ class Move:
 class LiveMoves:
     """The moves under way. Each leaves once: when it arrives, when it fails, or when its caller gives up."""
 
-    def __init__(self) -> None:
+    def __init__(self, log: Log = log) -> None:
         self._moves: list[Move] = []
+        self._log = log
+        self._has_warned = False
 
     def __bool__(self) -> bool:
         return bool(self._moves)
@@ -132,7 +143,22 @@ class LiveMoves:
             move.see(status)
             if acts(move.write) and move.has_arrived(status, arrived, limited):
                 self._moves.remove(move)
-                move.end(status)
+                self._warn_of_unreached(move, move.end(status), limited)
+
+    def _warn_of_unreached(self, move: Move, result: MoveResult, limited: Mapping[Finger, int]) -> None:
+        """Warn once if a gripper says "at position" and stands far from where it was asked to go."""
+        for axis, how in result.outcomes.items():
+            is_there = axis in result.reached or axis in limited
+            if self._has_warned or is_there or how is not ObjectStatus.AT_POSITION:
+                continue
+            self._has_warned = True
+            self._log.warning(
+                "%s was asked for %d, and the gripper says that it is at position, at %d: it ends there, as "
+                "with fingertips of your own, or it did not follow. See MoveResult.reached; logged once",
+                axis,
+                move.position,
+                result.positions[axis],
+            )
 
     def fail(self, error: RobotiqError, which: Callable[[Move], bool] = lambda _: True) -> None:
         """Fail the moves for which ``which`` is true."""

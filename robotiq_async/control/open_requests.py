@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from ..runtime.log import Log, log
 from ..values.enums import NO_AXES, Finger
 from ..values.errors import MoveSupersededError, RobotiqError
 from ..values.status import RobotiqStatus
@@ -31,9 +32,9 @@ class OpenRequests:
         halting: the halts that were acknowledged and do not act yet.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, log: Log = log) -> None:
         self.pending = PendingCommand()
-        self.moves = LiveMoves()
+        self.moves = LiveMoves(log)
         self.halting: list[_Halt] = []
         self._sent = PendingCommand()
         """What is on the line."""

@@ -109,8 +109,7 @@ class Hand(ABC):
         """Connect, read the status, activate a gripper that is reset, and poll from then on.
 
         An activation MOVES the fingers: they open and close to their stops. An active gripper is adopted:
-        nothing is written. (A gripper that has to be woken on a new connection follows its second motion: the
-        first ends with MoveIgnoredError.) A gripper in fault is left there, so that :meth:`atr` and
+        nothing is written. A gripper in fault is left there, so that :meth:`atr` and
         :meth:`recover` can run. Fault 0x09, which some grippers show once after a second without a poll, is
         passed over first.
 
@@ -233,13 +232,13 @@ class Hand(ABC):
     ) -> MoveResult:
         """Move axes; when all have stopped, return how each ended: at the target, or against something.
 
-        A contact is a result, not an error. When the call is cancelled (by a task, ``asyncio.timeout`` or an
-        anyio scope) or times out, those of its axes that still move are held where they are; an axis in
-        contact keeps its request and its grip.
+        A contact is a result, not an error, and so is an axis that is "at position" elsewhere:
+        ``result.reached`` has those that are where they were asked to be. When the call is cancelled (by a
+        task, ``asyncio.timeout`` or an anyio scope) or times out, those of its axes that still move are held
+        where they are; an axis in contact keeps its request and its grip.
 
         Raises:
-            MoveTimeoutError: an axis still moved when the time was over; as MoveIgnoredError, the first
-                motion on a connection was echoed and nothing moved for a second.
+            MoveTimeoutError: an axis still moved when the time was over.
             MoveSupersededError: another command, halt(), reset() or another client took over an axis.
             GripperFaultError: the gripper reports a minor or a major fault.
             NotActivatedError: the gripper is not activated, or lost its activation.

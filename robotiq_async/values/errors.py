@@ -11,7 +11,6 @@
     |   +-- ActivationTimeoutError (TimeoutError)
     |   +-- StateTimeoutError (TimeoutError)    a state that was never reached
     |   +-- MoveTimeoutError (TimeoutError)     .status
-    |   |   +-- MoveIgnoredError                acknowledged, echoed, and nothing has moved
     |   +-- MoveSupersededError                 another command took over an axis of this move
     |   +-- ControlLostError                    on another host: this hand does not hold the lease
     |   +-- NotAllowedError                     on another host: the fleet's access rules forbid it
@@ -28,8 +27,7 @@
     +-- NotAllStoppedError                      the halt of a fleet; .outcomes, .unreached
 
 The package exports those of the gripper and the link. Import the errors of other hosts, of recordings,
-viewers and measurements, and MoveIgnoredError, from here. RecordingError, ViewerError and MeasuringError
-leave the hand running.
+viewers and measurements from here. RecordingError, ViewerError and MeasuringError leave the hand running.
 
 Bad arguments raise ValueError or TypeError.
 """
@@ -131,15 +129,6 @@ class MoveTimeoutError(RobotiqStateError, TimeoutError):
     def __init__(self, message: str, status: RobotiqStatus) -> None:
         self.status = status
         super().__init__(message)
-
-
-class MoveIgnoredError(MoveTimeoutError):
-    """The gripper acknowledged and echoed the first motion on a connection, and moved nothing for a second.
-
-    Users report grippers that need an image with rACT before they move on a new connection, or that lose
-    their activation when idle. The axes of the move now hold. Try the move once more; if that fails too,
-    :meth:`reset` and :meth:`activate` (DROPS the part and MOVES the fingers).
-    """
 
 
 class MoveSupersededError(RobotiqStateError):

@@ -21,6 +21,8 @@ class MoveResult:
         outcomes: how each addressed axis ended.
         positions: final position of each addressed axis, in counts.
         contacts: the addressed axes that a contact stopped.
+        reached: the addressed axes that end within 2 counts of the target, or at the end of the stroke for a
+            target beyond it. An axis whose fingertips end elsewhere is at position, and not in here.
         duration: seconds from the call to the status that ended the move.
         peak_current_ma: highest motor current seen of each addressed axis, in milliamperes.
         status: the status that ended the move.
@@ -29,6 +31,7 @@ class MoveResult:
     outcomes: Mapping[Finger, ObjectStatus]
     positions: Mapping[Finger, int]
     contacts: Finger
+    reached: Finger
     duration: float
     peak_current_ma: Mapping[Finger, int]
     status: RobotiqStatus
@@ -45,7 +48,7 @@ class MoveResult:
     def as_dict(self) -> dict[str, Any]:
         """The result in types that JSON and pandas accept; enumerations and masks as in a status.
 
-        The key of each axis holds its ``outcome``, ``position`` and ``peak_current_ma``.
+        The key of each axis holds its ``outcome``, ``position``, ``reached`` and ``peak_current_ma``.
         """
         return {
             "duration": self.duration,
@@ -55,6 +58,7 @@ class MoveResult:
                 str(axis.name): {
                     "outcome": self.outcomes[axis].name,
                     "position": self.positions[axis],
+                    "reached": axis in self.reached,
                     "peak_current_ma": self.peak_current_ma[axis],
                 }
                 for axis in self.outcomes

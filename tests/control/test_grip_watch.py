@@ -324,7 +324,8 @@ def test_something_soft_that_is_pressed_deeper_slips() -> None:
 def grasp(at_least: int, **outcomes: ObjectStatus) -> GraspResult:
     ends = {Finger[name]: how for name, how in outcomes.items()}
     contacts = Finger(sum(axis for axis, how in ends.items() if how.is_contact))
-    move = MoveResult(ends, dict.fromkeys(ends, 150), contacts, 1.0, dict.fromkeys(ends, 0), status_of(0xB9))
+    peaks = dict.fromkeys(ends, 0)
+    move = MoveResult(ends, dict.fromkeys(ends, 150), contacts, Finger(0), 1.0, peaks, status_of(0xB9))
     return GraspResult(move, at_least)
 
 

@@ -165,9 +165,7 @@ class BesideAnotherClient(RuleBasedStateMachine):
         self.scan.start()
 
     @rule(positions=st.tuples(values, values, values, values), go=st.booleans(), seconds=PAUSES)
-    def another_client_writes(
-        self, positions: tuple[int, int, int, int], go: bool, seconds: float
-    ) -> None:
+    def another_client_writes(self, positions: tuple[int, int, int, int], go: bool, seconds: float) -> None:
         asked = dict(zip(THREE_FINGER.axes, positions, strict=True))
         self.scan.gripper.write(0, image(asked, go=go))
         self.scan.run(seconds)

@@ -55,6 +55,7 @@ RESULT: Final = MoveResult(
     outcomes={Finger.A: ObjectStatus.AT_POSITION},
     positions={Finger.A: 100},
     contacts=Finger(0),
+    reached=Finger.A,
     duration=0.75,
     peak_current_ma={Finger.A: 310},
     status=STATUS,

@@ -292,6 +292,7 @@ def test_results(axes: dict[Finger, tuple[ObjectStatus, int, int]], duration: fl
             outcomes={axis: how for axis, (how, _, _) in axes.items()},
             positions={axis: at for axis, (_, at, _) in axes.items()},
             contacts=Finger(sum(axis for axis, (how, _, _) in axes.items() if how.is_contact)),
+            reached=Finger(sum(axis for axis, (how, _, _) in axes.items() if not how.is_contact)),
             duration=duration,
             peak_current_ma={axis: peak for axis, (_, _, peak) in axes.items()},
             status=status,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -12,17 +13,17 @@ from robotiq_async import (
     ActivationTimeoutError,
     Finger,
     GripChange,
+    MoveTimeoutError,
+    ObjectStatus,
     RobotiqHand,
     State,
     StateTimeoutError,
 )
-from robotiq_async.control.first_motion import IGNORED_S
-from robotiq_async.control.requests.standstill import LAG_S
 from robotiq_async.runtime.clock import now
 from robotiq_async.session.options import ACTIVATION_TIMEOUT_S
 from robotiq_async.session.waiting import STALLED_S, TOLD_EVERY_S
 from robotiq_async.simulator import Habits
-from robotiq_async.values.errors import MoveIgnoredError
+from robotiq_async.values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, Model
 from tests.fake_transport import Asleep, Wire
 from tests.grippers import activate_beforehand
 from tests.virtual import VirtualLoop
@@ -144,49 +145,69 @@ async def test_an_activation_that_times_out_is_taken_back() -> None:
     assert [request.activate for request in slow.written] == [True, False]
 
 
-# -- a gripper that does not follow at first ---------------------------------------------------------------
+# -- a gripper that does not follow, or whose fingertips end elsewhere ---------------------------------------
+
+FAR = "it ends there, as with fingertips of your own, or it did not follow"
 
 
-@pytest.mark.parametrize("shows", [None, 0, 3], ids=["as it was", "moving", "at position"])
-async def test_a_first_motion_that_moves_nothing_is_named(shows: int | None) -> None:
-    asleep = Asleep(shows=shows)
+async def test_a_motion_that_moves_nothing_and_is_reported_as_done_has_reached_nothing(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level(logging.WARNING, "robotiq_async")
+    asleep = Asleep(shows=3)
     await activate_beforehand(asleep.gripper)
     async with RobotiqHand(asleep) as hand:
-        began = now()
-        with pytest.raises(MoveIgnoredError, match="nothing has moved"):
-            await hand.close()
-        assert now() - began == pytest.approx(IGNORED_S, abs=0.2)
-        await asyncio.sleep(5)
-        assert asleep.gripper.position(Finger.A) <= 7, "it does not begin by itself"
-        assert min((await hand.close()).positions.values()) >= 240
+        result = await hand.close()
+        assert not result.reached
+        assert set(result.outcomes.values()) == {ObjectStatus.AT_POSITION}
+        assert caplog.text.count(FAR) == 1
+        await hand.close()  # this one it follows
+        await asyncio.sleep(3)
+        assert (await hand.close()).reached == ABC
+        assert caplog.text.count(FAR) == 1
 
 
-async def test_a_gripper_that_never_follows_is_named_each_time() -> None:
-    asleep = Asleep(images=math.inf)
+async def test_a_motion_that_never_begins_and_never_ends_times_out() -> None:
+    asleep = Asleep(images=math.inf, shows=0)
     await activate_beforehand(asleep.gripper)
     async with RobotiqHand(asleep) as hand:
-        for _ in range(2):
-            with pytest.raises(MoveIgnoredError):
-                await hand.close()
+        with pytest.raises(MoveTimeoutError):
+            await hand.close(timeout=3.0)
 
 
-async def test_after_a_reconnect_it_is_the_same() -> None:
-    asleep = Asleep(images=0)
-    await activate_beforehand(asleep.gripper)
-    async with RobotiqHand(asleep) as hand:
-        await hand.move(100)
-        asleep._images = 1
-        asleep.pull()
-        await hand.wait_for_state(State.DISCONNECTED)
-        asleep.plug()
-        await hand.wait_for_state(State.RUNNING_IDLE)
-        with pytest.raises(MoveIgnoredError):
-            await hand.move(200)
-        assert (await hand.move(200)).positions[Finger.A] == 200
+def with_ends(model: Model, low: int, high: int) -> Model:
+    """What a gripper whose fingertips end elsewhere reads when it is open and closed."""
+    return replace(model, stroke=replace(model.stroke, open_reading=low, closed_reading=high))
+
+
+@pytest.mark.parametrize(("low", "high"), [(13, 223), (10, 215), (40, 180)])
+@pytest.mark.parametrize("model", [TWO_FINGER_85, HAND_E, THREE_FINGER], ids=lambda model: model.name)
+async def test_ends_that_read_otherwise_end_a_move_and_loosen_nothing(
+    model: Model, low: int, high: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The first motions after an adoption and after a reconnect, begun where the jaw stands already."""
+    caplog.set_level(logging.WARNING, "robotiq_async")
+    wire = Wire(model=with_ends(model, low, high))
+    await activate_beforehand(wire.gripper)
+    for target, end in ((0, low), (255, high), (0, low)):
+        async with RobotiqHand(wire, model=model.name) as hand:
+            for _ in range(2):
+                result = await hand.move(target, model.all_axes & ABC)
+                assert result.positions[Finger.A] == pytest.approx(end, abs=1)
+                assert set(result.outcomes.values()) == {ObjectStatus.AT_POSITION}
+                assert not result.reached
+            wire.pull()
+            await hand.wait_for_state(State.DISCONNECTED)
+            wire.plug()
+            await hand.wait_for_state(State.RUNNING_IDLE)
+            assert not (await hand.move(target, model.all_axes & ABC)).reached
+            await asyncio.sleep(3)
+            assert hand.status.requested_position(Finger.A) == target, "it goes on pressing"
+    assert caplog.text.count(FAR) == 3, "once a hand"
 
 
 @pytest.mark.parametrize(("target", "fingers"), [(0, ABC), (255, Finger.SCISSOR), (130, Finger.SCISSOR)])
-async def test_a_first_motion_of_nothing_is_one(target: int, fingers: Finger) -> None:
+async def test_a_first_motion_of_nothing_ends_at_once(target: int, fingers: Finger) -> None:
     """The scissor stands at its software limit, which is reported as reached."""
     wire = Wire(scissor_limit=(6, 228))
     await activate_beforehand(wire.gripper)
@@ -196,14 +217,6 @@ async def test_a_first_motion_of_nothing_is_one(target: int, fingers: Finger) ->
         began = now()
         await hand.move(target, fingers)
         assert now() - began < 0.5
-
-
-async def test_a_slow_first_motion_is_one() -> None:
-    assert IGNORED_S > 2 * LAG_S
-    wire = Wire()
-    await activate_beforehand(wire.gripper)
-    async with RobotiqHand(wire) as hand:
-        assert (await hand.move(12, speed=0)).positions[Finger.A] == 12
 
 
 # -- an emergency stop -------------------------------------------------------------------------------------

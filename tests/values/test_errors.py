@@ -22,7 +22,6 @@ TREE = {
     "ResponseTimeoutError": "RobotiqConnectionError TimeoutError",
     "ProtocolError": "RobotiqConnectionError",
     # What a user may tell from other time-outs.
-    "MoveIgnoredError": "MoveTimeoutError",
     "WrongModelError": "ProtocolError",
     # Around a hand; not among the names of the package.
     "RecordingError": "RobotiqError",

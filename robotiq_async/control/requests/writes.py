@@ -197,7 +197,7 @@ class WriteHistory:
     def newest_overtaken(self) -> Request | None:
         """The newest write after the one that shows that was overtaken by another client's.
 
-        The gripper acknowledged it and takes writes in order: once an older one of ours shows, it has this one.
+        The gripper acknowledged it and takes writes in order: once an older one of ours shows, it has this.
         """
         shown = 0 if self._shown is None else self._shown.number
         overtaken = [

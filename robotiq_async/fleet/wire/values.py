@@ -148,6 +148,7 @@ def read_result(fields: Mapping[str, Any], clock: Clock) -> MoveResult:
         outcomes={axis: ObjectStatus[end["outcome"]] for axis, end in axes.items()},
         positions={axis: int(end["position"]) for axis, end in axes.items()},
         contacts=Finger(sum(Finger[name] for name in fields["contacts"])),
+        reached=Finger(sum(axis for axis, end in axes.items() if end["reached"])),
         duration=float(fields["duration"]),
         peak_current_ma={axis: int(end["peak_current_ma"]) for axis, end in axes.items()},
         status=read_status(fields["status"], clock),

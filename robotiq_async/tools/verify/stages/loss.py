@@ -93,7 +93,7 @@ async def _first_motion(bench: Bench, watch: Watch, image: Request, home: dict[F
             break
     else:
         raise EndError("time", "the gripper did not follow two motions on a new connection")
-    follows = "The first move after a connection raises MoveIgnoredError: call it again."
+    follows = "The first move after a connection may move nothing: see MoveResult.reached, call it again."
     found = "the gripper followed the first motion on the new connection"
     if number:
         found = "the gripper echoed the first motion without moving, and followed the second"
