@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async import Finger, MoveResult, MoveSupersededError, ObjectStatus
 from robotiq_async.control.requests.standstill import LAG_READS, LAG_S, LONG_AGO, Moment, Standstill
-from robotiq_async.values.model import THREE_FINGER
+from robotiq_async.values.enums import NO_AXES
+from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
 from tests.control.other_client import image
 from tests.control.scan import POLL_S, Outcome, Scan, started
 
@@ -25,7 +28,7 @@ def ended(scan: Scan, outcome: Outcome) -> MoveResult:
     scan.until(lambda: outcome.is_answered)
     result, status = outcome.result, scan.controller.status
     assert status is not None
-    moves = [axis for axis in THREE_FINGER.axes if axis in status.moving]
+    moves = [axis for axis in status.model.axes if axis in status.moving]
     axes = list(result.outcomes)
     travels = scan.travels()
     assert not set(axes) & set(moves)
@@ -221,6 +224,117 @@ def test_a_second_try_sees_that_the_part_is_gone(lag: int, device_cycle: float, 
         scan.run(0.5)
     _, outcome = scan.move(254, force=200) if after == "more force" else scan.move(255)
     assert ended(scan, outcome).contacts == Finger(0)
+
+
+# -- short motions before -----------------------------------------------------------------------------------
+
+SHORT = [1, 3, 8, 15, 30]
+PAUSES_S = [0.0, 0.03, 0.12, 0.3]
+SHORT_LAGS = pytest.mark.parametrize("lag", [4, 10, 20, 40, 48])  # polls: 0.02 to 0.24 s
+MODELS = pytest.mark.parametrize("model", [THREE_FINGER, TWO_FINGER_85], ids=lambda model: model.name)
+
+
+def at_100(lag: int, model: Model) -> Scan:
+    """A hand whose finger A, or jaw, has rested at 100 for a while."""
+    scan = Scan(lag=lag, model=model, speed=255)
+    scan.start()
+    return back_at_100(scan)
+
+
+def back_at_100(scan: Scan) -> Scan:
+    """The same, after the part is gone."""
+    scan.gripper.remove_object(A)
+    scan.moved(0, A)
+    scan.moved(100, A)
+    scan.run(1.0)
+    return scan
+
+
+def each_short_motion(lag: int, model: Model) -> Iterator[Scan]:
+    """The hand at the end of each short first motion, after each pause."""
+    scan = at_100(lag, model)
+    for counts in SHORT:
+        for pause in PAUSES_S:
+            scan.moved(100 + counts, A)
+            scan.run(pause)
+            yield scan
+            back_at_100(scan)
+
+
+@SHORT_LAGS
+@MODELS
+def test_a_move_after_a_short_one_ends_where_it_was_sent(lag: int, model: Model) -> None:
+    """The late object status of the first motion, moving and then at position, is not that of the second."""
+    for scan in each_short_motion(lag, model):
+        result = ended(scan, scan.move(200, A)[1])
+        assert abs(result.positions[A] - 200) <= 2
+        assert result.reached == A
+
+
+@SHORT_LAGS
+@MODELS
+def test_a_part_that_is_met_after_a_short_motion_is_held(lag: int, model: Model) -> None:
+    for scan in each_short_motion(lag, model):
+        scan.gripper.place_object(A, 180)
+        assert ended(scan, scan.move(255, A)[1]).contacts == A
+        assert scan.gripper.grips == A
+
+
+@SHORT_LAGS
+@MODELS
+def test_a_part_is_let_go_of_after_a_short_motion(lag: int, model: Model) -> None:
+    scan = at_100(lag, model)
+    scan.moved(108, A)
+    for pause in PAUSES_S:
+        scan.gripper.place_object(A, 180)
+        assert ended(scan, scan.move(255, A)[1]).contacts == A
+        scan.run(pause)
+        result = ended(scan, scan.move(150, A)[1])
+        assert result.contacts == NO_AXES
+        assert abs(result.positions[A] - 150) <= 2
+        scan.moved(158, A)
+        assert ended(scan, scan.move(60, A)[1]).reached == A
+
+
+@SHORT_LAGS
+@MODELS
+def test_a_hold_after_a_short_motion_stops_the_second(lag: int, model: Model) -> None:
+    for scan in each_short_motion(lag, model):
+        _, second = scan.move(250, A)
+        scan.run(0.05)
+        scan.hold(A)
+        scan.run(0.05)
+        assert second.is_answered
+        travel = scan.gripper.travel(A)
+        scan.run(1.0)
+        assert scan.gripper.travel(A) - travel <= 2, "it went on after a hold"
+
+
+@SHORT_LAGS
+@MODELS
+def test_a_stop_that_keeps_a_grip_leaves_no_motion_after_a_short_one(lag: int, model: Model) -> None:
+    for counts in (3, 15):
+        for pause in (0.0, 0.12):
+            scan = at_100(lag, model)
+            scan.moved(100 + counts, A)
+            scan.run(pause)
+            scan.command(A, position=250)
+            scan.run(0.02)
+            scan.stop(keep_grip=True)
+            travel = scan.gripper.travel(A)
+            scan.now += 5
+            assert scan.gripper.travel(A) == travel, (counts, pause)
+
+
+@SHORT_LAGS
+@pytest.mark.parametrize("pause", [0.0, 0.03, 0.12])
+def test_a_short_motion_of_another_client_does_not_end_ours(lag: int, pause: float) -> None:
+    scan = at_100(lag, THREE_FINGER)
+    here = {axis: scan.last_image.position(axis) for axis in THREE_FINGER.axes}
+    scan.gripper.write(0, image(here | {A: 108}))
+    scan.run(0.01 + pause)
+    result = ended(scan, scan.move(200, A)[1])
+    assert abs(result.positions[A] - 200) <= 2
 
 
 # -- what cannot be reached --------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ import pytest
 from robotiq_async.control.requests.adoption import DIRECTION_WAIT_S
 from robotiq_async.control.requests.merging import at_rest
 from robotiq_async.control.requests.shadow import RequestShadow, Whose
+from robotiq_async.control.requests.standstill import LAG_READS, LAG_S
 from robotiq_async.control.requests.writes import SILENT_S, WINDOW_S
 from robotiq_async.values.enums import NO_AXES, Finger
 from robotiq_async.values.model import THREE_FINGER
@@ -64,6 +65,14 @@ def ours(shadow: Shadow) -> Shadow:
     shadow.write(image(200))
     assert shadow.follows(shadow.shown(shows(200, 1.1), 1.1))
     return shadow
+
+
+@pytest.fixture
+def later(ours: Shadow) -> Shadow:
+    """The same, when no status can be from before our request."""
+    for _ in range(LAG_READS + 1):
+        ours.axes.see(ours.shown(status_of(0x39, 0x00, echo=200, position=150), ours.at + LAG_S), ours.now)
+    return ours
 
 
 # -- before anything was written ---------------------------------------------------------------------------
@@ -244,44 +253,44 @@ def gripping(ours: Shadow, status: RobotiqStatus = HALTED) -> Finger:
     return ours.axes.grips.held(status, ours.base)
 
 
-def test_axes_that_gripped_when_rgto_was_set_still_grip(ours: Shadow) -> None:
-    ours.axes.see(GRIP, ours.now)
-    assert gripping(ours, GRIP) == A | B | S
-    ours.axes.see(status_of(0x31, 0xFF, echo=200, position=150), ours.now)
-    assert gripping(ours) == A | B | S, "gDT is not worth reading while rGTO is clear"
+def test_axes_that_gripped_when_rgto_was_set_still_grip(later: Shadow) -> None:
+    later.axes.see(GRIP, later.now)
+    assert gripping(later, GRIP) == A | B | S
+    later.axes.see(status_of(0x31, 0xFF, echo=200, position=150), later.now)
+    assert gripping(later) == A | B | S, "gDT is not worth reading while rGTO is clear"
 
 
-def test_an_axis_that_is_somewhere_else_by_now_does_not_grip(ours: Shadow) -> None:
-    ours.axes.see(GRIP, ours.now)
-    assert gripping(ours, status_of(0x31, 0xFF, position=(150, 6, 6, 152))) == A | S
+def test_an_axis_that_is_somewhere_else_by_now_does_not_grip(later: Shadow) -> None:
+    later.axes.see(GRIP, later.now)
+    assert gripping(later, status_of(0x31, 0xFF, position=(150, 6, 6, 152))) == A | S
 
 
-def test_a_grip_by_a_request_no_longer_in_force_does_not_count(ours: Shadow) -> None:
+def test_a_grip_by_a_request_no_longer_in_force_does_not_count(later: Shadow) -> None:
     """A motion that was halted must not come back because the axis had gripped."""
-    ours.axes.see(GRIP, ours.now)
-    ours.write(image(200).with_positions({A: 20}), moved=NO_AXES)
-    assert gripping(ours) == B | S
+    later.axes.see(GRIP, later.now)
+    later.write(image(200).with_positions({A: 20}), moved=NO_AXES)
+    assert gripping(later) == B | S
 
 
 @pytest.mark.parametrize("how", ["moved", "adopted", "sequence"])
-def test_a_grip_ends(ours: Shadow, how: str) -> None:
-    ours.axes.see(GRIP, ours.now)
+def test_a_grip_ends(later: Shadow, how: str) -> None:
+    later.axes.see(GRIP, later.now)
     match how:
         case "moved":
-            ours.write(image(200), moved=A)
+            later.write(image(200), moved=A)
         case "adopted":
-            ours.follow(Whose.FOREIGN, GRIP)
+            later.follow(Whose.FOREIGN, GRIP)
         case "sequence":
-            ours.axes.grips.forget()
-    assert gripping(ours) == (B | S if how == "moved" else NO_AXES)
+            later.axes.grips.forget()
+    assert gripping(later) == (B | S if how == "moved" else NO_AXES)
 
 
-def test_an_axis_has_arrived_when_it_was_seen_at_rest_under_what_it_was_asked_last(ours: Shadow) -> None:
-    assert ours.axes.resting == NO_AXES
-    ours.axes.see(status_of(0x39, 0b11_11_10_00, echo=200, position=(100, 150, 199, 200)), ours.now)
-    assert ours.axes.resting == B | C | S
-    ours.write(image(200).with_positions({B: 190}), moved=B)
-    assert ours.axes.resting == C | S
+def test_an_axis_has_arrived_when_it_was_seen_at_rest_under_what_it_was_asked_last(later: Shadow) -> None:
+    assert later.axes.resting == NO_AXES
+    later.axes.see(status_of(0x39, 0b11_11_10_00, echo=200, position=(100, 150, 199, 200)), later.now)
+    assert later.axes.resting == B | C | S
+    later.write(image(200).with_positions({B: 190}), moved=B)
+    assert later.axes.resting == C | S
 
 
 def test_no_axis_arrives_under_what_does_not_act_yet_nor_while_rgto_is_clear(ours: Shadow) -> None:

@@ -47,6 +47,10 @@ class Grips:
 class Axes:
     """Follows each axis from the write that asks it for something to the status that shows it at rest.
 
+    An axis at rest where it was asked to be has come to rest, whatever the age of its object status. The
+    status of that motion may still come: moving, and at position once more. Until it cannot, the rest is not
+    proven, and a motion that is seen does not show that the next request acts.
+
     Attributes:
         resting: those that are known to rest, and those that the model lacks. The others move, or are about
             to, or the object status that they show may be from before the write.
@@ -58,6 +62,8 @@ class Axes:
         self.resting: Finger = Finger.ALL
         self.limited: dict[Finger, int] = {}
         self.grips: Final = Grips()
+        self._proven: Finger = Finger.ALL
+        """Those of the resting axes that no status from before their rest can show any more."""
         self._writes: Final = writes
         self._log: Final = log
         self._standstill = {axis: Standstill(model) for axis in model.axes}
@@ -77,10 +83,24 @@ class Axes:
                     new.position if image.go else None,
                     before=old.position if before.go else None,
                     again=raised or pressed,
-                    rested=axis in self.resting and before.go,
+                    rested=axis in self._proven and before.go,
                 )
+                self._proven &= ~axis
                 if image.go:
                     self.resting &= ~axis
+
+    def adopt(self, before: Request, adopted: Request) -> None:
+        """Another client replaces ``before`` by ``adopted``."""
+        for axis, old, new in zip(adopted.model.axes, before.axes, adopted.axes, strict=True):
+            if adopted.go is not before.go or new.position != old.position:
+                self._standstill[axis].ask(
+                    0,
+                    new.position if adopted.go else None,
+                    before=old.position if before.go else None,
+                    again=False,
+                    rested=False,
+                )
+                self._proven &= ~axis
 
     def limit(self, axis: Finger, limit: int) -> None:
         """The last request of an axis was replaced by a software limit."""
@@ -89,7 +109,7 @@ class Axes:
 
     def clear(self) -> None:
         """Every axis rests, and nothing that was asked before counts."""
-        self.resting = Finger.ALL
+        self.resting = self._proven = Finger.ALL
         for standstill in self._standstill.values():
             standstill.clear()
 
@@ -97,7 +117,7 @@ class Axes:
         """Take in a status. Not one with a fault: it keeps axes from starting."""
         if not status.go_echo:
             return  # gDT says nothing without rGTO
-        if self.resting is not Finger.ALL:  # usually it is
+        if self._proven is not Finger.ALL:  # usually it is
             self._see_rest(status, now)
         if self.grips or status.contacts:
             contacts = status.contacts
@@ -107,11 +127,13 @@ class Axes:
 
     def _see_rest(self, status: RobotiqStatus, now: Moment) -> None:
         for axis in self._standstill:
-            if not axis & self.resting:
+            if not axis & self._proven:
                 standstill, what = self._seen(axis, status, now), status.finger_status(axis)
-                if standstill.is_known(what, status.position(axis)):
+                if not axis & self.resting and standstill.is_known(what, status.position(axis)):
                     self.resting |= axis
                     self._prove_limit(axis, what, status.position(axis))
+                if axis & self.resting and standstill.is_proven(what, status.position(axis)):
+                    self._proven |= axis
 
     def doubtful(self, status: RobotiqStatus, now: Moment) -> Finger:
         """The axes that may move, or be about to, although the status shows them at rest."""

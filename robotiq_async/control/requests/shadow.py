@@ -186,8 +186,9 @@ class RequestShadow:
         self.axes.grips.forget()
         # A client that keeps writing must not make us wait anew each time.
         since = self.now if self._adoption is None else self._adoption.since
-        self._adoption = Adoption(status, self.now, since)
+        before, self._adoption = self.base, Adoption(status, self.now, since)
         self._adopted = self.base
+        self.axes.adopt(before, self._adopted)
         self._writes.adopt(self._adopted, status.echo, self.now.time)
 
     def identify(self) -> Whose:

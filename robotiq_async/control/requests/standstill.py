@@ -146,6 +146,14 @@ class Standstill:
             return self._asked[-1].fits(what, position)
         return self._is_true_since(what, position, unless_tried_again=True)
 
+    def is_proven(self, what: ObjectStatus, position: int) -> bool:
+        """Whether what it shows is from after its last request, so that no older status can follow.
+
+        An axis within its tolerance is known to rest by its position alone: its object status may still be
+        from before the request, and that of its motion is to come.
+        """
+        return self.is_known(what, position) and (what.is_contact or len(self._asked) <= 1)
+
     def is_doubtful(self, what: ObjectStatus, position: int) -> bool:
         """Whether the axis may move, or be about to, although it shows rest.
 
