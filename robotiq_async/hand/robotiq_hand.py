@@ -282,8 +282,7 @@ class RobotiqHand(Hand):
                     await self._recover_step()
                 if step.cancelled_caught:
                     self._check_worth_a_reset(resets)
-                    resets += 1
-                    await self.reset()
+                    resets = await self._reset_until_shown(resets)
             return
         raise StateTimeoutError(f"the gripper is not active after {limit:g} s: {self.state.name}")
 
@@ -297,6 +296,21 @@ class RobotiqHand(Hand):
             )
         self._options.log.warning("%s for %g s; it is reset and activated", what, STALLED_S)
 
+    async def _reset_until_shown(self, resets: int = 0) -> int:
+        """Reset, and again if the gripper does not show it; return the number of resets so far.
+
+        After an emergency stop a reset helps only sometimes (one report, of a two-finger gripper).
+        """
+        while True:
+            resets += 1
+            try:
+                await self.reset()
+                return resets
+            except StateTimeoutError as error:
+                if resets >= RESETS:
+                    raise
+                self._options.log.warning("%s: it is reset again", error)
+
     async def _recover_step(self) -> None:
         session, state = self._asked(), self.state
         if state is State.RESET:
@@ -304,7 +318,7 @@ class RobotiqHand(Hand):
         elif state is State.ATR_DONE or (
             state is State.FAULT and self.status.fault.severity is Severity.MAJOR
         ):
-            await self.reset()
+            await self._reset_until_shown()
         elif state is State.DISCONNECTED:
             raise session.link_lost()
         else:

@@ -24,6 +24,7 @@ from robotiq_async.session.options import ACTIVATION_TIMEOUT_S
 from robotiq_async.session.waiting import STALLED_S, TOLD_EVERY_S
 from robotiq_async.simulator import Habits
 from robotiq_async.values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, Model
+from robotiq_async.values.registers import Registers
 from tests.fake_transport import Asleep, Wire
 from tests.grippers import activate_beforehand
 from tests.virtual import VirtualLoop
@@ -234,6 +235,46 @@ async def test_a_gripper_that_waits_for_its_activation_is_reset_and_activated(re
     assert [each.activate for each in stopped.written].count(False) == resets
     assert now() - began < resets * (STALLED_S + 1) + 10
     assert (await hand.move(100)).positions[Finger.A] == 100
+    await hand.stop()
+
+
+class Deaf(Wire):
+    """After an emergency stop, the first rACT = 0 clears gACT and leaves gIMC = 1 (activating)."""
+
+    def __init__(self, resets: int = 2) -> None:
+        super().__init__()
+        self._resets = resets
+
+    def shown(self) -> Registers:
+        words = super().shown()
+        is_deaf = 0 < self.resets < self._resets
+        return (0x1000, 0, *words[2:]) if is_deaf else words
+
+    @property
+    def resets(self) -> int:
+        return [each.activate for each in self.written].count(False)
+
+
+@pytest.mark.parametrize("needed", [1, 2])
+async def test_a_reset_that_does_not_show_is_tried_once_more(needed: int) -> None:
+    deaf = await pressed(Deaf(needed), 1)
+    assert isinstance(deaf, Deaf)
+    hand = RobotiqHand(deaf)
+    await hand.start(activate=False)
+    await hand.recover()
+    assert hand.state is State.RUNNING_IDLE
+    assert deaf.resets == needed
+    await hand.stop()
+
+
+async def test_a_gripper_that_shows_no_reset_is_reset_twice_at_most() -> None:
+    deaf = await pressed(Deaf(9), 1)
+    assert isinstance(deaf, Deaf)
+    hand = RobotiqHand(deaf)
+    await hand.start(activate=False)
+    with pytest.raises(StateTimeoutError, match="did not report the reset"):
+        await hand.recover()
+    assert deaf.resets == 2
     await hand.stop()
 
 
