@@ -88,8 +88,23 @@ class Session:
         machine.fire(Trigger.ASK_START)
         channels.publish_changes()
         self.is_over = False
-        self._task = self._loop.create_task(self._poller.run(), name="robotiq_async poller")
-        self._task.add_done_callback(self._end)
+        self._task = self._loop.create_task(self._run(), name="robotiq_async poller")
+        self._task.add_done_callback(self._end_with)
+
+    async def _run(self) -> None:
+        """Run the poller; the run is over in the same turn of the loop.
+
+        A stop() in a turn between would strengthen an ending that has ended, and be lost.
+        """
+        bug: BaseException | None = None
+        try:
+            await self._poller.run()
+        except Exception as error:
+            bug = error
+            raise
+        finally:
+            if not self._loop.is_closed():
+                self._end(bug)
 
     # -- its end ---------------------------------------------------------------------------------------
 
@@ -110,7 +125,7 @@ class Session:
             await wait_shielded(self._task)
         finally:
             if self._task.done():  # not if a second Ctrl-C has broken the event loop
-                self._end(self._task)
+                self._end_with(self._task)
 
     def abandon(self) -> None:
         """End a run whose event loop was closed. Its callers' futures belong to that loop: leave them."""
@@ -139,15 +154,19 @@ class Session:
         self.is_over = True
         self._claims.release(self)
 
-    def _end(self, task: asyncio.Task[None]) -> None:
-        """The task has ended: no caller may wait for it. Called by the task and by :meth:`ended`."""
+    def _end_with(self, task: asyncio.Task[None]) -> None:
+        """The task has ended, perhaps before it ran."""
+        self._end(None if task.cancelled() else task.exception())
+
+    def _end(self, bug: BaseException | None) -> None:
+        """The run is over: no caller may wait for it."""
         if self.is_over:
             return
         self._release()  # before SHUTDOWN is published: a reader of it may start a hand
         self.controller.stopped()
         self._channels.publish_changes()
         failure: Callable[[], RobotiqError] | None = None
-        if not task.cancelled() and (bug := task.exception()) is not None:
+        if bug is not None:
             self.options.log.critical("the task that owns the link failed", exc_info=bug)
             failure = lambda: ConnectionLostError(f"internal error: {bug!r}")  # noqa: E731
         elif self._poller.failure is not None:

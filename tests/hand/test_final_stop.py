@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import anyio
 import pytest
@@ -230,6 +231,52 @@ async def test_the_strongest_stop_counts_in_any_order(
     assert hand.state is State.SHUTDOWN
     assert gripper.is_moving == (strongest == "leave")
     assert Request.from_registers(gripper.request_registers).go == (strongest != "halt")
+
+
+class Closing(Wire):
+    """Calls something some turns of the loop after it was closed."""
+
+    def __init__(self, turns: int, call: Callable[[], object]) -> None:
+        super().__init__()
+        self._turns, self._call = turns, call
+
+    async def close(self) -> None:
+        await super().close()
+        self._after(self._turns)
+
+    def _after(self, turns: int) -> None:
+        call = functools.partial(self._after, turns - 1) if turns else self._call
+        asyncio.get_running_loop().call_soon(call)
+
+
+@pytest.mark.parametrize("keep_grip", [False, True])
+@pytest.mark.parametrize("turns", range(8))
+async def test_a_stop_in_the_last_turns_of_a_gentle_one_counts(turns: int, keep_grip: bool) -> None:
+    """As long as the hand is not in SHUTDOWN, a stronger stop counts."""
+    stops: list[asyncio.Task[None]] = []
+    was_over: list[bool] = []
+
+    async def stop() -> None:
+        was_over.append(hand.state is State.SHUTDOWN)
+        await hand.stop(keep_grip=keep_grip)
+
+    def begin() -> None:
+        if not stops:
+            stops.append(asyncio.create_task(stop()))
+
+    wire = Closing(turns, begin)
+    await activate_beforehand(wire.gripper)
+    hand = RobotiqHand(wire)
+    await hand.start()
+    hand.command(A, position=255, speed=0)
+    await until(lambda: wire.gripper.is_moving)
+    await hand.stop(halt=False)
+    await until(lambda: bool(stops))
+    await asyncio.gather(*stops)
+    await asyncio.sleep(0.1)
+    assert hand.state is State.SHUTDOWN
+    assert wire.gripper.is_moving == was_over[0]
+    assert not wire.is_open
 
 
 async def test_a_weaker_stop_hears_that_a_stronger_one_counts(
