@@ -120,7 +120,14 @@ class Soak:
 
     def random_move(self, axes: Finger) -> Awaitable[MoveResult]:
         speed, force = self.writes.next_settings()
-        return self.hand.move(self.rng.randrange(256), axes, speed=speed, force=force)
+        return self.hand.move(self.random_target(axes), axes, speed=speed, force=force)
+
+    def random_target(self, axes: Finger) -> int:
+        """Anywhere, or some counts from where an axis is: short moves end before a late status shows them."""
+        if self.rng.random() < 0.5:
+            return self.rng.randrange(256)
+        here = self.world.gripper.position(next(iter(axes)))
+        return min(255, max(0, round(here) + self.rng.randint(-30, 30)))
 
     async def set_position(self, axes: Finger) -> None:
         async def write() -> None:
