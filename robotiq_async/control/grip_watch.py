@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from ..values.checks import check_int, check_mask
+from ..values.checks import check_int, check_mask, repr_of
 from ..values.enums import Finger, ObjectStatus
 from ..values.grip import GripChange, GripEvent
 from ..values.model import Model
@@ -74,7 +74,7 @@ class GripWatch:
         self._axes = check_mask(fingers)
         self._slip = check_int("slip", slip, 1, 255)
         if since is not None and not isinstance(since, RobotiqStatus):
-            raise TypeError(f"since must be None or a RobotiqStatus, got {since!r}")
+            raise TypeError(f"since must be None or a RobotiqStatus, got {repr_of(since)}")
         self._grips: dict[Finger, _Grip] = {}
         self._last: RobotiqStatus | None = None
         self._passing_fault = PassingFault()

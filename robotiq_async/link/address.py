@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from ipaddress import IPv4Address, IPv6Address
 from typing import Final, Literal
 
-from ..values.checks import check_byte
+from ..values.checks import check_byte, repr_of
 from ..values.model import Model, model_of
 
 TCP_PORT: Final = 502  # the port of Modbus TCP, and the gripper's
@@ -100,7 +100,7 @@ def is_remote(address: object) -> bool:
 def parse_address(address: object) -> Address:
     """The address in a string."""
     if not isinstance(address, str):
-        raise TypeError(f"address must be a string, got {address!r}; accepted: {FORMS}")
+        raise TypeError(f"address must be a string, got {repr_of(address)}; accepted: {FORMS}")
     scheme, separator, rest = address.partition("://")
     scheme = scheme.lower()
     if not separator:
@@ -111,7 +111,10 @@ def parse_address(address: object) -> Address:
             return Address("sim", simulation=parse_simulation(rest), model=model)
     except ValueError as error:
         raise ValueError(f"malformed address {address!r}: {error}; accepted: {FORMS}") from None
-    if scheme == "rtu" and rest.strip("/") and rest == rest.strip() and "\0" not in rest:
+    if scheme == "rtu" and rest.strip("/") and rest == rest.strip() and rest.isprintable():
+        if "://" in rest:  # pyserial would open it, and block the event loop for seconds
+            what = f"{rest} is no serial port; for one behind a TCP socket use rtu+tcp://HOST:PORT"
+            raise ValueError(f"malformed address {address!r}: {what}; accepted: {FORMS}")
         return Address("rtu", rest, model=model)
     if scheme in ("tcp", "rtu+tcp"):
         # Serial servers have no usual port, so one must be given.

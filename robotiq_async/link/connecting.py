@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import socket
 from collections.abc import Callable
 from typing import Any, Final
 
+import anyio
 from pymodbus import FramerType
 from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
 
@@ -26,12 +28,16 @@ nothing else shows either end that the other is gone."""
 
 
 async def connected_client(
-    address: Address, on_data: Callable[[bytes], None], on_connection: Callable[[bool], None]
+    address: Address,
+    on_data: Callable[[bytes], None],
+    on_connection: Callable[[bool], None],
+    seconds: float,
 ) -> Client:
     """A client that is connected to the first reachable address of the host.
 
-    ``on_data`` gets the bytes that arrive, from the first one on; ``on_connection`` gets True when the
-    connection is made and False when it is lost.
+    The caller limits its time to ``seconds``: each address but the last gets an equal part of them, so that
+    one that does not answer leaves time for the others. ``on_data`` gets the bytes that arrive, from the
+    first one on; ``on_connection`` gets True when the connection is made and False when it is lost.
 
     Raises:
         ConnectFailedError: refused, unreachable, no such port, or no pyserial.
@@ -44,14 +50,16 @@ async def connected_client(
         "trace_connect": on_connection,
     }
     reasons: list[OSError] = []
-    for host in await _hosts(address):
+    hosts = await _hosts(address)
+    for host in hosts:
         client, connected = _make(address, host, options), False
         # Replaces pymodbus's receiver before the first byte can arrive: its buffer silently drops what does
         # not fit, and its framer accepts replies that frames.py refuses.
         client.ctx.data_received = on_data  # type: ignore[method-assign, assignment]
         _keep_reasons(client, reasons)
         try:
-            connected = await client.connect()
+            with anyio.move_on_after(math.inf if host is hosts[-1] else seconds / len(hosts)):
+                connected = await client.connect()
         except Exception as error:
             raise ConnectFailedError(str(address), str(error)) from error
         finally:
@@ -63,6 +71,19 @@ async def connected_client(
     last = reasons[-1] if reasons else None
     why = why_no_socket() or why_unreachable(last) if address.is_socket else why_no_port(last)
     raise ConnectFailedError(str(address), why) from last
+
+
+def disconnect(client: Client) -> None:
+    """Close the connection for every process that has it.
+
+    A process that was forked from this one has a copy of the socket: closing ours alone would leave the
+    gripper connected, and one that serves a single client would never take us back.
+    """
+    line = client.ctx.transport.get_extra_info("socket") if client.ctx.transport is not None else None
+    if line is not None:
+        with contextlib.suppress(OSError):
+            line.shutdown(socket.SHUT_RDWR)
+    client.close()
 
 
 async def _hosts(address: Address) -> list[str]:

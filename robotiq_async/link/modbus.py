@@ -37,7 +37,7 @@ from ..values.errors import (
 )
 from ..values.registers import REGISTER_COUNT, RegisterMap, Registers
 from .address import Address
-from .connecting import Client, connected_client
+from .connecting import Client, connected_client, disconnect
 from .frames import (
     Expected,
     MisfitError,
@@ -157,7 +157,9 @@ class ModbusTransport:
         self._received = b""
         try:
             with anyio.fail_after(self._connect_timeout):
-                client = await connected_client(self._address, self._on_data, self._on_connection)
+                client = await connected_client(
+                    self._address, self._on_data, self._on_connection, self._connect_timeout
+                )
         except TimeoutError:
             raise ConnectFailedError(
                 str(self._address), f"no connection within {self._connect_timeout:g} s"
@@ -276,7 +278,7 @@ class ModbusTransport:
         client, self._client = self._client, None
         if client is not None:
             self._watchdog.stop()
-            client.close()
+            disconnect(client)
 
     # -- what the connection calls ---------------------------------------------------------------------
 

@@ -32,16 +32,18 @@ class Watchdog:
         self._on_timeout = on_timeout
         self._due = 0.0
         self._has_grace = False
-        self._timer: asyncio.TimerHandle | None = None
+        # The handle of a foreign loop (qasync's) cannot tell its time, so that is kept beside it.
+        self._timer: asyncio.Handle | None = None
+        self._timer_due = math.inf
 
     def watch(self, by: float = math.inf) -> None:
         """Start watching an exchange; ``by`` is its latest end, in the loop's time."""
         self._due = min(self._loop.time() + self._seconds, by)
         self._has_grace = False
-        if self._timer is not None and self._timer.when() > self._due:
+        if self._timer is not None and self._timer_due > self._due:
             self.stop()
         if self._timer is None:
-            self._timer = self._loop.call_at(self._due, self._look, self._due)
+            self._set_timer()
 
     def stop(self) -> None:
         """Stop watching."""
@@ -58,6 +60,10 @@ class Watchdog:
         if now >= self._due and now - when > HELD_S and not self._has_grace:
             self._due, self._has_grace = now + GRACE_S, True
         if now < self._due:
-            self._timer = self._loop.call_at(self._due, self._look, self._due)
+            self._set_timer()
         else:
             self._on_timeout()
+
+    def _set_timer(self) -> None:
+        self._timer_due = self._due
+        self._timer = self._loop.call_at(self._due, self._look, self._due)

@@ -15,7 +15,7 @@ from ..link.modbus import ModbusTransport
 from ..link.sim_transport import SimulatedTransport, new_gripper
 from ..link.transport import Link, Transport
 from ..runtime.log import Log
-from ..values.checks import check_int
+from ..values.checks import check_int, repr_of
 from ..values.model import THREE_FINGER, Model, model_of
 from ..values.registers import REGISTER_COUNT, RegisterMap
 
@@ -89,7 +89,7 @@ def gripper_link(
         shown = f"<{type(address).__name__} at {id(address):#x}>"
         guarded = partial(GuardedTransport, address, shown, log=Log(name or shown))
         return GripperLink(shown, partial(Gripper, shown), guarded, model=model_of(model))
-    raise TypeError(f"address must be a string or a Transport, got {address!r}")
+    raise TypeError(f"address must be a string or a Transport, got {repr_of(address)}")
 
 
 def with_model(address: Address, model: object) -> Address:

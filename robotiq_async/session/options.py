@@ -17,7 +17,7 @@ from typing import Annotated, Final, get_type_hints
 from ..link.transport import Link, Transport
 from ..runtime.log import Log
 from ..values.calibration import ForceCalibration, SpeedCalibration, Units
-from ..values.checks import check_byte, check_flag, check_int, check_seconds
+from ..values.checks import check_byte, check_flag, check_int, check_seconds, repr_of
 from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..values.model import MODELS, THREE_FINGER, Model, model_of
 from ..values.registers import RTU_REGISTERS, TCP_REGISTERS
@@ -126,7 +126,7 @@ def _check_name(_: str, name: object) -> str | None:
     if name is None:
         return None
     if not isinstance(name, str):
-        raise TypeError(f"name must be {form}, got {name!r}")
+        raise TypeError(f"name must be {form}, got {repr_of(name)}")
     if not 1 <= len(name) <= LONGEST_NAME or not name.isprintable() or name != name.strip():
         raise ValueError(f"name must be {form}, got {name!r:.100}")
     return name
@@ -134,13 +134,13 @@ def _check_name(_: str, name: object) -> str | None:
 
 def _check_reconnect(_: str, reconnect: object) -> object:
     if not isinstance(reconnect, bool | ReconnectPolicy):
-        raise TypeError(f"reconnect must be True, False or a ReconnectPolicy, got {reconnect!r}")
+        raise TypeError(f"reconnect must be True, False or a ReconnectPolicy, got {repr_of(reconnect)}")
     return reconnect
 
 
 def _check_speeds(_: str, speeds: object) -> SpeedCalibration | None:
     if not isinstance(speeds, SpeedCalibration | None):
-        raise TypeError(f"calibration must be None or a SpeedCalibration, got {speeds!r}")
+        raise TypeError(f"calibration must be None or a SpeedCalibration, got {repr_of(speeds)}")
     if speeds is not None and (ends := (speeds.points[0][0], speeds.points[-1][0])) != (0, 255):
         raise ValueError(f"calibration must reach over the speed values 0..255, got {ends[0]}..{ends[1]}")
     return speeds
@@ -148,7 +148,7 @@ def _check_speeds(_: str, speeds: object) -> SpeedCalibration | None:
 
 def _check_forces(_: str, forces: object) -> ForceCalibration | None:
     if not isinstance(forces, ForceCalibration | None):
-        raise TypeError(f"force_calibration must be None or a ForceCalibration, got {forces!r}")
+        raise TypeError(f"force_calibration must be None or a ForceCalibration, got {repr_of(forces)}")
     return forces
 
 

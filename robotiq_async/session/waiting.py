@@ -11,6 +11,7 @@ import anyio
 
 from ..control.state_machine import StateMachine
 from ..runtime.log import Log
+from ..values.checks import repr_of
 from ..values.enums import Severity, State
 from ..values.errors import RobotiqError
 from ..values.registers import Registers
@@ -31,7 +32,7 @@ def check_states(states: Collection[object]) -> None:
         raise ValueError("states must name at least one State, got none")
     for state in states:
         if not isinstance(state, State):
-            raise TypeError(f"states must be State members, got {state!r}")
+            raise TypeError(f"states must be State members, got {repr_of(state)}")
 
 
 class StateWaiters:

@@ -33,10 +33,18 @@ def check_int(name: str, value: object, low: int, high: int) -> int:
     """An int in low..high."""
     number = as_int(value)
     if number is None:
-        raise TypeError(f"{name} must be an int in {low}..{high}, got {value!r}")
+        raise TypeError(f"{name} must be an int in {low}..{high}, got {repr_of(value)}")
     if not low <= number <= high:
-        raise ValueError(f"{name} must be in {low}..{high}, got {value!r}")
+        raise ValueError(f"{name} must be in {low}..{high}, got {repr_of(value)}")
     return number
+
+
+def repr_of(value: object) -> str:
+    """A value for a message. Python refuses to write an int of more than 4,300 digits."""
+    try:
+        return repr(value)
+    except ValueError:
+        return f"a number of {int(value).bit_length()} bits" if isinstance(value, int) else "a huge number"
 
 
 def as_int(value: object) -> int | None:
@@ -53,9 +61,9 @@ def check_mask(fingers: object) -> Finger:
     """A mask of axes: a Finger, or an int in 1..15."""
     mask = as_int(fingers)
     if mask is None:
-        raise TypeError(f"fingers must be a Finger mask or an int in 1..15, got {fingers!r}")
+        raise TypeError(f"fingers must be a Finger mask or an int in 1..15, got {repr_of(fingers)}")
     if not 1 <= mask <= 15:
-        raise ValueError(f"fingers must be a mask of Finger members in 1..15, got {mask!r}")
+        raise ValueError(f"fingers must be a mask of Finger members in 1..15, got {repr_of(mask)}")
     return Finger(mask)
 
 
@@ -80,10 +88,12 @@ def check_axis(finger: object) -> Finger:
         return finger
     value = as_int(finger)
     if value is None:
-        raise TypeError(f"finger must be one Finger (A, B, C or SCISSOR), got {finger!r}")
+        raise TypeError(f"finger must be one Finger (A, B, C or SCISSOR), got {repr_of(finger)}")
     axis = _BY_VALUE.get(value)
     if axis is None:
-        raise ValueError(f"finger must be one of Finger.A, B, C or SCISSOR (1, 2, 4 or 8), got {finger!r}")
+        raise ValueError(
+            f"finger must be one of Finger.A, B, C or SCISSOR (1, 2, 4 or 8), got {repr_of(finger)}"
+        )
     return axis
 
 
@@ -96,9 +106,9 @@ def check_number(name: str, value: object, low: float, high: float, what: str = 
     """A number within low..high; ``what`` is for the message."""
     number = as_float(value)
     if number is None:
-        raise TypeError(f"{name} must be {what} in {low}..{high}, got {value!r}")
+        raise TypeError(f"{name} must be {what} in {low}..{high}, got {repr_of(value)}")
     if not low <= number <= high:
-        raise ValueError(f"{name} must be {what} in {low}..{high}, got {value!r}")
+        raise ValueError(f"{name} must be {what} in {low}..{high}, got {repr_of(value)}")
     return number
 
 
@@ -122,16 +132,16 @@ def check_timeout(name: str, value: object) -> float | None:
         return None
     number = as_float(value)
     if number is None:
-        raise TypeError(f"{name} must be None or seconds above 0, got {value!r}")
+        raise TypeError(f"{name} must be None or seconds above 0, got {repr_of(value)}")
     if not 0 < number <= sys.float_info.max:
-        raise ValueError(f"{name} must be None or seconds above 0, got {value!r}")
+        raise ValueError(f"{name} must be None or seconds above 0, got {repr_of(value)}")
     return number
 
 
 def check_flag(name: str, value: object) -> bool:
     """True or False."""
     if not isinstance(value, bool):
-        raise TypeError(f"{name} must be True or False, got {value!r}")
+        raise TypeError(f"{name} must be True or False, got {repr_of(value)}")
     return value
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from . import registers as reg
-from .checks import check_axis, check_byte, check_int, check_mask, check_number
+from .checks import check_axis, check_byte, check_int, check_mask, check_number, repr_of
 from .enums import Fault, Finger, ObjectStatus, names_of
 from .registers import Field, RegisterMap, Registers
 
@@ -271,7 +271,7 @@ def model_of(value: object, name: str = "model") -> Model:
     if isinstance(value, Model):
         return value
     if not isinstance(value, str):
-        raise TypeError(f"{name} must be a Model or one of {', '.join(MODELS)}, got {value!r}")
+        raise TypeError(f"{name} must be a Model or one of {', '.join(MODELS)}, got {repr_of(value)}")
     if value.lower() not in MODELS:
         raise ValueError(f"{name} must be one of {', '.join(MODELS)}, got {value!r:.100}")
     return MODELS[value.lower()]

@@ -12,7 +12,7 @@ from collections.abc import MutableSequence, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from .checks import as_int
+from .checks import as_int, repr_of
 
 REGISTER_COUNT: Final = 8  # registers in either block
 
@@ -128,7 +128,7 @@ def check_registers(registers: Sequence[int]) -> Registers:
 def _checked(index: int, given: object) -> int:
     register = as_int(given)
     if register is None:
-        raise TypeError(f"registers[{index}] must be an int in 0..65535, got {given!r}")
+        raise TypeError(f"registers[{index}] must be an int in 0..65535, got {repr_of(given)}")
     if not 0 <= register <= 0xFFFF:
         raise ValueError(f"registers[{index}] must be in 0..65535, got {register}")
     return register

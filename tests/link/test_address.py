@@ -148,6 +148,8 @@ MALFORMED = {
     "IPv6 digits": ["[:]", "[:::::]", "[1:2]", "[1::2::3]", "[::12345]", "[::1%]", "[%:]"],
     "serial": ["rtu://", "rtu:///", "rtu:////", "rtu:", "rtu:/dev/x", "rtu:// /dev/x", "rtu:///dev/x "],
     "serial port": ["rtu:///dev/x\n", "rtu:///dev/tty\0USB0", "/dev/ttyUSB0"],
+    "terminal": ["rtu:///dev/tty\x1b[2J", "rtu:///dev/tty\x07", "rtu:///dev/tty\u202e", "\x1b[2Jhost"],
+    "pyserial": ["rtu://socket://192.168.1.20:5000", "rtu://rfc2217://host:1", "rtu://loop://"],
     "simulator": ["sim://x", "sim:///", "sim:// ", "sim:"],
     "serial server": ["rtu+tcp://192.168.1.20", "rtu+tcp://", "rtu+tcp://[::1]", "rtu+tcp:///dev/ttyUSB0"],
 }

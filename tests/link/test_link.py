@@ -9,6 +9,8 @@ import asyncio
 import contextlib
 import errno
 import logging
+import os
+import signal
 import socket
 import threading
 import time
@@ -333,6 +335,24 @@ async def test_opening_again_leaves_no_old_connection() -> None:
         assert scripted.connections == 2
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+async def test_a_forked_process_does_not_keep_the_connection() -> None:
+    """A worker of a ProcessPoolExecutor has a copy of the socket, and outlives the connection."""
+    async with linked() as (transport, scripted):
+        child = os.fork()
+        if child == 0:
+            signal.pause()
+            os._exit(0)
+        try:
+            await transport.close()
+            async with asyncio.timeout(5.0):
+                await scripted.writers[0].wait_closed()
+        finally:
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)  # noqa: ASYNC222  # it was killed
+
+
 # -- names -------------------------------------------------------------------------------------------------
 
 
@@ -367,6 +387,24 @@ async def test_the_first_address_of_a_name_that_can_be_reached(
         await named.open()
         assert await named.read() == REGISTERS
         await named.close()
+
+
+async def test_an_address_that_does_not_answer_leaves_time_for_others(resolved: Callable[..., None]) -> None:
+    """Its queue of connections is full, so it does not even refuse."""
+    async with linked() as (transport, _):
+        with contextlib.ExitStack() as sockets:
+            silent = sockets.enter_context(socket.socket())
+            silent.bind(("127.0.0.2", transport._address.port))
+            silent.listen(0)
+            for _ in range(3):
+                waiting = sockets.enter_context(socket.socket())
+                waiting.setblocking(False)
+                waiting.connect_ex(silent.getsockname())
+            resolved("127.0.0.2", "127.0.0.1")
+            named = to_the_host(transport)
+            await named.open()
+            assert await named.read() == REGISTERS
+            await named.close()
 
 
 async def test_no_address_of_a_name_can_be_reached(resolved: Callable[..., None]) -> None:

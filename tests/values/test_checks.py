@@ -73,6 +73,18 @@ def test_a_value_beyond_a_byte_is_a_value_error(value: int) -> None:
         check_byte("force", value)
 
 
+@pytest.mark.parametrize("value", [10**5000, -(10**5000)], ids=["large", "small"])
+def test_an_integer_that_python_does_not_write_out_is_refused_with_its_argument(value: int) -> None:
+    with refused(ValueError, "force must be in 0..255, got a number of 16610 bits"):
+        check_byte("force", value)
+    with refused(ValueError, "fingers must be a mask of Finger members in 1..15, got a number"):
+        check_mask(value)
+    with refused(ValueError, "finger must be one of Finger.A, B, C or SCISSOR (1, 2, 4 or 8), got a number"):
+        check_axis(value)
+    with refused(ValueError, "timeout must be seconds in 0..9, got a number"):
+        check_seconds("timeout", value, 0, 9)
+
+
 @pytest.mark.parametrize("value", NOT_INTEGERS, ids=repr)
 def test_a_value_that_is_not_an_integer_is_a_type_error(value: object) -> None:
     with refused(TypeError, f"speed must be an int in 0..255, got {value!r}"):
