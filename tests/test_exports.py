@@ -103,6 +103,17 @@ def test_every_public_method_and_attribute_is_described() -> None:
                 assert f"{field}:" in value.__doc__, f"{name}.{field} is not in its docstring"
 
 
+def test_every_error_that_a_docstring_names_is_exported() -> None:
+    errors = {name for name in vars(robotiq_async.values.errors) if name.endswith("Error")}
+    for module in (robotiq_async, fleet, sync):
+        ours = set(module.__all__) | set(robotiq_async.__all__)
+        for name, method in methods():
+            owner = name.partition(".")[0]
+            named = set(re.findall(r"\b[A-Z]\w+Error\b", method.__doc__ or "")) & errors
+            if owner in module.__all__:
+                assert named <= ours, f"{name} names {named - ours}"
+
+
 def test_the_parameters_of_the_calls_are_those_of_the_contract() -> None:
     hand = robotiq_async.RobotiqHand
     empty = inspect.Parameter.empty

@@ -17,6 +17,7 @@ from typing import Self
 
 from cyclopts import CycloptsError
 
+from ..session.options import LATE_POLLS
 from ..values.errors import RobotiqError
 from .app import build
 from .failures import CommandError, UsageError
@@ -33,7 +34,13 @@ def run(arguments: Sequence[str]) -> int:
     """Run the sub-command that the arguments name and return the exit code."""
     _mend_streams()
     warnings: list[str] = []
-    with forwarded_warnings(warnings.append), _Signals() as signals:
+
+    def keep(warning: str) -> None:
+        # A command that ends soon imports while it polls: that a poll was late tells its user nothing.
+        if LATE_POLLS not in warning:
+            warnings.append(warning)
+
+    with forwarded_warnings(keep), _Signals() as signals:
         code, problem = _outcome(arguments, signals)
     # A failure is always one line, for logs and scripts.
     lines = warnings if problem is None else ["; ".join((problem, *warnings))]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection
 from types import TracebackType
-from typing import TYPE_CHECKING, Final, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Final, Literal, NoReturn, Self, TypeVar
 
 from ..control.grip_watch import SLIP_COUNTS, GripWatch
 from ..runtime.concurrency import running_loop
@@ -30,7 +30,7 @@ from ..values.model import THREE_FINGER, Model
 from ..values.move_result import MoveResult
 from ..values.statistics import Statistics
 from ..values.status import RobotiqStatus
-from .run import NamesErrors, Run, refuse_with
+from .run import NamesErrors, Run, refuse_copy, refuse_with
 
 T = TypeVar("T")
 LONGEST_BUFFER: Final = 1_000_000  # items: over an hour of statuses at 200 Hz
@@ -90,6 +90,9 @@ class Hand(ABC):
     def __repr__(self) -> str:
         name = f"{self._given_name} " if self._given_name else ""
         return f"<{type(self).__name__} {name}{self._address} {self.state.name}>"
+
+    def __reduce__(self) -> NoReturn:
+        refuse_copy(self)
 
     # -- lifetime --------------------------------------------------------------------------------------
 

@@ -164,6 +164,8 @@ class RobotiqHand(Hand):
     # -- lifetime --------------------------------------------------------------------------------------
 
     async def _start(self, activate: bool, wait: float) -> None:
+        if self._session is not None and not self._session.is_over:
+            self._session.check_loop("hand.start()")
         self._session = session = Session(
             self._options, self._machine, self._channels, activate=activate, wait=wait
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NoReturn, Protocol
 
 from ..values.errors import RobotiqError
 
@@ -41,6 +41,18 @@ class NamesErrors:
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if self._name and isinstance(error, RobotiqError):
             error.hand = self._name
+
+
+def refuse_copy(hand: object) -> NoReturn:
+    """Say why a hand is neither pickled nor copied.
+
+    Raises:
+        TypeError: always.
+    """
+    raise TypeError(
+        f"a {type(hand).__name__} cannot be pickled or copied: it owns the connection to its gripper. "
+        "Make one where it is used, from its address, and stop this one first"
+    )
 
 
 def refuse_with(hand: object) -> None:

@@ -80,9 +80,12 @@ def disconnect(client: Client) -> None:
     gripper connected, and one that serves a single client would never take us back.
     """
     line = client.ctx.transport.get_extra_info("socket") if client.ctx.transport is not None else None
-    if line is not None:
-        with contextlib.suppress(OSError):
-            line.shutdown(socket.SHUT_RDWR)
+    # By a copy of our own: uvloop's sockets cannot be shut down, and not every loop gives one.
+    with (
+        contextlib.suppress(AttributeError, OSError),
+        socket.fromfd(line.fileno(), line.family, line.type) as copy,
+    ):
+        copy.shutdown(socket.SHUT_RDWR)
     client.close()
 
 

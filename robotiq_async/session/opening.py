@@ -46,14 +46,7 @@ class Opener:
         Raises:
             RobotiqConnectionError: the last try has failed.
         """
-        told = ""
-
-        def tell(error: RobotiqConnectionError) -> None:
-            nonlocal told
-            if str(error) != told:
-                told = str(error)
-                self._log.warning("no gripper yet, trying for %g s: %s", wait, told)
-
+        tell = self._once_each(f"no gripper yet, trying for {wait:g} s")
         policy = replace(self._options.policy or ReconnectPolicy(), give_up_after=wait)
         try:
             return await self._open(policy, tell)
@@ -61,15 +54,33 @@ class Opener:
             why = f"connected, but no device answers: {error}"
             raise ConnectFailedError(self._options.link.address, why) from error
 
-    async def again(self, policy: ReconnectPolicy) -> bool:
+    async def again(self, policy: ReconnectPolicy, failed: Callable[[RobotiqConnectionError], None]) -> bool:
         """Open a link that was lost; False when that was ended meanwhile.
+
+        ``failed`` is called with the error of each try but the last.
 
         Raises:
             RobotiqConnectionError: the last try has failed.
         """
-        return await self._open(
-            policy, lambda error: self._log.debug("still no link: %s", error), policy.first_delay
-        )
+        tell = self._once_each("still no link")
+
+        def note(error: RobotiqConnectionError) -> None:
+            tell(error)
+            failed(error)
+
+        return await self._open(policy, note, policy.first_delay)
+
+    def _once_each(self, what: str) -> Callable[[RobotiqConnectionError], None]:
+        """Make a function that logs an error if it differs from the one before."""
+        told = ""
+
+        def tell(error: RobotiqConnectionError) -> None:
+            nonlocal told
+            if str(error) != told:
+                told = str(error)
+                self._log.warning("%s: %s", what, told)
+
+        return tell
 
     async def _open(
         self,

@@ -42,6 +42,7 @@ replies, so that a stream of commands misses no polls."""
 WRITE_SPACING_S: Final = 0.01
 """The manual of 2014 (chapters on TCP and RTU): registers are renewed at 100 Hz; leave 10 ms, or some writes
 are lost. Users of two-finger grippers on two arms saw that."""
+LATE_POLLS: Final = "polling was late"  # how the warning about late polls begins
 LONGEST_SPACING_S: Final = 0.1  # a command waits that long at most before it is written
 CONNECT_TIMEOUT_S: Final = 2.0
 """A lost first packet is sent again after 1 s; what answers neither is not there."""

@@ -13,6 +13,8 @@ import asyncio
 import contextlib
 import importlib
 import math
+import sys
+from time import strftime
 from typing import Final
 
 import anyio
@@ -23,7 +25,14 @@ from ..link.transport import Link
 from ..link.watchdog import HELD_S
 from ..runtime.tick import Tick
 from ..values.enums import Ending
-from ..values.errors import NotStartedError, ResponseTimeoutError, RobotiqConnectionError, WrongModelError
+from ..values.errors import (
+    ConnectionLostError,
+    NotStartedError,
+    ResponseTimeoutError,
+    RobotiqConnectionError,
+    RobotiqError,
+    WrongModelError,
+)
 from ..values.events import SentRequest
 from ..values.model import names_that_fit
 from ..values.registers import Registers
@@ -31,7 +40,7 @@ from ..values.request import Request
 from ..values.statistics import Counters
 from ..values.status import RobotiqStatus
 from .opening import Opener
-from .options import LONGEST_SPACING_S, HandOptions
+from .options import LATE_POLLS, LONGEST_SPACING_S, HandOptions
 from .streams import Channels
 
 # anyio loads its backend at its first use, which would hold up the loop for some 20 ms when a hand starts.
@@ -51,11 +60,9 @@ SOON_S: Final = 0.0025
 """How long a cycle waits for write_spacing: half of a usual period, so that its status is still fresh."""
 LATE_S: Final = 0.05
 """A poll that is later than this is worth a warning; on a busy machine a few milliseconds are usual."""
-LATE_WARNING_S: Final = 1.0  # seconds between two warnings about late polls
-HELD_UP: Final = (
-    "something holds up the event loop, or it was not running (as between the prompts of IPython's terminal: "
-    "use robotiq_async.sync there)"
-)
+LATE_WARNING_S: Final = 60.0  # seconds between two warnings about late polls
+HELD_UP: Final = "something holds up the event loop, or it was not running"
+IN_IPYTHON: Final = " (as between the prompts of IPython's terminal: use robotiq_async.sync there)"
 
 
 class Poller:
@@ -91,6 +98,8 @@ class Poller:
         self.connected: asyncio.Future[None] = self._loop.create_future()
         self.failure: RobotiqConnectionError | None = None
         self.why_lost: RobotiqConnectionError | None = None
+        self.lost_since = ""
+        """The time of day at which the link went down, if it is down."""
         self._stopping = False
         self._end_by = math.inf
         self._ending = Ending.LEAVE
@@ -100,6 +109,8 @@ class Poller:
         self._tick = Tick(options.poll_interval)
         self._last_poll = 0.0
         self._warned = -math.inf
+        self._late: list[float] = []
+        """The seconds of each late poll since the last warning about them."""
         self._decided: tuple[Request, float] | None = None  # the last image decided on, and when
 
     def request_stop(self, *, halt: bool, keep_grip: bool = False) -> None:
@@ -146,17 +157,28 @@ class Poller:
 
     async def run(self) -> None:
         """Own the link until asked to stop, or until the policy gives up."""
+        bug: Exception | None = None
         try:
             if await self._connect_first():
                 with anyio.CancelScope() as self._polling:
                     await self._poll()
                 if self._polling.cancelled_caught:
                     self._controller.lost(ResponseTimeoutError("no answer until the hand was stopped"))
+        except Exception as error:
+            bug = error
+            raise
         finally:
             # An abandoned task is ended when it is collected: the hand may have been started again by then.
             if not self._loop.is_closed():
                 await self._finish()
-                fail([self.connected], NotStartedError("the hand was stopped while it connected"))
+                fail([self.connected], self._not_connected(bug))
+
+    @staticmethod
+    def _not_connected(bug: Exception | None) -> RobotiqError:
+        """Why the task has ended before the first status."""
+        if bug is not None:
+            return ConnectionLostError(f"internal error: {bug!r}")
+        return NotStartedError("the hand was stopped while it connected")
 
     # -- connecting ------------------------------------------------------------------------------------
 
@@ -188,7 +210,8 @@ class Poller:
     async def _reconnect(self, why: RobotiqConnectionError) -> bool:
         """Open the link again; False when that is given up, or when asked to stop."""
         self._log.warning("link lost: %s", why)
-        self.why_lost = self._controller.machine.why_down = why
+        self.lost_since = strftime("%H:%M:%S")
+        self._note_why_lost(why)
         self._controller.lost(why)
         self._channels.publish_changes()
         policy, since = self._options.policy, self._loop.time()
@@ -196,15 +219,20 @@ class Poller:
             self.failure = why
             return False
         try:
-            connected = await self._opener.again(policy)
+            connected = await self._opener.again(policy, self._note_why_lost)
         except RobotiqConnectionError as error:
             self.failure = error
             return False
         if connected:
-            self.why_lost = None
+            self.why_lost, self.lost_since = None, ""
             self._counters.reconnects += 1
             self._log.warning("link back after %.2f s", self._loop.time() - since)
         return connected
+
+    def _note_why_lost(self, why: RobotiqConnectionError) -> None:
+        """The newest reason counts: the first one is often the least telling."""
+        self.why_lost = why
+        self._controller.machine.why_down = f"{why} (down since {self.lost_since})"
 
     # -- polling ---------------------------------------------------------------------------------------
 
@@ -316,13 +344,16 @@ class Poller:
         return passed
 
     def _warn_late(self, late: float) -> None:
+        self._late.append(late)
         now = self._loop.time()
         if now - self._warned < LATE_WARNING_S:
             return
         self._warned = now
-        why = "the gripper answers slowly" if self._tick.late < late / 2 else HELD_UP
-        missed = self._counters.overruns
-        self._log.warning("polling is %.0f ms late: %s (%d polls missed so far)", 1000 * late, why, missed)
+        why = "the gripper answers slowly" if self._tick.late < late / 2 else HELD_UP + _where()
+        late_polls, self._late = self._late, []
+        often = "" if len(late_polls) == 1 else f"{len(late_polls)} times, at most "
+        by, missed = 1000 * max(late_polls), self._counters.overruns
+        self._log.warning("%s, %s%.0f ms: %s (%d polls missed so far)", LATE_POLLS, often, by, why, missed)
 
     # -- the end ---------------------------------------------------------------------------------------
 
@@ -389,3 +420,9 @@ class Poller:
             if self._controller.machine.sequence is None:
                 return
             await asyncio.sleep(self._options.poll_interval)
+
+
+def _where() -> str:
+    """A hint for those who type at IPython's prompt, empty for others."""
+    ipython = sys.modules.get("IPython")
+    return IN_IPYTHON if ipython is not None and ipython.get_ipython() is not None else ""

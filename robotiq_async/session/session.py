@@ -197,7 +197,8 @@ class Session:
     def link_lost(self) -> RobotiqConnectionError:
         """Make the error for a link that is down, with the reason if that is known."""
         failure = self._poller.failure or self._poller.why_lost
-        error = ConnectionLostError(f"the link is down{'' if failure is None else f': {failure}'}")
+        since = f" (down since {self._poller.lost_since})" if self._poller.lost_since else ""
+        error = ConnectionLostError(f"the link is down{'' if failure is None else f': {failure}'}{since}")
         error.__cause__ = failure
         error.hand = self.options.given_name
         return error

@@ -167,6 +167,8 @@ class Listeners:
         self._log = log
         self._listeners: dict[object, Listener] = {}
         """By a key of their own: the same callback may be added twice."""
+        self._interrupted: set[object] = set()
+        """The keys of those in which the program was interrupted."""
         self._items: deque[object] = deque()
         self._is_telling = False
 
@@ -199,6 +201,14 @@ class Listeners:
             except (Exception, asyncio.CancelledError):  # noqa: BLE001  # no listener may end the poller task
                 self._remove(key)
                 self._log.exception("a listener raised, and is no longer called: %r", listener)
+            except BaseException:
+                # A Ctrl-C, perhaps by chance in this one. But one that ends the program at every item would
+                # keep the fingers from being stopped.
+                if key not in self._interrupted:
+                    self._interrupted.add(key)
+                    raise
+                self._remove(key)
+                self._log.exception("a listener interrupts again, and is no longer called: %r", listener)
 
     def _remove(self, key: object) -> None:
         self._listeners.pop(key, None)

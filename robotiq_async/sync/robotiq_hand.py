@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Generic, Self, TypeVar
+from typing import Generic, NoReturn, Self, TypeVar
 
 from ..control.grip_watch import SLIP_COUNTS
 from ..hand.robotiq_hand import RobotiqHand as AsyncRobotiqHand
+from ..hand.run import refuse_copy
 from ..link.transport import Transport
 from ..session.options import (
     ACTIVATION_TIMEOUT_S,
@@ -155,6 +156,9 @@ class RobotiqHand:
     def _inner(self) -> AsyncRobotiqHand:
         self._caller.check_process()
         return self._hand
+
+    def __reduce__(self) -> NoReturn:
+        refuse_copy(self)
 
     def __repr__(self) -> str:
         return repr(self._hand)

@@ -9,6 +9,7 @@ from itertools import pairwise
 import pytest
 
 from robotiq_async import Fault, Finger, NotActivatedError, RobotiqHand, State
+from robotiq_async.session.options import LATE_POLLS
 from robotiq_async.simulator import Trouble
 from robotiq_async.values.request import Request
 from tests.adversity.world import World, started, world
@@ -35,13 +36,13 @@ async def test_missed_polls_are_counted_and_skipped(here: World) -> None:
 
 
 @inside(started)
-async def test_one_warning_a_second_at_most(here: World, caplog: pytest.LogCaptureFixture) -> None:
+async def test_one_warning_a_minute_at_most(here: World, caplog: pytest.LogCaptureFixture) -> None:
     began = here.loop.time()
-    while here.loop.time() - began < 10.0:
+    while here.loop.time() - began < 100.0:
         here.loop.hold_up(0.2)
         await asyncio.sleep(0.025)
     warnings = [each.message for each in caplog.records if "holds up the event loop" in each.message]
-    assert 5 <= len(warnings) <= 11
+    assert len(warnings) == 2
 
 
 @inside(world)
@@ -53,7 +54,7 @@ async def test_slow_replies_are_not_blamed_on_the_loop_alone(
     await here.hand.start()
     await asyncio.sleep(1.0)
     assert here.hand.statistics.longest_stall < 0.01
-    (warning,) = [each.message for each in caplog.records if "polling is" in each.message]
+    (warning,) = [each.message for each in caplog.records if LATE_POLLS in each.message]
     assert "the gripper answers slowly" in warning
     assert "event loop" not in warning
 
@@ -189,7 +190,7 @@ def test_a_loop_that_was_not_running_is_late_and_goes_on(kind: str, caplog: pyte
         runner.run(asyncio.sleep(0.02))
         (warning,) = caplog.messages
         assert "it was not running" in warning
-        assert "robotiq_async.sync" in warning
+        assert "robotiq_async.sync" not in warning, "a hint for IPython alone"
         stall = hand.statistics.longest_stall
         assert 0.15 < stall < 0.6
         # It goes on as if nothing had been.

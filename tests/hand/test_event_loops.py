@@ -42,6 +42,38 @@ async def test_a_command_from_another_thread_is_an_error_and_asks_for_nothing(
     await hand.move(20, Finger.A)
 
 
+async def test_a_start_from_another_loop_is_refused(hand: RobotiqHand) -> None:
+    with pytest.raises(RuntimeError, match=r"hand.start\(\) was used outside of the event loop"):
+        await asyncio.to_thread(lambda: asyncio.run(hand.start()))
+    assert hand.state is State.RUNNING_IDLE
+
+
+class _Handle:
+    """A timer handle as qasync has it: it can be cancelled, and cannot tell its time."""
+
+    def __init__(self, handle: asyncio.TimerHandle) -> None:
+        self.cancel = handle.cancel
+        self.cancelled = handle.cancelled
+
+
+class _ForeignLoop(asyncio.SelectorEventLoop):
+    def call_later(self, delay: float, callback: Any, *arguments: Any, **options: Any) -> Any:
+        return self.call_at(self.time() + delay, callback, *arguments, **options)
+
+    def call_at(self, when: float, callback: Any, *arguments: Any, **options: Any) -> Any:
+        return _Handle(super().call_at(when, callback, *arguments, **options))
+
+
+def test_a_loop_whose_timer_handles_cannot_tell_their_time_runs_a_hand() -> None:
+    async def program() -> None:
+        gripper = SimulatedGripper(asyncio.get_running_loop().time, speedup=100)
+        async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
+            await hand.move(100, Finger.A, speed=255)
+
+    with asyncio.Runner(loop_factory=_ForeignLoop) as runner:
+        runner.run(program())
+
+
 async def test_the_advice_works(hand: RobotiqHand, gripper: SimulatedGripper) -> None:
     loop = asyncio.get_running_loop()
 

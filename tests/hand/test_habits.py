@@ -11,6 +11,8 @@ import pytest
 
 from robotiq_async import (
     ActivationTimeoutError,
+    ConnectFailedError,
+    ConnectionLostError,
     Finger,
     GripChange,
     MoveTimeoutError,
@@ -25,7 +27,7 @@ from robotiq_async.session.waiting import STALLED_S, TOLD_EVERY_S
 from robotiq_async.simulator import Habits
 from robotiq_async.values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, Model
 from robotiq_async.values.registers import Registers
-from tests.fake_transport import Asleep, Wire
+from tests.fake_transport import LOST, Asleep, Wire
 from tests.grippers import activate_beforehand
 from tests.virtual import VirtualLoop
 
@@ -243,6 +245,27 @@ async def test_a_first_motion_of_nothing_ends_at_once(target: int, fingers: Fing
         began = now()
         await hand.move(target, fingers)
         assert now() - began < 0.5
+
+
+# -- a link that does not come back ------------------------------------------------------------------------
+
+
+async def test_the_newest_reason_is_given_and_since_when_the_link_is_down(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """The adapter was pulled out: the first reason says nothing of it."""
+    caplog.set_level(logging.WARNING, "robotiq_async")
+    wire = Wire()
+    await activate_beforehand(wire.gripper)
+    async with RobotiqHand(wire) as hand:
+        wire.failing = {"read": LOST, "open": ConnectFailedError("wire", "there is no such device")}
+        await hand.wait_for_state(State.DISCONNECTED)
+        await asyncio.sleep(5)
+        for call in (hand.move(100), hand.recover()):
+            with pytest.raises(ConnectionLostError, match=r"no such device \(down since \d\d:\d\d:\d\d\)"):
+                await call
+        assert caplog.text.count("still no link: ") == 1
+        wire.failing.clear()
 
 
 # -- an emergency stop -------------------------------------------------------------------------------------

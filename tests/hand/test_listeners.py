@@ -19,6 +19,10 @@ from robotiq_async import (
     Transition,
 )
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.values.request import Request
+from tests.fake_transport import Wire
+from tests.grippers import activate_beforehand
+from tests.virtual import VirtualLoop
 
 A = Finger.A
 
@@ -162,6 +166,32 @@ async def test_a_listener_that_raises_does_not_end_the_hand(
         await hand.move(40, A)
     assert [record.levelno for record in caplog.records] == [logging.ERROR]
     assert hand.state is State.RUNNING_IDLE
+
+
+@pytest.mark.parametrize("error", [SystemExit, KeyboardInterrupt])
+def test_a_listener_that_ends_the_program_at_every_item_leaves_the_fingers_stopped(
+    error: type[BaseException],
+) -> None:
+    """It ended the stop of the fingers, too: rGTO stayed set after the program."""
+    grippers: list[SimulatedGripper] = []
+
+    def end(item: object) -> None:
+        if grippers[0].is_moving:
+            raise error
+
+    async def program() -> None:
+        wire = Wire()
+        grippers.append(wire.gripper)
+        await activate_beforehand(wire.gripper)
+        async with RobotiqHand(wire) as hand:
+            hand.add_listener(end)
+            await hand.move(255, speed=0)
+
+    with pytest.raises(error), asyncio.Runner(loop_factory=VirtualLoop) as runner:
+        runner.run(program())
+    (gripper,) = grippers
+    assert not Request.from_registers(gripper.request_registers).go
+    assert not gripper.is_moving
 
 
 async def coroutine(item: object) -> None:

@@ -6,7 +6,7 @@ import asyncio
 import copy
 import logging
 import pickle
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 import pytest
@@ -26,6 +26,7 @@ from robotiq_async import (
     RobotiqHand,
     State,
     StateTimeoutError,
+    sync,
 )
 from robotiq_async.session.options import LONGEST_NAME
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
@@ -46,6 +47,16 @@ async def named(server: SimulatorServer, clock: Clock) -> AsyncIterator[RobotiqH
     await started(hand, clock)
     yield hand
     await hand.stop()
+
+
+# -- what it is not ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", [RobotiqHand, sync.RobotiqHand], ids=["async", "blocking"])
+@pytest.mark.parametrize("how", [pickle.dumps, copy.copy, copy.deepcopy])
+def test_a_hand_is_neither_pickled_nor_copied(kind: type[object], how: Callable[[object], object]) -> None:
+    with pytest.raises(TypeError, match=r"RobotiqHand cannot be pickled or copied: it owns the connection"):
+        how(kind())
 
 
 # -- what it is called -------------------------------------------------------------------------------------

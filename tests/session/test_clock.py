@@ -13,6 +13,7 @@ import pytest
 
 from robotiq_async import Finger, RobotiqHand, RobotiqStatus, SentRequest, State, Transition
 from robotiq_async.runtime.clock import clock_of, now
+from robotiq_async.session.options import LATE_POLLS
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.request import AxisRequest, Request
 from tests.virtual import VirtualLoop
@@ -123,4 +124,4 @@ def test_all_times_of_a_hand_are_of_one_clock(
     with asyncio.Runner(loop_factory=factory) as runner, caplog.at_level(logging.WARNING, "robotiq_async"):
         runner.run(main())
     assert "another client" in caplog.text
-    assert "polling is" in caplog.text
+    assert LATE_POLLS in caplog.text

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import logging
+import sys
+import types
 from itertools import pairwise
 
 import pytest
 
 from robotiq_async.control.requests.pending import Command
 from robotiq_async.session.opening import SHORTEST_S, Opener
-from robotiq_async.session.options import HandOptions, ReconnectPolicy
+from robotiq_async.session.options import LATE_POLLS, HandOptions, ReconnectPolicy
 from robotiq_async.session.poller import READS, STOP_S
 from robotiq_async.values.enums import Finger, State
 from robotiq_async.values.errors import (
@@ -145,6 +148,28 @@ async def test_in_a_loop_that_is_always_held_up_something_is_written_in_the_end(
     here.at_next_status = None
 
 
+@pytest.mark.parametrize("in_ipython", [False, True])
+async def test_late_polls_are_warned_of_once_a_minute_and_counted(
+    here: Polled, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch, in_ipython: bool
+) -> None:
+    caplog.set_level(logging.WARNING, "robotiq_async")
+    ipython = types.SimpleNamespace(get_ipython=lambda: object() if in_ipython else None)
+    monkeypatch.setitem(sys.modules, "IPython", ipython)
+
+    async def late(seconds: float, times: int) -> None:
+        for _ in range(times):
+            here.at_next_status = lambda: here.loop.hold_up(seconds)
+            await here.polls(3)
+
+    await late(0.2, 10)
+    await asyncio.sleep(70)
+    await late(0.3, 3)
+    first, second = [each for each in caplog.messages if LATE_POLLS in each]
+    assert "late, 190 ms: something holds up the event loop" in first
+    assert "late, 10 times, at most 290 ms" in second
+    assert ("IPython" in first) is in_ipython
+
+
 # -- the first contact -------------------------------------------------------------------------------------
 
 
@@ -254,7 +279,7 @@ async def test_when_it_is_tried_and_given_up(
     policy: ReconnectPolicy, tries: list[float], gives_up: bool
 ) -> None:
     loop = asyncio.get_running_loop()
-    began, tried = loop.time(), list[float]()
+    began, tried, failed = loop.time(), list[float](), list[RobotiqConnectionError]()
 
     async def connect() -> None:
         tried.append(loop.time() - began)
@@ -264,10 +289,11 @@ async def test_when_it_is_tried_and_given_up(
     opener = Opener(connect, HandOptions())
     if gives_up:
         with pytest.raises(ConnectionLostError):
-            await opener.again(policy)
+            await opener.again(policy, failed.append)
     else:
-        assert await opener.again(policy)
+        assert await opener.again(policy, failed.append)
     assert tried == pytest.approx(tries)
+    assert failed == [LOST] * (len(tried) - 1)
 
 
 @pytest.mark.parametrize(

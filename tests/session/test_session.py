@@ -140,6 +140,17 @@ async def test_callers_that_wait_when_the_task_fails_get_an_error(caplog: pytest
     assert "the task that owns the link failed" in record.getMessage()
 
 
+async def test_a_bug_while_it_connects_is_named(caplog: pytest.LogCaptureFixture) -> None:
+    """It was told as "the hand was stopped while it connected"."""
+    here = Run()
+    here.wire.failing["open"] = ZeroDivisionError("a bug")  # type: ignore[assignment]
+    session = here.session()
+    with pytest.raises(ConnectionLostError, match="internal error: ZeroDivisionError"):
+        await session.connected()
+    await session.ended()
+    assert "the task that owns the link failed" in caplog.text
+
+
 # -- a loop that is closed under it ------------------------------------------------------------------------
 
 
