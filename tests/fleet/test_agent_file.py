@@ -163,7 +163,7 @@ def test_a_gripper_on_a_serial_line_gets_the_defaults_of_the_line(tmp_path: Path
 
 def test_an_uncertain_line_number_is_left_out(tmp_path: Path) -> None:
     """The search takes what stands in a text of several lines for keys."""
-    port = '[grippers.left]\naddress = """rtu:///dev/\nspeed = 3\n/x"""\nspeed = 300\n'
+    port = '[grippers.left]\naddress = """rtu:///dev/\\\nspeed = 3\\\n/x"""\nspeed = 300\n'
     with pytest.raises(AgentFileError, match=r"FLEET\.toml, in \[grippers\.left\]: speed"):
         read(tmp_path, f'site = "lab"\n{port}')
 

@@ -118,6 +118,22 @@ async def test_the_error_goes_on_saying_that_another_client_took_the_lease(
 
 
 @inside(lab)
+async def test_a_move_that_runs_is_not_given_the_refusal_of_another_request(here: Lab) -> None:
+    """The answer to the move is lost; that to a renewal says that nothing was done."""
+    bus = Spoiling(here.network.bus("client"), "/cmd/move", sends=True)
+    async with here.client("other", control=False) as other, here.client_over(bus) as hand:
+        moving = asyncio.create_task(hand.move(215, Finger.A, speed=0))
+        await until(lambda: here.gripper.is_moving)
+        await other.take()
+        with pytest.raises(ControlLostError, match=r"taken.*cmd/move may have been carried out") as lost:
+            await moving
+        assert "nothing was done" not in str(lost.value)
+        assert lost.value.reason == "taken"
+        with pytest.raises(ControlLostError, match="nothing was done"):
+            await hand.move(10)
+
+
+@inside(lab)
 async def test_silence_is_noticed_while_the_lease_is_asked_for_again(here: Lab, hand: RemoteHand) -> None:
     """The last status of an agent that had died was shown as the present one for ever."""
     here.network.cut(("client", "agent"))

@@ -175,7 +175,7 @@ class LeaseKeeper:
         # After a halt or a take by another client only an explicit acquire() gets it back.
         self._wants_control = self._wants_control and reason not in (*NOT_REACQUIRED, "released")
         self.lost = ControlLostError(f"lost control of {self._run.name}: {why}", reason)
-        self._run.requests.lose_lease(self.lease, self.lost)
+        self._run.requests.lose_lease(self.lease, reason)
         if reason != "released":
             self._log.warning("lost control: %s", why)
 

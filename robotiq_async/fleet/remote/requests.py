@@ -11,9 +11,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
-from ...control.waiters import copy_of
 from ...runtime.clock import now
-from ...values.errors import AgentError, ConnectionLostError, NotAllowedError, NotStartedError, RobotiqError
+from ...values.errors import (
+    AgentError,
+    ConnectionLostError,
+    ControlLostError,
+    NotAllowedError,
+    NotStartedError,
+    RobotiqError,
+)
 from ..network.bus import Bus, Reply, Urgency
 from ..wire.envelope import Answer, Call, unpack_answer
 from ..wire.names import GripperName
@@ -102,12 +108,18 @@ class Requests:
         silence, self._silence = self._silence, self._loop.create_future()
         silence.set_result(None)
 
-    def lose_lease(self, lease: int, error: RobotiqError) -> None:
-        # The agent needs a moment to report the outcome of the commands under the lease.
+    def lose_lease(self, lease: int, reason: str) -> None:
+        """Wait no longer for the outcome of the commands under a lease that has ended.
+
+        The agent needs a moment to report it. Without its answer each gets an error of its own: what the
+        agent said of another request, such as that nothing was done, may not be so of this one.
+        """
         for posted in self._commands.values():
             if posted.call.lease == lease:
                 posted.stop_repeating()
-                self._loop.call_later(LAST_ANSWER_S, posted.fail, copy_of(error))
+                outcome = f"{posted.verb} may have been carried out"
+                error = ControlLostError(f"{self._name}: the lease has ended ({reason}); {outcome}", reason)
+                self._loop.call_later(LAST_ANSWER_S, posted.fail, error)
 
     def end(self) -> None:
         """The hand was stopped: from now on only requests that end motion are sent."""
