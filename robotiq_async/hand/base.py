@@ -382,13 +382,14 @@ class Hand(ABC):
     async def recover(self, timeout: float | None = None) -> None:
         """Do what the present fault needs, until the gripper is active again.
 
-        A minor fault, and an activation, reset or release under way, are waited for. After a major fault the
-        gripper is reset and activated. So is a gripper that makes no progress for 5 s while it waits for its
-        activation (0x05, as after an emergency stop) or releases, at most twice. A reset DROPS the part, and
-        an activation MOVES the fingers. The ``timeout`` is for all of it; None for 90 s.
+        A minor or unknown fault, and an activation, reset or release under way, are waited for. After a major
+        fault the gripper is reset and activated. So is a gripper that makes no progress for 5 s while it
+        waits for its activation (0x05, as after an emergency stop) or releases, at most twice. A reset DROPS
+        the part, and an activation MOVES the fingers. The ``timeout`` is for all of it; None for 90 s.
 
         Raises:
-            StateTimeoutError: not active in time, or not after two resets: a person has to look at it.
+            StateTimeoutError: not active in time, or not after two resets: a person has to look at it. It
+                names a fault that lasts.
             ActivationTimeoutError: the new activation took longer than the activation timeout.
             GripperFaultError: the new activation ended in a fault.
             NotActivatedError: the gripper was reset during the new activation.

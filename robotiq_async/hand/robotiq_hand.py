@@ -286,7 +286,14 @@ class RobotiqHand(Hand):
                     self._check_worth_a_reset(resets)
                     resets = await self._reset_until_shown(resets)
             return
-        raise StateTimeoutError(f"the gripper is not active after {limit:g} s: {self.state.name}")
+        raise StateTimeoutError(f"the gripper is not active after {limit:g} s: {self._what_keeps_it()}")
+
+    def _what_keeps_it(self) -> str:
+        if self.state is not State.FAULT:
+            return self.state.name
+        fault = self.status.fault
+        why = f"{fault.description} (gFLT 0x{int(fault):02X})"
+        return why if fault.is_known else f"{why}. reset() may clear it, and DROPS the part"
 
     def _check_worth_a_reset(self, resets: int) -> None:
         fault = self.status.fault
@@ -317,15 +324,19 @@ class RobotiqHand(Hand):
         session, state = self._asked(), self.state
         if state is State.RESET:
             await self.activate()
-        elif state is State.ATR_DONE or (
-            state is State.FAULT and self.status.fault.severity is Severity.MAJOR
-        ):
+        elif state is State.ATR_DONE or (state is State.FAULT and self._needs_reset):
             await self._reset_until_shown()
         elif state is State.DISCONNECTED:
             raise session.link_lost()
         else:
-            # A minor fault, or a sequence under way: the next status may tell more.
+            # A minor or unknown fault, or a sequence under way: the next status may tell more.
             await session.next_status()
+
+    @property
+    def _needs_reset(self) -> bool:
+        """Whether the fault is known to need one. A reset drops the part: no unknown code is worth that."""
+        fault = self.status.fault
+        return fault.severity is Severity.MAJOR and fault.is_known
 
     # -- what the hand shows ---------------------------------------------------------------------------
 

@@ -226,7 +226,7 @@ class Fault(Code):
 
     @property
     def severity(self) -> Severity:
-        """The class of the fault; an unknown code counts as MAJOR."""
+        """The class of the fault; an unknown code counts as MAJOR, and :meth:`Hand.recover` resets none."""
         return _FAULTS[self._name_][0] if self._name_ in _FAULTS else Severity.MAJOR
 
     @property
@@ -235,6 +235,11 @@ class Fault(Code):
         if self._name_ in _FAULTS:
             return _FAULTS[self._name_][1]
         return f"fault code 0x{int(self):02X}, which the manual does not assign"
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the manual of the model assigns the code."""
+        return self._name_ in _FAULTS
 
     @property
     def is_serious(self) -> bool:

@@ -49,7 +49,11 @@ async def test_a_major_fault(here: Bench, hand: Hand, fault: int) -> None:
     with pytest.raises(GripperFaultError) as caught:
         hand.command(position=3)
     assert caught.value.fault is Fault(fault)
-    await hand.recover()
+    if Fault(fault).is_known:
+        await hand.recover()
+    else:  # nothing but a person decides to reset it
+        await hand.reset()
+        await hand.activate()
     assert hand.state is State.RUNNING_IDLE
     await hand.move(60, A)
 
@@ -60,6 +64,25 @@ async def test_recover_waits_for_a_minor_fault_and_writes_nothing(here: Bench, h
     await hand.wait_for_state(State.FAULT)
     writes = here.writes
     await hand.recover()
+    assert hand.state is State.RUNNING_IDLE
+    assert here.writes == writes
+
+
+@contract
+@pytest.mark.parametrize("code", [0x01, 0x02, 0x04, 0x08, 0x0C])
+async def test_recover_waits_for_a_fault_that_nobody_knows_and_drops_no_part(
+    here: Bench, hand: Hand, code: int
+) -> None:
+    here.gripper.inject_fault(code)
+    await hand.wait_for_state(State.FAULT)
+    writes = here.writes
+    with pytest.raises(StateTimeoutError, match=rf"0x{code:02X}.*reset\(\) may clear it, and DROPS the part"):
+        await hand.recover(timeout=0.3)
+    assert here.writes == writes
+    recovering = asyncio.create_task(hand.recover())
+    await asyncio.sleep(0)
+    here.gripper.clear_faults()
+    await recovering
     assert hand.state is State.RUNNING_IDLE
     assert here.writes == writes
 
