@@ -286,6 +286,28 @@ async def test_one_lost_reply_does_not_make_it_another_unit(words: str) -> None:
     assert found["Modbus"].found == "answers when asked 2 times"
 
 
+@pytest.mark.parametrize("lost", range(1, 9))
+@pytest.mark.parametrize("server_of", [SimulatorServer, RtuOverTcpSimulatorServer])
+async def test_a_line_that_loses_its_first_requests_needs_no_option(
+    server_of: type[SimulatorServer], lost: int
+) -> None:
+    """What answered after them was taken for what the gripper needs: read_function=4, request_address=0."""
+    left = [lost]
+
+    def losing(frame: bytes) -> list[tuple[float, bytes]]:
+        left[0] -= 1
+        return [] if left[0] >= 0 else [(0.0, frame)]
+
+    async with server_of(SimulatedGripper()) as server:
+        server.policy = losing
+        found = await findings(server.address, seconds=60)
+    assert left[0] < 0
+    assert [each.what for each in found.values() if "Pass" in each.advice] == []
+    assert found["registers"].level is found["unit id"].level is Level.GOOD
+    assert found["Modbus"].level is Level.DOUBT
+    assert "answers when asked" in found["Modbus"].found
+
+
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("changes", [True, False])
 async def test_the_memory_of_another_device_is_no_gripper(seed: int, changes: bool) -> None:

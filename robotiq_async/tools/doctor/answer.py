@@ -70,7 +70,11 @@ async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> 
             await link.close()
             stranger = stranger or status
             continue
-        report(_answers(failure if registers == usual else None, number + 1, seconds))
+        tries = number + 1
+        if registers != usual and (again := await _ask_again(address, usual, link)) is not None:
+            # The line had lost the first requests, whatever they were: nothing about this gripper is unusual.
+            (link, status, seconds), registers, tries = again, usual, tries + 1
+        report(_answers(failure if registers == usual else None, tries, seconds))
         _report_place(usual, registers, report)
         _report_silence(status, report)
         return Answering(link, registers)
@@ -81,6 +85,31 @@ async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> 
     advice = await _other_frames(address) or _advice_for_silence(failure)
     report(Finding(Level.BAD, "Modbus", str(failure), advice))
     raise GiveUpError
+
+
+async def _ask_again(
+    address: Address, usual: RegisterMap, other: Link
+) -> tuple[Link, RobotiqStatus, float] | None:
+    """Ask with the usual unit id and registers once more; None if only ``other`` answers, which is open then.
+
+    Some lines lose the first requests of a connection, or of a client. What answered after them would else be
+    taken for what the gripper needs.
+    """
+    await other.close()
+    for _ in range(TRIES):
+        await asyncio.sleep(LET_GO_S)
+        link = _link(address, usual, ANSWER_S)
+        try:
+            status, seconds = await _first_reading(link)
+        except RobotiqConnectionError:
+            continue
+        if _has_reserved_bits(status):
+            await link.close()
+            break
+        return link, status, seconds
+    await asyncio.sleep(LET_GO_S)
+    await _first_reading(other)
+    return None
 
 
 def long_enough(seconds: float) -> float:
@@ -105,6 +134,8 @@ def _attempts(address: Address, usual: RegisterMap) -> Iterator[tuple[RegisterMa
     for each in dict.fromkeys(others):
         if each != usual:
             yield each, ANSWER_S
+    for _ in range(TRIES):  # by now a line that loses the first requests may let them through
+        yield usual, ANSWER_S
 
 
 async def _other_frames(address: Address) -> str:
