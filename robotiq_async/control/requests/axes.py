@@ -90,16 +90,15 @@ class Axes:
                     self.resting &= ~axis
 
     def adopt(self, before: Request, adopted: Request) -> None:
-        """Another client replaces ``before`` by ``adopted``."""
+        """Another client replaces ``before`` by ``adopted``.
+
+        Without rGTO before, nothing is known that its request could contradict: no contact is doubted then.
+        """
         for axis, old, new in zip(adopted.model.axes, before.axes, adopted.axes, strict=True):
             if adopted.go is not before.go or new.position != old.position:
-                self._standstill[axis].ask(
-                    0,
-                    new.position if adopted.go else None,
-                    before=old.position if before.go else None,
-                    again=False,
-                    rested=False,
-                )
+                position = new.position if adopted.go else None
+                known = old.position if before.go else position
+                self._standstill[axis].ask(0, position, before=known, again=False, rested=False)
                 self._proven &= ~axis
 
     def limit(self, axis: Finger, limit: int) -> None:

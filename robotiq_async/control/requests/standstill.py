@@ -164,7 +164,8 @@ class Standstill:
             return False
         if what is ObjectStatus.AT_POSITION:
             *before, last = self._asked
-            return not last.fits(what, position) or any(asked.fits(what, position) for asked in before)
+            others = [asked for asked in before if asked.position != last.position]
+            return not last.fits(what, position) or any(asked.fits(what, position) for asked in others)
         return not self._is_true_since(what, position, unless_tried_again=False)
 
     def _is_true_since(self, what: ObjectStatus, position: int, *, unless_tried_again: bool) -> bool:
