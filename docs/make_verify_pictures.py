@@ -24,7 +24,8 @@ if __name__ == "__main__":
 
 from docs.make_pictures import FOLDER, FONT  # noqa: E402
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer  # noqa: E402
-from robotiq_async.simulator.troubles.like_hardware import LIKE_HARDWARE, OWN_HABITS  # noqa: E402
+from robotiq_async.simulator.troubles.like_hardware import like_hardware, own_habits  # noqa: E402
+from robotiq_async.values.model import THREE_FINGER  # noqa: E402
 from tests.cli.terminal import Terminal  # noqa: E402
 
 WIDTH: Final = 100
@@ -33,10 +34,10 @@ PORT: Final = 5020
 
 async def main() -> None:
     """All of them."""
-    gripper = SimulatedGripper(habits=OWN_HABITS)
+    gripper = SimulatedGripper(habits=own_habits(THREE_FINGER))
     with TemporaryDirectory() as folder:
         async with SimulatorServer(gripper, port=PORT) as server:
-            for habit in LIKE_HARDWARE:
+            for habit in like_hardware(THREE_FINGER):
                 await server.fault_injector.begin(habit)
             await reading(f"{folder}/verify-1")
             await moving(f"{folder}/verify-2", gripper)

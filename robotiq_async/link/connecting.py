@@ -79,7 +79,8 @@ def disconnect(client: Client) -> None:
     A process that was forked from this one has a copy of the socket: closing ours alone would leave the
     gripper connected, and one that serves a single client would never take us back.
     """
-    line = client.ctx.transport.get_extra_info("socket") if client.ctx.transport is not None else None
+    transport: Any = client.ctx.transport
+    line: Any = None if transport is None else transport.get_extra_info("socket")
     # By a copy of our own: uvloop's sockets cannot be shut down, and not every loop gives one.
     with (
         contextlib.suppress(AttributeError, OSError),

@@ -57,10 +57,10 @@ class _Handle:
 
 
 class _ForeignLoop(asyncio.SelectorEventLoop):
-    def call_later(self, delay: float, callback: Any, *arguments: Any, **options: Any) -> Any:
+    def call_later(self, delay: float, callback: Any, *arguments: Any, **options: Any) -> Any:  # type: ignore[override]
         return self.call_at(self.time() + delay, callback, *arguments, **options)
 
-    def call_at(self, when: float, callback: Any, *arguments: Any, **options: Any) -> Any:
+    def call_at(self, when: float, callback: Any, *arguments: Any, **options: Any) -> Any:  # type: ignore[override]
         return _Handle(super().call_at(when, callback, *arguments, **options))
 
 

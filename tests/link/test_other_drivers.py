@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import struct
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -13,7 +14,8 @@ from pyrobotiqgripper import RobotiqGripper
 
 from robotiq_async import JAW, TWO_FINGER_85, RobotiqStatus
 from robotiq_async.simulator import RtuOverTcpSimulatorServer, SerialSimulatorServer, SimulatedGripper
-from tests.serial_line import SerialLine
+from robotiq_async.simulator.troubles.like_hardware import like_hardware, own_habits
+from tests.serial_line import SerialLine, with_crc
 
 
 @pytest.fixture
@@ -61,6 +63,48 @@ async def test_pyrobotiqgripper_grips_a_part_through_the_port_of_a_tool(gripper:
     async with RtuOverTcpSimulatorServer(gripper) as server:
         status, position = await asyncio.to_thread(grip, server.port)
     assert (status, position) == (2, pytest.approx(120, abs=5))
+
+
+async def test_pyrobotiqgripper_on_a_jaw_like_hardware() -> None:
+    """It gives up an activation after 5 s; with the habits of a 3-Finger, of 12 s, it always did."""
+    jaw = SimulatedGripper(speedup=2, spread=False, model=TWO_FINGER_85, habits=own_habits(TWO_FINGER_85))
+    async with RtuOverTcpSimulatorServer(jaw) as server:
+        for habit in like_hardware(TWO_FINGER_85):
+            await server.fault_injector.begin(habit)
+
+        def grip() -> tuple[bool, int]:
+            driver = RobotiqGripper(connection_type="RTU_VIA_TCP", tcp_port=server.port)
+            driver.activate()
+            driver.move(120, speed=255, force=100)
+            found = driver.isActivated(), driver.position()
+            driver.disconnect()
+            return found
+
+        assert await asyncio.to_thread(grip) == (True, pytest.approx(120, abs=3))
+
+
+async def test_a_loop_that_writes_and_reads_with_function_23_sees_its_own_request() -> None:
+    """The vendor's example: write, and read until gOBJ says that the motion has ended."""
+    jaw = SimulatedGripper(speedup=2, spread=False, model=TWO_FINGER_85)
+    async with RtuOverTcpSimulatorServer(jaw) as server:
+        for habit in like_hardware(TWO_FINGER_85):
+            await server.fault_injector.begin(habit)
+        reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
+
+        async def exchange(*image: int) -> RobotiqStatus:
+            request = struct.pack(">BBHHHHB3H", 9, 23, 2000, 3, 1000, 3, 6, *image)
+            writer.write(with_crc(request))
+            reply = await reader.readexactly(3 + 6 + 2)
+            words = struct.unpack(">3H", reply[3:9])
+            return RobotiqStatus((*words, 0, 0, 0, 0, 0), model=TWO_FINGER_85)
+
+        while not (await exchange(0x0100, 0, 0)).is_activated:
+            pass
+        while (status := await exchange(0x0900, 200, 0xFFFF)).is_moving:
+            assert status.requested_position(JAW) == 200, "each reply shows the request that it answers"
+        assert abs(status.position(JAW) - 200) <= 2
+        writer.close()
+        await writer.wait_closed()
 
 
 async def test_minimalmodbus(gripper: SimulatedGripper, port: str) -> None:

@@ -138,7 +138,7 @@ def frame(pdu: str) -> bytes:
             ("03 03ea 0002", "03 04 aaaa 1234"),
         ],
         # The manual's example of function 23, but for the checksum that it prints under the request.
-        [("17 07d0 0002 03e9 0002 04 00e6 3cc8", "17 04 0000 0000"), ("03 03e9 0002", "03 04 00e6 3cc8")],
+        [("17 07d0 0002 03e9 0002 04 00e6 3cc8", "17 04 0000 00e6"), ("03 03e9 0002", "03 04 00e6 3cc8")],
         # What is written comes before what is read.
         [("17 03e9 0001 03e9 0001 02 1234", "17 02 1234"), ("17 03e9 0001 03e9 0001 02 5678", "17 02 5678")],
     ],

@@ -12,7 +12,7 @@ from mcap.writer import Writer
 
 from robotiq_async.link.address import parse_address
 from robotiq_async.simulator.physics.habits import Habits
-from robotiq_async.simulator.troubles.like_hardware import LIKE_HARDWARE, OWN_HABITS
+from robotiq_async.simulator.troubles.like_hardware import like_hardware, own_habits
 from robotiq_async.tools.recording.recordings import read_recording
 from robotiq_async.tools.verify import Plan, Runner, pictures
 from robotiq_async.tools.verify.files import NAME, Folder
@@ -27,10 +27,10 @@ Change = Callable[[str, dict[str, Any]], None]
 
 
 async def record(
-    folder: Path, *, like_hardware: bool = False, last: int = 6, model: Model = THREE_FINGER
+    folder: Path, *, is_like_hardware: bool = False, last: int = 6, model: Model = THREE_FINGER
 ) -> None:
-    troubles = [habit.kind for habit in LIKE_HARDWARE] if like_hardware else []
-    habits = OWN_HABITS if like_hardware else None
+    troubles = [str(habit) for habit in like_hardware(model)] if is_like_hardware else []
+    habits = own_habits(model) if is_like_hardware else None
     async with served(*troubles, habits=habits, model=model) as server, threads():
         address = parse_address(server.address)
         into = Folder(folder, address)
@@ -54,7 +54,7 @@ def recording(**options: Any) -> Any:
 
 plain, short = recording(), recording(last=3)
 """To the last stage that is compared, and up to the activation."""
-hardware_like, jaw = recording(like_hardware=True), recording(model=TWO_FINGER_85)
+hardware_like, jaw = recording(is_like_hardware=True), recording(model=TWO_FINGER_85)
 
 
 def test_a_recording_of_a_sibling_knows_its_model_and_differs_in_nothing(jaw: Path) -> None:

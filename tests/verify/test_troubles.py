@@ -10,10 +10,11 @@ import pytest
 
 from robotiq_async.link.address import parse_address
 from robotiq_async.simulator import SimulatorServer, Trouble
-from robotiq_async.simulator.troubles.like_hardware import LIKE_HARDWARE, OWN_HABITS
+from robotiq_async.simulator.troubles.like_hardware import like_hardware, own_habits
 from robotiq_async.tools.verify import Plan, Report, Runner
 from robotiq_async.tools.verify.catalogue import CATALOGUE, HARMLESS
 from robotiq_async.tools.verify.motions import REACHED, UNREACHED
+from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.registers import rGTO
 from tests.verify.matrix import EVENTS, HABITS, options
 from tests.verify.people import SHORT, Helper, Roll, assert_as_assumed, differing, served, verified
@@ -37,7 +38,7 @@ async def test_a_habit_is_found_and_nothing_else(trouble: str, check: str, optio
 
 
 async def test_a_gripper_like_hardware_has_its_three_habits() -> None:
-    async with served(*(habit.kind for habit in LIKE_HARDWARE), habits=OWN_HABITS) as server:
+    async with served(*map(str, like_hardware(THREE_FINGER)), habits=own_habits(THREE_FINGER)) as server:
         report = await verified(server)
     assert report.why == "done", report.words
     assert differing(report).keys() == {"read.silence", "write.spacing", "axis.lag"}

@@ -44,11 +44,12 @@ async def simulate(
     other programs connect to it as to a real gripper.
 
     It has the habits that several sources report of real grippers; none has been
-    measured on a 3-Finger. An activation takes 12 s; gDT and gSTA trail the
-    echo by 0.05 s (status-lag); the first status after a second without a message
-    shows fault 0x09 (silence-fault); a write within 10 ms of the one before is
-    acknowledged and forgotten (write-spacing). With --plain it does what the
-    manual says, and activates in 4.2 s. Other habits are troubles: see --troubles.
+    measured by us. A 3-Finger takes 12 s for an activation, its gDT and gSTA trail
+    the echo by 0.05 s (status-lag), and a write within 10 ms of the one before is
+    acknowledged and forgotten (write-spacing); a jaw has none of these. The first
+    status after a second without a message shows fault 0x09 (silence-fault).
+    With --plain it does what the manual says, and activates in 4.2 s. Other habits
+    are troubles: see --troubles.
 
     A trouble is
 
@@ -92,18 +93,20 @@ async def simulate(
         SimulatorServer,
         parse_troubles,
     )
-    from ...simulator.troubles.like_hardware import LIKE_HARDWARE, OWN_HABITS
+    from ...simulator.troubles.like_hardware import like_hardware as habits_like_hardware
+    from ...simulator.troubles.like_hardware import own_habits
 
     if troubles:
         _list_troubles()
         return
     with usage():
+        kind = model_of(model)
         plan = parse_troubles("\n".join(trouble or ()))
         gripper = SimulatedGripper(
             speedup=speedup,
             spread=not exact,
-            habits=OWN_HABITS if like_hardware else None,
-            model=model_of(model),
+            habits=own_habits(kind) if like_hardware else None,
+            model=kind,
         )
         _place(gripper, object_, fixed=fixed)
         if serial is not None and rtu_over_tcp:
@@ -126,7 +129,7 @@ async def simulate(
     try:
         with normal_end():
             async with server:
-                for habit in LIKE_HARDWARE if like_hardware else ():
+                for habit in habits_like_hardware(kind) if like_hardware else ():
                     await server.fault_injector.begin(habit)
                 print(server.address, flush=True)
                 await server.fault_injector.run(plan, lambda trouble: tell(f"trouble: {trouble}"))

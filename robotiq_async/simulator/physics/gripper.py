@@ -124,6 +124,12 @@ class SimulatedGripper(Surroundings):
             self._inbox.keep(self._time, Write(self._clock(), image), self._cycle, self.habits.write_spacing)
             self._catch_up()
 
+    def carry_out_writes(self) -> None:
+        """Let what was written take effect now, and not a device cycle later."""
+        self._catch_up()
+        self._inbox.hasten(self._time)
+        self._catch_up()
+
     @property
     def request_registers(self) -> reg.Registers:
         """The eight request registers as written, in effect or not yet."""
@@ -338,6 +344,10 @@ class Inbox:
         # Keep their order, even if the device cycle was shortened meanwhile.
         due = max(time + cycle, self.pending[-1][0] if self.pending else 0.0)
         self.pending.append((due, Request.from_registers(write.registers, self._model)))
+
+    def hasten(self, time: float) -> None:
+        """All that is pending takes effect now."""
+        self.pending = deque((min(due, time), request) for due, request in self.pending)
 
     def clear(self) -> None:
         self.image = ZEROS

@@ -40,6 +40,10 @@ class Habits:
             otherwise gDT and gSTA are 0 then. The manual says only that their 0 means nothing while gGTO = 0.
         opens_without_rics: clearing rICS is a mode change: it opens the fingers, rGTO or not, and drops the
             part. Otherwise the scissor alone goes to its mode, as soon as rGTO is set. No source says.
+        answers_with_echo: the reply to function 23 shows the request that came with it. By the 2F's manual
+            the gripper executes the command, and one cycle of motion, before it answers; the vendor's own
+            loop lives on that. Otherwise it shows the state before, as a read soon after a write does. No
+            source tells it of a 3-Finger.
     """
 
     activation_time: float = QUICK_ACTIVATION
@@ -50,6 +54,7 @@ class Habits:
     lets_go_on_halt: bool = False
     keeps_status_on_halt: bool = True
     opens_without_rics: bool = True
+    answers_with_echo: bool = True
 
     def __post_init__(self) -> None:
         """Check that they are what a gripper can have.
@@ -62,5 +67,11 @@ class Habits:
             check_seconds(name, getattr(self, name), 0, _LONGEST)
         if self.silence_fault != math.inf:
             check_seconds("silence_fault", self.silence_fault, 0, _LONGEST)
-        for name in ("echoes_limits", "lets_go_on_halt", "keeps_status_on_halt", "opens_without_rics"):
+        for name in (
+            "echoes_limits",
+            "lets_go_on_halt",
+            "keeps_status_on_halt",
+            "opens_without_rics",
+            "answers_with_echo",
+        ):
             check_flag(name, getattr(self, name))

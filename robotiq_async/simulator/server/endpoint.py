@@ -13,7 +13,7 @@ from ..functions import READ_INPUT
 from ..physics.gripper import SimulatedGripper
 from ..troubles.corruption import ReplyPolicy, unchanged
 from ..troubles.fault_injector import FaultInjector
-from ..troubles.like_hardware import OWN_HABITS
+from ..troubles.like_hardware import own_habits
 from .connection import Connection
 from .register_bank import RegisterBank
 
@@ -45,7 +45,7 @@ class SimulatorEndpoint(ABC):
     """The Modbus functions that are served without any trouble."""
 
     def __init__(self, gripper: SimulatedGripper | None) -> None:
-        self.gripper = SimulatedGripper(habits=OWN_HABITS) if gripper is None else gripper
+        self.gripper = SimulatedGripper(habits=own_habits(THREE_FINGER)) if gripper is None else gripper
         self.policy: ReplyPolicy = unchanged
         self.fault_injector = FaultInjector(self)
         self.connections: list[Connection] = []

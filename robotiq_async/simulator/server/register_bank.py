@@ -75,6 +75,8 @@ class RegisterBank:
         block = _block_of(address, count, _READABLE)
         if function == READ_WRITE:
             self._write(data[4:6], _content(data[6:], _MOST_WRITTEN_AND_READ))
+            if self._gripper.habits.answers_with_echo:
+                self._gripper.carry_out_writes()
         else:
             _check(len(data) == 4)
         first = address - block

@@ -1,15 +1,18 @@
-"""What a simulator does to be like hardware: the habits of real grippers that several sources agree on.
+"""What a simulator does to be like hardware: habits of real grippers that several sources agree on, by model.
 
-======================  ===================================================================================
-habit                   sources
-======================  ===================================================================================
-``status-lag``          the vendor's SDK for the two-finger grippers, in its text and in its example, which
-                        wait up to 0.2 s; no driver of the 3-Finger looks soon enough to have seen it
-``silence-fault``       the manual of a sibling, two recordings of others in normal operation
-``write-spacing``       the manual of 2014, in its chapters on TCP and on RTU; users of two arms whose
-                        two-finger grippers took no dense commands
-an activation of 12 s   one driver reports 15 s; others wait for 25 and 30
-======================  ===================================================================================
+======================  =============  ====================================================================
+habit                   of which       sources
+======================  =============  ====================================================================
+activation of 12 s      3-Finger       one driver reports 15 s; others wait for 25 and 30
+activation of 4.2 s     2F, Hand-E     pyRobotiqGripper gives up after 5 s, and its users do not complain
+``status-lag``          3-Finger       none of its own: no driver looks soon enough to have seen one. The
+                                       vendor's SDK for the 2F waits up to 0.2 s
+no ``status-lag``       2F, Hand-E     pyRobotiqGripper's and the vendor's example loop end with the first
+                                       gOBJ after a write; only the SDK's text says that gOBJ trails
+``silence-fault``       all            the manual of a sibling, two recordings of 2F in normal operation
+``write-spacing``       3-Finger       the manual of 2014, in its chapters on TCP and on RTU
+no ``write-spacing``    2F, Hand-E     the vendor's loop writes 100 times a second, and up to 250 times
+======================  =============  ====================================================================
 
 Left out is what one source tells or none: ``echoed-limits``, ``e-stop``, ``wake-needed``, ``idle-reset``,
 ``function-3-only``, ``one-connection-only``. Nothing of it has been measured by us.
@@ -17,12 +20,19 @@ Left out is what one source tells or none: ``echoed-limits``, ``e-stop``, ``wake
 
 from __future__ import annotations
 
-from typing import Final
+from robotiq_async.values.model import THREE_FINGER, Model
 
-from ..physics.habits import REAL_ACTIVATION, Habits
+from ..physics.habits import QUICK_ACTIVATION, REAL_ACTIVATION, Habits
 from .trouble import Trouble
 
-OWN_HABITS: Final = Habits(activation_time=REAL_ACTIVATION)
-"""Those of the gripper itself: faster in a simulation that is."""
-LIKE_HARDWARE: Final = (Trouble("status-lag"), Trouble("silence-fault"), Trouble("write-spacing"))
-"""Those that go by real time, as the clients do that meet them."""
+
+def own_habits(model: Model) -> Habits:
+    """The habits of the gripper itself: faster in a simulation that is."""
+    return Habits(activation_time=REAL_ACTIVATION if model is THREE_FINGER else QUICK_ACTIVATION)
+
+
+def like_hardware(model: Model) -> tuple[Trouble, ...]:
+    """The habits that go by real time, as the clients do that meet them."""
+    if model is THREE_FINGER:
+        return Trouble("status-lag"), Trouble("silence-fault"), Trouble("write-spacing")
+    return (Trouble("silence-fault"),)
