@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
+import resource
 import signal
 import socket
 from collections.abc import Callable
@@ -204,3 +206,19 @@ def test_the_list_of_troubles(call: Call) -> None:
         assert ("VALUE: " in line) == (kind.value is not None)
         assert line.endswith(f"; {kind.link} only") == (kind.link is not None)
         assert ("lasts for ever" in line) == (kind.lasts > 0)
+
+
+@pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="no way here to take files away from a process")
+def test_without_files_for_more_connections_it_says_one_sentence(beside: Callable[..., Beside]) -> None:
+    """asyncio reports each connection that cannot be accepted with a traceback."""
+    process = beside("simulate", "--port", "0")
+    port = int(process.read_line().rpartition(":")[2])
+    number = process.process.pid
+    most = len(list(Path(f"/proc/{number}/fd").iterdir())) + 2
+    resource.prlimit(number, resource.RLIMIT_NOFILE, (most, most))
+    with contextlib.ExitStack() as clients:
+        for _ in range(10):
+            clients.enter_context(socket.create_connection(("127.0.0.1", port)))
+        said = process.read_error()
+    assert "no further connection can be accepted: Too many open files" in said
+    assert process.finish(signal.SIGTERM) == Outcome(0, "", "")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, Annotated, Literal
+import errno
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from cyclopts import Parameter
 
@@ -19,6 +21,9 @@ from ..output.messages import tell
 
 if TYPE_CHECKING:
     from ...simulator import SimulatedGripper
+
+
+_EXHAUSTED: Final = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
 
 
 async def simulate(
@@ -126,6 +131,7 @@ async def simulate(
         server.fault_injector.check(plan)
     if serial is None and not is_loopback(host):
         tell(f"anyone who reaches {host} can command this gripper")
+    asyncio.get_running_loop().set_exception_handler(_without_tracebacks())
     try:
         with normal_end():
             async with server:
@@ -142,6 +148,22 @@ async def simulate(
         if serial is not None:
             raise RobotiqError(f"cannot listen on {serial}: {why_no_port(error)}") from error
         raise RobotiqError(f"cannot listen on {host}:{port}: {error.strerror or error}") from error
+
+
+def _without_tracebacks() -> Callable[[asyncio.AbstractEventLoop, dict[str, Any]], None]:
+    """Make a handler of the loop's complaints: one sentence when no connection can be accepted any more."""
+    told = False
+
+    def handle(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        nonlocal told
+        error = context.get("exception")
+        if not (isinstance(error, OSError) and error.errno in _EXHAUSTED):
+            loop.default_exception_handler(context)
+        elif not told:
+            told = True
+            tell(f"no further connection can be accepted: {error.strerror} (ulimit -n shows the limit)")
+
+    return handle
 
 
 def _place(gripper: SimulatedGripper, position: int | None, *, fixed: bool) -> None:
