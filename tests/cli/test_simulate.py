@@ -210,7 +210,7 @@ def test_the_list_of_troubles(call: Call) -> None:
 
 @pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="no way here to take files away from a process")
 def test_without_files_for_more_connections_it_says_one_sentence(beside: Callable[..., Beside]) -> None:
-    """asyncio reports each connection that cannot be accepted with a traceback."""
+    """Each connection that could not be accepted was reported with a traceback of asyncio."""
     process = beside("simulate", "--port", "0")
     port = int(process.read_line().rpartition(":")[2])
     number = process.process.pid
