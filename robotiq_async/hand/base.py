@@ -5,9 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection
 from types import TracebackType
-from typing import TYPE_CHECKING, Final, Literal, NoReturn, Self, TypeVar
+from typing import TYPE_CHECKING, Final, Literal, Self, TypeVar
 
-from ..control.grip_watch import SLIP_COUNTS, GripWatch
 from ..runtime.concurrency import running_loop
 from ..runtime.log import Log
 from ..session.options import LONGEST_WAIT_S
@@ -30,6 +29,7 @@ from ..values.model import THREE_FINGER, Model
 from ..values.move_result import MoveResult
 from ..values.statistics import Statistics
 from ..values.status import RobotiqStatus
+from .grip_watch import SLIP_COUNTS, GripWatch
 from .run import NamesErrors, Run, refuse_copy, refuse_with
 
 T = TypeVar("T")
@@ -91,8 +91,7 @@ class Hand(ABC):
         name = f"{self._given_name} " if self._given_name else ""
         return f"<{type(self).__name__} {name}{self._address} {self.state.name}>"
 
-    def __reduce__(self) -> NoReturn:
-        refuse_copy(self)
+    __reduce__ = refuse_copy
 
     # -- lifetime --------------------------------------------------------------------------------------
 
@@ -388,8 +387,7 @@ class Hand(ABC):
         the part, and an activation MOVES the fingers. The ``timeout`` is for all of it; None for 90 s.
 
         Raises:
-            StateTimeoutError: not active in time, or not after two resets: a person has to look at it. It
-                names a fault that lasts.
+            StateTimeoutError: not active in time, with the fault that lasts, or not after two resets.
             ActivationTimeoutError: the new activation took longer than the activation timeout.
             GripperFaultError: the new activation ended in a fault.
             NotActivatedError: the gripper was reset during the new activation.

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Generic, NoReturn, Self, TypeVar
+from typing import Generic, Self, TypeVar
 
-from ..control.grip_watch import SLIP_COUNTS
+from ..hand.grip_watch import SLIP_COUNTS
 from ..hand.robotiq_hand import RobotiqHand as AsyncRobotiqHand
 from ..hand.run import refuse_copy
 from ..link.transport import Transport
@@ -157,8 +157,7 @@ class RobotiqHand:
         self._caller.check_process()
         return self._hand
 
-    def __reduce__(self) -> NoReturn:
-        refuse_copy(self)
+    __reduce__ = refuse_copy
 
     def __repr__(self) -> str:
         return repr(self._hand)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from ..control.contact import agrees
+from ..control.passing_fault import PassingFault
 from ..values.checks import check_int, check_mask, repr_of
 from ..values.enums import Finger, ObjectStatus
 from ..values.grip import GripChange, GripEvent
 from ..values.model import Model
 from ..values.status import RobotiqStatus
-from .contact import agrees
-from .passing_fault import PassingFault
 
 SLIP_COUNTS: Final = 3
 """Counts that an axis in contact may move without an event: more than the 2 by which positions and requests

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async import GraspResult, MoveResult
-from robotiq_async.control.grip_watch import SLIP_COUNTS, GripWatch
+from robotiq_async.hand.grip_watch import SLIP_COUNTS, GripWatch
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.enums import Finger, ObjectStatus
 from robotiq_async.values.grip import GripChange, GripEvent
