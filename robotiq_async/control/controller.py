@@ -25,6 +25,7 @@ from ..values.errors import (
 from ..values.model import THREE_FINGER, Model
 from ..values.request import Request
 from ..values.status import RobotiqStatus
+from .gate import gate
 from .grip_keeper import GripKeeper
 from .motion import Move
 from .open_requests import OpenRequests
@@ -339,10 +340,8 @@ class Controller:
         status, pending = self._judged, self._requests.pending
         if status is None:
             return None
-        if self._early_stop is not None and self._early_stop.activate and not status.activation_echo:
-            self._early_stop = None  # the gripper was reset meanwhile: the image would activate it
         if self._early_stop is not None:
-            return self._repeat_stop(self._early_stop, now)
+            return self._repeat_stop(self._early_stop, status, now)
         if self.machine.sequence is not None:
             return self._next_step(status, now)
         # Most cycles end here.
@@ -356,13 +355,16 @@ class Controller:
         stopping = not base.go and status.go_echo and not shadow.acts()
         if pending.halting is None and (shadow.doubt is not None or (pending.positions and stopping)):
             return None  # only a halt does not wait
-        image = merged(
-            base,
-            pending,
+        image = gate(
+            merged(
+                base,
+                pending,
+                status,
+                gripping=shadow.axes.grips.held(status, base),
+                arrived=shadow.axes.resting,
+                doubtful=shadow.axes.doubtful(status, shadow.now) if pending.hold else NO_AXES,
+            ),
             status,
-            gripping=shadow.axes.grips.held(status, base),
-            arrived=shadow.axes.resting,
-            doubtful=shadow.axes.doubtful(status, shadow.now) if pending.hold else NO_AXES,
         )
         if pending.holds_at_most and image == base:
             # No axis moves. If an earlier write does not act yet, one may begin to: ask again then.
@@ -383,10 +385,10 @@ class Controller:
         if stops and now - self._written_at < self._write_spacing:
             self._early_stop = image
 
-    def _repeat_stop(self, image: Request, now: float) -> Request | None:
+    def _repeat_stop(self, stop: Request, status: RobotiqStatus, now: float) -> Request | None:
         if self.wait(now):
             return None
-        self._early_stop = None
+        self._early_stop, image = None, gate(stop, status)
         number = self._shadow.writing(image, NO_AXES, now)
         if self.machine.sequence is None:
             self._requests.halt_again()
@@ -439,8 +441,10 @@ class Controller:
             return None
         if self.wait(now):
             return None
+        activates, releases = (self.machine.state is each for each in (State.DO_ACTIVATION, State.DO_ATR))
         image = self.machine.advance(status)
         if image is not None:
+            image = gate(image, status, activates=activates, releases=releases)
             self._note_early_stop(image, now, stops=self._stops)
             self._step = self._shadow.writing(image, NO_AXES, now)
         elif self.machine.sequence is None:

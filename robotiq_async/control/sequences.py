@@ -40,7 +40,7 @@ def activation(at_rest: Image) -> Sequence:
     status = yield None
     if classify(status) is not Trigger.SEEN_RESET:
         return
-    status = yield replace(at_rest(status), activate=True, release=False)
+    status = yield replace(at_rest(status), activate=True)
     asked, begun = status.timestamp, False
     while classify(status) is not Trigger.SEEN_READY:
         if status.fault.severity is Severity.MAJOR:
@@ -58,7 +58,7 @@ def activation(at_rest: Image) -> Sequence:
 def reset(at_rest: Image) -> Sequence:
     """Clear rACT and wait for gACT = 0 and gIMC = 0. This clears faults and releases the part."""
     status = yield None
-    yield from _until_reset(replace(at_rest(status), activate=False, release=False))
+    yield from _until_reset(replace(at_rest(status), activate=False))
 
 
 def _until_reset(image: Request) -> Sequence:

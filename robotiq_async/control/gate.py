@@ -1,0 +1,32 @@
+"""The gate through which every image leaves: the one place that decides about rACT and rATR.
+
+A rising rACT moves all fingers to their stops, and rATR releases the part (manual: activation, automatic
+release). An image is made from an older one, so either could be carried along by accident: by a command after
+another client's reset, by a stop that crosses a power cycle, by a hold after a release. So an image has rACT
+only if the gripper shows it, and rATR never; an activation may raise rACT, and a release rATR.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..values.request import Request
+from ..values.status import RobotiqStatus
+
+
+def gate(
+    image: Request, status: RobotiqStatus, *, activates: bool = False, releases: bool = False
+) -> Request:
+    """The image as it may be written.
+
+    Args:
+        image: to be written.
+        status: the newest one.
+        activates: whether it begins an activation that was asked for.
+        releases: whether it begins an automatic release that was asked for.
+    """
+    return replace(
+        image,
+        activate=image.activate and (activates or status.activation_echo),
+        release=image.release and releases,
+    )
