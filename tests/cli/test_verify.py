@@ -185,6 +185,8 @@ async def test_every_key_that_interrupts_stops_the_fingers(
     assert await terminal.end() == code
     text = (tmp_path / "report" / "report.json").read_text()
     assert '"why": "interrupted"' in text or '"why": "stopped"' in text
+    if key.startswith("Ctrl-C"):
+        assert f"interrupted: the report is in {tmp_path / 'report'}" in terminal.out.decode()
 
 
 async def test_a_terminal_that_shows_nothing_does_not_keep_the_fingers_moving(

@@ -215,7 +215,43 @@ async def test_after_each_stage_the_report_is_on_the_disk(tmp_path: Path) -> Non
 
         runner = Runner(Plan(address, last=3, lengths=SHORT), Helper(server), folder.recording, save)
         await folder.end(await runner.run())
-    assert seen == [[0], [0, 1], [0, 1, 2], [0, 1, 2, 3]]
+    assert seen == [[0], [0, 1], [0, 1], [0, 1, 2], [0, 1, 2], [0, 1, 2, 3]], "and before each that writes"
+
+
+@pytest.mark.virtual_time
+async def test_a_run_that_is_killed_in_a_stage_that_writes_says_that_the_fingers_may_move(
+    tmp_path: Path,
+) -> None:
+    """It read "nothing speaks against using this gripper ... it was killed: -."."""
+    pages: list[str] = []
+    async with served() as server, threads():
+        address = parse_address(server.address)
+        folder = Folder(tmp_path, address)
+
+        def save(report: Report) -> None:
+            folder.save(report)
+            pages.append((tmp_path / PAGE).read_text())
+
+        runner = Runner(Plan(address, last=2, lengths=SHORT), Helper(server), folder.recording, save)
+        await folder.end(await runner.run())
+    after_0, after_1, before_2, after_2 = pages
+    assert "THE FINGERS MAY STILL MOVE: stage 2 has begun, and the run has not ended" in before_2
+    for text in pages:
+        assert "The run has not ended, or was killed." in text
+        assert "nothing speaks against" not in text
+        assert "Lines to paste" not in text
+    for text in (after_0, after_1, after_2):
+        assert "FINGERS MAY" not in text
+    assert "Lines to paste" in (tmp_path / PAGE).read_text(), "of a run that has ended"
+
+
+def test_above_do_not_use_there_are_no_lines_to_paste() -> None:
+    report = report_with(poll_interval=0.061)
+    assert "poll_interval=0.061" in page(report)
+    report.why, report.words = "deviation", "a safety check differs"
+    assert "Do not use this gripper" in page(report)
+    assert "poll_interval=0.061" not in page(report)
+    assert "Lines to paste" not in page(report)
 
 
 # -- what follows ------------------------------------------------------------------------------------------

@@ -5,19 +5,21 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
 from robotiq_async.link.address import parse_address
 from robotiq_async.simulator import SimulatorServer, Trouble
 from robotiq_async.simulator.troubles.like_hardware import like_hardware, own_habits
-from robotiq_async.tools.verify import Plan, Report, Runner
+from robotiq_async.tools.verify import Plan, Report, Runner, Verdict
 from robotiq_async.tools.verify.catalogue import CATALOGUE, HARMLESS
 from robotiq_async.tools.verify.motions import REACHED, UNREACHED
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.registers import rGTO
 from tests.verify.matrix import EVENTS, HABITS, options
 from tests.verify.people import SHORT, Helper, Roll, assert_as_assumed, differing, served, verified
+from tests.virtual import VirtualLoop
 
 pytestmark = pytest.mark.virtual_time
 
@@ -165,3 +167,31 @@ async def test_an_alarm_is_withdrawn_when_the_gripper_answers_again() -> None:
         assert report.why == "link"
         assert helper.alarms == [UNREACHED.format("rGTO = 0 could not be sent"), REACHED]
         assert not server.gripper.is_moving
+
+
+class LateTimers(VirtualLoop):
+    """A computer whose timers are late by 10 ms."""
+
+    def call_at(self, when: float, callback: Any, *arguments: Any, **options: Any) -> asyncio.TimerHandle:
+        return super().call_at(when + 0.01, callback, *arguments, **options)
+
+
+@pytest.mark.parametrize("is_late", [False, True])
+def test_late_timers_of_this_computer_are_not_blamed_on_the_gripper(is_late: bool) -> None:
+    async def main() -> None:
+        async with served("delay") as server:
+            report = await verified(server, last=1)
+        check = report.checks["read.round_trip"]
+        assert check.verdict is (Verdict.INCONCLUSIVE if is_late else Verdict.DIFFERS)
+        assert ("poll_interval" in report.options) is not is_late
+        assert "wired network" not in check.follows, "the simulator is on this computer"
+
+    with asyncio.Runner(loop_factory=LateTimers if is_late else VirtualLoop) as runner:
+        runner.run(main())
+
+
+async def test_a_write_that_is_forgotten_is_told_with_the_distance_at_which_it_acts() -> None:
+    async with served("write-spacing 0.008") as server:
+        report = await verified(server, first=2, last=2)
+    found = report.checks["write.spacing"].found
+    assert found == "a write 5 ms after another is acknowledged and forgotten, and one 11 ms after it acts"

@@ -19,6 +19,7 @@ from ..addresses import gripper_words
 from ..arguments import Address, Stage, need
 from ..failures import CommandError, UsageError, usage
 from ..keyboard import Keyboard, has_terminal, wrapped
+from ..output.messages import tell
 
 if TYPE_CHECKING:
     from ...tools.verify import Person, Plan, Report
@@ -116,6 +117,10 @@ async def _run(plan: Plan, person: Person, folder: Folder) -> None:
     report = runner.report
     try:
         await runner.run()
+    except asyncio.CancelledError:
+        with suppress(OSError):  # the terminal is gone
+            tell(f"interrupted: the report is in {folder.path}")
+        raise
     finally:
         ending = asyncio.ensure_future(folder.end(report))
         try:
@@ -130,12 +135,13 @@ async def _run(plan: Plan, person: Person, folder: Folder) -> None:
 
 
 def _print_summary(report: Report, where: str) -> None:
-    from ...tools.verify.report import lines, sentences
+    from ...tools.verify.report import is_unusable, lines, sentences
 
     print(wrapped("\n" + "\n".join(sentences(report))), flush=True)
     for check in report.differing:
         print(wrapped(f"  {check.name} differs: {check.found}. {check.follows}"), flush=True)
-    print("\n" + "\n\n".join(lines(report).values()), flush=True)
+    if not is_unusable(report):
+        print("\n" + "\n\n".join(lines(report).values()), flush=True)
     print(f"\n{where}", flush=True)
 
 

@@ -109,8 +109,15 @@ def sentences(report: Report) -> tuple[str, str, str]:
     return _usable(report), _known(report), _to_report(report)
 
 
+def is_unusable(report: Report) -> bool:
+    """Whether the gripper must not be used: lines to paste would say that it can be."""
+    return not report.why or report.is_unstopped or report.why in UNUSABLE
+
+
 def _usable(report: Report) -> str:
     words = report.words.rstrip(".")
+    if not report.why:
+        return _unended(report)
     if report.is_unstopped:
         return f"THE FINGERS MAY STILL MOVE: the last rGTO = 0 was not confirmed ({words}). {DO_NOT_USE}."
     if report.why in UNUSABLE:
@@ -130,6 +137,16 @@ def _usable(report: Report) -> str:
         return f"This gripper can be used {how}."
     moved = "" if max(report.entered) > HARMLESS else " It has not moved yet."
     return f"So far nothing speaks against using this gripper {how}.{moved}"
+
+
+def _unended(report: Report) -> str:
+    """While the run lasts, and for ever if it was killed."""
+    begun = [number for number in report.entered if number not in report.stages]
+    if begun and begun[-1] >= HARMLESS:
+        why = f"stage {begun[-1]} has begun, and the run has not ended, or was killed"
+        return f"THE FINGERS MAY STILL MOVE: {why}. {DO_NOT_USE}."
+    known = f"stage {report.stages[-1]} was the last that ended" if report.stages else "no stage has ended"
+    return f"Whether this gripper can be used is not known: the run has not ended, or was killed; {known}."
 
 
 def _missing(report: Report) -> list[int]:
@@ -186,15 +203,18 @@ def page(report: Report, pictures: tuple[str, ...] = (), why_none: str = "") -> 
         *([f"**{report.label}**", ""] if report.label else []),
         *sentences(report),
         "",
-        f"The run ended: {ENDINGS.get(report.why, 'it was killed')}: {report.words.rstrip('.') or '-'}.",
+        f"The run ended: {ENDINGS[report.why]}: {report.words.rstrip('.')}."
+        if report.why
+        else "The run has not ended, or was killed.",
         f"Checked as a {report.model}, link {report.link}.",
         f"Python {fields['python']} on {fields['system']}, {fields['machine']}.",
         "",
-        "## Lines to paste",
-        "",
     ]
-    paste = [
-        line for name, text in lines(report).items() for line in (f"{name}:", "", "```", text, "```", "")
+    paste = [] if is_unusable(report) else ["## Lines to paste", ""]
+    paste += [
+        line
+        for name, text in (lines(report) if paste else {}).items()
+        for line in (f"{name}:", "", "```", text, "```", "")
     ]
     table = ["## Checks", "", "| stage | check | assumed | | found |", "| -- | -- | -- | -- | -- |"]
     table += [_row(report.checks[name]) for name in CATALOGUE if name in report.checks]

@@ -76,7 +76,8 @@ class Runner:
             plan: what is to be done.
             person: answers and watches.
             tape: takes every frame.
-            save: is called with the report after each stage, while nothing moves; an OSError ends the run.
+            save: is called with the report after each stage, and before each that writes; nothing moves then.
+                An OSError ends the run.
         """
         self.report = Report(plan.address.kind, model_of(plan.address.model), label=plan.label)
         self._plan = plan
@@ -118,6 +119,8 @@ class Runner:
         if stage.number == 1 and not self._is_found:
             await self._find()
         self.report.entered.append(stage.number)
+        if stage.number >= HARMLESS:
+            self._save_report()  # it must not call the gripper usable if the run is killed from here on
         self._tape.begin(stage.number)
         try:
             await stage.run(self._bench)
@@ -128,14 +131,17 @@ class Runner:
             raise EndError("unstopped", f"rGTO = 0 was not confirmed at the end of stage {stage.number}")
         self.report.stages.append(stage.number)
         self._bench.is_active = stage.number > HARMLESS
-        try:
-            self._save(self.report)
-        except OSError as error:
-            raise EndError("disk", f"the report cannot be written: {error.strerror or error}") from error
+        self._save_report()
         if self._person.has_stopped:
             raise EndError("stopped", "a key was pressed, or the terminal was closed")
         if self._tape.failure:
             raise EndError("disk", f"the recording has failed: {self._tape.failure}")
+
+    def _save_report(self) -> None:
+        try:
+            self._save(self.report)
+        except OSError as error:
+            raise EndError("disk", f"the report cannot be written: {error.strerror or error}") from error
 
     # -- before a stage --------------------------------------------------------------------------------------
 

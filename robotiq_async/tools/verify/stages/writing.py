@@ -173,7 +173,9 @@ def _judge_spacing(bench: Bench, kept: list[Figure], enough: list[float]) -> Non
         bench.as_assumed("write.spacing", f"all {PAIRS} pairs at each distance", gap_pairs_acted=kept)
         return
     forgotten = max(set(GAPS_S) - set(enough))
-    found = f"a write within {1000 * forgotten:.0f} ms of another is acknowledged and forgotten"
+    kept_at = min((gap for gap in enough if gap > forgotten), default=None)
+    found = f"a write {1000 * forgotten:.0f} ms after another is acknowledged and forgotten"
+    found += "" if kept_at is None else f", and one {1000 * kept_at:.0f} ms after it acts"
     options: Options = NO_OPTIONS
     follows = "No option is needed: a hand leaves enough time. Programs that write faster lose commands."
     if forgotten >= WRITE_SPACING_S:
