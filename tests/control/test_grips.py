@@ -115,3 +115,22 @@ def test_after_another_clients_reset_and_activation_no_old_grip_closes_the_finge
         scan.moved(100, S)
         scan.run(3)
         assert scan.positions()[A] < 20
+
+
+def test_a_contact_that_may_be_from_before_is_no_grip() -> None:
+    """Sent away and back within the lag, and halted: the part is gone, and nothing may close on its place."""
+    scan = started(lag=8)
+    scan.gripper.place_object(A, 150)
+    assert scan.moved(255, A, speed=255).contacts == A
+    scan.run(1.0)
+    scan.move(0, A, speed=0)
+    scan.run(0.005)
+    scan.gripper.remove_object(A)
+    scan.move(255, A, speed=0)
+    scan.run(0.01)
+    scan.halt()
+    scan.run(0.1)
+    travel = scan.gripper.travel(A)
+    scan.command(S, position=100)
+    scan.run(3.0)
+    assert scan.gripper.travel(A) - travel <= 2

@@ -12,6 +12,7 @@ from robotiq_async.simulator import Habits
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import AxisRequest, Request
+from tests.control.other_client import image
 from tests.control.scan import POLL_S, Scan, started
 from tests.register_words import status_of
 
@@ -55,6 +56,20 @@ def test_a_limit_is_learned_and_logged_once(caplog: pytest.LogCaptureFixture) ->
     for request in (255, 130, 250, 130, 255):
         scan.moved(request, S)
     assert caplog.text.count(f"its limit {HIGH}") == 1
+
+
+def test_a_limit_that_no_axis_has_proven_is_dropped_when_another_client_is_seen() -> None:
+    """What looked like a limit may have been that client's request: it explains no later echo."""
+    scan = echoing()
+    scan.move(255, S)
+    scan.run(0.05)
+    assert scan.controller.foreign_commands == 0, "taken for a limit"
+    scan.gripper.write(0, image({A: 50, S: 100}))
+    scan.run(1.0)
+    _, again = scan.move(255, S)
+    scan.run(1.0)
+    assert scan.controller.foreign_commands == 2
+    assert isinstance(again.error, MoveSupersededError)
 
 
 def test_an_axis_at_its_limit_rests_and_is_left_alone() -> None:

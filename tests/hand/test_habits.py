@@ -13,9 +13,11 @@ from robotiq_async import (
     ActivationTimeoutError,
     ConnectFailedError,
     ConnectionLostError,
+    Fault,
     Finger,
     GripChange,
     MoveTimeoutError,
+    NotActivatedError,
     ObjectStatus,
     RobotiqHand,
     State,
@@ -324,6 +326,27 @@ async def test_a_gripper_that_shows_no_reset_is_reset_twice_at_most() -> None:
         await hand.recover()
     assert deaf.resets == 2
     await hand.stop()
+
+
+async def test_a_release_that_a_reset_and_a_fault_end_between_two_polls_is_not_waited_for() -> None:
+    """Another client resets and activates the gripper, and the activation fails: only FAULT is ever seen."""
+    wire = Wire(device_cycle=0.0, speedup=0.2)
+    await wire.activate()
+    wire.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    async with RobotiqHand(wire) as hand:
+        releasing = asyncio.create_task(hand.atr())
+        await hand.wait_for_state(State.WF_ATR)
+        await asyncio.sleep(1.0)
+        assert not releasing.done()
+        wire.gripper.clear_faults()
+        wire.gripper.write(0, [0x0000])
+        wire.gripper.write(0, [0x0100])
+        wire.gripper.inject_fault(Fault.ACTIVATION_FAULT)
+        began = now()
+        with pytest.raises(NotActivatedError, match="reset during the release"):
+            await releasing
+        assert now() - began < 1.0
+        assert hand.state is State.FAULT
 
 
 async def test_a_gripper_that_never_recovers_is_reset_twice_and_left_to_a_person() -> None:

@@ -187,6 +187,22 @@ async def test_a_rogue_transport_is_a_lost_link(call: str, what: str) -> None:
     assert wire.most_inside == 1
 
 
+async def test_after_a_reply_that_is_no_status_the_fingers_are_stopped_over_a_new_connection() -> None:
+    """The rest of that reply could answer the next request."""
+    wire = Wire()
+    await wire.activate()
+    async with RobotiqHand(wire, reconnect=False) as hand:
+        hand.command(Finger.A, position=255, speed=0)
+        await until(lambda: wire.gripper.is_moving)
+        words, wire.shown = wire.shown, lambda: (0,) * 7  # type: ignore[method-assign]
+        del wire.calls[:]
+        await until(lambda: "close" in wire.calls)
+        wire.shown = words  # type: ignore[method-assign]
+        await hand.wait_for_state(State.SHUTDOWN)
+        assert not wire.gripper.is_moving
+        assert wire.calls.index("close") < wire.calls.index("open") < wire.calls.index("write")
+
+
 @pytest.mark.parametrize("call", ["read", "write", "close"])
 @pytest.mark.parametrize("what", IN_ANY_CALL)
 async def test_stop_ends_on_a_rogue_transport(call: str, what: str) -> None:

@@ -237,15 +237,17 @@ async def test_the_first_answer_that_was_only_late_is_not_the_second(
     assert await transport.read() == (len(device.requests),) * 8
 
 
+@pytest.mark.parametrize(("pieces", "pause"), [(4, 0.005), (6, 0.012)])
 async def test_the_rest_of_a_damaged_answer_is_no_part_of_the_next(
-    transport: ModbusTransport, device: Device
+    transport: ModbusTransport, device: Device, pieces: int, pause: float
 ) -> None:
     device.spoil = lambda reply: b"\xff" + reply[:10]
     reading = asyncio.ensure_future(transport.read())
-    for _ in range(4):
-        await asyncio.sleep(0.005)
+    for _ in range(pieces):
+        await asyncio.sleep(pause)
         device.send(bytes.fromhex("09 03 10 00 00"))
     assert await reading == (len(device.requests),) * 8
+    assert await transport.read() == (len(device.requests),) * 8, "nor of the one after it"
 
 
 async def test_a_device_that_never_falls_silent_is_given_up(

@@ -133,6 +133,26 @@ async def test_when_the_loop_was_held_up_the_gripper_is_read_again_before_anythi
     assert not here.requests
 
 
+async def test_when_the_loop_was_held_up_between_two_cycles_a_stop_reads_first(here: Polled) -> None:
+    """Another client has reset the gripper meanwhile: the halt, made of the old status, would activate it."""
+    await here.polls(3)
+    waiter = here.loop.create_future()
+
+    def hold_up() -> None:
+        here.wire.gripper.write(0, Request().registers)
+        here.loop.hold_up(0.5)
+        here.controller.halt(waiter)
+        here.poller.hurry()
+
+    here.loop.call_later(POLL_S / 2, hold_up)
+    await here.polls(1)
+    del here.wire.calls[:]
+    await here.polls(3)
+    assert here.wire.calls[0] == "read"
+    assert not any(image.activate for image in here.wire.written)
+    waiter.cancel()
+
+
 async def test_in_a_loop_that_is_always_held_up_something_is_written_in_the_end(here: Polled) -> None:
     await here.polls(3)
     here.controller.command(Command(Finger.A, 100))

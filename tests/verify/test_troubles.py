@@ -172,7 +172,9 @@ async def test_an_alarm_is_withdrawn_when_the_gripper_answers_again() -> None:
 class LateTimers(VirtualLoop):
     """A computer whose timers are late by 10 ms."""
 
-    def call_at(self, when: float, callback: Any, *arguments: Any, **options: Any) -> asyncio.TimerHandle:
+    def call_at(  # type: ignore[override]
+        self, when: float, callback: Any, *arguments: Any, **options: Any
+    ) -> asyncio.TimerHandle:
         return super().call_at(when + 0.01, callback, *arguments, **options)
 
 
