@@ -65,6 +65,7 @@ async def command_pending(world: World) -> Call:
 async def moving(world: World) -> Call:
     await idle(world)
     await world.hand.move(SHORT, A)
+    await world.until(lambda: not world.gripper.is_moving)  # what is late shows it for longer
     call = asyncio.create_task(world.hand.move(TARGET, A, speed=0))
     await world.until_moving()
     return lambda: call
