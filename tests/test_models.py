@@ -26,6 +26,7 @@ from robotiq_async import (
     RobotiqStatus,
     Severity,
     State,
+    StateTimeoutError,
     WrongModelError,
 )
 from robotiq_async.cli.output.lines import status_line
@@ -317,6 +318,21 @@ async def test_a_fault_is_that_of_the_model_and_is_recovered_from() -> None:
 
 
 @virtual
+async def test_a_fault_that_the_model_does_not_know_is_waited_for() -> None:
+    """0x0C is one of a jaw, and is reset; 0x02 is of none."""
+    async with hand_on(HAND_E) as (gripper, hand):
+        gripper.inject_fault(0x0C)
+        await hand.wait_for_state(State.FAULT)
+        await hand.recover()
+        writes = len(gripper.writes)
+        gripper.inject_fault(0x02)
+        await hand.wait_for_state(State.FAULT)
+        with pytest.raises(StateTimeoutError, match="0x02"):
+            await hand.recover(timeout=1.0)
+        assert len(gripper.writes) == writes
+
+
+@virtual
 async def test_an_automatic_release_opens_the_jaw() -> None:
     async with hand_on(HAND_E) as (gripper, hand):
         await hand.close()
@@ -348,6 +364,7 @@ async def test_a_remote_hand_learns_the_model_from_its_agent() -> None:
 FINGERS = "it counts on three fingers"
 STROKE = "it counts on the time that a 3-Finger takes for a stroke"
 READING = "it has the reading of a closed 3-Finger"
+CODES = "its codes mean something else on a sibling"
 OTHERWISE = {
     "test_more_contacts_than_axes": FINGERS,
     "test_integers_of_numpy_are_integers": FINGERS,
@@ -367,7 +384,8 @@ OTHERWISE = {
     "test_statuses_opened_before_the_start_end_after_the_stop": STROKE,
     "test_nothing_there": READING,
     "test_a_contact_while_opening_is_not_held": READING,
-    "test_a_major_fault": "its codes mean something else on a sibling",
+    "test_a_major_fault": CODES,
+    "test_recover_waits_for_a_fault_that_nobody_knows_and_drops_no_part": CODES,
 }
 """Scenes of the contract that are about the 3-Finger alone, and why; the tests above have their like."""
 
