@@ -385,7 +385,7 @@ OTHERWISE = {
     "test_nothing_there": READING,
     "test_a_contact_while_opening_is_not_held": READING,
     "test_a_major_fault": CODES,
-    "test_recover_waits_for_a_fault_that_nobody_knows_and_drops_no_part": CODES,
+    "test_recover_waits_for_a_fault_that_no_manual_names_and_drops_no_part": CODES,
 }
 """Scenes of the contract that are about the 3-Finger alone, and why; the tests above have their like."""
 

@@ -175,7 +175,7 @@ class Poller:
 
     @staticmethod
     def _not_connected(bug: Exception | None) -> RobotiqError:
-        """Why the task has ended before the first status."""
+        """The error of callers that wait for the first status when the task ends."""
         if bug is not None:
             return ConnectionLostError(f"internal error: {bug!r}")
         return NotStartedError("the hand was stopped while it connected")

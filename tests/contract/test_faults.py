@@ -70,7 +70,7 @@ async def test_recover_waits_for_a_minor_fault_and_writes_nothing(here: Bench, h
 
 @contract
 @pytest.mark.parametrize("code", [0x01, 0x02, 0x04, 0x08, 0x0C])
-async def test_recover_waits_for_a_fault_that_nobody_knows_and_drops_no_part(
+async def test_recover_waits_for_a_fault_that_no_manual_names_and_drops_no_part(
     here: Bench, hand: Hand, code: int
 ) -> None:
     here.gripper.inject_fault(code)

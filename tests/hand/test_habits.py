@@ -206,7 +206,7 @@ async def test_a_motion_that_never_begins_and_never_ends_times_out() -> None:
 
 
 def with_ends(model: Model, low: int, high: int) -> Model:
-    """What a gripper whose fingertips end elsewhere reads when it is open and closed."""
+    """The readings of a gripper whose fingertips end elsewhere, open and closed."""
     return replace(model, stroke=replace(model.stroke, open_reading=low, closed_reading=high))
 
 
@@ -232,7 +232,7 @@ async def test_ends_that_read_otherwise_end_a_move_and_loosen_nothing(
             await hand.wait_for_state(State.RUNNING_IDLE)
             assert not (await hand.move(target, model.all_axes & ABC)).reached
             await asyncio.sleep(3)
-            assert hand.status.requested_position(Finger.A) == target, "it goes on pressing"
+            assert hand.status.requested_position(Finger.A) == target, "it keeps pressing"
     assert caplog.text.count(FAR) == 3, "once a hand"
 
 

@@ -1,4 +1,4 @@
-"""What a simulator does to be like hardware: habits of real grippers that several sources agree on, by model.
+"""The habits of real grippers that several sources agree on, by model: a simulator like hardware has them.
 
 ======================  =============  ====================================================================
 habit                   of which       sources
