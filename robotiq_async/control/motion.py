@@ -146,15 +146,19 @@ class LiveMoves:
                 self._warn_of_unreached(move, move.end(status), limited)
 
     def _warn_of_unreached(self, move: Move, result: MoveResult, limited: Mapping[Finger, int]) -> None:
-        """Warn once if a gripper says "at position" and stands far from where it was asked to go."""
+        """Warn once if a gripper says "at position" and stands far from where it was asked to go.
+
+        Not of the scissor: its range ends within 15..232 (drivers), and programs ask it for 0 and 255.
+        """
         for axis, how in result.outcomes.items():
-            is_there = axis in result.reached or axis in limited
+            is_there = axis in result.reached or axis in limited or axis is Finger.SCISSOR
             if self._has_warned or is_there or how is not ObjectStatus.AT_POSITION:
                 continue
             self._has_warned = True
             self._log.warning(
-                "%s was asked for %d, and the gripper says that it is at position, at %d: it ends there, as "
-                "with fingertips of your own, or it did not follow. See MoveResult.reached; logged once",
+                "%s was asked for %d, and the gripper says that it is at position, at %d: it ends there (a "
+                "software limit, fingertips of your own), or it did not follow. See MoveResult.reached; "
+                "logged once",
                 axis,
                 move.position,
                 result.positions[axis],

@@ -177,7 +177,7 @@ async def test_an_activation_that_times_out_is_taken_back() -> None:
 
 # -- a gripper that does not follow, or whose fingertips end elsewhere ---------------------------------------
 
-FAR = "it ends there, as with fingertips of your own, or it did not follow"
+FAR = "it ends there (a software limit, fingertips of your own), or it did not follow"
 
 
 async def test_a_motion_that_moves_nothing_and_is_reported_as_done_has_reached_nothing(
@@ -237,8 +237,11 @@ async def test_ends_that_read_otherwise_end_a_move_and_loosen_nothing(
 
 
 @pytest.mark.parametrize(("target", "fingers"), [(0, ABC), (255, Finger.SCISSOR), (130, Finger.SCISSOR)])
-async def test_a_first_motion_of_nothing_ends_at_once(target: int, fingers: Finger) -> None:
+async def test_a_first_motion_of_nothing_ends_at_once(
+    target: int, fingers: Finger, caplog: pytest.LogCaptureFixture
+) -> None:
     """The scissor stands at its software limit, which is reported as reached."""
+    caplog.set_level(logging.WARNING, "robotiq_async")
     wire = Wire(scissor_limit=(6, 228))
     await activate_beforehand(wire.gripper)
     async with RobotiqHand(wire) as hand:
@@ -247,6 +250,7 @@ async def test_a_first_motion_of_nothing_ends_at_once(target: int, fingers: Fing
         began = now()
         await hand.move(target, fingers)
         assert now() - began < 0.5
+    assert FAR not in caplog.text, "the range of a scissor ends there"
 
 
 # -- a link that does not come back ------------------------------------------------------------------------
