@@ -105,12 +105,13 @@ def test_every_public_method_and_attribute_is_described() -> None:
 
 def test_every_error_that_a_docstring_names_is_exported() -> None:
     errors = {name for name in vars(robotiq_async.values.errors) if name.endswith("Error")}
-    for module in (robotiq_async, fleet, sync):
-        ours = set(module.__all__) | set(robotiq_async.__all__)
-        for name, method in methods():
-            owner = name.partition(".")[0]
-            named = set(re.findall(r"\b[A-Z]\w+Error\b", method.__doc__ or "")) & errors
-            if owner in module.__all__:
+    described = [*methods()]
+    for module in (robotiq_async, simulator, fleet, sync):
+        described += [(name, getattr(module, name)) for name in module.__all__]
+        ours = {*module.__all__, *robotiq_async.__all__}
+        for name, each in described:
+            named = set(re.findall(r"\b[A-Z]\w+Error\b", each.__doc__ or "")) & errors
+            if name.partition(".")[0] in module.__all__:
                 assert named <= ours, f"{name} names {named - ours}"
 
 
