@@ -63,12 +63,14 @@ class Scan:
         speed: int = 128,
         after: Scan | None = None,
         lag: int = 0,
+        spacing: float = 0.0,
         model: Model = THREE_FINGER,
         **options: Any,
     ) -> None:
         """``after`` is the program before this one: the gripper is its, and so is the time.
 
-        ``lag`` is by how many reads gDT and gSTA come late; the options are the gripper's.
+        ``lag`` is by how many reads gDT and gSTA come late, ``spacing`` the hand's ``write_spacing``; the
+        options are the gripper's.
         """
         self._late: deque[Registers] = deque(maxlen=lag + 1)
         self._time: list[float] = [100.0] if after is None else after._time
@@ -82,7 +84,7 @@ class Scan:
         self.transitions: list[tuple[State, State, Trigger]] = []
         self.machine = StateMachine(lambda *change: self.transitions.append(change))
         self.controller = Controller(
-            self.machine, speed, 64, units_of(None, None, model).closing_s, model=model
+            self.machine, speed, 64, units_of(None, None, model).closing_s, spacing, model
         )
         self.written: list[Registers] = []
         self.forgets = 0
@@ -118,6 +120,14 @@ class Scan:
         """One cycle; without an answer the write arrives and the link goes down before it is known."""
         self.now += POLL_S
         self.controller.see(self.status())
+        self._write(answer=answer)
+
+    def hurry(self) -> None:
+        """Write what is urgent before the next read, as the poller does."""
+        if self.controller.is_urgent and not self.controller.wait(self.now):
+            self._write(answer=True)
+
+    def _write(self, *, answer: bool) -> None:
         request = self.controller.decide(self.now)
         if request is not None:
             self.written.append(request.registers)

@@ -1,0 +1,226 @@
+"""Random lives of a hand, with slow grippers, lost links and other clients; the promises as invariants."""
+
+from __future__ import annotations
+
+import contextlib
+from collections import Counter
+from typing import Final, NamedTuple
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robotiq_async import Finger, State
+from robotiq_async.control.motion import Move
+from robotiq_async.control.state_machine import RUNNING, SEQUENCES
+from robotiq_async.values.enums import Trigger
+from robotiq_async.values.errors import RobotiqError
+from robotiq_async.values.model import THREE_FINGER, TOLERANCE
+from robotiq_async.values.request import Request
+from tests.control.other_client import image
+from tests.control.scan import Outcome, Scan
+
+AXES: Final = THREE_FINGER.axes
+OURS: Final = ("move", "move", "command", "cancel", "hold", "halt")
+KINDS: Final = {
+    "ours": (*OURS, "place", "forget"),
+    "link": (*OURS, "lose", "lose"),
+    "fault": (*OURS, "fault", "clear", "reset", "activate", "release"),
+    "foreign": (*OURS, "foreign", "foreign"),
+    "all": (
+        *OURS,
+        *("place", "forget", "lose", "fault", "clear", "reset", "activate", "release"),
+        *("foreign", "foreign reset", "foreign activation", "power"),
+    ),
+}
+
+
+class Step(NamedTuple):
+    """One thing that happens, and the time until the next."""
+
+    what: int
+    axes: Finger
+    position: int
+    chance: float
+    pause: float
+
+
+PAUSES: Final = [0.0, 0.005, 0.005, 0.01, 0.05, 0.3, 2.0]
+steps = st.lists(
+    st.builds(
+        Step,
+        st.integers(0, 1000),
+        st.integers(1, 15).map(Finger),
+        st.integers(0, 255),
+        st.floats(0, 1, exclude_max=True),
+        st.sampled_from(PAUSES),
+    ),
+    min_size=3,
+    max_size=12,
+)
+
+
+class Watched(Scan):
+    """Checks each image as it is written."""
+
+    motions: Counter[tuple[Finger, int]]
+    """How often an image set an axis in motion to a position."""
+
+    def _write(self, *, answer: bool) -> None:
+        written, state, shown = len(self.written), self.state, self.latest
+        before = Request.from_registers(self.written[-1]) if self.written else Request()
+        at = {axis: self.gripper.position(axis) for axis in AXES}
+        super()._write(answer=answer)
+        if len(self.written) == written:
+            return
+        now = self.last_image
+        assert not now.activate or shown.activation_echo or state is State.DO_ACTIVATION, "rACT has risen"
+        assert not now.release or state is State.DO_ATR, "rATR was set"
+        for axis in AXES:
+            asked = now.position(axis)
+            is_new = now.go and (not before.go or before.position(axis) != asked)
+            if is_new and abs(asked - at[axis]) > TOLERANCE:
+                self.motions[axis, asked] += 1
+
+
+class Life:
+    """A hand, a gripper, and all who want something of them."""
+
+    def __init__(self, scan: Watched) -> None:
+        self.scan = scan
+        self.calls: list[Outcome] = []
+        self.moves: list[tuple[Move, Outcome]] = []
+        self.asked: Counter[tuple[Finger, int]] = Counter()
+        """How often an axis was asked to go to a position."""
+        self.stays: dict[Finger, float] = {}
+        """The axes that nobody has asked to move, with the travel of each."""
+
+    def begin(self) -> None:
+        self.scan.motions = Counter()
+        self.scan.start()
+        self.stays = self.scan.travels()
+
+    def ask(self, axes: Finger, position: int) -> None:
+        for axis in AXES:
+            if axis in axes:
+                self.asked[axis, position] += 1
+                self.stays.pop(axis, None)
+
+    def happen(self, what: str, step: Step) -> None:
+        scan, gripper, axes, position = self.scan, self.scan.gripper, step.axes, step.position
+        match what:
+            case "move":
+                speed = (None, 0, 255)[int(step.chance * 3)]
+                move, outcome = scan.move(position, axes, speed=speed)
+                self.moves.append((move, outcome))
+                self.calls.append(outcome)
+                self.ask(axes, position)
+            case "command":
+                is_motion = step.chance < 0.6
+                self.calls.append(scan.command(axes, position if is_motion else None, force=position))
+                if is_motion:
+                    self.ask(axes, position)
+            case "cancel":
+                live = [each for each in self.moves if not each[1].is_answered]
+                if live:
+                    move, outcome = live[int(step.chance * len(live))]
+                    scan.controller.abandon(move)
+                    self.calls.remove(outcome)
+                    self.moves.remove((move, outcome))
+            case "hold":
+                self.calls.append(scan.hold(axes))
+            case "halt":
+                if scan.state in SEQUENCES:
+                    scan.controller.reset(Trigger.ASK_HALT)
+                else:
+                    self.calls.append(scan.halt())
+            case "place":
+                gripper.place_object(axes, 20 + position * 210 // 255)
+            case "forget":
+                scan.forgets += 1
+            case "lose":
+                self.lose_the_link(step)
+            case "fault":
+                gripper.inject_fault((0x09, 0x0C, 0x0E)[int(step.chance * 3)])
+            case "clear":
+                gripper.clear_faults()
+            case "reset":
+                scan.controller.reset()
+            case "activate" | "foreign activation" | "power" | "release" | "foreign reset":
+                self.stays.clear()  # these move every axis, or may
+                self.move_all(what)
+            case "foreign":
+                wanted = {axis: (position + 67 * number) % 256 for number, axis in enumerate(AXES)}
+                gripper.write(0, image(wanted, go=step.chance < 0.7))
+                self.stays.clear()
+
+    def move_all(self, what: str) -> None:
+        scan = self.scan
+        match what:
+            case "activate":
+                scan.controller.activate()
+            case "release":
+                scan.controller.release()
+            case "power":
+                scan.gripper.power_cycle()
+            case _:
+                scan.gripper.write(0, [0x0100 if what == "foreign activation" else 0])
+
+    def lose_the_link(self, step: Step) -> None:
+        scan = self.scan
+        if step.chance < 0.5:
+            scan.step(answer=False)
+        if scan.state is not State.DISCONNECTED:
+            scan.controller.lost(None)
+        assert all(each.is_answered for each in self.calls), "a caller waits for ever"
+        scan.come_back((0.001, 0.05, 1.0)[int(step.chance * 6) % 3])
+
+    def live(self, actions: tuple[str, ...], life: list[Step]) -> None:
+        self.begin()
+        for step in life:
+            with contextlib.suppress(RobotiqError):
+                self.happen(actions[step.what % len(actions)], step)
+            self.scan.hurry()
+            self.scan.run(step.pause)
+            travels = self.scan.travels()
+            assert all(travels[axis] == travel for axis, travel in self.stays.items()), "nobody asked it"
+
+    def end(self, *, keep_grip: bool) -> None:
+        """Everything clears up, and the hand is stopped."""
+        scan = self.scan
+        scan.gripper.clear_faults()
+        scan.run(1.0)
+        if scan.state in RUNNING:
+            scan.until(lambda: not scan.controller.is_moving, 60)
+            scan.run(0.6)
+            assert not scan.gripper.is_moving
+            assert all(each.is_answered for each in self.calls), "a caller waits for ever"
+        scan.forgets, is_active = 0, scan.state in RUNNING
+        scan.stop(keep_grip=keep_grip)
+        assert all(each.is_answered for each in self.calls), "the stop leaves a caller waiting"
+        assert keep_grip or not scan.status().go_echo, "rGTO is set after a stop"
+        before = scan.travels()
+        scan.now += 10
+        assert scan.travels() == before or not is_active, "something goes on after a stop"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@given(
+    device_cycle=st.sampled_from([0.0, 0.005, 0.03, 0.2]),
+    lag=st.sampled_from([0, 0, 8]),
+    spacing=st.sampled_from([0.0, 0.0, 0.01]),
+    life=steps,
+    keep_grip=st.booleans(),
+)
+@settings(max_examples=settings().max_examples // 5)
+def test_whatever_happens_the_hand_does_what_was_asked_and_nothing_else(
+    kind: str, device_cycle: float, lag: int, spacing: float, life: list[Step], keep_grip: bool
+) -> None:
+    scan = Watched(device_cycle=device_cycle, lag=lag, spacing=spacing)
+    lived = Life(scan)
+    lived.live(KINDS[kind], life)
+    if "foreign" not in KINDS[kind]:  # what another client asked is repeated with our own
+        assert all(
+            count <= lived.asked[motion] for motion, count in scan.motions.items() if lived.asked[motion]
+        )
+    lived.end(keep_grip=keep_grip)
