@@ -139,6 +139,6 @@ def test_the_parameters_of_the_calls_are_those_of_the_contract() -> None:
     motion = [(name, None, True) for name in ("speed", "force", "timeout")]
     assert parameters("move") == [("position", empty, False), ("fingers", abc, False), *motion]
     assert parameters("open") == parameters("close") == [("fingers", abc, False), *motion]
-    assert parameters("statuses") == [("buffer", 1, False)]
+    assert parameters("statuses") == [("buffer", 1, False), ("lost_after", None, True)]
     assert parameters("transitions") == parameters("halt") == parameters("atr") == parameters("reset") == []
     assert parameters("wait_for_state")[-1] == ("timeout", None, True)

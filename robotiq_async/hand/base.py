@@ -34,6 +34,8 @@ from .run import NamesErrors, Run, refuse_copy, refuse_with
 
 T = TypeVar("T")
 LONGEST_BUFFER: Final = 1_000_000  # items: over an hour of statuses at 200 Hz
+SHORTEST_LOSS_S: Final = 0.01  # the range of ``lost_after``: two usual polls
+LONGEST_LOSS_S: Final = 3600.0
 
 
 class Hand(ABC):
@@ -457,15 +459,34 @@ class Hand(ABC):
     def statistics(self) -> Statistics:
         """Figures of the polling since the last start."""
 
-    def statuses(self, buffer: int = 1) -> Stream[RobotiqStatus]:
+    def statuses(self, buffer: int = 1, *, lost_after: float | None = None) -> Stream[RobotiqStatus]:
         """Every status from now on, in order, for one reader.
 
         A slow reader costs only itself: the stream keeps the newest ``buffer`` statuses, and its ``missed``
-        counts the others; ``buffer`` is 1..1000000. A stream opened before the start waits for it, and it
-        waits while the link is down. It ends after :meth:`stop`, and raises RobotiqConnectionError when the
-        hand gives up on its link.
+        counts the others. A stream opened before the start waits for it. It ends after :meth:`stop`, and
+        raises RobotiqConnectionError when the hand gives up on its link.
+
+        While the link is down the stream waits, and so does the loop that reads it. A control loop passes
+        ``lost_after``: then the reader gets ConnectionLostError when no status has come for that time since
+        the last one, or since the opening. It may read on; the time begins again.
+
+        Args:
+            buffer: statuses to keep, 1..1000000.
+            lost_after: seconds, 0.01..3600; None to wait however long the link is down. An event loop that is
+                held up for this time counts as well: then no status was read.
         """
-        return self._opened(self._channels.statuses, check_int("buffer", buffer, 1, LONGEST_BUFFER))
+        kept = check_int("buffer", buffer, 1, LONGEST_BUFFER)
+        if lost_after is None:
+            return self._opened(self._channels.statuses, kept)
+        limit = check_seconds("lost_after", lost_after, SHORTEST_LOSS_S, LONGEST_LOSS_S)
+        self._check_may_listen()
+        return self._channels.statuses.open_limited(kept, limit, lambda: self._no_status_for(limit))
+
+    def _no_status_for(self, seconds: float) -> ConnectionLostError:
+        """The error of a reader that has waited for a status for this time."""
+        error = ConnectionLostError(f"no status for {seconds:g} s (the hand is in {self.state.name})")
+        error.hand = self._given_name
+        return error
 
     def transitions(self) -> Stream[Transition]:
         """Every change of state from now on, none lost, for one reader. Ends as :meth:`statuses` does."""

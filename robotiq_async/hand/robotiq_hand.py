@@ -28,6 +28,7 @@ from ..session.waiting import STALLED_S, StallWatch
 from ..values.calibration import ForceCalibration, SpeedCalibration
 from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED, Finger, Severity, State, Trigger
 from ..values.errors import (
+    ConnectionLostError,
     InvalidStateError,
     MoveSupersededError,
     MoveTimeoutError,
@@ -356,6 +357,14 @@ class RobotiqHand(Hand):
     @property
     def _newest_status(self) -> RobotiqStatus | None:
         return None if self._session is None else self._session.controller.status
+
+    def _no_status_for(self, seconds: float) -> ConnectionLostError:
+        if self._session is None or self.state is not State.DISCONNECTED:
+            return super()._no_status_for(seconds)
+        why = self._session.link_lost()
+        error = ConnectionLostError(f"no status for {seconds:g} s: {why.message}")
+        error.__cause__, error.hand = why.__cause__, why.hand
+        return error
 
     def _is_moving(self) -> bool:
         assert self._session is not None, "only asked of a hand that runs"

@@ -139,6 +139,53 @@ class Stream(Generic[T]):
                 loop.call_soon_threadsafe(_wake, waiting)
 
 
+class LimitedStream(Stream[T]):
+    """A stream whose reader gets an error if no item comes for some time, and may then read on.
+
+    The time counts from the last item, or from the last error; before the first item from the opening, if the
+    hand runs then. A reader that waits for the start waits for the first item without a limit.
+
+    Args:
+        buffer: as that of a stream.
+        kept: as that of a stream.
+        limit: seconds.
+        make_error: makes the error.
+        since: when the time begins, by the clock of the loop; None if the hand does not run.
+    """
+
+    def __init__(
+        self,
+        buffer: int | None,
+        kept: set[Stream[Any]],
+        limit: float,
+        make_error: Callable[[], RobotiqError],
+        since: float | None,
+    ) -> None:
+        super().__init__(buffer, kept)
+        self._limit = limit
+        self._make_error = make_error
+        self._since = since
+        """From when the time counts, by the clock of the loop; None before the first item after a start."""
+
+    async def __anext__(self) -> T:
+        if self._items or self._ended or self._since is None:
+            return await super().__anext__()
+        timer = asyncio.get_running_loop().call_at(self._since + self._limit, self._expire)
+        try:
+            return await super().__anext__()
+        finally:
+            timer.cancel()
+
+    def push(self, item: T) -> None:
+        self._since = asyncio.get_running_loop().time()
+        super().push(item)
+
+    def _expire(self) -> None:
+        if self._waiting is not None and not self._waiting.done():
+            self._since = self._waiting.get_loop().time()
+            self._waiting.set_exception(self._make_error())
+
+
 class DerivedStream(Stream[T]):
     """A stream of items that ``make`` derives from those of a channel; it drops none.
 
@@ -229,6 +276,13 @@ class Channel(Generic[T]):
     def open(self, buffer: int | None) -> Stream[T]:
         """Open a stream. Before a start it waits; after the link was given up it raises the reason."""
         return self._begin(Stream(buffer, self._waited_for))
+
+    def open_limited(
+        self, buffer: int | None, limit: float, make_error: Callable[[], RobotiqError]
+    ) -> Stream[T]:
+        """Open a stream that raises an error if no item comes for ``limit`` seconds."""
+        since = None if self._loop is None else self._loop.time()
+        return self._begin(LimitedStream(buffer, self._waited_for, limit, make_error, since))
 
     def derive(self, make: Callable[[T], Iterable[U]]) -> Stream[U]:
         """Open a stream of the items that ``make`` derives from each item from now on."""

@@ -314,8 +314,8 @@ class RobotiqHand:
     def statistics(self) -> Statistics:
         return self._inner.statistics
 
-    def statuses(self, buffer: int = 1) -> Stream[RobotiqStatus]:
-        return self._opened(lambda: self._inner.statuses(buffer))
+    def statuses(self, buffer: int = 1, *, lost_after: float | None = None) -> Stream[RobotiqStatus]:
+        return self._opened(lambda: self._inner.statuses(buffer, lost_after=lost_after))
 
     def transitions(self) -> Stream[Transition]:
         return self._opened(lambda: self._inner.transitions())

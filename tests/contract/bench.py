@@ -43,7 +43,7 @@ CALLS: dict[str, dict[str, Any]] = {
     "recover": {"timeout": 1.0},
     "wait_for_state": {"states": (State.FAULT,), "timeout": 1.0},
     "stop": {},
-    "statuses": {"buffer": 3},
+    "statuses": {"buffer": 3, "lost_after": 1.0},
     "transitions": {},
     "requests": {"buffer": 3},
     "grip_events": {"fingers": A, "slip": 3},

@@ -20,6 +20,10 @@ OF_BYTES: Bad = [(TypeError, NO_INTEGERS), (ValueError, [-1, 256, 10**400])]
 OTHERS: dict[str, Bad] = {
     "fingers": [(TypeError, NO_INTEGERS), (ValueError, [-1, 0, 16, 256, 10**400])],
     "buffer": [(TypeError, NO_INTEGERS), (ValueError, [-1, 0, 10**400])],
+    "lost_after": [
+        (TypeError, ["1", True, np.bool_(True), np.complex64(1)]),
+        (ValueError, [0, 0.001, -1, 3601, float("nan"), float("inf"), 10**400]),
+    ],
     "timeout": [
         (TypeError, ["1", True, np.bool_(True), np.complex64(1)]),
         (ValueError, [0, -1, float("nan"), float("inf"), 10**400]),

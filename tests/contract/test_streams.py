@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import pytest
 
-from robotiq_async import Fault, State, Stream
+from robotiq_async import ConnectionLostError, Fault, State, Stream
 from robotiq_async.hand import Hand
 from tests.contract.bench import A, Bench, at_rest, contract
 
@@ -173,3 +173,48 @@ async def test_a_request_that_another_client_wrote_is_not_ours(here: Bench, hand
     here.gripper.write(0, [0x0900, 0, 0, 0x0AFF, 0, 0, 0, 0])
     await asyncio.sleep(0.5)
     assert stream.take_nowait() is None
+
+
+@contract
+async def test_a_reader_that_asks_for_it_hears_of_a_lost_link_and_may_read_on(
+    here: Bench, hand: Hand
+) -> None:
+    loop, stream, patient = asyncio.get_running_loop(), hand.statuses(lost_after=0.3), hand.statuses()
+    for _ in range(100):
+        await anext(stream)
+    await here.unplug(hand)
+    while stream.take_nowait() is not None:
+        pass
+    for earliest in (0.0, 0.29):
+        began = loop.time()
+        with pytest.raises(ConnectionLostError, match=r"no status for 0\.3 s.*DISCONNECTED|0\.3 s: .*down"):
+            await anext(stream)
+        assert earliest <= loop.time() - began <= 0.31
+    with pytest.raises(ConnectionLostError):
+        await anext(hand.statuses(lost_after=0.3))
+    await here.plug(hand)
+    assert (await anext(stream)).sequence <= hand.status.sequence
+    patient.take_nowait()
+    await anext(patient)
+
+
+@contract
+async def test_a_reader_that_waits_for_the_start_waits_without_a_limit(here: Bench) -> None:
+    hand = here.make()
+    stream = hand.statuses(lost_after=0.05)
+    waiting = asyncio.create_task(anext(stream))
+    await asyncio.sleep(0.2)
+    assert not waiting.done()
+    async with hand:
+        assert (await waiting).sequence >= 0
+
+
+@contract
+async def test_a_stream_with_a_limit_gives_every_status_and_ends_after_the_stop(here: Bench) -> None:
+    hand = here.make()
+    stream = hand.statuses(100_000, lost_after=0.2)
+    collecting = asyncio.create_task(all_of(stream))
+    async with hand:
+        await hand.move(250, speed=0)
+    sequences = [status.sequence for status in await collecting]
+    assert sequences == list(range(sequences[0], sequences[0] + len(sequences)))

@@ -119,6 +119,18 @@ def test_statuses_are_iterated_over_until_the_hand_is_stopped(hand: RobotiqHand)
     assert stream.missed >= 0
 
 
+def test_a_loop_that_asks_for_it_hears_of_a_gripper_that_falls_silent(hand: RobotiqHand, wire: Wire) -> None:
+    stream = hand.statuses(lost_after=0.2)
+    assert next(stream).is_activated
+    wire.is_slow = True
+    with pytest.raises(ConnectionLostError, match=r"no status for 0\.2 s"):
+        for _ in stream:
+            pass
+    wire.is_slow = False
+    while not next(stream).is_activated:
+        pass
+
+
 def test_a_stream_that_waits_ends_when_another_thread_stops_the_hand(hand: RobotiqHand) -> None:
     thread, outcome = in_a_thread(lambda: [each.target for each in hand.transitions()])
     until(lambda: len(loop_threads()) == 1)
