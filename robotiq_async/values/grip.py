@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
 from .checks import check_int
-from .enums import Finger, ObjectStatus
+from .enums import Finger, ObjectStatus, names_of
 from .move_result import MoveResult
 from .status import RobotiqStatus
 
@@ -52,6 +53,15 @@ class GraspResult:
     def status(self) -> RobotiqStatus:
         """The status that ended the grasp: ``hand.grip_events(since=result.status)`` continues from there."""
         return self.move.status
+
+    def as_dict(self) -> dict[str, Any]:
+        """The result in types that JSON and pandas accept; the key ``move`` holds that of the closing."""
+        return {
+            "is_held": self.is_held,
+            "holds": names_of(self.holds),
+            "at_least": self.at_least,
+            "move": self.move.as_dict(),
+        }
 
     def __bool__(self) -> bool:
         return self.is_held
@@ -103,6 +113,18 @@ class GripEvent:
     def timestamp(self) -> float:
         """Monotonic seconds of the status."""
         return self.status.timestamp
+
+    def as_dict(self) -> dict[str, Any]:
+        """The event in types that JSON and pandas accept; change and axis by name."""
+        return {
+            "timestamp": self.timestamp,
+            "change": self.change.name,
+            "finger": str(self.finger.name),
+            "position": self.position,
+            "moved": self.moved,
+            "holds": names_of(self.holds),
+            "status": self.status.as_dict(),
+        }
 
     def __repr__(self) -> str:
         moved = f" by {self.moved:+d}" if self.moved else ""

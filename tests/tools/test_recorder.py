@@ -19,7 +19,7 @@ from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from robotiq_async import Finger, RobotiqHand, RobotiqStatus, State
+from robotiq_async import Finger, RobotiqHand, RobotiqStatus, State, sync
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.description.joint_states import SCHEMA_NAME, JointStateEncoder
 from robotiq_async.tools.description.kinematics import JOINTS, joint_angles
@@ -187,6 +187,12 @@ def test_frames_of_any_length_leave_the_numbers_aligned(frame: str) -> None:
 
 
 # -- what can go wrong -------------------------------------------------------------------------------------
+
+
+def test_a_blocking_hand_is_refused_before_a_file_is_made(file: Path) -> None:
+    with pytest.raises(TypeError, match=r"hand must be a hand for asyncio .*blocking"):
+        Recorder(sync.RobotiqHand("sim://"), file)  # type: ignore[arg-type]
+    assert not file.exists()
 
 
 async def test_a_file_that_is_there_is_not_overwritten(hand: RobotiqHand, file: Path) -> None:

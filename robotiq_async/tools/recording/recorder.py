@@ -99,8 +99,13 @@ class Recorder:
 
         Raises:
             ImportError: MCAP without the extra ``record``.
+            TypeError: no hand for asyncio; a blocking one cannot be recorded.
             ValueError: ``ros2`` with a table.
         """
+        if not isinstance(hand, Hand):
+            raise TypeError(
+                f"hand must be a hand for asyncio (a blocking one cannot be recorded), got {hand!r}"
+            )
         if ros2 and is_table(path):
             raise ValueError(f"ros2 is for MCAP files, and {path} is a table")
         self.path = Path(path)
