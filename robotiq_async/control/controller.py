@@ -373,8 +373,6 @@ class Controller:
                 self.machine.delivered()
             return None
         sent = self._requests.take()
-        if image.go and not base.go:
-            self._grip_keeper.warn_of_lost_grips(status, sent.moved)
         self._note_early_stop(image, now, stops=sent.halting is not None)
         number = shadow.writing(image, sent.moved, now)
         if sent.positions:

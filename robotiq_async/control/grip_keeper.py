@@ -122,14 +122,3 @@ class GripKeeper:
             doubtful=shadow.axes.doubtful(status, shadow.now),
         )
         return None if image == shadow.base else image
-
-    def warn_of_lost_grips(self, status: RobotiqStatus, moved: Finger) -> None:
-        """Warn before an image sets rGTO: an axis whose request is unknown is only held where it is then.
-
-        ``moved`` are the axes that get a position.
-        """
-        axes = status.contacts & ~self._shadow.axes.grips.held(status, self._shadow.base) & ~moved
-        if axes:
-            self._log.warning(
-                "%s in contact while rGTO was clear: held in place, and gripping no longer", axes
-            )
