@@ -278,7 +278,7 @@ class Session:
         }
         try:
             watch = StallWatch(self._channels.listeners, self.machine)
-            with watch, watch.ends_early():
+            with watch, watch.ends_early() as stall:
                 await self.reach(
                     RUNNING.union(faulty),
                     self.options.activation_timeout,
@@ -286,12 +286,12 @@ class Session:
                     failing=failing,
                     what="the activation was not finished",
                 )
-                return
-            raise self._stalled()
         except StateTimeoutError as error:
             fault = Fault.NONE if self.controller.status is None else self.controller.status.fault
             why = f": {fault.description} (gFLT 0x{int(fault):02X}); recover() resets it" if fault else ""
             raise ActivationTimeoutError(f"{error}{why}") from None
+        if stall.cancelled_caught:
+            raise self._stalled()
 
     async def next_status(self) -> None:
         with self._waiters.watching((), self._ends) as seen:
