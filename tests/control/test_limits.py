@@ -219,7 +219,7 @@ def test_a_client_that_is_taken_for_a_limit_is_not_undone() -> None:
     assert scan.controller.foreign_commands == 0
 
 
-# -- what is suspected -------------------------------------------------------------------------------------
+# -- what is learned ---------------------------------------------------------------------------------------
 
 BEFORE = Request(activate=True, go=True, axes=(AxisRequest(0),) * 3 + (AxisRequest(130),))
 
@@ -241,23 +241,23 @@ def test_which_echoes_may_be_limits(
     shown: tuple[int, ...], position: int, asked: dict[Finger, int], expected: bool
 ) -> None:
     status = status_of(0x39, 0xFF, echo=shown, position=(6, 6, 6, position))
-    assert Limits().suspect(BEFORE, BEFORE.with_positions(asked), status) is expected
+    assert Limits().learn(BEFORE, BEFORE.with_positions(asked), status) is expected
 
 
 @pytest.mark.parametrize("byte_0", [0x31, 0x38, 0x30], ids=["halt", "reset", "both"])
 def test_a_halt_and_a_reset_by_others_are_no_limits(byte_0: int) -> None:
     image = BEFORE.with_positions({S: 255})
     status = status_of(byte_0, 0xFF, echo=(0, 0, 0, 220), position=130)
-    assert not Limits().suspect(BEFORE, image, status)
+    assert not Limits().learn(BEFORE, image, status)
 
 
 def test_unproven_limits_are_dropped_when_another_client_is_seen() -> None:
     limits, image = Limits(), BEFORE.with_positions({S: 255})
     status = status_of(0x39, 0xFF, echo=(0, 0, 0, 220), position=130)
-    assert limits.suspect(BEFORE, image, status)
+    assert limits.learn(BEFORE, image, status)
     limits.doubt()
     assert limits.alias(image) is None
-    assert limits.suspect(BEFORE, image, status)
+    assert limits.learn(BEFORE, image, status)
     assert limits.prove(S, 219) == 220
     assert limits.prove(S, 219) is None, "no news"
     limits.doubt()
@@ -269,7 +269,7 @@ def test_unproven_limits_are_dropped_when_another_client_is_seen() -> None:
 @pytest.mark.parametrize(("asked", "limit"), [(255, 220), (0, 20)])
 def test_a_request_at_a_limit_does_not_refute_it_and_one_beyond_does(asked: int, limit: int) -> None:
     limits, beyond, at = Limits(), BEFORE.with_positions({S: asked}), BEFORE.with_positions({S: limit})
-    assert limits.suspect(BEFORE, beyond, status_of(0x39, 0xFF, echo=(0, 0, 0, limit), position=130))
+    assert limits.learn(BEFORE, beyond, status_of(0x39, 0xFF, echo=(0, 0, 0, limit), position=130))
     limits.forget(at, at.echo)
     assert limits.alias(beyond) == at.echo
     limits.forget(beyond, beyond.echo)

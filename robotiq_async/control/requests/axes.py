@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import reduce
 from operator import or_
 from typing import Final
@@ -127,7 +128,8 @@ class Axes:
     def _see_rest(self, status: RobotiqStatus, now: Moment) -> None:
         for axis in self._standstill:
             if not axis & self._proven:
-                standstill, what = self._seen(axis, status, now), status.finger_status(axis)
+                standstill, what = self._standstill[axis], status.finger_status(axis)
+                standstill.see(what, *self._when(now), now)
                 if not axis & self.resting and standstill.is_known(what, status.position(axis)):
                     self.resting |= axis
                     self._prove_limit(axis, what, status.position(axis))
@@ -137,21 +139,19 @@ class Axes:
     def doubtful(self, status: RobotiqStatus, now: Moment) -> Finger:
         """The axes that may move, or be about to, although the status shows them at rest."""
         doubtful = NO_AXES
-        for axis in self._standstill:
-            standstill = self._seen(axis, status, now)
-            if standstill.is_doubtful(status.finger_status(axis), status.position(axis)):
+        for axis, standstill in self._standstill.items():
+            what = status.finger_status(axis)
+            if standstill.after_seeing(what, *self._when(now), now).is_doubtful(what, status.position(axis)):
                 doubtful |= axis
         return doubtful
 
-    def _seen(self, axis: Finger, status: RobotiqStatus, now: Moment) -> Standstill:
-        standstill, writes = self._standstill[axis], self._writes
-        standstill.see(
-            status.finger_status(axis),
+    def _when(self, now: Moment) -> tuple[Callable[[int], bool], Callable[[int], bool]]:
+        """Whether the write of a number acts by now, and whether it was acknowledged long ago."""
+        writes = self._writes
+        return (
             lambda number: writes.acts(number, now.time),
             lambda number: writes.is_old(number, now.time),
-            now,
         )
-        return standstill
 
     def _prove_limit(self, axis: Finger, what: ObjectStatus, position: int) -> None:
         if axis in self.limited and what is ObjectStatus.AT_POSITION:

@@ -56,8 +56,8 @@ class Limits:
             if (image.position(axis) > limit if closing else image.position(axis) < limit)
         }
 
-    def suspect(self, before: Request, image: Request, status: RobotiqStatus) -> bool:
-        """Add the differences between a write and a status to the limits, if they can be limits.
+    def learn(self, before: Request, image: Request, status: RobotiqStatus) -> bool:
+        """Learn the differences between a write and a status as limits; return whether they can be limits.
 
         Args:
             before: the image in force before the write.

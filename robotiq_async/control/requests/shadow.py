@@ -148,7 +148,7 @@ class RequestShadow:
         self.now = Moment(asked, self.now.reads + 1)
         if self._writes.last_number:
             self._shown = self._writes.see(status, asked)
-            if self._shown is None and self._suspects_limits(status):
+            if self._shown is None and self._learn_limits(status):
                 self._shown = self._writes.see(status, asked)
             if self._writes.replaced:
                 self._take_limits()
@@ -158,10 +158,10 @@ class RequestShadow:
         if not self._writes.is_in_doubt:
             self._sure_at = asked
 
-    def _suspects_limits(self, status: RobotiqStatus) -> bool:
-        """Whether a foreign echo may be software limits in place of our last requests."""
+    def _learn_limits(self, status: RobotiqStatus) -> bool:
+        """Learn limits from a foreign echo; return whether it may be limits in place of our last requests."""
         is_alone = self.now.time - self._others_at > ALONE_S and self._adoption is None
-        return is_alone and self._writes.suspect_limits(status)
+        return is_alone and self._writes.learn_limits(status)
 
     def _take_limits(self) -> None:
         """Make the limits that show in place of our requests part of the base."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 from ...values.enums import ObjectStatus
@@ -127,6 +127,20 @@ class Standstill:
             # An axis at rest moves only for a new request: from here on every status is from after it.
             self._drop_first()
         self._forget(now)
+
+    def after_seeing(
+        self,
+        what: ObjectStatus,
+        acts: Callable[[int], bool],
+        is_old: Callable[[int], bool],
+        now: Moment,
+    ) -> Standstill:
+        """A copy that has taken in a status, for questions about a status that is not to be taken in."""
+        copied = Standstill(self._model)
+        copied._asked = deque(replace(asked) for asked in self._asked)
+        copied._rested = self._rested
+        copied.see(what, acts, is_old, now)
+        return copied
 
     def is_known(self, what: ObjectStatus, position: int) -> bool:
         """Whether the axis is known to rest like this under its last request.

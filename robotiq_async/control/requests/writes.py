@@ -161,13 +161,13 @@ class WriteHistory:
             self._has_alias = any(each.alias is not None for each in self._writes)
         return (newer or fitting)[0].image
 
-    def suspect_limits(self, status: RobotiqStatus) -> bool:
-        """Whether a status may show limits in place of the last writes; if so, note how they would show."""
+    def learn_limits(self, status: RobotiqStatus) -> bool:
+        """Learn the limits that a status may show in place of the last writes; return whether it may."""
         shown = self._shown
         waiting = [each for each in self._writes if shown is not None and each.number > shown.number]
         if shown is None or not waiting or any(each.phase is not Phase.ACKNOWLEDGED for each in waiting):
             return False
-        if not any(self.limits.suspect(shown.image, each.image, status) for each in waiting):
+        if not any(self.limits.learn(shown.image, each.image, status) for each in waiting):
             return False
         for each in waiting:
             each.alias = self.limits.alias(each.image)
