@@ -5,22 +5,15 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection
 from types import TracebackType
-from typing import TYPE_CHECKING, Final, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Literal, Self, TypeVar
 
 from ..runtime.concurrency import running_loop
 from ..runtime.log import Log
 from ..session.options import LONGEST_WAIT_S
-from ..session.streams import Channel, Channels, Stream
+from ..session.streams import Channel, Channels, Stream, check_buffer, check_limit
 from ..session.waiting import check_states
 from ..values.calibration import Units
-from ..values.checks import (
-    check_byte,
-    check_flag,
-    check_int,
-    check_optional_byte,
-    check_seconds,
-    check_timeout,
-)
+from ..values.checks import check_byte, check_flag, check_optional_byte, check_seconds, check_timeout
 from ..values.enums import CLOSED, OPEN, Finger, State
 from ..values.errors import ConnectionLostError, NotStartedError
 from ..values.events import SentRequest, Transition
@@ -33,9 +26,6 @@ from .grip_watch import SLIP_COUNTS, GripWatch
 from .run import NamesErrors, Run, refuse_copy, refuse_with
 
 T = TypeVar("T")
-LONGEST_BUFFER: Final = 1_000_000  # items: over an hour of statuses at 200 Hz
-SHORTEST_LOSS_S: Final = 0.01  # the range of ``lost_after``: two usual polls
-LONGEST_LOSS_S: Final = 3600.0
 
 
 class Hand(ABC):
@@ -462,31 +452,15 @@ class Hand(ABC):
     def statuses(self, buffer: int = 1, *, lost_after: float | None = None) -> Stream[RobotiqStatus]:
         """Every status from now on, in order, for one reader.
 
-        A slow reader costs only itself: the stream keeps the newest ``buffer`` statuses, and its ``missed``
-        counts the others. A stream opened before the start waits for it. It ends after :meth:`stop`, and
-        raises RobotiqConnectionError when the hand gives up on its link.
-
-        While the link is down the stream waits, and so does the loop that reads it. A control loop passes
-        ``lost_after``: then the reader gets ConnectionLostError when no status has come for that time since
-        the last one, or since the opening. It may read on; the time begins again.
-
-        Args:
-            buffer: statuses to keep, 1..1000000.
-            lost_after: seconds, 0.01..3600; None to wait however long the link is down. An event loop that is
-                held up for this time counts as well: then no status was read.
+        A slow reader costs only itself: the stream keeps the newest ``buffer`` statuses, 1..1000000, and its
+        ``missed`` counts the others. Opened before the start it waits for it. It ends after :meth:`stop`, and
+        raises RobotiqConnectionError when the hand gives up on its link. While the link is down it waits; a
+        control loop passes ``lost_after``, 0.01..3600 s: when no status has come for that time since the last
+        one, or since the opening, it raises ConnectionLostError, and may be read on. So it does if the event
+        loop was held up for that time.
         """
-        kept = check_int("buffer", buffer, 1, LONGEST_BUFFER)
-        if lost_after is None:
-            return self._opened(self._channels.statuses, kept)
-        limit = check_seconds("lost_after", lost_after, SHORTEST_LOSS_S, LONGEST_LOSS_S)
-        self._check_may_listen()
-        return self._channels.statuses.open_limited(kept, limit, lambda: self._no_status_for(limit))
-
-    def _no_status_for(self, seconds: float) -> ConnectionLostError:
-        """The error of a reader that has waited for a status for this time."""
-        error = ConnectionLostError(f"no status for {seconds:g} s (the hand is in {self.state.name})")
-        error.hand = self._given_name
-        return error
+        kept, limit = check_buffer(buffer), check_limit("lost_after", lost_after)
+        return self._opened(self._channels.statuses, kept, limit)
 
     def transitions(self) -> Stream[Transition]:
         """Every change of state from now on, none lost, for one reader. Ends as :meth:`statuses` does."""
@@ -494,7 +468,7 @@ class Hand(ABC):
 
     def requests(self, buffer: int | None = None) -> Stream[SentRequest]:
         """Every request written from now on, as :meth:`statuses`; a ``buffer`` of None loses none."""
-        kept = None if buffer is None else check_int("buffer", buffer, 1, LONGEST_BUFFER)
+        kept = None if buffer is None else check_buffer(buffer)
         return self._opened(self._channels.requests, kept)
 
     def grip_events(
@@ -612,9 +586,14 @@ class Hand(ABC):
                 raise ConnectionLostError("the link to the gripper is down: what it does is not known")
             return status
 
-    def _opened(self, channel: Channel[T], buffer: int | None) -> Stream[T]:
+    def _opened(self, channel: Channel[T], buffer: int | None, limit: float | None = None) -> Stream[T]:
         self._check_may_listen()
-        return channel.open(buffer)
+        return channel.open(buffer, limit, self._no_status_for)
+
+    def _no_status_for(self, seconds: float) -> ConnectionLostError:
+        error = ConnectionLostError(f"no status for {seconds:g} s (the hand is in {self.state.name})")
+        error.hand = self._given_name
+        return error
 
     def _abandon_if_loop_closed(self) -> None:
         if self._session is not None and self._session.lost_its_loop:

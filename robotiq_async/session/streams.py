@@ -11,17 +11,31 @@ import itertools
 import weakref
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Generic, Self, TypeVar
 
 from ..runtime.concurrency import check_loop
 from ..runtime.log import Log, log
-from ..values.errors import RobotiqError
+from ..values.checks import check_int, check_seconds
+from ..values.errors import ConnectionLostError, RobotiqError
 from ..values.events import SentRequest, Transition
 from ..values.status import RobotiqStatus
 
 T = TypeVar("T")
 U = TypeVar("U")
 Listener = Callable[[Any], None]
+LONGEST_BUFFER: Final = 1_000_000  # items: over an hour of statuses at 200 Hz
+SHORTEST_LIMIT_S: Final = 0.01  # two usual polls
+LONGEST_LIMIT_S: Final = 3600.0
+
+
+def check_buffer(buffer: object) -> int:
+    """The number of items that a stream keeps."""
+    return check_int("buffer", buffer, 1, LONGEST_BUFFER)
+
+
+def check_limit(name: str, value: object) -> float | None:
+    """The seconds that a reader may be left without an item; None for no limit."""
+    return None if value is None else check_seconds(name, value, SHORTEST_LIMIT_S, LONGEST_LIMIT_S)
 
 
 class Stream(Generic[T]):
@@ -149,7 +163,7 @@ class LimitedStream(Stream[T]):
         buffer: as that of a stream.
         kept: as that of a stream.
         limit: seconds.
-        make_error: makes the error.
+        make_error: makes the error for these seconds.
         since: when the time begins, by the clock of the loop; None if the hand does not run.
     """
 
@@ -158,7 +172,7 @@ class LimitedStream(Stream[T]):
         buffer: int | None,
         kept: set[Stream[Any]],
         limit: float,
-        make_error: Callable[[], RobotiqError],
+        make_error: Callable[[float], RobotiqError],
         since: float | None,
     ) -> None:
         super().__init__(buffer, kept)
@@ -183,7 +197,7 @@ class LimitedStream(Stream[T]):
     def _expire(self) -> None:
         if self._waiting is not None and not self._waiting.done():
             self._since = self._waiting.get_loop().time()
-            self._waiting.set_exception(self._make_error())
+            self._waiting.set_exception(self._make_error(self._limit))
 
 
 class DerivedStream(Stream[T]):
@@ -273,14 +287,18 @@ class Channel(Generic[T]):
         self._failure: Callable[[], RobotiqError] | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
 
-    def open(self, buffer: int | None) -> Stream[T]:
-        """Open a stream. Before a start it waits; after the link was given up it raises the reason."""
-        return self._begin(Stream(buffer, self._waited_for))
-
-    def open_limited(
-        self, buffer: int | None, limit: float, make_error: Callable[[], RobotiqError]
+    def open(
+        self,
+        buffer: int | None,
+        limit: float | None = None,
+        make_error: Callable[[float], RobotiqError] = ConnectionLostError,
     ) -> Stream[T]:
-        """Open a stream that raises an error if no item comes for ``limit`` seconds."""
+        """Open a stream. Before a start it waits; after the link was given up it raises the reason.
+
+        With a ``limit`` its reader gets the error for these seconds if no item comes in them.
+        """
+        if limit is None:
+            return self._begin(Stream(buffer, self._waited_for))
         since = None if self._loop is None else self._loop.time()
         return self._begin(LimitedStream(buffer, self._waited_for, limit, make_error, since))
 
