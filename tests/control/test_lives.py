@@ -64,7 +64,7 @@ class Watched(Scan):
     """Checks each image as it is written."""
 
     motions: Counter[tuple[Finger, int]]
-    """How often an image set an axis in motion to a position."""
+    """Number of images that set an axis in motion to a position."""
 
     def _write(self, *, answer: bool) -> None:
         written, state, shown = len(self.written), self.state, self.latest
@@ -91,7 +91,7 @@ class Life:
         self.calls: list[Outcome] = []
         self.moves: list[tuple[Move, Outcome]] = []
         self.asked: Counter[tuple[Finger, int]] = Counter()
-        """How often an axis was asked to go to a position."""
+        """Number of requests for an axis to go to a position."""
         self.stays: dict[Finger, float] = {}
         """The axes that nobody has asked to move, with the travel of each."""
 
