@@ -22,13 +22,16 @@ async def all_of(stream: Stream[T]) -> list[T]:
 
 
 @contract
-async def test_statuses_opened_before_the_start_end_after_the_stop(here: Bench) -> None:
+@pytest.mark.parametrize("lost_after", [None, 0.2])
+async def test_statuses_opened_before_the_start_end_after_the_stop(
+    here: Bench, lost_after: float | None
+) -> None:
     hand = here.make()
-    stream = hand.statuses(buffer=100_000)
+    stream = hand.statuses(100_000, lost_after=lost_after)
     collecting = asyncio.create_task(all_of(stream))
     await asyncio.sleep(0)
     async with hand:
-        await hand.move(50)
+        await hand.move(250, speed=0)  # longer than the limit
     sequences = [status.sequence for status in await collecting]
     assert len(sequences) > 20
     assert sequences == list(range(sequences[0], sequences[0] + len(sequences))), "none twice, none lost"
@@ -207,14 +210,3 @@ async def test_a_reader_that_waits_for_the_start_waits_without_a_limit(here: Ben
     assert not waiting.done()
     async with hand:
         assert (await waiting).sequence >= 0
-
-
-@contract
-async def test_a_stream_with_a_limit_gives_every_status_and_ends_after_the_stop(here: Bench) -> None:
-    hand = here.make()
-    stream = hand.statuses(100_000, lost_after=0.2)
-    collecting = asyncio.create_task(all_of(stream))
-    async with hand:
-        await hand.move(250, speed=0)
-    sequences = [status.sequence for status in await collecting]
-    assert sequences == list(range(sequences[0], sequences[0] + len(sequences)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import reduce
 from operator import or_
 from typing import Final
@@ -128,8 +127,8 @@ class Axes:
     def _see_rest(self, status: RobotiqStatus, now: Moment) -> None:
         for axis in self._standstill:
             if not axis & self._proven:
-                standstill, what = self._standstill[axis], status.finger_status(axis)
-                standstill.see(what, *self._when(now), now)
+                what = status.finger_status(axis)
+                standstill = self._seen(self._standstill[axis], what, now)
                 if not axis & self.resting and standstill.is_known(what, status.position(axis)):
                     self.resting |= axis
                     self._prove_limit(axis, what, status.position(axis))
@@ -141,17 +140,20 @@ class Axes:
         doubtful = NO_AXES
         for axis, standstill in self._standstill.items():
             what = status.finger_status(axis)
-            if standstill.after_seeing(what, *self._when(now), now).is_doubtful(what, status.position(axis)):
+            seen = self._seen(standstill.copy(), what, now)  # a question: it takes no status in
+            if seen.is_doubtful(what, status.position(axis)):
                 doubtful |= axis
         return doubtful
 
-    def _when(self, now: Moment) -> tuple[Callable[[int], bool], Callable[[int], bool]]:
-        """Whether the write of a number acts by now, and whether it was acknowledged long ago."""
+    def _seen(self, standstill: Standstill, what: ObjectStatus, now: Moment) -> Standstill:
         writes = self._writes
-        return (
+        standstill.see(
+            what,
             lambda number: writes.acts(number, now.time),
             lambda number: writes.is_old(number, now.time),
+            now,
         )
+        return standstill
 
     def _prove_limit(self, axis: Finger, what: ObjectStatus, position: int) -> None:
         if axis in self.limited and what is ObjectStatus.AT_POSITION:

@@ -128,18 +128,11 @@ class Standstill:
             self._drop_first()
         self._forget(now)
 
-    def after_seeing(
-        self,
-        what: ObjectStatus,
-        acts: Callable[[int], bool],
-        is_old: Callable[[int], bool],
-        now: Moment,
-    ) -> Standstill:
-        """A copy that has taken in a status, for questions about a status that is not to be taken in."""
+    def copy(self) -> Standstill:
+        """A copy that can take in a status for a question, and leave this one as it is."""
         copied = Standstill(self._model)
         copied._asked = deque(replace(asked) for asked in self._asked)
         copied._rested = self._rested
-        copied.see(what, acts, is_old, now)
         return copied
 
     def is_known(self, what: ObjectStatus, position: int) -> bool:
