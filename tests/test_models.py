@@ -381,7 +381,6 @@ OTHERWISE = {
     "test_a_grasp_that_is_given_up_holds_what_moves_and_keeps_the_grip": STROKE,
     "test_a_finger_that_presses_again_after_a_fault_has_kept_its_grip": STROKE,
     "test_timestamps_are_of_this_process_and_only_rise": STROKE,
-    "test_statuses_opened_before_the_start_end_after_the_stop": STROKE,
     "test_nothing_there": READING,
     "test_a_contact_while_opening_is_not_held": READING,
     "test_a_major_fault": CODES,

@@ -26,7 +26,6 @@ AT_200_HZ = dict.fromkeys(
         "test_a_command_moves_from_the_moment_it_is_asked_for",
         "test_timestamps_are_of_this_process_and_only_rise",
         "test_statistics",
-        "test_statuses_opened_before_the_start_end_after_the_stop",
         "test_a_transition_finds_the_status_that_made_it",
         "test_the_state_and_what_it_comes_from_are_there",
         "test_a_cancelled_wait_leaves_nothing",
