@@ -1,1 +1,44 @@
 """What decides: the state machine, and what to write after what has been read. Pure."""
+
+# Theory of operation
+#
+# Three things are known, and every decision is a question between them:
+#
+# * what callers have asked: changes and holds (pending.py), one stop (stops.py), one procedure
+#   (procedures.py), moves that wait for their end (motion.py);
+# * what the gripper may have: the images written, by us or by others (ledger.py);
+# * what it shows: one of five conditions (evidence.py), and which axes rest (rest.py).
+#
+# A cycle is see(), then decide(). An image is made from the base, which is what the gripper has, so that an
+# axis that nobody addresses keeps its request. It leaves through one gate (gate.py): only the procedure that
+# was asked for raises rACT or rATR, whatever an image carries along from another client or an older one.
+#
+# One write. A change is merged with others until the next cycle, then taken out and sent once, because it
+# may move an axis. Its acknowledgement answers its callers. It acts within a device cycle; a status shows it;
+# a later one supersedes it. If the link goes down before the acknowledgement, its callers get an error, the
+# entry is in doubt, and nothing but a stop is written for the time in which it may act. A speed or a force
+# has no echo: it counts as acting after a time, and is known to be the gripper's if it was acknowledged.
+#
+# Holds only stop an axis, and are decided when they are written: an axis at rest or in contact keeps its
+# request, and with it its grip. So they may be sent again. They survive a lost link, unless another client
+# has moved the axis since. A fault puts a hold on all axes that may move because of us: a minor fault clears
+# by itself [manual], and nothing must resume then.
+#
+# A stop goes before all else: a halt, a reset, the end of the hand. It is written at once, again until it is
+# seen, and is over when its write acts and a status shows it. A halt and a reset fail with the link: sent
+# later they would stop another client, or drop a part. The end of a hand begins its stop anew on a new link.
+#
+# Procedures raise rACT or rATR. While one is under way, what a status shows is its matter, not news. When it
+# ends, nothing of ours is on its way, and the ledger begins anew. What an activation of ours began is
+# remembered until its end shows: stopping the hand takes it back.
+#
+# Another client is seen by a status that shows none of our images. It is adopted: its image becomes the base,
+# the moves whose request is gone fail, the others go on, and our writes on their way are in doubt. An
+# adopted axis that moves gets time to show where to. Nothing is written to a gripper for finding it.
+#
+# Each question "is it reached" asks two things: does the write act, and does a status show it. What shows may
+# be from before the write, and what acts may have been undone by another client.
+#
+# The state of the hand is a view of all this: _view() says which of the fourteen holds, state_machine.py what
+# each answers to a call. Evidence: [manual] and [thesis] are printed, [seen] is from real grippers, [vendor]
+# from the maker's examples, [follows] from Modbus and two clients alone, [conceivable] from nothing but care.

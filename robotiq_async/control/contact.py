@@ -18,6 +18,8 @@ def agrees(model: Model, request: int, what: ObjectStatus, position: int, direct
         position: where it is, in counts.
         direction: above 0 closing, below 0 opening, 0 unknown; used only while it moves.
     """
+    # gDT says that an axis has stopped before its request, and in which direction it was going [manual]. One
+    # at its request may be off by the tolerance of the model [manual: positions differ by up to 2 counts].
     match what:
         case ObjectStatus.CONTACT_CLOSING:
             return request > position
@@ -45,7 +47,8 @@ def drifts(
         doubtful: the axes that show rest, and may move because of an earlier request.
     """
     if not base.go:
-        return False
+        return False  # rGTO = 0 stops every axis [manual]
+    # A needless hold would cost an axis in contact its grip: it would be asked for where it is.
     if axis in doubtful:
         return base.position(axis) != status.position(axis)
     what, position, request = status.finger_status(axis), status.position(axis), base.position(axis)

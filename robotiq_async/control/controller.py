@@ -3,15 +3,15 @@
 No I/O, no clock and no event loop. The task that owns the link calls:
 
 * :meth:`Controller.see` with each status that it has read;
-* :meth:`Controller.decide` for the image to write now, if any, and then :meth:`Controller.acknowledged`:
-  after the read of a cycle, and before it if the request is urgent, as a stop is;
+* :meth:`Controller.due` to learn whether there is something to write; :meth:`Controller.decide` for the
+  image, in the turn in which the link writes; and :meth:`Controller.acknowledged`;
 * :meth:`Controller.lost` if the link goes down at any point.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final
+from typing import Final, NamedTuple
 
 from ..values.enums import NO_AXES, Finger, Severity, State, Trigger
 from ..values.errors import (
@@ -25,25 +25,40 @@ from ..values.errors import (
 from ..values.model import THREE_FINGER, Model
 from ..values.request import Request
 from ..values.status import RobotiqStatus
+from .evidence import FOLLOWS, Evidence, classify
 from .gate import gate
-from .grip_keeper import GripKeeper
+from .keeping import Keeping
+from .ledger import NEVER, Entry, Ledger
+from .limits import Limits
 from .motion import Move
 from .open_requests import OpenRequests
-from .passing_fault import PassingFault
-from .requests.merging import at_rest, merged, stopped
-from .requests.pending import Command
-from .requests.shadow import NEVER, RequestShadow, Whose
-from .sequences import Sequence, activation, automatic_release, reset, shutdown
+from .pending import Command, Pending, merged
+from .procedures import Procedure
 from .state_machine import RUNNING, StateMachine
-from .triggers import classify, is_activating
-from .waiters import Waiter
+from .stops import Level, Stop
+from .waiters import Waiter, fail, resolve
 
-_COMMANDED: Final = RUNNING | {State.FAULT}
-"""The states in which the gripper follows requests, ours or another client's."""
 WARNING_S: Final = 1.0
 """Seconds between two warnings about another client."""
-_STOPPING: Final = frozenset({State.DO_RESET, State.WF_RESET, State.DO_SHUTDOWN})
-"""The states whose writes end motion: these do not wait for write_spacing."""
+_OFF: Final = frozenset({State.DO_SHUTDOWN, State.SHUTDOWN})
+_STATES: Final = {
+    Trigger.SEEN_BUSY: State.WF_ACTIVATION,
+    Trigger.SEEN_RESET: State.RESET,
+    Trigger.SEEN_FAULT: State.FAULT,
+    Trigger.SEEN_RELEASED: State.ATR_DONE,
+}
+
+
+class Due(NamedTuple):
+    """What there is to write.
+
+    Attributes:
+        wait: seconds until it may leave, because of write_spacing.
+        is_urgent: whether it is a stop, which does not wait for a status that may never come.
+    """
+
+    wait: float
+    is_urgent: bool
 
 
 class Controller:
@@ -62,7 +77,6 @@ class Controller:
         status: the newest status; None before the first.
         activates: whether a gripper that is found reset is activated.
         foreign_commands: how often another client was seen to command the gripper.
-        passing_faults: how often 0x09 was shown in passing.
     """
 
     def __init__(
@@ -74,55 +88,39 @@ class Controller:
         write_spacing: float = 0.0,
         model: Model = THREE_FINGER,
     ) -> None:
-        self.machine = machine
+        self.machine: Final = machine
         self.status: RobotiqStatus | None = None
         self.activates = False
         self.foreign_commands = 0
-        self.passing_faults = 0
-        self._passing_fault = PassingFault(self._count_passing_fault)
-        self._judged: RobotiqStatus | None = None
-        """The newest status, with a brief 0x09 filtered out: decisions use this one."""
-        self._warned = NEVER
-        self._closing_time = closing_time
-        self._shadow = RequestShadow(speed, force, model, log=machine.log)
-        self._requests = OpenRequests(machine.log)
-        self._step = 0
-        """The number of the last write of a sequence: its next status must show the effect. 0 for none."""
-        self._activating = False
-        """Whether an activation of ours may be under way: stopping the hand takes it back."""
-        self._write_spacing = write_spacing
+        self._ledger: Final = Ledger(speed, force, model, Limits(machine.log))
+        self._closing_time: Final = closing_time
+        self._spacing: Final = write_spacing
+        self._evidence: Final = Evidence(machine.log)
+        self._requests: Final = OpenRequests(machine.log)
+        self._stop: Stop | None = None
+        self._procedure: Procedure | None = None
+        # The write that raised rACT, while what it began may go on: stopping the hand takes it back.
+        self._activation: Entry | None = None
+        # Why a hand that is being stopped must not leave rGTO set.
+        self._doubt = ""
+        # When a write was last acknowledged.
         self._written_at = NEVER
-        """When a write was last acknowledged."""
-        self._early_stop: Request | None = None
-        """A stop written sooner than write_spacing after another write. It is written again after the next
-        status, even if that shows it: the gripper may forget it and go on with the write before."""
-        self._hold_on_return = NO_AXES
-        """The axes whose hold was not delivered before the link went down."""
-        self._grip_keeper = GripKeeper(self._shadow, log=machine.log)
-        self._keeps_grip = False
-        """Whether the stop under way is to leave rGTO set."""
+        self._warned = NEVER
 
     # -- what is asked ---------------------------------------------------------------------------------
 
     def command(self, command: Command, waiter: Waiter[None] | None = None) -> None:
-        """Add a command to the next write.
-
-        Raises:
-            RobotiqError: the hand takes no command now.
-        """
-        self.machine.fire(Trigger.ASK_COMMAND, self.status)
+        """Add a command to the next write; raises RobotiqError if the hand takes none now."""
+        self.machine.ask(Trigger.ASK_COMMAND, self.status)
         self._requests.command(command, waiter)
+        self._show(Trigger.ASK_COMMAND)
 
     def move(self, move: Move, speed: int | None, force: int | None) -> float:
-        """Add a move to the next write; return its default timeout in seconds.
-
-        Raises:
-            RobotiqError: the hand takes no command now.
-        """
+        """Add a move as a command; return its default timeout in seconds."""
         self.command(Command(move.axes, move.position, speed, force))
         self._requests.moves.add(move)
         assert self.status is not None, "the hand takes commands, so a status has been read"
-        written = {axis: asked.speed for axis, asked in self._shadow.base.by_axis}
+        written = {axis: asked.speed for axis, asked in self._ledger.base.by_axis}
         speeds = written | self._requests.pending.speeds
         return move.default_timeout(self.status, speeds, self._closing_time)
 
@@ -134,52 +132,59 @@ class Controller:
         if self._requests.moves.remove(move):
             self._requests.hold(move.axes, "a move took over and was given up")
         elif unseen and move.was_lost:
-            self._hold_on_return |= move.axes
-            self._hold_what_was_lost()
+            self._requests.pending.merge_hold(move.axes)
+            if self._evidence.condition is not None:  # the link is back
+                self._requests.pending.hold_only(self._ledger.ours)
 
     def hold(self, axes: Finger, waiter: Waiter[None]) -> None:
-        """Hold those axes that move, whichever client moves them. In a sequence there is nothing to do.
+        """Hold those axes that move, whichever client moves them. In a procedure there is nothing to do.
 
         Raises:
             RobotiqError: the gripper cannot be reached.
         """
-        if self.machine.fire(Trigger.ASK_HOLD, self.status):
+        if self.machine.ask(Trigger.ASK_HOLD, self.status):
             self._requests.hold(axes, "hold() took over", waiter)
+            self._show(Trigger.ASK_HOLD)
         else:
             waiter.set_result(None)
 
     def halt(self, waiter: Waiter[None]) -> None:
-        """Clear rGTO, unless no axis can move. A sequence needs :meth:`reset`.
+        """Clear rGTO, unless no axis can move. In a procedure it is a reset.
 
         Raises:
             RobotiqError: the hand cannot halt now.
         """
-        if self.machine.fire(Trigger.ASK_HALT, self.status):
-            self._requests.halt(waiter)
-        else:
+        if not self.machine.ask(Trigger.ASK_HALT, self.status):
             waiter.set_result(None)
+            return
+        if self.is_busy or self._evidence.condition is Trigger.SEEN_BUSY:
+            self._begin_reset(Trigger.ASK_HALT, MoveSupersededError("halt() took over"))
+        self._requests.supersede(Finger.ALL, MoveSupersededError("halt() stopped the fingers"))
+        if self._stop is None or self._stop.is_delivered:  # a new halt is sent anew
+            self._stop = Stop(Level.HALT, [] if self._stop is None else self._stop.waiters)
+        self._stop.waiters.append(waiter)
+        self._show(Trigger.ASK_HALT)
 
     def activate(self) -> None:
         """Begin an activation, unless the gripper is active or activating.
 
         Raises:
-            GripperFaultError: a fault is reported, or the gripper has released automatically.
-            InvalidStateError: a reset or a release is under way.
-            ConnectionLostError: the link is down.
-            NotStartedError: the hand is not started, or is being stopped.
+            RobotiqError: not possible now: a fault, a reset or a release; the link is down.
         """
-        self._begin_activation(Trigger.ASK_ACTIVATE)
+        if self.machine.ask(Trigger.ASK_ACTIVATE, self.status):
+            self._begin(Trigger.ASK_ACTIVATE)
 
     def reset(self, trigger: Trigger = Trigger.ASK_RESET) -> None:
         """Begin a reset, unless one is about to be sent.
 
         Args:
-            trigger: ASK_HALT for a halt that ends a sequence.
+            trigger: ASK_HALT for a halt that ends a procedure.
 
         Raises:
             RobotiqError: not possible now.
         """
-        self._begin_reset(trigger, MoveSupersededError(f"{trigger.value} took over"))
+        if self.machine.ask(trigger, self.status):
+            self._begin_reset(trigger, MoveSupersededError(f"{trigger.value} took over"))
 
     def release(self) -> None:
         """Begin an automatic release.
@@ -189,41 +194,39 @@ class Controller:
         """
         if self.machine.state is State.FAULT and self.status is not None and not self.status.activation_echo:
             raise NotActivatedError("the gripper is reset: there is nothing to release")
-        self.machine.fire(Trigger.ASK_RELEASE, self.status)
-        self._requests.fail(MoveSupersededError("atr() took over"))
-        self._begin(automatic_release(self._at_rest))
+        self.machine.ask(Trigger.ASK_RELEASE, self.status)
+        self._fail_all(MoveSupersededError("atr() took over"))
+        self._begin(Trigger.ASK_RELEASE)
 
     def drop_requests(self, error: RobotiqError) -> None:
         """Fail the requests that are not sent, except holds and halts."""
-        self._requests.fail_but_stops(error)
+        self._requests.fail_motions(error)
+        self._show(Trigger.DELIVERED)
 
     def stop(self) -> None:
         """Begin to stop the hand: refuse new requests, and fail those that are not sent."""
-        self._grip_keeper.begin(self.machine.state, halts=self._requests.pending.halting is not None)
-        if self._activating and not self._step:
-            self._activating = False  # it was not sent, so it need not be taken back
-        if not self._requests.pending.is_empty:
+        state, stop = self.machine.state, self._stop
+        halts = stop is not None and stop.level is Level.HALT and stop.entry is None
+        was_elsewhere = "" if state in RUNNING else f"the hand was in {state.name}"
+        self._doubt = "halt() was asked for" if halts else was_elsewhere
+        if not self._requests.pending.is_empty or halts:
             self.machine.log.info("stopped: requests that were not sent are dropped")
-        self.machine.fire(Trigger.ASK_STOP)
-        self._requests.fail(NotStartedError("the hand was stopped"))
-        self.machine.drop_sequence()
+        if self.machine.ask(Trigger.ASK_STOP):
+            self.machine.show(State.DO_SHUTDOWN, Trigger.ASK_STOP)
+        self._fail_all(NotStartedError("the hand was stopped"))
+        self._procedure, self._stop = None, None
 
     def stopped(self) -> None:
         """The shutdown has ended or has run out of time."""
-        self.machine.drop_sequence()
-        self.machine.fire(Trigger.STOPPED)
-
-    @property
-    def has_undelivered_stop(self) -> bool:
-        """Whether a halt, a hold or a reset waits for its acknowledgement."""
-        resets = self.machine.state is State.DO_RESET
-        waits = self._early_stop is not None or bool(self._hold_on_return)
-        return resets or self._requests.has_undelivered_stop or waits
+        self._stop = None
+        if self.machine.ask(Trigger.STOPPED):
+            self.machine.show(State.SHUTDOWN, Trigger.STOPPED)
 
     def keep_no_grip(self, why: str) -> None:
         """Make the shutdown under way clear rGTO after all."""
-        self._keeps_grip = False
-        self._grip_keeper.doubt = why
+        self._doubt = why
+        if isinstance(self._stop, Keeping):
+            self._stop = Stop(Level.SHUTDOWN)
 
     def shut_down(self, *, keep_grip: bool = False) -> None:
         """Begin to stop the fingers, if any may move.
@@ -231,32 +234,97 @@ class Controller:
         An activation that this hand began is taken back with rACT = 0: clearing rGTO would not stop it. With
         ``keep_grip`` rGTO stays set if every axis is known to rest.
         """
-        self._keeps_grip = keep_grip
-        if self._activating:
-            self._begin(reset(self._at_rest))
-        elif self.status is not None:
-            stop = self._image_to_stop
-            self._begin(self._grip_keeper.sequence(stop) if keep_grip else shutdown(stop))
+        self._procedure, status = None, self._evidence.status
+        if self._activation is not None:
+            self._stop = Stop(Level.RESET)
+        elif status is not None and keep_grip:
+            self._stop = keeping = Keeping(status, self._doubt)
+            self._advance_keeping(keeping)
+        elif status is not None:
+            self._stop = Stop(Level.SHUTDOWN)
 
-    def _at_rest(self, status: RobotiqStatus) -> Request:
-        return at_rest(self._shadow.base, status)
+    # -- what follows from that ------------------------------------------------------------------------
 
-    def _image_to_stop(self, status: RobotiqStatus) -> Request | None:
-        """The image that stops the fingers, whichever client moves them; None if there is nothing to stop."""
-        if classify(status) is Trigger.SEEN_READY:
-            self._shadow.follow(self._shadow.identify(), status)
-        return stopped(self._shadow.base, status, settled=self._shadow.acts())
+    def _begin(self, trigger: Trigger) -> None:
+        """Begin an activation or a release."""
+        releases = trigger is Trigger.ASK_RELEASE
+        self._procedure, self._stop = Procedure(self._ledger, releases=releases), None
+        self._requests.pending.hold = NO_AXES
+        self._ledger.grips.forget()
+        self._show(trigger)
+
+    def _begin_reset(self, trigger: Trigger, error: RobotiqError) -> None:
+        """Reset; ``error`` is what the callers get whose requests end with it."""
+        self._fail_all(error)
+        self._procedure, self._stop = None, Stop(Level.RESET)
+        self._ledger.grips.forget()
+        self._show(trigger)
+
+    def _fail_all(self, error: RobotiqError) -> None:
+        """Fail everything asked so far, halts too. A write may be on the line all the same."""
+        self._requests.fail(error)
+        stop = self._stop
+        if stop is not None:
+            fail(stop.waiters, error)
+            self._stop = None if stop.level is Level.HALT else stop
 
     # -- what is known ---------------------------------------------------------------------------------
+
+    @property
+    def passing_faults(self) -> int:
+        """How often 0x09 was shown in passing."""
+        return self._evidence.passed
 
     @property
     def is_moving(self) -> bool:
         """Whether an axis moves, or will because of a command that does not act yet."""
         if self.status is None or self.status.is_moving or self.machine.state not in RUNNING:
             return self.status is not None and self.status.is_moving
-        return bool(self._requests.pending.positions) or self._shadow.may_begin_to_move
+        return bool(self._requests.pending.positions) or self._ledger.may_begin_to_move
 
-    # -- the cycle -------------------------------------------------------------------------------------
+    @property
+    def is_busy(self) -> bool:
+        """Whether a procedure, a reset or the end of the hand is under way."""
+        is_stopping = self._stop is not None and self._stop.level is not Level.HALT
+        return is_stopping or self._procedure is not None
+
+    @property
+    def is_undecided(self) -> bool:
+        """Whether the first status on a new link does not decide anything yet: see evidence.py."""
+        return self._evidence.is_undecided
+
+    @property
+    def has_request(self) -> bool:
+        """Whether there may be a request to write."""
+        return self._stop is not None or self._procedure is not None or not self._requests.pending.is_empty
+
+    @property
+    def has_undelivered_stop(self) -> bool:
+        """Whether a halt, a hold or a reset waits for its acknowledgement."""
+        stop = self._stop
+        waits = stop is not None and (not stop.is_delivered or stop.is_early)
+        return waits or self._requests.has_undelivered_hold
+
+    def _view(self) -> State:
+        """The state: what is under way decides, and if nothing is, what the gripper shows."""
+        if self.machine.state in _OFF:
+            return self.machine.state
+        if self._evidence.condition is None:
+            return State.DISCONNECTED
+        stop = self._stop
+        if stop is not None and stop.level is Level.RESET:
+            return State.WF_RESET if stop.is_delivered else State.DO_RESET
+        if self._procedure is not None:
+            return self._procedure.state
+        if self._evidence.condition is not Trigger.SEEN_READY:
+            return _STATES[self._evidence.condition]
+        halts = stop is not None and not stop.is_delivered
+        return State.RUNNING_CC if halts or self._requests.is_asked else State.RUNNING_IDLE
+
+    def _show(self, trigger: Trigger) -> None:
+        self.machine.show(self._view(), trigger)
+
+    # -- what a status says ----------------------------------------------------------------------------
 
     def see(self, status: RobotiqStatus, asked: float | None = None) -> None:
         """Take in a status that was read after every acknowledgement so far.
@@ -264,285 +332,265 @@ class Controller:
         ``asked`` is when it was asked for, in monotonic seconds; None for the time of the reply.
         """
         asked = status.timestamp if asked is None else asked
-        before, self.status = self.machine.state, status
-        self._shadow.see(status, asked)
-        self._judged, condition = status, classify(status)
-        if condition is Trigger.SEEN_FAULT or self._passing_fault.reads:
-            condition = self._look_past_fault(status, asked)
-        if self.machine.sequence is not None:
-            return  # the sequence takes it in decide()
-        if before is State.DISCONNECTED and self.is_undecided:
-            return  # the next status decides
-        if before is State.DISCONNECTED and condition is Trigger.SEEN_RESET and self.activates:
-            self._begin_activation(Trigger.ACTIVATES)
-            return
-        if self._requests.halting and (condition is Trigger.SEEN_RESET or is_activating(status)):
-            self._take_back_activation()
-            return
-        self.machine.fire(condition)
-        after = self.machine.state
-        if after is not before and before in _COMMANDED and after not in RUNNING:
-            self._leave(after, status)
-        elif after in _COMMANDED:
-            self._go_on(before, status)
-        else:
-            self._hold_on_return = NO_AXES
+        ledger, before = self._ledger, self._evidence.condition
+        self.status = status
+        ledger.update(status, asked)
+        condition = self._evidence.update(status, asked)
         # This runs at every poll, so it works out only what is waited for.
-        if self._activating:
-            self._see_activation(status)
-        if self._requests.halting and self._early_stop is None:
-            self._requests.see_halt(status, self._shadow.acts)
-        if after in RUNNING:
-            self._shadow.axes.see(status, self._shadow.now)
+        if self._activation is not None:
+            self._note_end_of_activation(self._activation, status)
+        if self._is_hidden(status) or self.is_undecided:
+            return
+        if before is None and condition is Trigger.SEEN_RESET and self.activates:
+            self._begin(Trigger.ACTIVATES)
+            return
+        if condition is not before:
+            self._follow_change(before, condition, status)
+        elif ledger.match is None and condition in FOLLOWS:
+            self._adopt_other_client(status)
+        if ledger.match is None and condition not in FOLLOWS:
+            ledger.adopt(status)  # after a reset or a power cycle, no image from before it acts
+        if condition is Trigger.SEEN_READY:
+            ledger.update_rest(status)
             if self._requests.moves:
-                axes = self._shadow.axes
-                self._requests.moves.see(status, self._shadow.acts, axes.resting, axes.limited)
+                self._requests.moves.end_arrived(status, ledger.acts, ledger.resting, ledger.limited)
+        if condition is not before:
+            self._show(condition)
 
-    @property
-    def is_undecided(self) -> bool:
-        """Whether the first status on a new link shows 0x09, perhaps because of the silence before it."""
-        return self._passing_fault.is_open and self.machine.state is State.DISCONNECTED
+    def _is_hidden(self, status: RobotiqStatus) -> bool:
+        """Whether what is under way hides the condition that a status shows. Ends a stop that is reached."""
+        stop = self._stop
+        if isinstance(stop, Keeping):
+            self._advance_keeping(stop)
+        elif stop is not None:
+            self._advance_stop(stop, status)
+        hides = stop is not None and stop.level is not Level.HALT
+        return hides or self.is_busy or self.machine.state in _OFF
 
-    @property
-    def has_request(self) -> bool:
-        """Whether there may be a request to write."""
-        asked = self.machine.sequence is not None or not self._requests.pending.is_empty
-        return asked or self._early_stop is not None
+    def _advance_stop(self, stop: Stop, status: RobotiqStatus) -> None:
+        if stop.has_activated(self._ledger, status):
+            error = NotActivatedError("the gripper was reset as it was stopped: its activation is taken back")
+            self.machine.log.warning("%s", error)
+            self._begin_reset(Trigger.ASK_RESET, error)
+        elif stop.is_reached(self._ledger, status):
+            self._stop = None
+            resolve(stop.waiters)
+            if stop.level is not Level.HALT:
+                self._finish(status, has_written=True)
 
-    @property
-    def is_urgent(self) -> bool:
-        """Whether to write a stop now, without waiting for a status that may never come."""
-        if self.machine.sequence is None or self._judged is None:
-            return self._requests.pending.halting is not None
-        if self._step or self.machine.state not in (State.DO_RESET, State.DO_SHUTDOWN):
-            return False
-        if self.machine.state is State.DO_RESET:
-            return True
-        if self._keeps_grip and self._grip_keeper.rests(self._judged):
-            return False  # the next status decides whether rGTO stays set
-        return self._activating or self._judged.go_echo or not self._shadow.acts()
+    def _advance_keeping(self, keeping: Keeping) -> None:
+        ledger, status = self._ledger, self._evidence.status
+        assert status is not None
+        if classify(status) in FOLLOWS:
+            ledger.update_rest(status)
+        keeping.judge(ledger, status)
+        if keeping.doubt:
+            self._stop = stop = Stop(Level.SHUTDOWN)
+            if ledger.match is None and classify(status) is Trigger.SEEN_READY:
+                ledger.adopt(status)
+            if stop.image(ledger, status) is not None:
+                self.machine.log.warning("rGTO is cleared, and no grip is kept: %s", keeping.doubt)
+        elif keeping.is_reached(ledger, status):
+            self._stop = None
+            self.machine.log.info("stopped with rGTO set; in contact: %s", status.contacts or "nothing")
 
-    def wait(self, now: float) -> float:
-        """Seconds until the next write may leave; 0 for a stop that is not a repetition."""
-        if self._stops and self._early_stop is None:
-            return 0.0
-        return max(0.0, self._written_at + self._write_spacing - now)
+    def _note_end_of_activation(self, activation: Entry, status: RobotiqStatus) -> None:
+        """Whether the activation that this hand began is over: what shows may be from before it."""
+        is_over = classify(status) in (Trigger.SEEN_READY, Trigger.SEEN_RESET)
+        if (is_over or status.fault.severity is Severity.MAJOR) and self._ledger.acts(activation):
+            self._activation = None
 
-    @property
-    def _stops(self) -> bool:
-        """Whether the next write ends motion."""
-        if self.machine.sequence is None:
-            return self._requests.pending.halting is not None
-        return self.machine.state in _STOPPING and not self._keeps_grip
+    def _follow_change(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
+        """The condition is another than before: all that follows from that is here."""
+        ledger, requests = self._ledger, self._requests
+        if before is None:
+            self._resume_or_adopt(condition, status)
+        elif before in FOLLOWS and condition is Trigger.SEEN_FAULT:
+            requests.fail_motions(GripperFaultError(status.fault))
+            if status.activation_echo:
+                # A command sent just before may not act yet, and its motion would begin when the fault
+                # clears. Which axes need the hold is decided when it is written.
+                requests.hold(ledger.ours, "the fingers are held")
+        elif before in FOLLOWS and condition is Trigger.SEEN_RELEASED:
+            self._fail_all(GripperFaultError(status.fault))
+        elif before in FOLLOWS and condition is not Trigger.SEEN_READY:
+            self._fail_all(NotActivatedError("the gripper lost its activation"))
+        elif condition in FOLLOWS and before not in FOLLOWS:
+            # Others have reset and activated it, even if its image is equal to one of ours.
+            ledger.adopt(status)
+            ledger.ours = NO_AXES
+        elif ledger.match is None and condition in FOLLOWS:
+            self._adopt_other_client(status)
+        if condition not in FOLLOWS:
+            requests.pending.hold = NO_AXES
 
-    def decide(self, now: float) -> Request | None:
-        """Return the image to write now, or None. It counts as sent from here on."""
-        status, pending = self._judged, self._requests.pending
-        if status is None:
-            return None
-        if self._early_stop is not None:
-            return self._repeat_stop(self._early_stop, status, now)
-        if self.machine.sequence is not None:
-            return self._next_step(status, now)
-        # Most cycles end here.
-        if pending.is_empty or self.machine.state not in _COMMANDED or self.wait(now):
-            return None
-        shadow = self._shadow
-        if self._passing_fault.is_open and pending.halting is None and not pending.holds_at_most:
-            return None  # if the fault lasts, no motion is sent at all
-        base = shadow.base
-        # After a halt a motion waits until the halt acts: only then is it known where the fingers stopped.
-        stopping = not base.go and status.go_echo and not shadow.acts()
-        if pending.halting is None and (shadow.doubt is not None or (pending.positions and stopping)):
-            return None  # only a halt does not wait
-        image = gate(
-            merged(
-                base,
-                pending,
-                status,
-                gripping=shadow.axes.grips.held(status, base),
-                arrived=shadow.axes.resting,
-                doubtful=shadow.axes.doubtful(status, shadow.now) if pending.hold else NO_AXES,
-            ),
-            status,
-        )
-        if pending.holds_at_most and image == base:
-            # No axis moves. If an earlier write does not act yet, one may begin to: ask again then.
-            if shadow.acts():
-                self._requests.nothing_to_send()
-                self.machine.delivered()
-            return None
-        sent = self._requests.take()
-        self._note_early_stop(image, now, stops=sent.halting is not None)
-        number = shadow.writing(image, sent.moved, now)
-        if sent.positions:
-            self._requests.moves.written(number)
-        return image
+    def _resume_or_adopt(self, condition: Trigger, status: RobotiqStatus) -> None:
+        """The link is back: go on from the image of ours that the gripper shows, or adopt it."""
+        ledger, pending = self._ledger, self._requests.pending
+        if condition not in FOLLOWS:
+            return
+        if ledger.match is None or not ledger.match.is_ours:
+            ledger.adopt(status)
+            ledger.ours = NO_AXES
+        if condition is Trigger.SEEN_FAULT and status.activation_echo:
+            pending.hold = Finger.ALL  # as when a fault begins: no motion may resume when it clears
+        pending.hold_only(ledger.ours)
 
-    def _note_early_stop(self, image: Request, now: float, *, stops: bool) -> None:
-        if stops and now - self._written_at < self._write_spacing:
-            self._early_stop = image
-
-    def _repeat_stop(self, stop: Request, status: RobotiqStatus, now: float) -> Request | None:
-        if self.wait(now):
-            return None
-        self._early_stop, image = None, gate(stop, status)
-        number = self._shadow.writing(image, NO_AXES, now)
-        if self.machine.sequence is None:
-            self._requests.halt_again()
-        else:
-            self._step = number
-        return image
-
-    def acknowledged(self, now: float) -> None:
-        self._written_at = now
-        number = self._shadow.acknowledged(now)
-        self._requests.acknowledged(number)
-        if number == self._step or (self.machine.sequence is None and self._requests.pending.is_empty):
-            self.machine.delivered()
-
-    def lost(self, why: RobotiqError | None = None) -> None:
-        """The link is down: drop what was not acknowledged. No motion is sent again; holds are, on return."""
-        self.machine.fire(Trigger.LINK_LOST)
-        self._grip_keeper.doubt = "the link went down"
-        error = ConnectionLostError(f"the link went down before this was done: {why}")
-        error.__cause__ = why
-        self._early_stop = None
-        self._hold_on_return |= self._requests.lost(error)
-        self.machine.drop_sequence()
-        self._shadow.lost()
-
-    # -- sequences -------------------------------------------------------------------------------------
-
-    def _begin_reset(self, trigger: Trigger, error: RobotiqError) -> None:
-        """Reset; ``error`` is what the callers get whose requests end with it."""
-        if self.machine.fire(trigger, self.status):
-            self._requests.fail(error)
-            self._begin(reset(self._at_rest))
-
-    def _begin_activation(self, trigger: Trigger) -> None:
-        if self.machine.fire(trigger, self.status):
-            self._activating = True
-            self._begin(activation(self._at_rest))
-
-    def _begin(self, sequence: Sequence) -> None:
-        self.machine.begin(sequence)
-        self._step, self._early_stop = 0, None
-        self._hold_on_return = NO_AXES
-        self._shadow.axes.grips.forget()
-
-    def _next_step(self, status: RobotiqStatus, now: float) -> Request | None:
-        """Advance the sequence under way; return the image that it wants written."""
-        if self._step and not self._shadow.acts(self._step):
-            return None
-        if self.machine.state is State.DO_ACTIVATION and self._passing_fault.is_open:
-            return None
-        if self.wait(now):
-            return None
-        activates, releases = (self.machine.state is each for each in (State.DO_ACTIVATION, State.DO_ATR))
-        image = self.machine.advance(status)
-        if image is not None:
-            image = gate(image, status, activates=activates, releases=releases)
-            self._note_early_stop(image, now, stops=self._stops)
-            self._step = self._shadow.writing(image, NO_AXES, now)
-        elif self.machine.sequence is None:
-            self._after_sequence(status)
-        return image
-
-    def _after_sequence(self, status: RobotiqStatus) -> None:
-        if self._step:
-            is_ours = self._shadow.restart(status)
-        else:  # the sequence had nothing to do and has written nothing
-            self._activating, whose = False, self._shadow.identify()
-            is_ours = whose is not Whose.FOREIGN
-            if is_ours:
-                self._shadow.follow(whose, status)
-        if self.machine.state in _COMMANDED and not is_ours:
-            self._take_over(status)
-        if self._activating:
-            self._see_activation(status)
-
-    def _take_back_activation(self) -> None:
-        """Another client has reset the gripper just before a halt, whose rACT activates it then."""
-        error = NotActivatedError("the gripper was reset when halt() came: an activation by it is taken back")
-        self.machine.log.warning("%s", error)
-        self._begin_reset(Trigger.ASK_RESET, error)
-
-    def _see_activation(self, status: RobotiqStatus) -> None:
-        condition = classify(status)
-        self._activating = not (
-            condition is Trigger.SEEN_READY
-            or status.fault.severity is Severity.MAJOR
-            or (condition is Trigger.SEEN_RESET and self._shadow.acts())
-        )
-
-    def _look_past_fault(self, status: RobotiqStatus, asked: float) -> Trigger:
-        """The condition that a status shows, without 0x09 until that has lasted."""
-        judged = self._passing_fault.see(status, asked)
-        if self.machine.state is not State.FAULT:  # in FAULT 0x09 is no news, and counts at once
-            self._judged = judged
-        return classify(self._judged or status)
-
-    def _count_passing_fault(self) -> None:
-        self.passing_faults += 1
-        if self.passing_faults == 1:
-            self.machine.log.info(
-                "the gripper showed fault 0x09 for a moment, as some do after a second without a poll: "
-                "ignored, and from here on only counted"
-            )
-
-    # -- other clients, and a link that is back --------------------------------------------------------
-
-    def _go_on(self, before: State, status: RobotiqStatus) -> None:
-        """The gripper follows requests: find out whose."""
-        if before is State.DISCONNECTED:
-            self._return(status)
-        elif before not in _COMMANDED:
-            self._shadow.follow(Whose.FOREIGN, status)
-        elif (whose := self._shadow.identify()) is Whose.FOREIGN:
-            self._take_over(status)
-        elif whose is not Whose.OURS:
-            self._shadow.follow(whose, status)
-
-    def _return(self, status: RobotiqStatus) -> None:
-        """The link is back: go on from the image that the gripper shows, or adopt it."""
-        self._shadow.returned(status)
-        if self.machine.state is State.FAULT and status.activation_echo:
-            # As when a fault begins: no motion may resume when it clears.
-            self._hold_on_return = Finger.ALL
-        self._hold_what_was_lost()
-
-    def _hold_what_was_lost(self) -> None:
-        """Hold the axes whose hold was not delivered, unless another client moves them now."""
-        if self.machine.state not in _COMMANDED:
-            return  # the link is still down
-        axes, self._hold_on_return = self._hold_on_return & self._shadow.ours, NO_AXES
-        if axes:
-            self._requests.hold(axes, "the fingers are held")
-
-    def _take_over(self, status: RobotiqStatus) -> None:
+    def _adopt_other_client(self, status: RobotiqStatus) -> None:
         """Another client commands the gripper: adopt its requests, or our next write would undo them."""
+        ledger = self._ledger
+        limited = dict(ledger.limited)
         self.foreign_commands += 1
-        limited = self._shadow.axes.limited
         if status.timestamp - self._warned >= WARNING_S:
             self._warned = status.timestamp
             self.machine.log.warning("another client commands the gripper: %r", status)
-        self._shadow.follow(Whose.FOREIGN, status)
-        self._requests.pending.hold &= self._shadow.ours | self._requests.pending.asked_to_hold
+        ledger.note_other_client()
+        ledger.adopt(status)
+        self._requests.pending.hold_only(ledger.ours)
         self._requests.moves.fail(
             MoveSupersededError("another client commands the gripper"),
-            lambda move: move.write is not None and not move.is_under(status, limited),
+            lambda move: move.entry is not None and not move.is_under(status, limited),
         )
 
-    def _leave(self, after: State, status: RobotiqStatus) -> None:
-        """The gripper reports a fault or is no longer active: no earlier request may resume."""
-        if after not in (State.FAULT, State.ATR_DONE):
-            self._requests.fail(NotActivatedError("the gripper lost its activation"))
-        elif after is State.ATR_DONE:
-            self._requests.fail(GripperFaultError(status.fault))
+    def _finish(self, status: RobotiqStatus, *, has_written: bool) -> None:
+        """A procedure, a reset or a shutdown is over: the condition counts again."""
+        ledger, condition = self._ledger, self._evidence.condition or classify(status)
+        is_known = ledger.restart(status) if has_written else ledger.match is not None
+        self._show(condition)
+        if condition in FOLLOWS and not is_known and self.machine.state not in _OFF:
+            self._adopt_other_client(status)
+
+    # -- what is written -------------------------------------------------------------------------------
+
+    def due(self, now: float) -> Due | None:
+        """What there is to write; None for nothing."""
+        if not self.has_request:
+            return None
+        stop, status = self._stop, self._evidence.status
+        urgent = stop is not None and status is not None and stop.is_urgent(self._ledger, status)
+        return Due(self._wait(now), urgent)
+
+    def _wait(self, now: float) -> float:
+        stop = self._stop
+        if stop is not None and stop.level is not Level.KEEP and stop.entry is None:
+            return 0.0
+        return max(0.0, self._written_at + self._spacing - now)
+
+    def decide(self, now: float) -> Request | None:
+        """Return the image to write now, or None. It counts as sent from here on."""
+        status, stop = self._evidence.status, self._stop
+        if status is None or not self.has_request:
+            return None  # most cycles end here
+        if self._wait(now):
+            return None
+        if stop is not None:
+            return self._next_stop(stop, status, now)
+        if self._procedure is not None:
+            return self._next_step(self._procedure, status, now)
+        return self._next_changes(status, now)
+
+    def _next_stop(self, stop: Stop, status: RobotiqStatus, now: float) -> Request | None:
+        ledger = self._ledger
+        if stop.entry is not None:
+            image = stop.again(ledger, status)
+        elif stop.level is Level.HALT and self._evidence.condition not in FOLLOWS:
+            image = None
         else:
-            self._requests.fail_but_stops(GripperFaultError(status.fault))
-        if after is State.FAULT and status.activation_echo:
-            # Hold every axis of ours: a command sent just before may not act yet, and its motion would begin
-            # when the fault clears. Which axes need it is decided when the hold is written.
-            self._requests.hold(self._shadow.ours, "the fingers are held")
+            is_ready = self._evidence.condition is Trigger.SEEN_READY
+            if stop.level is Level.SHUTDOWN and ledger.match is None and is_ready:
+                ledger.adopt(status)  # stop the fingers whichever client moves them
+            image = stop.image(ledger, status)
+            if image is None and stop.level is Level.SHUTDOWN:
+                self._stop = None
+                self._finish(status, has_written=False)
+        if image is None:
+            return None
+        is_early = now - self._written_at < self._spacing
+        # A halt also stops the axes to be held, so the callers of hold() have their answer with it.
+        covered = self._requests.pending.take_holds() if stop.level is Level.HALT else Pending()
+        entry = self._send(image, covered, status, now)
+        stop.written(entry, status, is_early=is_early)
+        return entry.image
+
+    def _next_step(self, procedure: Procedure, status: RobotiqStatus, now: float) -> Request | None:
+        """Advance the procedure under way; return the image that it wants written."""
+        has_written = procedure.entry is not None
+        if procedure.entry is not None and not self._ledger.acts(procedure.entry):
+            return None
+        if not has_written and not procedure.releases and self._evidence.may_pass:
+            return None  # if the fault lasts, no activation is begun
+        try:
+            image = procedure.steps.send(status)
+        except (StopIteration, RobotiqError) as end:
+            if isinstance(end, RobotiqError):
+                self.machine.log.warning("%s", end)
+            if not has_written:  # it had nothing to do, so there is no write to wait for
+                procedure.entry = self._ledger.shown
+                self._show(Trigger.DELIVERED)
+            self._procedure = None
+            self._finish(status, has_written=has_written)
+            return None
+        if image is None:
+            return None
+        procedure.entry = entry = self._send(image, Pending(), status, now, of=procedure)
+        if not procedure.releases:
+            self._activation = entry
+        return entry.image
+
+    def _next_changes(self, status: RobotiqStatus, now: float) -> Request | None:
+        ledger, pending = self._ledger, self._requests.pending
+        if self._evidence.condition not in FOLLOWS or not ledger.is_certain:
+            return None
+        if self._evidence.may_pass and pending.has_changes:
+            return None  # if the fault lasts, no motion is sent at all
+        base = ledger.base
+        # After a halt a motion waits until the halt acts: only then is it known where the fingers stopped.
+        if pending.positions and not base.go and status.go_echo and not ledger.acts():
+            return None
+        image = merged(
+            base,
+            pending,
+            status,
+            gripping=ledger.grips.held(status, base) if pending.positions else NO_AXES,
+            arrived=ledger.resting,
+            doubtful=ledger.doubtful(status) if pending.hold else NO_AXES,
+        )
+        if not pending.has_changes and gate(image, status) == base:
+            # No axis moves. If an earlier write does not act yet, one may begin to: ask again then.
+            if ledger.acts():
+                self._requests.nothing_to_send()
+                self._show(Trigger.DELIVERED)
+            return None
+        self._requests.pending = Pending()
+        return self._send(image, pending, status, now).image
+
+    def _send(
+        self, image: Request, sent: Pending, status: RobotiqStatus, now: float, of: Procedure | None = None
+    ) -> Entry:
+        activates, releases = (of is not None and of.releases is each for each in (False, True))
+        image = gate(image, status, activates=activates, releases=releases)
+        entry = self._ledger.write(image, sent.moved, now)
+        self._requests.sending(sent, entry)
+        return entry
+
+    def acknowledged(self, now: float) -> None:
+        """What decide() gave was acknowledged."""
+        self._written_at = now
+        entry = self._ledger.acknowledge(now)
+        self._requests.acknowledged()
+        if self._stop is not None and self._stop.entry is entry:
+            self._stop.is_delivered = True
+        self._show(Trigger.DELIVERED)
+
+    def lost(self, why: RobotiqError | None = None) -> None:
+        """The link is down: drop what was not acknowledged. No motion is sent again; holds are, on return."""
+        self._doubt = "the link went down"
+        error = ConnectionLostError(f"the link went down before this was done: {why}")
+        error.__cause__ = why
+        if self._stop is not None:
+            fail(self._stop.waiters, error)
+        self._requests.lost(error)
+        self._procedure, self._stop = None, None
+        self._evidence.lost()
+        self._ledger.lost()
+        self._show(Trigger.LINK_LOST)

@@ -25,6 +25,8 @@ def gate(
         activates: whether it begins an activation that was asked for.
         releases: whether it begins an automatic release that was asked for.
     """
+    # The status may be a device cycle old. If another client resets the gripper within it, rACT passes and
+    # activates [follows]: stops.py takes that back, and a command is refused from the next status on.
     return replace(
         image,
         activate=image.activate and (activates or status.activation_echo),

@@ -12,6 +12,7 @@ from ..values.enums import NO_AXES, Finger, ObjectStatus
 from ..values.errors import ConnectionLostError, RobotiqError
 from ..values.move_result import MoveResult
 from ..values.status import RobotiqStatus
+from .ledger import Entry
 from .waiters import Waiter, fail
 
 MARGIN_S: Final = 2.0
@@ -33,8 +34,8 @@ class Move:
         self.axes = axes
         self.was_lost = False
         """Whether the link went down during it."""
-        self.write: int | None = None
-        """The number of its write; None before that."""
+        self.entry: Entry | None = None
+        """Its write; None before that."""
         self._started = now
         self._waiter = waiter
         self._peak = dict.fromkeys(axes, 0)
@@ -49,15 +50,17 @@ class Move:
         """
         full = status.model.stroke.counts
         strokes = {axis: abs(self.position - status.position(axis)) / full for axis in self._peak}
+        # The times are those of one gripper without load [thesis, table A1.1]: twice leaves room.
         return 2 * max(stroke * closing_time(speeds[axis]) for axis, stroke in strokes.items()) + MARGIN_S
 
-    def see(self, status: RobotiqStatus) -> None:
+    def note_currents(self, status: RobotiqStatus) -> None:
         """Take in the currents of a status read after the write."""
         for axis, peak in self._peak.items():
             self._peak[axis] = max(peak, status.current_ma(axis))
 
     def is_under(self, status: RobotiqStatus, limited: Mapping[Finger, int]) -> bool:
         """Whether a status echoes the target for every axis of the move, or the limit in place of it."""
+        # rGTO = 0 echoes positions, too, and none of them is followed [manual].
         return status.go_echo and all(
             status.requested_position(axis) == limited.get(axis, self.position) for axis in self._peak
         )
@@ -67,6 +70,7 @@ class Move:
 
         ``arrived`` has the axes that are known to rest under their last request.
         """
+        # An axis may be known to rest by its position, and move by its gDT, which is then from before.
         return self.axes in arrived and not status.moving & self.axes and self.is_under(status, limited)
 
     def end(self, status: RobotiqStatus) -> MoveResult:
@@ -116,16 +120,16 @@ class LiveMoves:
         self._moves.remove(move)
         return True
 
-    def written(self, number: int) -> None:
-        """The moves added since the last write go by this number."""
+    def written(self, entry: Entry) -> None:
+        """The moves added since the last write go out with this one."""
         for move in self._moves:
-            if move.write is None:
-                move.write = number
+            if move.entry is None:
+                move.entry = entry
 
-    def see(
+    def end_arrived(
         self,
         status: RobotiqStatus,
-        acts: Callable[[int], bool],
+        acts: Callable[[Entry], bool],
         arrived: Finger,
         limited: Mapping[Finger, int],
     ) -> None:
@@ -133,15 +137,15 @@ class LiveMoves:
 
         Args:
             status: the newest one.
-            acts: whether the write of a number acts.
+            acts: whether a write acts.
             arrived: the axes that are known to rest under their last request.
             limited: the limit that the gripper shows in place of the request, by axis.
         """
         for move in self._moves[:]:
-            if move.write is None:
+            if move.entry is None:
                 continue
-            move.see(status)
-            if acts(move.write) and move.has_arrived(status, arrived, limited):
+            move.note_currents(status)
+            if acts(move.entry) and move.has_arrived(status, arrived, limited):
                 self._moves.remove(move)
                 self._warn_of_unreached(move, move.end(status), limited)
 

@@ -1,12 +1,14 @@
-"""The state machine of a hand: one table of states and triggers, and the object that follows it.
+"""The states of a hand: which may follow which, and what each answers to a call.
 
 Every state has an entry for every trigger: the next state, IGNORED where there is nothing to do, or the
-error that the caller gets. A refusal changes nothing. What a status shows is never refused.
+error that the caller gets. A refusal changes nothing. What a status shows is never refused. The table comes
+from three rules and 18 entries: :func:`_row` says what holds wherever the link is up, what a status shows
+leads to its state from wherever nothing is under way, and the entries are what differs.
 
-DO_ states and RUNNING_CC last from the decision to write until the acknowledgement, so the state tells what
-was under way when the link went down. The steps of an activation, a release, a reset or a shutdown are a
-generator (see sequences.py) that :class:`StateMachine` runs. This module knows no register, clock or task.
-The diagram and the tables in docs/ are made from the table below.
+The state follows from what is under way and what the gripper shows; the controller works it out, and the
+table says what it may be. DO_ states and RUNNING_CC last from the decision to write until the
+acknowledgement, so the state tells what was under way when the link went down. This module knows no register,
+clock or task. The diagram and the tables in docs/ are made from the table below.
 """
 
 from __future__ import annotations
@@ -26,10 +28,7 @@ from ..values.errors import (
     NotStartedError,
     RobotiqError,
 )
-from ..values.request import Request
 from ..values.status import RobotiqStatus
-from .sequences import Sequence
-from .triggers import classify
 
 
 class Verdict(Enum):
@@ -51,6 +50,8 @@ def _all(triggers: tuple[Trigger, ...], entry: State | Verdict) -> Row:
     return dict.fromkeys(triggers, entry)
 
 
+# First rule: what a call finds wherever the link is up, in _row(). Second: what a status shows leads to its
+# state, from wherever nothing is under way, in _SEEN. Third: a hand that is off refuses, in _OFF.
 _STOPS: Final = (Trigger.ASK_HOLD, Trigger.ASK_HALT)
 _MOTIONS: Final = (Trigger.ASK_ACTIVATE, Trigger.ASK_COMMAND)
 _USER: Final = (*_MOTIONS, *_STOPS, Trigger.ASK_RELEASE, Trigger.ASK_RESET)
@@ -92,6 +93,8 @@ TABLE: Final[dict[State, Row]] = {
         | _all(_USER, Verdict.LINK_DOWN)
         | {Trigger.ASK_START: State.DISCONNECTED, Trigger.ACTIVATES: State.DO_ACTIVATION}
     ),
+    # While a procedure sends or waits, what a status shows is its own matter (see procedures.py). WF_ states
+    # that another client has begun follow each status, as there is nothing of ours to wait for.
     State.DO_ACTIVATION: _row(
         {Trigger.ASK_ACTIVATE: Verdict.IGNORED, Trigger.DELIVERED: State.WF_ACTIVATION}
     ),
@@ -100,6 +103,7 @@ TABLE: Final[dict[State, Row]] = {
     State.RUNNING_CC: _row(
         _RUNNING | {Trigger.SEEN_READY: State.RUNNING_CC, Trigger.DELIVERED: State.RUNNING_IDLE}
     ),
+    # Holds and halts are sent in a fault, too: when a minor one clears [manual], no motion may resume.
     State.FAULT: _row(_FAULTY | _all(_STOPS, State.FAULT) | {Trigger.ASK_RELEASE: State.DO_ATR}),
     State.DO_ATR: _row({Trigger.DELIVERED: State.WF_ATR}),
     State.WF_ATR: _row(_SEEN),
@@ -139,11 +143,10 @@ def states_allowing(trigger: Trigger) -> frozenset[State]:
 
 
 class StateMachine:
-    """The state of one hand, and the sequence under way. Only :meth:`fire` changes the state.
+    """The state of one hand. It is a view: the controller works out which state holds, and shows it here.
 
     Attributes:
         changed: called with source, target and trigger after each change of state.
-        sequence: the one under way; changed by :meth:`begin`, :meth:`advance` and :meth:`drop_sequence`.
         why_down: why the link is down, for the error of what is refused then.
     """
 
@@ -152,7 +155,6 @@ class StateMachine:
     ) -> None:
         self.log = log
         self.changed = changed
-        self.sequence: Sequence | None = None
         self.why_down: object = None
         self._state = State.DISCONNECTED
 
@@ -160,60 +162,29 @@ class StateMachine:
     def state(self) -> State:
         return self._state
 
-    def fire(self, trigger: Trigger, status: RobotiqStatus | None = None) -> bool:
-        """Follow a trigger; return whether there is anything to do (False where the table says IGNORED).
+    def ask(self, trigger: Trigger, status: RobotiqStatus | None = None) -> bool:
+        """Whether there is anything to do for what is asked: False where the table says IGNORED.
 
         ``status`` is the newest one, for the error of what a fault refuses.
 
         Raises:
-            RobotiqError: the table refuses the trigger; the state stays.
+            RobotiqError: the table refuses it.
         """
+        answer = TABLE[self._state][trigger]
+        if isinstance(answer, Verdict) and answer is not Verdict.IGNORED:
+            raise refusal(trigger, self._state, status, self.why_down)
+        return answer is not Verdict.IGNORED
+
+    def show(self, target: State, trigger: Trigger) -> None:
+        """Show another state, and what has led to it."""
         source = self._state
-        target = TABLE[source][trigger]
         if target is source:
-            return True  # the usual case: a status that shows nothing new
-        if target is Verdict.IGNORED:
-            return False
-        if isinstance(target, Verdict):
-            raise refusal(trigger, source, status, self.why_down)
+            return
         self._state = target
         # A control loop goes to RUNNING_CC and back with every command.
         level = logging.DEBUG if {source, target} <= RUNNING else logging.INFO
         self.log.log(level, "%s -> %s (%s)", source.name, target.name, trigger.value)
         self.changed(source, target, trigger)
-        return True
-
-    def delivered(self) -> None:
-        """What the state was about to send was acknowledged, or need not be sent."""
-        if isinstance(TABLE[self._state][Trigger.DELIVERED], State):
-            self.fire(Trigger.DELIVERED)
-
-    # -- the sequence under way ------------------------------------------------------------------------
-
-    def begin(self, sequence: Sequence) -> None:
-        """Run a sequence in place of the one under way."""
-        self.sequence = sequence
-        next(sequence)
-
-    def advance(self, status: RobotiqStatus) -> Request | None:
-        """Send a status to the sequence under way; return the image that it wants written now.
-
-        At the end of the sequence the state follows what the status shows.
-        """
-        assert self.sequence is not None, "a sequence is under way"
-        try:
-            return self.sequence.send(status)
-        except StopIteration:
-            pass
-        except RobotiqError as error:
-            self.log.warning("%s", error)
-        self.sequence = None
-        self.delivered()
-        self.fire(classify(status))
-        return None
-
-    def drop_sequence(self) -> None:
-        self.sequence = None
 
 
 def refusal(

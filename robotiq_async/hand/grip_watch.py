@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from ..control.contact import agrees
-from ..control.passing_fault import PassingFault
+from ..control.evidence import PassingFault
 from ..values.checks import check_int, check_mask, repr_of
 from ..values.enums import Finger, ObjectStatus
 from ..values.grip import GripChange, GripEvent
@@ -97,8 +97,8 @@ class GripWatch:
             return []
         self._last = status
         judged = status
-        if self._passing_fault.reads or status.fault.is_serious:
-            judged = self._passing_fault.see(status, status.timestamp)
+        if self._passing_fault.is_counting or status.fault.is_serious:
+            judged = self._passing_fault.filtered(status, status.timestamp)
         axes = self._axes & status.model.all_axes
         changes = [(axis, *change) for axis in axes for change in self._changes(axis, judged)]
         if last is None:

@@ -10,7 +10,7 @@ from typing import Final, Literal
 import anyio
 
 from ..control.motion import Move
-from ..control.requests.pending import Command
+from ..control.pending import Command
 from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
 from ..link.transport import Transport
 from ..runtime.clock import now

@@ -148,7 +148,8 @@ class Poller:
 
     def hurry(self) -> None:
         """Begin the next cycle at once, and not with the tick, if there is a stop to write."""
-        if self._controller.is_urgent:
+        due = self._controller.due(self._tick.time())
+        if due is not None and due.is_urgent:
             self._tick.hurry()
 
     def abandon(self) -> None:
@@ -251,24 +252,26 @@ class Poller:
 
     async def _cycle(self) -> None:
         """Read, decide, write. Write a stop before reading, too: a gripper may obey and not answer."""
-        controller = self._controller
-        if controller.is_urgent and not self._is_held_up() and await self._may_write(LONGEST_SPACING_S):
+        if await self._is_due(LONGEST_SPACING_S, urgent=True):
             await self._write()
         for _ in range(READS):
             await self._poll_once()
-            if not controller.has_request or not await self._may_write():
+            if not await self._is_due(SOON_S):
                 return
             if not self._is_held_up():
                 break
         await self._write()
 
-    async def _may_write(self, soon: float = SOON_S) -> bool:
-        """Whether write_spacing allows a write in this cycle; waits for it for up to ``soon`` seconds."""
-        wait = self._controller.wait(self._tick.time())
-        if wait > soon:
+    async def _is_due(self, soon: float, *, urgent: bool = False) -> bool:
+        """Whether there is something to write in this cycle; waits for write_spacing for ``soon`` seconds.
+
+        ``urgent`` for a stop that is to be written before the read.
+        """
+        due = self._controller.due(self._tick.time())
+        if due is None or due.wait > soon or (urgent and (not due.is_urgent or self._is_held_up())):
             return False
-        if wait:
-            await asyncio.sleep(wait)
+        if due.wait:
+            await asyncio.sleep(due.wait)
         return True
 
     async def _write(self) -> None:
@@ -417,7 +420,7 @@ class Poller:
         self._controller.shut_down(keep_grip=self._ending is Ending.KEEP)
         while True:
             await self._cycle()
-            if self._controller.machine.sequence is None:
+            if not self._controller.is_busy:
                 return
             await asyncio.sleep(self._options.poll_interval)
 

@@ -85,7 +85,7 @@ class Session:
         self._poller = Poller(
             options.make_transport(), self.controller, self.counters, channels, options, wait=wait
         )
-        machine.fire(Trigger.ASK_START)
+        machine.show(State.DISCONNECTED, Trigger.ASK_START)
         channels.publish_changes()
         self.is_over = False
         self._task = self._loop.create_task(self._run(), name="robotiq_async poller")
@@ -134,7 +134,7 @@ class Session:
         self._poller.abandon()
         self._waiters = StateWaiters()
         self._channels.end()
-        self.machine.fire(Trigger.ASK_STOP)
+        self.controller.stop()
         self.controller.stopped()
         self._channels.publish_changes()
 
@@ -269,7 +269,7 @@ class Session:
         """
         if ask is None and self.machine.state not in SEQUENCES:
             return
-        faulty = () if ask is not None or self.machine.sequence is not None else (State.FAULT, State.ATR_DONE)
+        faulty = () if ask is not None or self.controller.is_busy else (State.FAULT, State.ATR_DONE)
         failing: Failing = {
             State.FAULT: self._fault,
             State.ATR_DONE: self._fault,

@@ -9,8 +9,8 @@ from typing import Any
 from robotiq_async import Finger, MoveResult, RobotiqStatus, State
 from robotiq_async.control.controller import Controller
 from robotiq_async.control.motion import Move
-from robotiq_async.control.requests.pending import Command
-from robotiq_async.control.state_machine import StateMachine
+from robotiq_async.control.pending import Command
+from robotiq_async.control.state_machine import TABLE, StateMachine
 from robotiq_async.session.options import units_of
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.enums import Trigger
@@ -82,7 +82,7 @@ class Scan:
                 lambda: self.now, device_cycle=device_cycle, spread=False, model=model, **options
             )
         self.transitions: list[tuple[State, State, Trigger]] = []
-        self.machine = StateMachine(lambda *change: self.transitions.append(change))
+        self.machine = StateMachine(self._change)
         self.controller = Controller(
             self.machine, speed, 64, units_of(None, None, model).closing_s, spacing, model
         )
@@ -98,6 +98,10 @@ class Scan:
     @now.setter
     def now(self, value: float) -> None:
         self._time[0] = value
+
+    def _change(self, source: State, target: State, trigger: Trigger) -> None:
+        assert TABLE[source][trigger] is target, "each change of every story is one of the table"
+        self.transitions.append((source, target, trigger))
 
     # -- the link --------------------------------------------------------------------------------------
 
@@ -124,7 +128,8 @@ class Scan:
 
     def hurry(self) -> None:
         """Write what is urgent before the next read, as the poller does."""
-        if self.controller.is_urgent and not self.controller.wait(self.now):
+        due = self.controller.due(self.now)
+        if due is not None and due.is_urgent and not due.wait:
             self._write(answer=True)
 
     def _write(self, *, answer: bool) -> None:
@@ -220,7 +225,7 @@ class Scan:
     def stop(self, *, keep_grip: bool = False) -> None:
         self.controller.stop()
         self.controller.shut_down(keep_grip=keep_grip)
-        self.until(lambda: self.controller.machine.sequence is None, 1.0)
+        self.until(lambda: not self.controller.is_busy, 1.0)
 
     # -- what has happened -----------------------------------------------------------------------------
 

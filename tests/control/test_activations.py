@@ -155,7 +155,7 @@ def test_a_gripper_that_is_active_or_activating_is_not_activated_again(scan: Sca
     scan.controller.activate()
     scan.run(0.1)
     assert len(scan.written) == written
-    assert scan.controller.machine.sequence is None
+    assert not scan.controller.is_busy
     scan.controller.reset()
     scan.until(lambda: scan.state is State.RESET)
     scan.controller.activate()

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.control.requests.adoption import DIRECTION_WAIT_S, Adoption
-from robotiq_async.control.requests.standstill import LAG_READS, LAG_S, Moment
+from robotiq_async.control.adoption import DIRECTION_WAIT_S, Adoption
+from robotiq_async.control.rest import LAG_READS, LAG_S, Moment
 from robotiq_async.values.enums import Finger, Mode, ObjectStatus
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
@@ -36,7 +36,7 @@ def adopted(*statuses: RobotiqStatus) -> Request:
     """The request that statuses tell, the first one first."""
     adoption = Adoption(statuses[0])
     for status in statuses[1:]:
-        adoption.see(status)
+        adoption.update(status)
     return adoption.request(SETTINGS)
 
 
@@ -111,17 +111,21 @@ def test_a_halted_gripper_has_its_own_positions_as_requests(what: ObjectStatus) 
 def test_nothing_is_certain_before_every_moving_axis_has_shown_its_direction() -> None:
     adoption = Adoption(gripper(MOVING, MOVING, THERE, THERE, position=(100, 100, 6, 6)))
     assert not adoption.is_certain
-    adoption.see(gripper(MOVING, MOVING, THERE, THERE, position=(101, 100, 6, 6), at=0.01))
+    adoption.update(gripper(MOVING, MOVING, THERE, THERE, position=(101, 100, 6, 6), at=0.01))
     assert not adoption.is_certain
-    adoption.see(gripper(MOVING, MOVING, THERE, THERE, position=(101, 99, 6, 6), at=0.02))
+    adoption.update(gripper(MOVING, MOVING, THERE, THERE, position=(101, 99, 6, 6), at=0.02))
     assert adoption.is_certain
 
 
 def test_an_axis_that_stays_where_it_is_is_not_waited_for_any_longer_than_a_count_takes() -> None:
     adoption = Adoption(gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.0))
-    adoption.see(gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.0 + DIRECTION_WAIT_S / 2))
+    adoption.update(
+        gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.0 + DIRECTION_WAIT_S / 2)
+    )
     assert not adoption.is_certain
-    adoption.see(gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.001 + DIRECTION_WAIT_S))
+    adoption.update(
+        gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.001 + DIRECTION_WAIT_S)
+    )
     assert adoption.is_certain
 
 
@@ -145,12 +149,12 @@ def test_an_axis_at_rest_that_contradicts_its_echo_may_show_what_was_before_it(
     shown = gripper(THERE, what, THERE, THERE, echo=(100, echo, 100, 100), position=(100,) * 4)
     adoption = Adoption(shown)
     assert not adoption.is_certain
-    adoption.see(gripper(THERE, MOVING, THERE, THERE, echo=(100, echo, 100, 100), position=(100,) * 4))
+    adoption.update(gripper(THERE, MOVING, THERE, THERE, echo=(100, echo, 100, 100), position=(100,) * 4))
     assert not adoption.is_certain, "its direction is not known yet"
     for reads in range(1, LAG_READS):
-        adoption.see(shown, Moment(LAG_S, reads))
+        adoption.update(shown, Moment(LAG_S, reads))
         assert not adoption.is_certain
-    adoption.see(shown, Moment(LAG_S, LAG_READS))
+    adoption.update(shown, Moment(LAG_S, LAG_READS))
     assert adoption.is_certain, "it is so, and not late"
 
 

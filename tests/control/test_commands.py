@@ -6,7 +6,7 @@ import pytest
 
 from robotiq_async import ConnectionLostError, Finger, NotActivatedError
 from robotiq_async.control.motion import Move
-from robotiq_async.control.requests.pending import Command
+from robotiq_async.control.pending import Command
 from tests.control.other_client import going_to
 from tests.control.scan import Outcome, Scan
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import Fault, Finger, GripperFaultError, NotActivatedError, State
-from robotiq_async.control.passing_fault import LASTS_READS
+from robotiq_async.control.evidence import LASTS_READS
 from robotiq_async.values.request import Request
 from tests.control.other_client import moved_by_another
 from tests.control.scan import POLL_S, Scan, started

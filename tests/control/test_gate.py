@@ -13,7 +13,7 @@ from robotiq_async import Finger, RobotiqError, State
 from robotiq_async.control.controller import Controller
 from robotiq_async.control.gate import gate
 from robotiq_async.control.motion import Move
-from robotiq_async.control.requests.pending import Command
+from robotiq_async.control.pending import Command
 from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.session.options import units_of
 from robotiq_async.values.model import MODELS, Model

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from robotiq_async import Fault, Finger, MoveSupersededError, State
+from robotiq_async import ConnectionLostError, Fault, Finger, MoveSupersededError, State
 from robotiq_async.values.enums import Initialization, Mode
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
@@ -97,6 +97,50 @@ def test_halt_in_fault_ends_while_the_fault_lasts(scan: Scan, code: int, moving:
     scan.until(lambda: halted.is_answered, 0.7)
     assert halted.answers == [None]
     assert not scan.latest.go_echo
+
+
+def test_a_forgotten_halt_is_written_again_if_the_motion_before_it_had_not_begun() -> None:
+    """Until that motion acts, rGTO shows clear: no status tells whether the halt has arrived."""
+    scan = started(device_cycle=0.2)
+    scan.command(A, position=255, speed=0)
+    scan.step()
+    scan.forgets = 1
+    halter = scan.halt()
+    scan.step()
+    assert not scan.latest.go_echo
+    scan.run(0.1)
+    assert not halter.is_answered
+    scan.until(lambda: halter.is_answered)
+    before = scan.travels()
+    scan.run(1.0)
+    assert scan.travels() == before
+
+
+def test_a_speed_after_a_halt_waits_until_the_gripper_has_stopped() -> None:
+    scan = started(device_cycle=0.2)
+    scan.command(A, position=255)
+    scan.run(0.5)
+    scan.halt()
+    setter = scan.command(A, speed=9)
+    scan.run(0.1)
+    assert not setter.is_answered
+    scan.run(0.3)
+    assert setter.answers == [None]
+    assert (scan.last_image.go, scan.last_image.axes[0].speed) == (False, 9)
+
+
+def test_a_halt_fails_with_the_link_and_is_not_sent_later() -> None:
+    scan = started(device_cycle=0.2)
+    scan.command(A, position=255, speed=0)
+    scan.run(0.5)
+    scan.forgets = 1
+    halter = scan.halt()
+    scan.step()
+    scan.blink()
+    assert isinstance(halter.error, ConnectionLostError)
+    writes = len(scan.written)
+    scan.run(1.0)
+    assert len(scan.written) == writes
 
 
 def test_a_halt_outlives_a_fault_in_the_same_poll() -> None:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 
 from robotiq_async import Fault, Finger, NotStartedError, RobotiqStatus
-from robotiq_async.control.grip_keeper import KEEP_S, REST_S
+from robotiq_async.control.keeping import KEEP_S, REST_S
 from tests.control.other_client import image
 from tests.control.scan import POLL_S, Scan, started
 from tests.grippers import Restless
@@ -225,7 +225,7 @@ def test_a_link_that_goes_down_meanwhile_is_a_doubt() -> None:
     scan.controller.lost(None)
     scan.controller.see(scan.status())
     scan.controller.shut_down(keep_grip=True)
-    scan.until(lambda: scan.controller.machine.sequence is None, 1.0)
+    scan.until(lambda: not scan.controller.is_busy, 1.0)
     assert not scan.gripper.grips
     assert not scan.last_image.go
 
@@ -241,7 +241,7 @@ def test_replies_that_were_looked_at_late_tell_of_no_rest(caplog: pytest.LogCapt
         at = scan.now + late
         scan.controller.see(RobotiqStatus(status.registers, at, status.sequence), scan.now)
         images.append(scan.controller.decide(at))
-        assert scan.controller.machine.sequence is not None
+        assert scan.controller.is_busy
         scan.now += POLL_S
     assert images[:3] == [None] * 3
     assert images[3] is not None

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from robotiq_async import Finger, MoveResult, MoveSupersededError, ObjectStatus
-from robotiq_async.control.requests.standstill import LAG_READS, LAG_S, LONG_AGO, Moment, Standstill
+from robotiq_async.control.rest import LAG_READS, LAG_S, LONG_AGO, Asked, Moment, Rest, is_doubtful, rest_of
 from robotiq_async.values.enums import NO_AXES
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
 from tests.control.other_client import image
@@ -417,84 +415,82 @@ def test_the_first_write_beside_another_clients_leaves_it_what_it_has_just_asked
 # -- one axis ----------------------------------------------------------------------------------------------
 
 
-class Axis(Standstill):
-    """One that is asked something at a moment; everything acts at once."""
+NOW = Moment(10.0, 1000)
+OLD = Moment(NOW.time - LAG_S, NOW.reads - LAG_READS)
 
-    def __init__(self) -> None:
-        super().__init__(THREE_FINGER)
-        self.now = Moment(10.0, 1000)
 
-    def after(self, seconds: float, reads: int) -> Axis:
-        self.now = Moment(self.now.time + seconds, self.now.reads + reads)
-        return self.seen(THERE)
+def rest(what: ObjectStatus, position: int, *asked: Asked) -> Rest:
+    """What is known of an axis with these requests, the oldest first."""
+    return rest_of(reversed(asked), THREE_FINGER, what, position)
 
-    def seen(self, what: ObjectStatus) -> Axis:
-        self.see(what, lambda _: True, lambda _: False, self.now)
-        return self
 
-    def asked(
-        self, position: int | None, before: int | None, *, again: bool = False, rested: bool = False
-    ) -> Axis:
-        self.ask(1, position, before=before, again=again, rested=rested)
-        return self.after(0, 0)
+def doubted(what: ObjectStatus, position: int, *asked: Asked) -> bool:
+    return is_doubtful(reversed(asked), THREE_FINGER, what, position)
 
 
 def test_a_status_is_trusted_unless_an_earlier_request_explains_it() -> None:
-    assert Axis().is_known(THERE, 100)
-    assert not Axis().is_known(MOVING, 100)
-    assert not Axis().is_doubtful(CLOSING, 100)
-    assert Axis().asked(255, 0).is_known(CLOSING, 9), "it fits the new request alone"
-    assert not Axis().asked(0, 255).is_known(CLOSING, 9)
-    axis = Axis().asked(0, 255).asked(255, 0)
-    assert not axis.is_known(CLOSING, 150), "it fitted before, and was contradicted since"
-    assert axis.is_doubtful(CLOSING, 150)
-    # Until the request that contradicts it is old enough: it is from the last one then.
-    assert axis.after(LAG_S, LAG_READS).is_known(CLOSING, 150)
+    assert rest(THERE, 100) is Rest.PROVEN
+    assert rest(MOVING, 100) is Rest.UNKNOWN
+    assert not doubted(CLOSING, 100)
+    assert rest(CLOSING, 9, Asked(0), Asked(255)) is Rest.PROVEN, "it fits the new request alone"
+    assert rest(CLOSING, 9, Asked(255), Asked(0)) is Rest.UNKNOWN
+    asked = Asked(255), Asked(0), Asked(255)
+    assert rest(CLOSING, 150, *asked) is Rest.UNKNOWN, "it fitted before, and was contradicted since"
+    assert doubted(CLOSING, 150, *asked)
 
 
-@pytest.mark.parametrize(("seconds", "reads"), [(LAG_S - 0.001, 1000), (1000.0, LAG_READS - 1)])
+def test_an_axis_that_is_where_it_was_asked_to_be_rests_and_an_older_status_may_follow() -> None:
+    assert rest(THERE, 101, Asked(0), Asked(100)) is Rest.KNOWN
+    assert rest(THERE, 101, Asked(100)) is Rest.PROVEN
+    assert rest(THERE, 110, Asked(0), Asked(100)) is Rest.UNKNOWN
+
+
+@pytest.mark.parametrize(("seconds", "reads"), [(0.001, 0), (0.0, 1)])
 def test_the_lag_takes_both_time_and_reads(seconds: float, reads: int) -> None:
-    axis = Axis().asked(255, 0).after(seconds, reads)
-    assert not axis.is_known(THERE, 7)
-    assert axis.after(0.001, 1).is_known(THERE, 7)
+    assert OLD.is_lag_over(NOW)
+    assert not Moment(OLD.time + seconds, OLD.reads + reads).is_lag_over(NOW)
+    assert LONG_AGO.is_lag_over(Moment(0.0, 0))
 
 
 def test_nothing_is_known_under_what_does_not_act() -> None:
-    axis = Axis()
-    axis.ask(7, 100, before=101, again=False, rested=True)
-    assert not axis.is_known(THERE, 100)
+    assert rest(THERE, 100, Asked(101), Asked(100, shown=None)) is Rest.UNKNOWN
+
+
+def asked_of(scan: Scan, axis: Finger) -> int:
+    """How many requests of an axis a status may show."""
+    return len([*scan.controller._ledger._asked(axis)])
+
+
+@LAGS
+def test_every_request_but_the_last_is_forgotten_when_the_lag_is_over(lag: int) -> None:
+    scan = started(lag=lag)
+    for position in (40, 80, 120, 160):
+        scan.command(A, position=position)
+        scan.run(0.02)
+    scan.run(2 * LAG_S + LAG_READS * POLL_S)
+    assert asked_of(scan, A) == 1
 
 
 def test_a_status_after_a_motion_is_not_from_before_it() -> None:
     """What is shown comes in its order; but a motion may be that of a request before, if there was one."""
-    assert Axis().asked(0, 255, rested=True).asked(255, 0).seen(MOVING).is_known(CLOSING, 150)
-    assert not Axis().asked(0, 255).asked(255, 0).seen(MOVING).is_known(CLOSING, 150)
+    scan = started()
+    scan.moved(20, A)
+    scan.run(1.0)
+    scan.command(A, position=255)
+    scan.until(lambda: bool(scan.latest.moving))
+    assert asked_of(scan, A) == 1
+    scan.command(A, position=0)
+    scan.run(0.02)
+    assert asked_of(scan, A) == 2
 
 
 @pytest.mark.parametrize(("position", "doubtful"), [(100, True), (102, True), (103, False), (105, False)])
 def test_an_axis_between_two_requests_may_have_some_counts_to_go(position: int, doubtful: bool) -> None:
-    assert Axis().asked(104, 100).is_doubtful(THERE, position) is doubtful
+    assert doubted(THERE, position, Asked(100), Asked(104)) is doubtful
 
 
 def test_a_contact_that_is_tried_again_is_known_when_the_lag_is_over() -> None:
-    axis = Axis().asked(255, 255, again=True)
-    assert not axis.is_known(CLOSING, 150)
-    assert not axis.is_doubtful(CLOSING, 150), "for a hold it is a grip"
-    assert axis.after(LAG_S, LAG_READS).is_known(CLOSING, 150)
-
-
-@given(
-    st.lists(st.tuples(st.one_of(st.none(), st.integers(0, 255)), st.booleans()), max_size=8),
-    st.sampled_from(ObjectStatus),
-    st.integers(0, 255),
-)
-def test_every_request_is_forgotten_when_the_lag_is_over(
-    asked: list[tuple[int | None, bool]], what: ObjectStatus, position: int
-) -> None:
-    axis, before = Axis(), 0
-    for request, again in asked:
-        axis.asked(request, before, again=again).after(0.01, 2)
-        before = 0 if request is None else request
-    axis.after(LAG_S, LAG_READS)
-    assert axis.is_known(what, position) == (what is not MOVING)
-    assert LONG_AGO.is_lag_over(axis.now)
+    asked = Asked(255), Asked(255, again=True)
+    assert rest(CLOSING, 150, *asked) is Rest.UNKNOWN
+    assert not doubted(CLOSING, 150, *asked), "for a hold it is a grip"
+    assert rest(CLOSING, 150, *asked[1:]) is Rest.PROVEN

@@ -7,7 +7,7 @@ import logging
 import pytest
 
 from robotiq_async import Finger, MoveSupersededError, ObjectStatus
-from robotiq_async.control.requests.limits import ALONE_S, Limits
+from robotiq_async.control.limits import ALONE_S, Limits
 from robotiq_async.simulator import Habits
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.registers import Registers
@@ -255,15 +255,15 @@ def test_unproven_limits_are_dropped_when_another_client_is_seen() -> None:
     limits, image = Limits(), BEFORE.with_positions({S: 255})
     status = status_of(0x39, 0xFF, echo=(0, 0, 0, 220), position=130)
     assert limits.learn(BEFORE, image, status)
-    limits.doubt()
-    assert limits.alias(image) is None
+    limits.note_other_client(0.0)
+    assert not limits.apply(image)
     assert limits.learn(BEFORE, image, status)
     assert limits.prove(S, 219) == 220
     assert limits.prove(S, 219) is None, "no news"
-    limits.doubt()
-    assert limits.alias(image) == (True, True, 0, 0, 0, 220)
+    limits.note_other_client(0.0)
+    assert limits.apply(image) == {S: 220}
     limits.forget(image, image.echo)
-    assert limits.alias(image) is None
+    assert not limits.apply(image)
 
 
 @pytest.mark.parametrize(("asked", "limit"), [(255, 220), (0, 20)])
@@ -271,6 +271,6 @@ def test_a_request_at_a_limit_does_not_refute_it_and_one_beyond_does(asked: int,
     limits, beyond, at = Limits(), BEFORE.with_positions({S: asked}), BEFORE.with_positions({S: limit})
     assert limits.learn(BEFORE, beyond, status_of(0x39, 0xFF, echo=(0, 0, 0, limit), position=130))
     limits.forget(at, at.echo)
-    assert limits.alias(beyond) == at.echo
+    assert limits.apply(beyond) == {S: limit}
     limits.forget(beyond, beyond.echo)
-    assert limits.alias(beyond) is None
+    assert not limits.apply(beyond)

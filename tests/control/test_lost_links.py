@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from robotiq_async import ConnectionLostError, Finger, State
-from robotiq_async.control.requests.pending import Command
+from robotiq_async.control.pending import Command
 from robotiq_async.values.request import AxisRequest, Request
 from tests.control.other_client import activated_by_another
 from tests.control.scan import POLL_S, Scan, started

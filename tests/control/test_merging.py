@@ -9,14 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.control.contact import agrees, drifts
-from robotiq_async.control.requests.merging import merged
-from robotiq_async.control.requests.pending import Command, PendingCommand
+from robotiq_async.control.pending import Command, Pending, merged
 from robotiq_async.values.enums import NO_AXES, Finger, Mode, ObjectStatus
-from robotiq_async.values.errors import MoveSupersededError
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
-from tests.control.scan import Outcome
 from tests.register_words import status_of
 
 A, B, C, S = THREE_FINGER.axes
@@ -31,12 +28,11 @@ GOING = Request(
 HALTED = replace(GOING, go=False)
 MOVING = status_of(0x39, 0x00, position=AT)
 RESTING = status_of(0x31, 0xFF, position=AT)
-SUPERSEDED = MoveSupersededError("held")
 
 
 def after(
     base: Request,
-    pending: PendingCommand,
+    pending: Pending,
     status: RobotiqStatus = MOVING,
     *,
     gripping: Finger = NO_AXES,
@@ -47,15 +43,15 @@ def after(
 
 def command(
     axes: Finger, position: int | None = None, speed: int | None = None, force: int | None = None
-) -> PendingCommand:
-    pending = PendingCommand()
+) -> Pending:
+    pending = Pending()
     pending.merge(Command(axes, position, speed, force))
     return pending
 
 
-def hold(axes: Finger) -> PendingCommand:
-    pending = PendingCommand()
-    pending.merge_hold(axes, SUPERSEDED)
+def hold(axes: Finger) -> Pending:
+    pending = Pending()
+    pending.merge_hold(axes)
     return pending
 
 
@@ -68,7 +64,7 @@ def positions(image: Request) -> tuple[int, ...]:
 
 @pytest.mark.parametrize("base", [GOING, HALTED])
 def test_nothing_pending_changes_nothing(base: Request) -> None:
-    assert after(base, PendingCommand()) == base
+    assert after(base, Pending()) == base
 
 
 def test_a_position_changes_its_axes_and_no_other() -> None:
@@ -78,20 +74,6 @@ def test_a_position_changes_its_axes_and_no_other() -> None:
 def test_a_speed_and_a_force_change_their_axes_and_start_nothing() -> None:
     image = after(HALTED, command(B, speed=200, force=100))
     assert image == replace(HALTED, axes=(*HALTED.axes[:1], AxisRequest(20, 200, 100), *HALTED.axes[2:]))
-
-
-# -- rACT and rATR are for the sequences -------------------------------------------------------------------
-
-
-# -- halting -----------------------------------------------------------------------------------------------
-
-
-def test_a_halt_goes_alone() -> None:
-    """What was asked after it follows once the gripper has stopped."""
-    pending = command(B, 200, speed=9, force=9)
-    pending.merge_halt(Outcome(), SUPERSEDED)
-    pending.merge(Command(C, 200))
-    assert after(GOING, pending) == HALTED
 
 
 # -- waking and holding ------------------------------------------------------------------------------------
@@ -118,7 +100,7 @@ AT_REST = status_of(0x39, 0xFF, position=(9, 22, 103, 40))
 )
 def test_axes_not_addressed_stay_or_keep_their_requests(
     base: Request,
-    pending: PendingCommand,
+    pending: Pending,
     status: RobotiqStatus,
     options: dict[str, Finger],
     expected: tuple[int, ...],
@@ -167,8 +149,8 @@ def test_an_axis_not_addressed_keeps_its_request_or_stays(
     gripping: Finger,
     arrived: Finger,
 ) -> None:
-    pending = PendingCommand()
-    pending.merge_hold(held, SUPERSEDED)
+    pending = Pending()
+    pending.merge_hold(held)
     for each in commands:
         pending.merge(Command(*each))
     image = merged(base, pending, status, gripping=gripping, arrived=arrived)

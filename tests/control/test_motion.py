@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robotiq_async.control.ledger import Entry, Ledger
 from robotiq_async.control.motion import LiveMoves, Move
 from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.enums import Finger, ObjectStatus
@@ -98,12 +99,12 @@ def test_a_move_knows_whether_the_link_went_down_under_it(error: RobotiqError) -
 def test_a_result_tells_of_each_addressed_axis_and_of_no_other() -> None:
     """A and B hold something, C is closed, the scissor touches something too."""
     each, outcome = move(255, ABC, now=10.0)
-    each.see(status_of(0x39, 0xC0, echo=255, current=(15, 5, 0, 200)))
-    each.see(status_of(0x39, 0xC0, echo=255, current=(3, 40, 1, 0)))
+    each.note_currents(status_of(0x39, 0xC0, echo=255, current=(15, 5, 0, 200)))
+    each.note_currents(status_of(0x39, 0xC0, echo=255, current=(3, 40, 1, 0)))
     last = status_of(
         0x79, 0b10_11_10_10, echo=255, position=(150, 151, 241, 99), current=(9, 9, 9, 9), at=12.5
     )
-    each.see(last)
+    each.note_currents(last)
     result = ended((each, outcome), last)
     assert dict(result.outcomes) == {
         A: ObjectStatus.CONTACT_CLOSING,
@@ -142,7 +143,7 @@ def test_a_result_cannot_be_changed() -> None:
 def test_a_result_does_not_change_with_what_is_seen_later() -> None:
     each, outcome = move(255, A)
     result = ended((each, outcome), status_of(0xF9, 0xFF))
-    each.see(status_of(0xF9, 0xFF, current=255))
+    each.note_currents(status_of(0xF9, 0xFF, current=255))
     assert dict(result.peak_current_ma) == {A: 0}
 
 
@@ -189,11 +190,12 @@ def test_any_move_may_take_at_least_the_margin_and_at_most_the_slowest_full_stro
 
 # -- the moves under way -----------------------------------------------------------------------------------
 
+ENTRY = Ledger(128, 64).last
 ARRIVED = status_of(0xF9, 0xFF, echo=255, current=7)
 MOVING = status_of(0x39, 0x00, echo=255, current=9)
 
 
-def acts(_: int) -> bool:
+def acts(_: Entry) -> bool:
     return True
 
 
@@ -208,10 +210,10 @@ def test_a_move_that_was_not_written_yet_does_not_end() -> None:
     """The axes may rest where a move before this one has brought them."""
     each, outcome = move()
     moves = live(each)
-    moves.see(ARRIVED, acts, Finger.ALL, {})
+    moves.end_arrived(ARRIVED, acts, Finger.ALL, {})
     assert not outcome.answers
-    moves.written(1)
-    moves.see(ARRIVED, acts, Finger.ALL, {})
+    moves.written(ENTRY)
+    moves.end_arrived(ARRIVED, acts, Finger.ALL, {})
     assert outcome.result.positions == {A: 0, B: 0, C: 0}
     assert not moves
 
@@ -219,37 +221,37 @@ def test_a_move_that_was_not_written_yet_does_not_end() -> None:
 def test_a_move_whose_write_does_not_act_yet_does_not_end() -> None:
     each, outcome = move()
     moves = live(each)
-    moves.written(7)
-    moves.see(ARRIVED, lambda number: number < 7, Finger.ALL, {})
+    moves.written(ENTRY)
+    moves.end_arrived(ARRIVED, lambda entry: entry is not ENTRY, Finger.ALL, {})
     assert not outcome.answers
-    moves.see(ARRIVED, lambda number: number <= 7, Finger.ALL, {})
+    moves.end_arrived(ARRIVED, lambda entry: entry is ENTRY, Finger.ALL, {})
     assert outcome.is_answered
 
 
 def test_a_move_takes_in_currents_from_its_write_on() -> None:
     each, outcome = move()
     moves = live(each)
-    moves.see(status_of(0x39, 0x00, echo=255, current=99), acts, Finger.ALL, {})
-    moves.written(1)
-    moves.see(MOVING, acts, Finger.ALL, {})
-    moves.see(ARRIVED, acts, Finger.ALL, {})
+    moves.end_arrived(status_of(0x39, 0x00, echo=255, current=99), acts, Finger.ALL, {})
+    moves.written(ENTRY)
+    moves.end_arrived(MOVING, acts, Finger.ALL, {})
+    moves.end_arrived(ARRIVED, acts, Finger.ALL, {})
     assert set(outcome.result.peak_current_ma.values()) == {90}
 
 
 def test_a_later_write_does_not_carry_an_earlier_move() -> None:
-    (first, _), (second, _) = move(axes=A), move(axes=B)
+    (first, _), (second, _), later = move(axes=A), move(axes=B), Ledger(128, 64).last
     moves = live(first)
-    moves.written(1)
+    moves.written(ENTRY)
     moves.add(second)
-    moves.written(2)
-    assert (first.write, second.write) == (1, 2)
+    moves.written(later)
+    assert (first.entry, second.entry) == (ENTRY, later)
 
 
 def test_every_move_that_has_arrived_ends_and_the_others_go_on() -> None:
     (first, one), (second, other), (third, goes_on) = move(axes=A), move(axes=B), move(100, C)
     moves = live(first, second, third)
-    moves.written(1)
-    moves.see(ARRIVED, acts, Finger.ALL, {})
+    moves.written(ENTRY)
+    moves.end_arrived(ARRIVED, acts, Finger.ALL, {})
     assert one.is_answered
     assert other.is_answered
     assert not goes_on.answers
@@ -290,9 +292,9 @@ def test_a_move_has_left_when_its_outcome_is_handed_over(how: str) -> None:
 
     each = Move(255, ABC, 0.0, Caller())
     moves = live(each)
-    moves.written(1)
+    moves.written(ENTRY)
     if how == "end":
-        moves.see(ARRIVED, acts, Finger.ALL, {})
+        moves.end_arrived(ARRIVED, acts, Finger.ALL, {})
     else:
         moves.fail(MoveSupersededError("now"))
     assert was_under_way == [False]

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.control.requests.pending import Command, PendingCommand
+from robotiq_async.control.pending import Command, Pending
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.errors import ConnectionLostError, MoveSupersededError
 from robotiq_async.values.model import THREE_FINGER
@@ -35,7 +35,7 @@ LOST = ConnectionLostError("gone")
 def test_any_commands_leave_the_last_value_of_each_axis_and_field(
     commands: list[tuple[Finger, int | None, int | None, int | None]],
 ) -> None:
-    pending = PendingCommand()
+    pending = Pending()
     for axes, position, speed, force in commands:
         pending.merge(Command(axes, position, speed, force))
     for field, merged in enumerate((pending.positions, pending.speeds, pending.forces)):
@@ -49,7 +49,7 @@ def test_any_commands_leave_the_last_value_of_each_axis_and_field(
 
 # -- holding and halting -----------------------------------------------------------------------------------
 
-Step = Callable[[PendingCommand], None]
+Step = Callable[[Pending], None]
 
 
 def command(axes: Finger, position: int | None = None, setting: int | None = None) -> Step:
@@ -58,11 +58,15 @@ def command(axes: Finger, position: int | None = None, setting: int | None = Non
 
 
 def hold(axes: Finger) -> Step:
-    return lambda pending: pending.merge_hold(axes, SUPERSEDED)
+    def step(pending: Pending) -> None:
+        pending.drop_positions(axes, SUPERSEDED)
+        pending.merge_hold(axes)
+
+    return step
 
 
-def halt(pending: PendingCommand) -> None:
-    pending.merge_halt(Outcome(), SUPERSEDED)
+def halt(pending: Pending) -> None:
+    pending.drop_positions(Finger.ALL, SUPERSEDED)
 
 
 @pytest.mark.parametrize(
@@ -82,7 +86,7 @@ def halt(pending: PendingCommand) -> None:
 def test_holds_and_halts_drop_positions_and_nothing_else(
     steps: list[Step], positions: dict[Finger, int], settings: dict[Finger, int], held: Finger, moved: Finger
 ) -> None:
-    pending = PendingCommand()
+    pending = Pending()
     for step in steps:
         step(pending)
     assert (pending.positions, pending.hold, pending.moved) == (positions, held, moved)
@@ -90,85 +94,97 @@ def test_holds_and_halts_drop_positions_and_nothing_else(
 
 
 def test_a_hold_fails_only_the_callers_that_move_its_axes() -> None:
-    pending, held, other, setting = PendingCommand(), Outcome(), Outcome(), Outcome()
+    pending, held, other, setting = Pending(), Outcome(), Outcome(), Outcome()
     pending.merge(Command(A, 100), held)
     pending.merge(Command(B, 100), other)
     pending.merge(Command(A, None, 50), setting)
-    pending.merge_hold(A, SUPERSEDED)
+    hold(A)(pending)
     assert isinstance(held.error, MoveSupersededError)
     assert not other.answers
     assert not setting.answers
 
 
 @pytest.mark.parametrize(
-    ("fill", "empty", "holds_at_most"),
+    ("fill", "empty", "has_changes"),
     [
-        (lambda _: None, True, True),
-        (hold(A), False, True),
-        (command(A, 1), False, False),
-        (lambda pending: pending.merge(Command(A, None, 1)), False, False),
-        (lambda pending: pending.merge(Command(A, None, None, 1)), False, False),
-        (halt, False, False),
+        (lambda _: None, True, False),
+        (hold(A), False, False),
+        (command(A, 1), False, True),
+        (lambda pending: pending.merge(Command(A, None, 1)), False, True),
+        (lambda pending: pending.merge(Command(A, None, None, 1)), False, True),
     ],
-    ids=["nothing", "hold", "position", "speed", "force", "halt"],
+    ids=["nothing", "hold", "position", "speed", "force"],
 )
 def test_a_pending_command_knows_whether_there_is_something_to_write(
-    fill: Step, empty: bool, holds_at_most: bool
+    fill: Step, empty: bool, has_changes: bool
 ) -> None:
-    pending = PendingCommand()
+    pending = Pending()
     fill(pending)
     assert pending.is_empty == empty
-    assert pending.holds_at_most == holds_at_most
+    assert pending.has_changes == has_changes
 
 
 # -- who waits ---------------------------------------------------------------------------------------------
 
 
 def test_a_halt_drops_positions_and_leaves_pending_speeds() -> None:
-    """The speed stays on the pending and is delivered: its caller must not hear MoveSupersededError."""
-    pending, for_speed, for_position = PendingCommand(), Outcome(), Outcome()
+    """The speed stays pending and is delivered: its caller must not hear MoveSupersededError."""
+    pending, for_speed, for_position = Pending(), Outcome(), Outcome()
     pending.merge(Command(A, None, 50), for_speed)
     pending.merge(Command(B, 100), for_position)
-    pending.merge_halt(Outcome(), SUPERSEDED)
+    halt(pending)
     assert pending.speeds == {A: 50}
     assert isinstance(for_position.error, MoveSupersededError)
     assert not for_speed.answers
     assert pending.waiters == [for_speed]
 
 
-def test_a_position_replaces_a_hold_and_its_caller_still_waits() -> None:
-    pending, holder = PendingCommand(), Outcome()
-    pending.merge_hold(A, SUPERSEDED, holder)
+def test_a_position_goes_before_a_hold_whose_caller_still_waits() -> None:
+    pending, holder = Pending(), Outcome()
+    pending.merge_hold(A, holder)
     pending.merge(Command(A, 100))
     assert pending.waiters == [holder]
     assert not holder.is_answered
 
 
-def test_every_caller_of_halt_is_kept() -> None:
-    pending, one, other = PendingCommand(), Outcome(), Outcome()
-    pending.merge_halt(one, SUPERSEDED)
-    pending.merge_halt(other, SUPERSEDED)
-    assert pending.halting == [one, other]
+def test_a_hold_that_nobody_asked_for_is_no_request() -> None:
+    pending = Pending()
+    pending.merge_hold(A)
+    assert not pending.is_asked
+    pending.merge_hold(B, Outcome())
+    assert pending.is_asked
+    pending.hold_only(C)
+    assert pending.hold == B, "another client moves A now; B was named by a caller"
 
 
-# -- telling -----------------------------------------------------------------------------------------------
+def test_what_moves_is_dropped_alone_or_with_the_holds() -> None:
+    pending, mover, holder = Pending(), Outcome(), Outcome()
+    pending.merge(Command(A, 100, 50), mover)
+    pending.merge_hold(B, holder)
+    pending.merge_hold(C)
+    pending.drop_changes(LOST)
+    assert isinstance(mover.error, ConnectionLostError)
+    assert (pending.hold, pending.has_changes, holder.is_answered) == (B, False, False)
+    pending.drop(LOST)
+    assert isinstance(holder.error, ConnectionLostError)
+    assert pending.is_empty
+
+
+def test_a_halt_takes_the_holds_with_it() -> None:
+    """The hold alone would leave nothing to write, and its caller would wait for ever."""
+    pending, holder = Pending(), Outcome()
+    pending.merge(Command(B, None, 50))
+    pending.merge_hold(A, holder)
+    taken = pending.take_holds()
+    assert (taken.hold, taken.waiters, taken.has_changes) == (A, [holder], False)
+    assert (pending.hold, pending.waiters, pending.speeds) == (NONE, [], {B: 50})
 
 
 def test_a_failure_gives_every_caller_an_error_of_its_own() -> None:
-    pending, callers, halter = PendingCommand(), [Outcome(), Outcome()], Outcome()
+    pending, callers = Pending(), [Outcome(), Outcome()]
     pending.merge(Command(A, 100), callers[0])
     pending.merge(Command(A, None, 50), callers[1])
-    pending.halting = [halter]
-    pending.fail(LOST)
-    errors = [each.answers[0] for each in (*callers, halter)]
+    pending.drop(LOST)
+    errors = [each.answers[0] for each in callers]
     assert all(isinstance(error, ConnectionLostError) for error in errors)
-    assert len({id(error) for error in errors}) == 3
-
-
-def test_callers_of_halt_do_not_wait_for_the_acknowledgement_alone() -> None:
-    """A halt ends when the gripper shows that it has stopped."""
-    pending, callers = PendingCommand(), [Outcome(), Outcome()]
-    pending.merge(Command(A, 100), callers[0])
-    pending.merge(Command(A, None, 50), callers[1])
-    pending.halting = [Outcome()]
-    assert pending.waiters == callers
+    assert len({id(error) for error in errors}) == 2

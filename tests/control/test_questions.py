@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.control.controller import Controller
-from robotiq_async.control.requests.shadow import RequestShadow
-from robotiq_async.control.requests.standstill import LAG_READS, LAG_S
+from robotiq_async.control.ledger import Ledger
+from robotiq_async.control.rest import LAG_READS, LAG_S
 from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.session.options import units_of
 from robotiq_async.values.enums import NO_AXES, Finger
@@ -28,8 +28,8 @@ def answers(hand: Controller, now: float) -> list[object]:
         hand.is_undecided,
         hand.has_request,
         hand.has_undelivered_stop,
-        hand.is_urgent,
-        hand.wait(now),
+        hand.is_busy,
+        hand.due(now),
     ]
 
 
@@ -79,20 +79,21 @@ def test_a_hand_that_is_asked_everything_does_what_one_does_that_is_asked_nothin
 
 def known_to_rest(*, is_asked: bool) -> Finger:
     """The axes that are known to rest just after a fault, in which a request of theirs has shown."""
-    shadow, at = RequestShadow(128, 64), 1.0
-    shadow.see(shows(100, at), at)
-    shadow.returned(shows(100, at))
-    shadow.writing(image(200), Finger.ALL, at)
-    shadow.acknowledged(at)
+    ledger, at = Ledger(128, 64), 1.0
+    ledger.update(shows(100, at), at)
+    ledger.adopt(shows(100, at))
+    ledger.write(image(200), Finger.ALL, at)
+    ledger.acknowledge(at)
     for _ in range(2 * LAG_READS):
         at += LAG_S / LAG_READS
-        shadow.see(shows(200, at), at)
+        ledger.update(shows(200, at), at)
         if is_asked:
             for _ in range(2):
-                shadow.axes.doubtful(shows(200, at), shadow.now)
-    shadow.axes.see(status := shows(150, at), shadow.now)
-    shadow.axes.see(status, shadow.now)
-    return shadow.axes.resting
+                ledger.doubtful(shows(200, at))
+    ledger.update(status := shows(150, at), at)
+    ledger.update_rest(status)
+    ledger.update_rest(status)
+    return ledger.resting & Finger.ABC
 
 
 def test_whether_an_axis_rests_does_not_depend_on_who_has_asked() -> None:

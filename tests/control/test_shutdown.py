@@ -37,7 +37,7 @@ def test_the_shutdown_never_activates_a_gripper_that_was_power_cycled_unnoticed(
     scan.controller.stop()
     scan.controller.status = scan.status()
     scan.controller.shut_down()
-    assert scan.controller.machine.sequence is not None, "the write that was not acknowledged may still act"
+    assert scan.controller.is_busy, "the write that was not acknowledged may still act"
     scan.run(0.5)
     assert not scan.gripper.is_moving
     assert not scan.latest.activation_echo
@@ -50,6 +50,21 @@ def test_the_shutdown_takes_back_an_activation_of_ours() -> None:
     assert scan.gripper.is_moving
     scan.stop()
     assert not scan.gripper.is_moving
+
+
+def test_the_shutdown_takes_back_an_activation_of_ours_that_began_after_the_link_was_back() -> None:
+    """A reset that shows before the write acts is from before it."""
+    scan = Scan(device_cycle=0.2)
+    scan.connect(activate=False)
+    scan.run(0.3)
+    scan.controller.activate()
+    scan.step()
+    scan.blink(away=0.01)
+    assert scan.state is State.RESET
+    scan.run(0.5)
+    assert scan.state is State.WF_ACTIVATION
+    scan.stop()
+    assert not scan.status().activation_echo
 
 
 def test_stop_leaves_the_activation_of_others_alone() -> None:
@@ -104,6 +119,6 @@ def test_a_shutdown_without_an_answer_ends_in_time(scan: Scan) -> None:
     scan.controller.shut_down()
     scan.controller.stopped()
     assert scan.state is State.SHUTDOWN
-    assert scan.controller.machine.sequence is None
+    assert not scan.controller.is_busy
     with pytest.raises(NotStartedError):
         scan.command(A, position=3)

@@ -1,14 +1,13 @@
-"""The state machine: each cell of its table, each refusal, the sequence it runs, and what a status shows."""
+"""The state machine: each cell of its table, each refusal, and what a status shows."""
 
 from __future__ import annotations
 
 import itertools
 import logging
-from collections import deque
 
 import pytest
 
-from robotiq_async.control.sequences import Sequence
+from robotiq_async.control.evidence import classify
 from robotiq_async.control.state_machine import (
     RUNNING,
     SEQUENCES,
@@ -18,7 +17,6 @@ from robotiq_async.control.state_machine import (
     refusal,
     states_allowing,
 )
-from robotiq_async.control.triggers import classify
 from robotiq_async.values.enums import Fault, State, Trigger
 from robotiq_async.values.errors import (
     ConnectionLostError,
@@ -28,32 +26,16 @@ from robotiq_async.values.errors import (
     NotStartedError,
     RobotiqError,
 )
-from robotiq_async.values.request import Request
-from robotiq_async.values.status import RobotiqStatus
 from tests.register_words import status_of
 
 
-def path_to(target: State) -> list[Trigger]:
-    """The shortest way through the table."""
-    ways: dict[State, list[Trigger]] = {State.DISCONNECTED: []}
-    queue = deque(ways)
-    while target not in ways:
-        state = queue.popleft()
-        for trigger, following in TABLE[state].items():
-            if isinstance(following, State) and following not in ways:
-                ways[following] = [*ways[state], trigger]
-                queue.append(following)
-    return ways[target]
-
-
 class Recorded:
-    """A machine that has walked to a state, and the changes it has reported since."""
+    """A machine in a state, and the changes it has reported since."""
 
     def __init__(self, state: State) -> None:
         self.changes: list[tuple[State, State, Trigger]] = []
         self.machine = StateMachine(lambda *change: self.changes.append(change))
-        for trigger in path_to(state):
-            self.machine.fire(trigger)
+        self.machine.show(state, Trigger.ASK_START)
         assert self.machine.state is state
         self.changes.clear()
 
@@ -147,8 +129,21 @@ def test_the_contract_has_every_state_and_trigger() -> None:
     assert [trigger for trigger in Trigger if trigger.is_seen] == list(LEADS)
 
 
+def test_the_table_is_that_of_the_contract() -> None:
+    table = {(state, trigger): TABLE[state][trigger] for state, trigger in PAIRS}
+    words: dict[State | Verdict, State | str] = {
+        Verdict.IGNORED: "nothing",
+        Verdict.LINK_DOWN: "lost",
+        Verdict.NOT_STARTED: "off",
+        Verdict.NOT_ACTIVATED: "reset",
+        Verdict.IN_FAULT: "fault",
+        Verdict.NOT_NOW: "not now",
+    }
+    assert {pair: words.get(cell, cell) for pair, cell in table.items()} == ANSWERS
+
+
 @pytest.mark.parametrize("state", State)
-def test_every_trigger_leads_on_is_nothing_to_do_or_is_refused_with_the_error_that_says_why(
+def test_what_is_asked_is_something_or_nothing_to_do_or_refused_with_the_error_that_says_why(
     state: State,
 ) -> None:
     status = status_of(0x31, fault=0x0E)
@@ -156,19 +151,18 @@ def test_every_trigger_leads_on_is_nothing_to_do_or_is_refused_with_the_error_th
         recorded, answer = Recorded(state), ANSWERS[state, trigger]
         machine = recorded.machine
         if isinstance(answer, State) or answer == "nothing":
-            assert machine.fire(trigger, status) is (answer != "nothing"), trigger
+            assert machine.ask(trigger, status) is (answer != "nothing"), trigger
         else:
             with pytest.raises(RobotiqError) as caught:
-                machine.fire(trigger, status)
+                machine.ask(trigger, status)
             assert type(caught.value) is ERRORS[answer], trigger
             if isinstance(caught.value, GripperFaultError):
                 assert caught.value.fault is status.fault
             if isinstance(caught.value, InvalidStateError):
                 assert caught.value.state is state
                 assert caught.value.allowed == states_allowing(trigger), trigger
-        to = answer if isinstance(answer, State) else state
-        assert machine.state is to, trigger
-        assert recorded.changes == ([(state, to, trigger)] if to is not state else []), trigger
+        assert machine.state is state, "a question changes nothing"
+        assert not recorded.changes, trigger
 
 
 def test_the_states_that_allow_something_are_those_of_the_contract() -> None:
@@ -209,17 +203,9 @@ def test_a_machine_begins_disconnected_and_tells_a_change_when_it_has_happened()
     seen: list[State] = []
     machine = StateMachine(lambda *_: seen.append(machine.state))
     assert machine.state is State.DISCONNECTED
-    assert machine.sequence is None
-    machine.fire(Trigger.SEEN_RESET)
+    machine.show(State.RESET, Trigger.SEEN_RESET)
+    machine.show(State.RESET, Trigger.SEEN_RESET)
     assert seen == [State.RESET]
-
-
-@pytest.mark.parametrize("state", State)
-def test_delivered_advances_only_the_states_that_send(state: State) -> None:
-    machine = Recorded(state).machine
-    machine.delivered()
-    expected = ANSWERS[state, Trigger.DELIVERED]
-    assert machine.state is (expected if isinstance(expected, State) else state)
 
 
 def test_commands_are_logged_for_debugging_and_other_changes_as_info(
@@ -227,109 +213,16 @@ def test_commands_are_logged_for_debugging_and_other_changes_as_info(
 ) -> None:
     with caplog.at_level(logging.DEBUG, logger="robotiq_async"):
         machine = StateMachine()
-        for trigger in (Trigger.SEEN_READY, Trigger.ASK_COMMAND, Trigger.DELIVERED, Trigger.SEEN_FAULT):
-            machine.fire(trigger)
+        machine.show(State.RUNNING_IDLE, Trigger.SEEN_READY)
+        machine.show(State.RUNNING_CC, Trigger.ASK_COMMAND)
+        machine.show(State.RUNNING_IDLE, Trigger.DELIVERED)
+        machine.show(State.FAULT, Trigger.SEEN_FAULT)
     assert [(record.levelname, record.getMessage()) for record in caplog.records] == [
         ("INFO", "DISCONNECTED -> RUNNING_IDLE (gripper is active)"),
         ("DEBUG", "RUNNING_IDLE -> RUNNING_CC (a command)"),
         ("DEBUG", "RUNNING_CC -> RUNNING_IDLE (request acknowledged)"),
         ("INFO", "RUNNING_IDLE -> FAULT (gripper reports a fault)"),
     ]
-
-
-# -- the sequence under way --------------------------------------------------------------------------------
-
-READY, RESET = status_of(0x31), status_of(0x00)
-FAULT = status_of(0x31, fault=0x0E)
-IMAGE = Request(activate=True)
-
-
-def one_write(seen: list[RobotiqStatus]) -> Sequence:
-    """Writes once, and ends with the next status."""
-    seen.append((yield None))
-    seen.append((yield IMAGE))
-
-
-def test_a_sequence_is_handed_statuses_and_says_what_to_write() -> None:
-    seen: list[RobotiqStatus] = []
-    machine = Recorded(State.DO_ACTIVATION).machine
-    machine.begin(one_write(seen))
-    assert machine.sequence is not None
-    assert not seen, "it is asked for; what the gripper shows decides whether it begins"
-    assert machine.advance(RESET) is IMAGE
-    assert seen == [RESET]
-    assert machine.state is State.DO_ACTIVATION
-
-
-def test_at_the_end_of_a_sequence_the_state_follows_what_the_status_shows() -> None:
-    recorded = Recorded(State.DO_ACTIVATION)
-    machine = recorded.machine
-    machine.begin(one_write([]))
-    machine.advance(RESET)
-    machine.delivered()
-    assert machine.advance(READY) is None
-    assert machine.sequence is None
-    assert recorded.changes == [
-        (State.DO_ACTIVATION, State.WF_ACTIVATION, Trigger.DELIVERED),
-        (State.WF_ACTIVATION, State.RUNNING_IDLE, Trigger.SEEN_READY),
-    ]
-
-
-def test_a_sequence_with_nothing_to_begin_leads_to_where_the_gripper_is() -> None:
-    def nothing() -> Sequence:
-        yield None
-
-    machine = Recorded(State.DO_ACTIVATION).machine
-    machine.begin(nothing())
-    assert machine.advance(READY) is None
-    assert machine.sequence is None
-    assert machine.state is State.RUNNING_IDLE
-
-
-def test_a_sequence_that_fails_is_said_in_the_log_and_leads_to_where_the_gripper_is(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    def failing() -> Sequence:
-        status = yield None
-        raise GripperFaultError(status.fault)
-
-    machine = Recorded(State.WF_ACTIVATION).machine
-    machine.begin(failing())
-    assert machine.advance(FAULT) is None
-    assert machine.sequence is None
-    assert machine.state is State.FAULT
-    (record,) = [each for each in caplog.records if each.levelname == "WARNING"]
-    assert record.getMessage() == str(GripperFaultError(Fault(0x0E)))
-
-
-def test_a_bug_in_a_sequence_is_not_taken_for_its_end() -> None:
-    def broken() -> Sequence:
-        yield None
-        raise ZeroDivisionError
-
-    machine = Recorded(State.DO_RESET).machine
-    machine.begin(broken())
-    with pytest.raises(ZeroDivisionError):
-        machine.advance(READY)
-
-
-def test_a_sequence_takes_the_place_of_the_one_under_way() -> None:
-    first: list[RobotiqStatus] = []
-    second: list[RobotiqStatus] = []
-    machine = Recorded(State.DO_ACTIVATION).machine
-    machine.begin(one_write(first))
-    machine.begin(one_write(second))
-    machine.advance(RESET)
-    assert (first, second) == ([], [RESET])
-
-
-def test_a_sequence_that_is_dropped_is_over_and_changes_no_state() -> None:
-    recorded = Recorded(State.WF_RESET)
-    recorded.machine.begin(one_write([]))
-    recorded.machine.drop_sequence()
-    assert recorded.machine.sequence is None
-    assert recorded.machine.state is State.WF_RESET
-    assert not recorded.changes
 
 
 # -- what a status shows -----------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import pytest
 
-from robotiq_async.control.requests.pending import Command
+from robotiq_async.control.pending import Command
 from robotiq_async.session.opening import SHORTEST_S, Opener
 from robotiq_async.session.options import LATE_POLLS, HandOptions, ReconnectPolicy
 from robotiq_async.session.poller import READS, STOP_S

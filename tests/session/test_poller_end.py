@@ -7,7 +7,7 @@ import logging
 
 import pytest
 
-from robotiq_async.control.requests.pending import Command
+from robotiq_async.control.pending import Command
 from robotiq_async.session.options import ReconnectPolicy
 from robotiq_async.session.poller import SHUTDOWN_S
 from robotiq_async.values.enums import Finger, State

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import pytest
 
-from robotiq_async.control.requests.pending import Command
+from robotiq_async.control.pending import Command
 from robotiq_async.session.session import Session
 from robotiq_async.values.enums import Finger, State, Trigger
 from robotiq_async.values.errors import (

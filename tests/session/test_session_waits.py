@@ -7,7 +7,7 @@ from collections.abc import Awaitable
 
 import pytest
 
-from robotiq_async.control.requests.pending import Command
+from robotiq_async.control.pending import Command
 from robotiq_async.session.options import ReconnectPolicy
 from robotiq_async.session.session import Session
 from robotiq_async.values.enums import Fault, Finger, State

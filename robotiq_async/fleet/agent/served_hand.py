@@ -9,7 +9,7 @@ from contextlib import suppress
 from inspect import signature
 from typing import Final
 
-from ...control.grip_keeper import KEEP_S
+from ...control.keeping import KEEP_S
 from ...control.state_machine import RUNNING
 from ...hand.robotiq_hand import RobotiqHand
 from ...runtime.clock import now

@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from ...values.enums import CLOSED, OPEN, Finger, ObjectStatus
-from ...values.request import AxisRequest, Request
-from ...values.status import RobotiqStatus
-from ..contact import agrees
-from .standstill import Moment
+from ..values.enums import CLOSED, OPEN, Finger, ObjectStatus
+from ..values.request import AxisRequest, Request
+from ..values.status import RobotiqStatus
+from .contact import agrees
+from .rest import Moment
 
 DIRECTION_WAIT_S: Final = 0.1
 """Time in which a moving axis shows its direction: at the slowest speed a count takes 43 ms
@@ -38,7 +38,7 @@ class Adoption:
         self._now = Moment(first.timestamp, 0) if now is None else now
         self.since = self._now if since is None else since
 
-    def see(self, status: RobotiqStatus, now: Moment | None = None) -> None:
+    def update(self, status: RobotiqStatus, now: Moment | None = None) -> None:
         """Take in the next status, and when it was asked for."""
         self._latest = status
         self._now = Moment(status.timestamp, self._now.reads + 1) if now is None else now
@@ -59,6 +59,7 @@ class Adoption:
     def _is_late(self) -> bool:
         """Whether an axis at rest contradicts its echo. Under simple control some always do."""
         status = self._latest
+        # Speed has no echo, so a slow start cannot be told from a contradiction but by its time [vendor].
         return status.go_echo and not all(
             self._agrees(axis, status.requested_position(axis))
             for axis in status.model.axes
@@ -83,10 +84,11 @@ class Adoption:
         status = self._latest
         position = status.position(axis)
         if not status.go_echo:
-            return position
+            return position  # rGTO = 0: the axis stands, and its next rGTO = 1 must not move it [manual]
         requested = self._requested(axis)
         if requested is not None:
             return requested
+        # No echo explains the contact: press on in its direction, so that the grip is not given up [ours].
         match status.finger_status(axis):
             case ObjectStatus.CONTACT_CLOSING:
                 return CLOSED
@@ -98,6 +100,7 @@ class Adoption:
         """The echo that agrees with what an axis shows, if one does."""
         status = self._latest
         candidates = [status.requested_position(axis)]
+        # Under simple control the fingers B and C follow the registers of A [manual].
         if axis in Finger.B | Finger.C:
             candidates.append(status.requested_position(Finger.A))
         return next((each for each in candidates if self._agrees(axis, each)), None)

@@ -16,14 +16,16 @@ position at which the axis came to rest, and not with MoveSupersededError.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
-from ...values.enums import Finger
-from ...values.model import TOLERANCE
-from ...values.registers import Echo
-from ...values.request import Request
-from ...values.status import RobotiqStatus
+from ..runtime.log import Log, log
+from ..values.enums import Finger, ObjectStatus
+from ..values.model import TOLERANCE
+from ..values.registers import Echo
+from ..values.request import Request
+from ..values.status import RobotiqStatus
+from .ledger import NEVER, SILENT_S, Entry, NoLimits
 
 ALONE_S: Final = 10.0
 """If another client was seen within this time, it explains the echo better than a limit."""
@@ -33,20 +35,78 @@ FIRST_POSITION: Final = 2
 """Index of the first position in an echo."""
 
 
-class Limits:
+class Limits(NoLimits):
     """The limits that have been echoed in place of requests."""
 
-    def __init__(self) -> None:
+    def __init__(self, log: Log = log) -> None:
+        super().__init__()
+        self._log = log
+        # The limit by axis and whether it limits closing.
         self._known: dict[tuple[Finger, bool], int] = {}
-        """The limit by axis and whether it limits closing."""
         self._proven: set[tuple[Finger, bool]] = set()
+        # The echo of an entry under the known limits, until it shows.
+        self._aliases: dict[Entry, Echo] = {}
+        self._others_at = NEVER
 
-    def alias(self, image: Request) -> Echo | None:
-        """The echo of an image under the known limits; None if it is that of the image itself."""
-        if not self._known:
-            return None
-        limited = image.with_positions(self.apply(image)).echo
-        return limited if limited != image.echo else None
+    # -- what the ledger asks --------------------------------------------------------------------------
+
+    @property
+    def has_alias(self) -> bool:
+        return bool(self._aliases)
+
+    def written(self, entry: Entry, moved: Finger) -> None:
+        if self.limited:
+            self.limited = {axis: at for axis, at in self.limited.items() if axis not in moved}
+        self._note_alias(entry)
+
+    def shows(self, entry: Entry, echo: Echo, *, is_new: bool, now: float) -> bool:
+        # If the gripper showed the same echo before, the write may not act yet: then wait for SILENT_S.
+        if self._aliases.get(entry) != echo:
+            return False
+        return is_new or (entry.acknowledged is not None and now - entry.acknowledged >= SILENT_S)
+
+    def explains(self, shown: Entry, waiting: Sequence[Entry], status: RobotiqStatus, now: float) -> bool:
+        if now - self._others_at <= ALONE_S:
+            return False
+        # Any of those that wait may be the one: a slow gripper skips images [follows].
+        if not any(self.learn(shown.image, each.image, status) for each in waiting):
+            return False
+        for each in waiting:
+            self._note_alias(each)
+        return True
+
+    def settle(self, entry: Entry, last: Entry, echo: Echo) -> None:
+        """If an entry shows as limits in place of requests, make it an entry of these limits."""
+        if echo == entry.echo:
+            self.forget(entry.image, echo)
+        else:
+            # Later entries with the same request would echo the limit as well; the last is the base.
+            for axis, limit in self.apply(entry.image).items():
+                if last.image.position(axis) == entry.image.position(axis):
+                    self.limited[axis] = limit
+                    if last is not entry:
+                        last.image = last.image.with_positions({axis: limit})
+                        last.echo = last.image.echo
+            entry.image, entry.echo = entry.image.with_positions(self.apply(entry.image)), echo
+        self._aliases = {each: alias for each, alias in self._aliases.items() if each.number > entry.number}
+
+    def rests(self, axis: Finger, status: RobotiqStatus) -> None:
+        if axis in self.limited and status.finger_status(axis) is ObjectStatus.AT_POSITION:
+            limit = self.prove(axis, status.position(axis))
+            if limit is not None:
+                self._log.info("the gripper replaces requests of %s by its limit %d", axis, limit)
+
+    def note_other_client(self, now: float) -> None:
+        """Drop the limits that no axis has proven: they may be the other client's requests."""
+        self._others_at = now
+        self._known = {key: limit for key, limit in self._known.items() if key in self._proven}
+
+    # -- the limits ------------------------------------------------------------------------------------
+
+    def _note_alias(self, entry: Entry) -> None:
+        limits = self.apply(entry.image)
+        if limits:
+            self._aliases[entry] = entry.image.with_positions(limits).echo
 
     def apply(self, image: Request) -> dict[Finger, int]:
         """The limits that replace requests of an image, by axis."""
@@ -86,10 +146,6 @@ class Limits:
                 self._proven.add(key)
                 return limit
         return None
-
-    def doubt(self) -> None:
-        """Another client was seen: drop the limits that no axis has proven, they may be its requests."""
-        self._known = {key: limit for key, limit in self._known.items() if key in self._proven}
 
     def forget(self, image: Request, echo: Echo) -> None:
         """Drop the limits that a status refutes by showing the image as it was written."""

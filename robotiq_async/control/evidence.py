@@ -1,0 +1,170 @@
+"""Evidence: the condition that a status shows, without a fault that only passes.
+
+Fault 0x09 may pass. The 3-Finger's manual calls it "communication chip not ready (may be booting)". The
+two-finger and vacuum grippers of the same family, whose older manuals use the same words, show it in the
+first read after a second of silence and not again [seen on real ones]. So 0x09 counts as a fault only when it
+lasts.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Final
+
+from ..runtime.log import Log
+from ..values import registers as reg
+from ..values.enums import Fault, Initialization, Trigger
+from ..values.model import Model
+from ..values.status import RobotiqStatus
+
+LASTS_READS: Final = 3
+"""Reads that must show it. A gripper shows it in one; a second read may see the same registers."""
+LASTS_S: Final = 0.01
+"""Seconds between the first and the last of these reads. A gripper renews its registers at 100 Hz or faster
+(manual of 2014, Modbus TCP), so three reads over this time show it more than once. It must not be longer:
+fingers that must stop move on meanwhile, a count or two at full speed."""
+SILENCE_S: Final = 0.9
+"""After this time without a read a gripper may show it again, and the count begins anew. One second is what
+is known [seen]. A program that is stepped through in a debugger makes such silences."""
+FOLLOWS: Final = frozenset({Trigger.SEEN_READY, Trigger.SEEN_FAULT})
+"""The conditions in which the gripper follows requests, ours or another client's."""
+
+_CODE: Final = int(Fault.COMMUNICATION_NOT_READY)
+
+
+def classify(status: RobotiqStatus) -> Trigger:
+    """The condition that a status shows, one of five.
+
+    A serious fault comes first: gIMC = 0 with a fault is an automatic release and not a reset [manual].
+    """
+    # Only gACT, gIMC and gFLT decide. They rarely change and this runs at every poll, so it is cached.
+    registers = status.registers
+    return _classify(registers[0] >> 8, registers[1] >> 8 & 0x0F, status.model)
+
+
+def is_activating(status: RobotiqStatus) -> bool:
+    """Whether an activation is under way. A change of mode is busy as well, and keeps what the hand holds."""
+    return classify(status) is Trigger.SEEN_BUSY and status.initialization is Initialization.ACTIVATING
+
+
+@cache
+def _classify(activation: int, fault: int, model: Model) -> Trigger:
+    """``activation`` is the byte with gACT and gIMC, ``fault`` is gFLT."""
+    status = RobotiqStatus((activation << 8, fault << 8, 0, 0, 0, 0, 0, 0), model=model)
+    if status.fault is Fault.AUTOMATIC_RELEASE_DONE:
+        return Trigger.SEEN_RELEASED
+    if status.fault.is_serious:
+        return Trigger.SEEN_FAULT
+    if not status.activation_echo and status.initialization is Initialization.RESET:
+        return Trigger.SEEN_RESET
+    if status.activation_echo and status.is_activated:
+        return Trigger.SEEN_READY
+    return Trigger.SEEN_BUSY
+
+
+class Evidence:
+    """The newest status as decisions see it: without a 0x09 that may pass.
+
+    Attributes:
+        status: that status; None before the first.
+        condition: what it shows; None while the link is down.
+    """
+
+    def __init__(self, log: Log) -> None:
+        self.status: RobotiqStatus | None = None
+        self.condition: Trigger | None = None
+        self._log: Final = log
+        self._passing: Final = PassingFault()
+
+    @property
+    def passed(self) -> int:
+        """How often 0x09 was shown in passing."""
+        return self._passing.passed
+
+    @property
+    def may_pass(self) -> bool:
+        """Whether 0x09 shows, and the next reads decide whether it counts."""
+        return self._passing.is_open
+
+    @property
+    def is_undecided(self) -> bool:
+        """Whether the first status on a new link shows 0x09, perhaps because of the silence before it."""
+        return self._passing.is_open and self.condition is None
+
+    def update(self, status: RobotiqStatus, asked: float) -> Trigger:
+        """Take in a status that was asked for at ``asked``; return its condition. That counts from now on.
+
+        The first condition on a new link does not count while it is undecided.
+        """
+        passing, passed = self._passing, self._passing.passed
+        if passing.is_counting or classify(status) is Trigger.SEEN_FAULT:
+            judged = passing.filtered(status, asked)
+            # In a fault 0x09 is no news, and counts at once: hiding it would show the fault as cleared.
+            status = status if self.condition is Trigger.SEEN_FAULT else judged
+        if passing.passed > passed == 0:
+            self._log.info(
+                "the gripper showed fault 0x09 for a moment, as some do after a second without a poll: "
+                "ignored, and from here on only counted"
+            )
+        self.status, condition = status, classify(status)
+        if not self.is_undecided:
+            self.condition = condition
+        return condition
+
+    def lost(self) -> None:
+        """The link is down: the next condition is the first."""
+        self.condition = None
+
+
+class PassingFault:
+    """Distinguishes 0x09 that lasts from 0x09 that follows a silence.
+
+    Attributes:
+        passed: how often it has gone without having lasted.
+    """
+
+    def __init__(self) -> None:
+        self.passed = 0
+        # When the reads in a row that have shown it were asked for: all, and those since the last silence.
+        self._row: list[float] = []
+        self._since_silence: list[float] = []
+
+    @property
+    def is_counting(self) -> bool:
+        """Whether it has shown; if not, a status without a fault need not be seen."""
+        return bool(self._row)
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether the newest status shows it, and it has not lasted."""
+        return bool(self._since_silence) and not _lasts(self._since_silence)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the next reads decide. Never on a link so slow that each read ends a silence."""
+        return bool(self._row) and not _lasts(self._row)
+
+    def filtered(self, status: RobotiqStatus, asked: float) -> RobotiqStatus:
+        """Return the status to judge by: without the fault until that has lasted."""
+        shows = reg.gFLT.read(status.registers) == _CODE
+        if not shows or (self._row and asked - self._row[-1] > SILENCE_S):
+            self.passed += self.is_shown
+            self._since_silence.clear()
+        if not shows:
+            self._row.clear()
+            return status
+        for reads in (self._row, self._since_silence):
+            del reads[LASTS_READS - 1 :]  # the first ones and the last say enough
+            reads.append(asked)
+        return without_fault(status) if self.is_shown else status
+
+
+def _lasts(reads: list[float]) -> bool:
+    return len(reads) >= LASTS_READS and reads[-1] - reads[0] >= LASTS_S
+
+
+def without_fault(status: RobotiqStatus) -> RobotiqStatus:
+    """The same status, with gFLT = 0."""
+    words = list(status.registers)
+    reg.gFLT.write(words, 0)
+    return RobotiqStatus(tuple(words), status.timestamp, status.sequence, status.model)

@@ -1,0 +1,549 @@
+"""The ledger: the images that the gripper has, had, or may get. Every question about them is asked here.
+
+No I/O and no clock: time is that of the newest status.
+"""
+
+# The gripper's requests cannot be read back whole: speed and force have no echo [manual], a write shows a
+# device cycle late, and another client may write at any time. So each image is an entry, in the order in
+# which they act:
+#
+# * sent: on the line. It may act already, or never.
+# * acknowledged: it acts within a device cycle. The newest such entry is what the gripper has, or is about to
+#   have: the base of the next image.
+# * shown: a status has repeated its echo. A slow gripper may show an older one again, or skip one [follows].
+# * doubtful: the link went down before the acknowledgement, or another client's image showed first. It may
+#   act, and is not the base. If it shows, it is certain again, and so is what was acknowledged after it.
+#
+# A status that shows no entry of the last half second shows another client's image, or a power cycle: that
+# gets an entry of its own, before those that may still act. An entry that was replaced longer ago cannot show
+# in an echo, but gDT may trail the echo [vendor]: it is kept for that, apart from the others.
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from typing import Final
+
+from ..values.enums import NO_AXES, Finger, ObjectStatus
+from ..values.model import THREE_FINGER, Model
+from ..values.registers import Echo
+from ..values.request import AxisRequest, Request
+from ..values.status import RobotiqStatus
+from .adoption import Adoption
+from .rest import LONG_AGO, Asked, Grips, Moment, Rest, is_doubtful, rest_of
+
+WINDOW_S: Final = 0.5
+"""How long after its acknowledgement a write may take to show. The slowest device cycle considered is 0.2 s
+[conceivable]."""
+SILENT_S: Final = 0.25
+"""How long a change without an echo (speed, force) may take to act: the slowest device cycle and 0.05 s."""
+NEVER: Final = float("-inf")
+
+
+@dataclass(slots=True, eq=False)
+class Entry:
+    """One image. Callers keep the entry and not its number, which may change.
+
+    Attributes:
+        number: its place in the order in which the entries act.
+        image: what is asked.
+        before: the image that it replaces.
+        echo: what a status repeats of it.
+        is_ours: whether this hand has written it.
+        sent: when, in monotonic seconds.
+        acknowledged: when; None before that.
+        shown: the first status that showed that it acts, as far as that was needed.
+        is_doubtful: whether it may or may not act.
+        asks: the axes whose request it changes.
+        again: those of them that it lets try again: it sets rGTO or raises the force.
+        rested: those of them that were proven to rest before it.
+        started: those of these that have shown motion since, so that no status from before can follow.
+    """
+
+    number: int
+    image: Request
+    before: Request
+    echo: Echo
+    is_ours: bool
+    sent: float
+    acknowledged: float | None = None
+    shown: Moment | None = None
+    is_doubtful: bool = False
+    asks: Finger = NO_AXES
+    again: Finger = NO_AXES
+    rested: Finger = NO_AXES
+    started: Finger = NO_AXES
+
+    @property
+    def time(self) -> float:
+        """From when on it may act."""
+        return self.sent if self.acknowledged is None else self.acknowledged
+
+    @property
+    def is_in_flight(self) -> bool:
+        return self.acknowledged is None and not self.is_doubtful
+
+    def asked(self, axis: Finger, shown: Moment | None) -> Asked:
+        position = self.image.position(axis) if self.image.go else None
+        return Asked(position, bool(self.again & axis), shown)
+
+    def asked_before(self, axis: Finger) -> Asked:
+        """What it replaces. Nothing is known of what was asked before another client, if rGTO was clear."""
+        known = self.before if self.before.go or self.is_ours else self.image
+        return Asked(known.position(axis) if known.go else None)
+
+
+class NoLimits:
+    """A gripper that echoes each request as it was written. The base of software limits (see limits.py).
+
+    Attributes:
+        limited: the limit that the gripper shows in place of the last request, by axis.
+    """
+
+    def __init__(self) -> None:
+        self.limited: dict[Finger, int] = {}
+
+    @property
+    def has_alias(self) -> bool:
+        """Whether an entry that has not shown may show as another echo than its own."""
+        return False
+
+    def written(self, entry: Entry, moved: Finger) -> None:
+        """An entry is about to be sent, with new positions for some axes."""
+
+    def shows(self, entry: Entry, echo: Echo, *, is_new: bool, now: float) -> bool:  # noqa: ARG002
+        """Whether an echo that is not that of the entry shows it all the same."""
+        return False
+
+    def explains(
+        self,
+        shown: Entry,  # noqa: ARG002
+        waiting: Sequence[Entry],  # noqa: ARG002
+        status: RobotiqStatus,  # noqa: ARG002
+        now: float,  # noqa: ARG002
+    ) -> bool:
+        """Whether a status that shows no entry may show one of those that wait."""
+        return False
+
+    def settle(self, entry: Entry, last: Entry, echo: Echo) -> None:
+        """An entry shows for the first time; ``last`` is the newest one."""
+
+    def rests(self, axis: Finger, status: RobotiqStatus) -> None:
+        """An axis has come to rest."""
+
+    def note_other_client(self, now: float) -> None:
+        """Another client was seen."""
+
+
+class Ledger:
+    """The entries, the oldest first.
+
+    Args:
+        speed: what every axis gets until set otherwise, 0..255.
+        force: what every axis gets until set otherwise, 0..255.
+        model: of the gripper.
+        limits: software limits that a gripper may echo in place of requests.
+
+    Attributes:
+        shown: the newest entry that has shown.
+        match: the entry that the newest status shows; None if that is nobody's.
+        now: when the newest status was asked for. It may show the state of that time, however late a busy
+            loop reads the reply; so the age of a write is measured by this.
+        ours: the axes that may move because of us: we gave them their position.
+        unrested: the axes that are not known to have come to rest under their last request.
+        grips: the contacts when rGTO was last set.
+    """
+
+    def __init__(
+        self, speed: int, force: int, model: Model = THREE_FINGER, limits: NoLimits | None = None
+    ) -> None:
+        first = Request(axes=(AxisRequest(0, speed, force),) * len(model.axes), model=model)
+        self.shown = Entry(0, first, first, first.echo, False, NEVER, NEVER, LONG_AGO)
+        self.match: Entry | None = None
+        self.now = Moment(0.0, 0)
+        self.ours = NO_AXES
+        self.unrested = NO_AXES
+        self.grips: Final = Grips()
+        self._model: Final = model
+        self._limits: Final = NoLimits() if limits is None else limits
+        # Those that a status may show.
+        self._entries = deque([self.shown])
+        # Those before them. No status shows them, but a late gDT may be from their time.
+        self._past: deque[Entry] = deque()
+        # Follows the entry of another client as long as that is the last.
+        self._adoption: Adoption | None = None
+        # The masks and the flag spare a poll the questions whose answers are known.
+        # The axes that may still show a status from before their last request; all those unrested.
+        self._unproven = NO_AXES
+        # The axes of which an entry says that they rested before it, and that have not moved since.
+        self._may_start = NO_AXES
+        self._has_doubtful = False
+
+    # -- questions -------------------------------------------------------------------------------------
+
+    @property
+    def last(self) -> Entry:
+        """What the gripper has, or is about to have."""
+        if not self._has_doubtful:
+            return self._entries[-1]
+        return next(each for each in reversed(self._entries) if not each.is_doubtful)
+
+    @property
+    def base(self) -> Request:
+        """The image that the next one is made from."""
+        last = self.last
+        return last.image if self._adoption is None else self._adoption.request(last.before.axes)
+
+    @property
+    def has_lost_write(self) -> bool:
+        """Whether a write may act of which nothing is known: an image from before it would undo it."""
+        return self._has_doubtful and any(
+            each.is_doubtful and self.now.time - each.time < SILENT_S for each in self._entries
+        )
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether the base can be relied on."""
+        is_known = self._adoption is None or self._adoption.is_certain
+        return is_known and not self.has_lost_write
+
+    @property
+    def resting(self) -> Finger:
+        """The axes that are known to rest under their last request, and those that the model lacks."""
+        return Finger.ALL & ~self.unrested
+
+    @property
+    def limited(self) -> Mapping[Finger, int]:
+        """The limit that the gripper shows in place of the last request, by axis."""
+        return self._limits.limited
+
+    def acts(self, entry: Entry | None = None) -> bool:
+        """Whether the image of an entry, or of a later one, acts by now; None for the last one.
+
+        It does when its echo has shown, or a long enough time after its acknowledgement.
+        """
+        entry = self._entries[-1] if entry is None else entry
+        if entry.number <= self.shown.number:
+            return True
+        if entry.is_in_flight:
+            return False
+        age = self.now.time - entry.time
+        if age >= WINDOW_S:
+            return True
+        # As long as the entries between have the same echo, no status can tell which of them acts. Equal
+        # images act at once; a speed or a force may take SILENT_S.
+        for each in chain(self._between(entry), (self.shown,)):
+            if each.echo != entry.echo:
+                return False
+            if age < SILENT_S and each.image != entry.image:
+                return False
+        return True
+
+    def _between(self, entry: Entry) -> Iterator[Entry]:
+        """The entries after the one that shows and before another, the newest first."""
+        for each in reversed(self._entries):
+            if each.number <= self.shown.number:
+                return
+            if each.number < entry.number:
+                yield each
+
+    @property
+    def may_begin_to_move(self) -> bool:
+        """Whether an image that does not act yet, or does not show in gDT yet, may start an axis.
+
+        While rGTO is clear a speed or a force does not: then all entries that wait have the same echo.
+        """
+        if not self.acts():
+            return self.base.go or len({each.echo for each in self._entries}) > 1
+        return bool(self.unrested) and self.base.go and self._adoption is None
+
+    def doubtful(self, status: RobotiqStatus) -> Finger:
+        """The axes that may move, or be about to, although the status shows them at rest."""
+        doubtful = NO_AXES
+        for axis in self._model.axes if self._unproven else ():
+            what, position = status.finger_status(axis), status.position(axis)
+            if is_doubtful(self._asked(axis), self._model, what, position):
+                doubtful |= axis
+        return doubtful
+
+    def _asked(self, axis: Finger) -> Iterator[Asked]:
+        """The requests that an axis may show, the newest first."""
+        shown: Moment | None = None
+        oldest: Entry | None = None
+        for each in chain(reversed(self._entries), reversed(self._past)):
+            if each.is_doubtful:
+                continue
+            shown = each.shown or shown  # an entry acts when it or a later one does
+            if not each.asks & axis:
+                continue
+            oldest = each
+            yield each.asked(axis, shown)
+            if each.started & axis or (shown is not None and shown.is_lag_over(self.now)):
+                return
+            if each.rested & axis:
+                break
+        if oldest is not None:
+            yield oldest.asked_before(axis)
+
+    # -- what is written -------------------------------------------------------------------------------
+
+    def write(self, image: Request, moved: Finger, now: float) -> Entry:
+        """Add an image that is about to be sent, with new positions for ``moved``."""
+        before = self.base
+        self._freeze(before)
+        entry = Entry(self._entries[-1].number + 1, image, before, image.echo, is_ours=True, sent=now)
+        self._limits.written(entry, moved)
+        self.grips.forget(moved)  # a new position may let go
+        self._note_asked(entry)
+        self.ours |= moved
+        self._entries.append(entry)
+        return entry
+
+    def _note_asked(self, entry: Entry) -> None:
+        image, before = entry.image, entry.before
+        for axis, old, new in zip(image.model.axes, before.axes, image.axes, strict=True):
+            # More force lets an axis in contact try again; one that moves goes on as it did.
+            pressed = new.force > old.force
+            is_new = image.go is not before.go or new.position != old.position
+            if is_new or (pressed and not axis & self.unrested):
+                entry.asks |= axis
+                entry.again |= axis if pressed or (image.go and not before.go) else NO_AXES
+        # With rGTO clear gDT says nothing, so no axis was proven to rest under what was asked before.
+        if before.go:
+            entry.rested = entry.asks & ~self._unproven
+            self._may_start |= entry.rested
+        self._unproven |= entry.asks
+        if image.go:
+            self.unrested |= entry.asks
+
+    def acknowledge(self, now: float) -> Entry:
+        """The last image was acknowledged."""
+        self._entries[-1].acknowledged = now
+        return self._entries[-1]
+
+    def lost(self) -> None:
+        """The link is down: a write without acknowledgement may or may not have arrived."""
+        self._freeze(self.base)
+        last = self._entries[-1]
+        if last.is_in_flight:
+            last.is_doubtful = self._has_doubtful = True
+
+    def _freeze(self, base: Request) -> None:
+        """End the adoption: the base is settled."""
+        if self._adoption is not None:
+            self.last.image, self._adoption = base, None
+
+    # -- what is read ----------------------------------------------------------------------------------
+
+    def update(self, status: RobotiqStatus, asked: float) -> None:
+        """Take in a status. The questions then speak of it."""
+        self.now = Moment(asked, self.now.reads + 1)
+        entries, echo, shown = self._entries, status.echo, self.shown
+        if len(entries) > 1:
+            self._raise_floor()
+        # The common case first: nothing has changed since the last poll.
+        if shown.echo == echo and shown.number >= entries[0].number and not self._limits.has_alias:
+            self.match = shown
+        else:
+            self.match = self._find(status)
+        if self._has_doubtful:
+            self._forget_doubtful()
+        # A moving axis of another client shows its direction with time, an axis at rest its true gDT.
+        if self._adoption is not None and self.match is self.last:
+            self._adoption.update(status, self.now)
+
+    def _raise_floor(self) -> None:
+        """Take the entries that were replaced longer than WINDOW_S ago out of those that a status may show.
+
+        This comes before the status is looked at: after a silence it must not show an echo of long ago.
+        """
+        entries, floor = self._entries, 0
+        for index in range(1, len(entries)):
+            if not self._is_old(entries[index]):
+                break
+            floor = floor if entries[index].is_doubtful else index
+        for _ in range(floor):
+            first = entries.popleft()
+            if not first.is_doubtful:
+                self._past.append(first)
+        self._forget_past()
+
+    def _is_old(self, entry: Entry) -> bool:
+        return not entry.is_in_flight and self.now.time - entry.time > WINDOW_S
+
+    def _forget_past(self) -> None:
+        past = self._past
+        if not self._unproven:
+            past.clear()
+        while past:
+            following = past[1] if len(past) > 1 else self._entries[0]
+            if following.shown is None or not following.shown.is_lag_over(self.now):
+                return
+            past.popleft()
+
+    def _find(self, status: RobotiqStatus) -> Entry | None:
+        """The entry that a status shows: of those that fit its echo the first after the one shown before."""
+        # A control loop leaves a hundred entries in the window: look at each once, and call nothing.
+        echo, shown, limits = status.echo, self.shown, self._limits
+        is_new, is_limited = shown.echo != echo, limits.has_alias
+        fitting = [
+            each
+            for each in self._entries
+            if each.echo == echo
+            or (is_limited and limits.shows(each, echo, is_new=is_new, now=self.now.time))
+        ]
+        newer = [each for each in fitting if each.number > shown.number]
+        if newer:
+            self._show(newer[0], echo)
+        elif not fitting and self._is_limit(status):
+            return self._find(status)
+        return next(iter(newer or fitting), None)
+
+    def _show(self, entry: Entry, echo: Echo) -> None:
+        """An entry shows for the first time."""
+        if entry.is_doubtful:
+            self._revive(entry)
+        self.shown = entry
+        self._limits.settle(entry, self._entries[-1], echo)
+
+    def _revive(self, entry: Entry) -> None:
+        """An entry in doubt acts after all, and so will those that were acknowledged after it.
+
+        Images act in their order. What these ask is asked anew, of the image that showed until now.
+        """
+        self._freeze(self.base)
+        before = self.shown.image
+        for each in self._entries:
+            if each.number < entry.number or not each.is_doubtful:
+                continue
+            if each is entry or each.acknowledged is not None:
+                each.is_doubtful, each.before = False, before
+                each.asks = each.again = NO_AXES
+                self._unproven |= _changed(before, each.image)
+                self._note_asked(each)
+                self.ours |= each.asks
+                before = each.image
+        self._has_doubtful = any(each.is_doubtful for each in self._entries)
+
+    def _forget_doubtful(self) -> None:
+        """Forget the writes in doubt that did not show in time, but not before this status was compared."""
+        shown = self.shown.number
+        self._entries = deque(
+            each
+            for each in self._entries
+            if not each.is_doubtful or (each.number > shown and not self._is_old(each))
+        )
+        self._has_doubtful = any(each.is_doubtful for each in self._entries)
+
+    def _is_limit(self, status: RobotiqStatus) -> bool:
+        waiting = [each for each in self._entries if each.number > self.shown.number]
+        is_unknown = any(each.acknowledged is None or each.is_doubtful for each in waiting)
+        if self._adoption is not None or is_unknown:
+            return False
+        return self._limits.explains(self.shown, waiting, status, self.now.time)
+
+    def adopt(self, status: RobotiqStatus) -> None:
+        """The status shows nobody's image: it gets an entry, and what the hand writes next is made from that.
+
+        The entries that wait may still act after it. Nothing is written.
+        """
+        before = self.base
+        # A client that keeps writing must not make us wait anew each time.
+        since = self.now if self._adoption is None else self._adoption.since
+        self._freeze(before)
+        self._adoption = Adoption(status, self.now, since)
+        image, time = self._adoption.request(before.axes), self.now.time
+        other = Entry(self._entries[-1].number + 1, image, before, status.echo, False, time, time, self.now)
+        other.asks = _changed(before, image)
+        self._unproven |= other.asks
+        for axis, old in before.by_axis:
+            if old.position != image.position(axis):
+                self.ours &= ~axis
+        waiting = [each for each in self._entries if each.number > self.shown.number]
+        self._past.extend(each for each in self._entries if each.number <= self.shown.number)
+        self._entries, self.shown, self.match = deque([other, *waiting]), other, other
+        for number, each in enumerate(waiting, other.number + 1):
+            each.number, each.is_doubtful = number, True
+        self._has_doubtful = bool(waiting)
+        self.grips.forget()
+        self._forget_past()
+
+    def note_other_client(self) -> None:
+        """Another client was seen."""
+        self._limits.note_other_client(self.now.time)
+
+    def restart(self, status: RobotiqStatus) -> bool:
+        """A procedure has ended: the gripper has its last image, and no other write is under way.
+
+        Returns:
+            Whether the status shows that image. If not, another client has written meanwhile. rATR has no
+            echo, so an image with rATR counts as not shown by a gripper that follows requests.
+        """
+        image, time = self.base, self.now.time
+        self._adoption = None
+        number = self._entries[-1].number + 1
+        self.shown = self.match = Entry(number, image, image, status.echo, True, time, time, LONG_AGO)
+        self._entries, self._has_doubtful = deque([self.shown]), False
+        self._past.clear()
+        self.unrested = self._unproven = self._may_start = NO_AXES
+        self.ours = Finger.ALL
+        return status.echo == image.echo and not image.release
+
+    # -- which axes rest -------------------------------------------------------------------------------
+
+    def update_rest(self, status: RobotiqStatus) -> None:
+        """Find out which axes have come to rest. Not in a fault: it keeps axes from starting."""
+        if self._unproven:  # usually none is
+            self._note_shown()
+            if status.go_echo:  # gDT says nothing without rGTO [manual]
+                self._find_rest(status)
+        if status.go_echo and (self.grips or status.contacts):
+            contacts = status.contacts
+            if contacts & self.unrested:
+                contacts &= ~self.doubtful(status)
+            self.grips.remember(status, contacts)
+
+    def _note_shown(self) -> None:
+        """Note since when the newest entries act."""
+        for each in chain(reversed(self._entries), reversed(self._past)):
+            if each.shown is not None:
+                return
+            if not each.is_doubtful and self.acts(each):
+                # If the echo cannot tell when it began to act, the time for that and the lag end together.
+                never_showed = each.number > self.shown.number and self.now.time - each.time >= WINDOW_S
+                each.shown = LONG_AGO if never_showed else self.now
+
+    def _find_rest(self, status: RobotiqStatus) -> None:
+        for axis in self._model.axes:
+            if not axis & self._unproven:
+                continue
+            what, position = status.finger_status(axis), status.position(axis)
+            if what is ObjectStatus.IN_MOTION:
+                if axis & self._may_start:
+                    self._note_start(axis)
+                continue
+            rest = rest_of(self._asked(axis), self._model, what, position)
+            if rest is not Rest.UNKNOWN and axis & self.unrested:
+                self.unrested &= ~axis
+                self._limits.rests(axis, status)
+            if rest is Rest.PROVEN:
+                self._unproven &= ~axis
+
+    def _note_start(self, axis: Finger) -> None:
+        """An axis at rest moves only for a new request: from here on every status is from after it."""
+        self._may_start &= ~axis
+        for each in chain(reversed(self._entries), reversed(self._past)):
+            if each.rested & axis:
+                each.started |= axis
+                return
+
+
+def _changed(before: Request, image: Request) -> Finger:
+    """The axes whose request is another: all if rGTO is."""
+    changed = NO_AXES
+    for axis, old in before.by_axis:
+        if image.go is not before.go or old.position != image.position(axis):
+            changed |= axis
+    return changed

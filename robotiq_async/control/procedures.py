@@ -1,0 +1,101 @@
+"""Activation and automatic release, each as a generator.
+
+A procedure is sent a status and yields the image to write now, or None. After an image, the next status it is
+sent is one that can show the effect. The first status decides whether the procedure begins at all: another
+client may have changed the gripper since the call. A procedure does no I/O and has no clock; its caller
+limits its time. It never yields its image again, even if a gripper may have forgotten it: the image moves the
+fingers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import replace
+from typing import Final
+
+from ..values.enums import Fault, Severity, State, Trigger
+from ..values.errors import GripperFaultError, NotActivatedError
+from ..values.request import Request
+from ..values.status import RobotiqStatus
+from .evidence import classify
+from .ledger import WINDOW_S, Entry, Ledger
+from .pending import at_rest
+
+Steps = Generator[Request | None, RobotiqStatus, None]
+Image = Callable[[RobotiqStatus], Request]
+"""Makes the image to begin from, given the newest status."""
+
+
+class Procedure:
+    """An activation or an automatic release under way.
+
+    Attributes:
+        releases: whether it is an automatic release.
+        steps: what it does.
+        entry: its write; None before that.
+    """
+
+    def __init__(self, ledger: Ledger, *, releases: bool) -> None:
+        steps = automatic_release if releases else activation
+        self.releases: Final = releases
+        self.steps: Final = steps(lambda status: at_rest(ledger.base, status))
+        self.entry: Entry | None = None
+        next(self.steps)  # to its first yield: what the gripper shows decides whether it begins
+
+    @property
+    def state(self) -> State:
+        """DO_ until the write is acknowledged, then WF_."""
+        if self.entry is None or self.entry.acknowledged is None:
+            return State.DO_ATR if self.releases else State.DO_ACTIVATION
+        return State.WF_ATR if self.releases else State.WF_ACTIVATION
+
+
+def activation(image: Image) -> Steps:
+    """Raise rACT and wait for gIMC = 3. The fingers open and close to their stops.
+
+    Does nothing if the gripper is no longer reset.
+
+    Raises:
+        GripperFaultError: the activation ended in a major fault.
+        NotActivatedError: the gripper was reset after the activation had begun, or does not show it.
+    """
+    status = yield None
+    if classify(status) is not Trigger.SEEN_RESET:
+        return
+    status = yield replace(image(status), activate=True)
+    asked, begun = status.timestamp, False
+    while classify(status) is not Trigger.SEEN_READY:
+        if status.fault.severity is Severity.MAJOR:
+            raise GripperFaultError(status.fault)
+        # The first statuses may be from before the write: until the activation shows, a reset counts only if
+        # it lasts. The gripper may have forgotten the write, or another client may have taken it back.
+        is_sure = begun or status.timestamp - asked > WINDOW_S
+        if is_sure and classify(status) is Trigger.SEEN_RESET:
+            why = "was reset while it activated" if begun else "does not show the activation"
+            raise NotActivatedError(f"the gripper {why} (power cycle, or another client)")
+        begun = begun or status.activation_echo
+        status = yield None
+
+
+def automatic_release(image: Image) -> Steps:
+    """Raise rATR and wait for fault 0x0F. All axes open slowly; afterwards the gripper needs a reset.
+
+    Does nothing if the gripper was reset: the image has rACT set and would activate it.
+
+    Raises:
+        NotActivatedError: the gripper was reset meanwhile; it may have been activated again since.
+    """
+    status = yield None
+    if not status.activation_echo:
+        return
+    asked, begun = status.timestamp, False
+    status = yield replace(image(status), activate=True, release=True)
+    while status.fault is not Fault.AUTOMATIC_RELEASE_DONE:
+        begun = begun or status.fault is Fault.AUTOMATIC_RELEASE
+        # gIMC is 0 during a release. Until the release shows, a status may be from before the write, and its
+        # fault from before the release.
+        goes_on = status.is_reset or status.fault is Fault.AUTOMATIC_RELEASE
+        is_sure = begun or (status.timestamp - asked > WINDOW_S and not status.fault.is_serious)
+        if classify(status) is Trigger.SEEN_RESET or (is_sure and not goes_on):
+            raise NotActivatedError("the gripper was reset during the automatic release")
+        status = yield None

@@ -1,1 +1,0 @@
-"""What was asked of the gripper, what was written for it, and what of that shows."""

@@ -1,0 +1,162 @@
+"""Whether an axis rests under its last request, by an object status (gDT) that may be late.
+
+The manual says that gDT and gSTA are valid once the echo shows. The vendor's own software for the two-finger
+grippers says that they trail the echo by some exchanges [vendor]. So a gDT that is read just after a request
+acts may be from before it. It counts at once only if it can result from no other request than the last, or if
+no request contradicts it since it was true; and in any case when the lag is over. docs/decisions/
+late-status.md has the reasons. The functions here are questions about the last requests of one axis.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from enum import Enum
+from functools import reduce
+from operator import or_
+from typing import Final, NamedTuple
+
+from ..values.enums import NO_AXES, Finger, ObjectStatus
+from ..values.model import TOLERANCE, Model
+from ..values.request import Request
+from ..values.status import RobotiqStatus
+from .contact import agrees
+
+LAG_S: Final = 0.25
+"""How long gDT may show the state before a request, from the first status that echoes the request. The
+vendor's example for the two-finger grippers waits 0.2 s for a motion to show (robotiq/grippers,
+move_gripper.cpp); 0.05 s are added for a poll and a slow host. Nothing was measured on a 3-Finger."""
+LAG_READS: Final = 10
+"""The reads that the lag lasts at least: the same source counts exchanges, and a slow poll makes few of
+them."""
+
+
+class Moment(NamedTuple):
+    """When a status was asked for, in monotonic seconds and in statuses read."""
+
+    time: float
+    reads: int
+
+    def is_lag_over(self, now: Moment) -> bool:
+        """Whether a status asked for at ``now`` cannot show anything from before this moment."""
+        return now.time - self.time >= LAG_S and now.reads - self.reads >= LAG_READS
+
+
+LONG_AGO: Final = Moment(-math.inf, -LAG_READS)
+
+
+class Asked(NamedTuple):
+    """One request of an axis.
+
+    Attributes:
+        position: in counts; None while rGTO is clear, where gDT says nothing [manual].
+        again: whether it makes an axis in contact try again: it sets rGTO or raises the force.
+        shown: the first status that showed that it acts; None before that.
+    """
+
+    position: int | None
+    again: bool = False
+    shown: Moment | None = LONG_AGO
+
+    def fits(self, model: Model, what: ObjectStatus, position: int) -> bool:
+        """Whether an axis can rest like this under it."""
+        return self.position is None or agrees(model, self.position, what, position, direction=0)
+
+
+class Rest(Enum):
+    """What is known of an axis that shows rest."""
+
+    __hash__ = object.__hash__  # see State
+
+    UNKNOWN = "it may move, or be about to"
+    KNOWN = "it is where it was asked to be; a status from before its request may still come"
+    PROVEN = "what it shows is from after its last request, so that no older status can follow"
+
+
+def rest_of(asked: Iterator[Asked], model: Model, what: ObjectStatus, position: int) -> Rest:
+    """Whether an axis rests under the last of its requests.
+
+    Args:
+        asked: the requests that the status may show, the newest first.
+        model: of the gripper.
+        what: the object status of the axis.
+        position: where it is, in counts. It is never late.
+    """
+    # Only the newest requests are looked at where they decide: this runs at every poll of a motion, and a
+    # control loop leaves fifty requests in the lag.
+    last = next(asked, None)
+    if what is ObjectStatus.IN_MOTION or (last is not None and last.shown is None):
+        return Rest.UNKNOWN
+    before = next(asked, None)
+    if last is None or before is None:
+        # gDT results from the only request that is left, even if it contradicts it: the axis may be at a
+        # software limit, or blocked.
+        return Rest.PROVEN
+    if what is ObjectStatus.AT_POSITION:  # within its tolerance, whatever the age of gDT
+        return Rest.KNOWN if last.fits(model, what, position) else Rest.UNKNOWN
+    is_true = _is_true_since((last, before, *asked), model, what, position, unless_again=True)
+    return Rest.PROVEN if is_true else Rest.UNKNOWN
+
+
+def is_doubtful(asked: Iterable[Asked], model: Model, what: ObjectStatus, position: int) -> bool:
+    """Whether an axis may move, or be about to, although it shows rest.
+
+    A contact is doubted only if a request within the lag contradicts it: a needless doubt would cost the
+    grip. An axis close to the request before the last may have some counts to go. ``asked`` as above.
+    """
+    last, *before = [*asked] or [Asked(None)]
+    if not before or what is ObjectStatus.IN_MOTION:
+        return False
+    if what is ObjectStatus.AT_POSITION:
+        others = [each for each in before if each.position != last.position]
+        return not last.fits(model, what, position) or any(
+            each.fits(model, what, position) for each in others
+        )
+    return not _is_true_since((last, *before), model, what, position, unless_again=False)
+
+
+def _is_true_since(
+    asked: tuple[Asked, ...], model: Model, what: ObjectStatus, position: int, *, unless_again: bool
+) -> bool:
+    """Whether this fits the last request, and every request since the first that it fits.
+
+    It was true under that one. If no later request contradicts it, it is still true.
+    """
+    fits = False
+    for each in reversed(asked):
+        was_fitting, fits = fits, each.fits(model, what, position)
+        if was_fitting and ((unless_again and each.again) or not fits):
+            return False
+    return fits
+
+
+class Grips:
+    """The contacts when rGTO was last seen set: gDT shows none while it is clear. False while it is empty.
+
+    What becomes of a grip at rGTO = 0 is unknown [conceivable]: an axis that has not moved since and is asked
+    to press on is taken to grip still.
+    """
+
+    def __init__(self) -> None:
+        self._contacts: dict[Finger, tuple[ObjectStatus, int]] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._contacts)
+
+    def remember(self, status: RobotiqStatus, contacts: Finger) -> None:
+        """Remember the axes that are in contact in a status that shows rGTO set."""
+        self._contacts = {axis: (status.finger_status(axis), status.position(axis)) for axis in contacts}
+
+    def forget(self, axes: Finger = Finger.ALL) -> None:
+        """Forget the grips of some axes, which are asked to move or let go."""
+        self._contacts = {axis: at for axis, at in self._contacts.items() if axis not in axes}
+
+    def held(self, status: RobotiqStatus, base: Request) -> Finger:
+        """The axes that gripped when rGTO was last set, have not moved since, and by ``base`` still grip."""
+        held = (
+            axis
+            for axis, (what, at) in self._contacts.items()
+            if abs(status.position(axis) - at) <= TOLERANCE
+            and agrees(status.model, base.position(axis), what, at, direction=0)
+        )
+        return reduce(or_, held, NO_AXES)

@@ -1,0 +1,130 @@
+"""Stops: a halt, a reset, and what ends a hand. Each is a level, and a stronger one replaces a weaker.
+
+A stop differs from all else that is written. It does not wait for write_spacing and is written before the
+read of its cycle: a gripper may obey and not answer. It may be written again, because it only ends motion: a
+gripper may acknowledge a write that comes soon after another one and forget it (manual of 2014: space them by
+10 ms). So it is sent once more after the spacing if it came early, and again if it acts by its time and does
+not show. It is reached when its write acts and a status shows it: what shows may be from before the write.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from enum import IntEnum
+from typing import Final
+
+from ..values.enums import Trigger
+from ..values.request import Request
+from ..values.status import RobotiqStatus
+from .evidence import classify, is_activating
+from .ledger import Entry, Ledger
+from .pending import at_rest
+from .waiters import Waiter
+
+HALTS: Final = 2
+"""How often a halt is sent at most. Then its caller gets the answer, even if rGTO still shows."""
+
+
+class Level(IntEnum):
+    """Ordered by strength."""
+
+    KEEP = 1
+    """Hold what moves, and leave rGTO set if every axis rests: see keeping.py."""
+    HALT = 2
+    """Clear rGTO, and go on."""
+    SHUTDOWN = 3
+    """Clear rGTO, and see the whole last image."""
+    RESET = 4
+    """Clear rACT. This clears faults, releases the part and ends an activation."""
+
+
+class Stop:
+    """A stop under way.
+
+    Attributes:
+        level: its level. A new level is a new stop.
+        waiters: the callers of halt().
+        entry: its last write; None before that.
+        is_early: whether that came within write_spacing, so that it is due again.
+        is_delivered: whether a write of it was acknowledged.
+    """
+
+    def __init__(self, level: Level, waiters: list[Waiter[None]] | None = None) -> None:
+        self.level: Final = level
+        self.waiters: Final = waiters or []
+        self.entry: Entry | None = None
+        self.is_early = False
+        self.is_delivered = False
+        self._times = 0
+        self._was_ready = False
+
+    def written(self, entry: Entry, status: RobotiqStatus, *, is_early: bool) -> None:
+        """A write of it is about to be sent, made from this status."""
+        self.entry, self.is_early = entry, is_early
+        self._times += not is_early
+        self._was_ready = classify(status) is Trigger.SEEN_READY
+
+    def is_urgent(self, ledger: Ledger, status: RobotiqStatus) -> bool:
+        """Whether it is to be written before the next read."""
+        if self.entry is not None:
+            return False
+        return self.level is not Level.SHUTDOWN or status.go_echo or not ledger.acts()
+
+    def image(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
+        """The image to write first; None if there is nothing to stop."""
+        base = ledger.base
+        match self.level:
+            case Level.RESET:  # rACT = 0 clears faults and ends an activation or a release [manual]
+                return replace(at_rest(base, status), activate=False)
+            case Level.HALT:  # positions and speeds stay as they were asked
+                return replace(base, go=False)
+        # A write of ours that does not act yet may set rGTO after this status: then it is not settled.
+        is_settled = ledger.acts()
+        if is_settled and not status.go_echo:
+            return None
+        # A shutdown must not reset a gripper that another client has activated.
+        return replace(base, activate=base.activate or is_settled, go=False)
+
+    def again(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
+        """The image to write once more, if it is due again."""
+        entry = self.entry
+        if entry is None or entry.acknowledged is None:
+            return None
+        if self.is_early:
+            return entry.image  # whatever shows: the gripper may have taken it and lose it [manual of 2014]
+        if not ledger.acts(entry):
+            return None
+        match self.level:
+            case Level.RESET:
+                is_due = status.activation_echo
+            case Level.HALT:
+                is_due = status.go_echo and self._times < HALTS
+            case _:  # while another client resets the gripper it comes to rest, and rACT might cross that
+                is_due = not entry.image.activate or status.activation_echo
+        return entry.image if is_due else None
+
+    def is_reached(self, ledger: Ledger, status: RobotiqStatus) -> bool:
+        entry = self.entry
+        if entry is None or entry.acknowledged is None or self.is_early or not ledger.acts(entry):
+            return False
+        is_reset = classify(status) is Trigger.SEEN_RESET
+        match self.level:
+            case Level.RESET:
+                return is_reset
+            case Level.HALT:
+                return not status.go_echo or self._times >= HALTS
+        # gGTO = 0 alone may be from before the write before, and the next client would adopt an echo that is
+        # about to change.
+        return is_reset or status.echo == entry.echo
+
+    def has_activated(self, ledger: Ledger, status: RobotiqStatus) -> bool:
+        """Whether its rACT activates a gripper that another client has reset just before.
+
+        Two clients within one device cycle can do that [follows from Modbus].
+        """
+        entry = self.entry
+        if entry is None or not self.is_delivered or not entry.image.activate:
+            return False
+        if self.level is Level.HALT:
+            return classify(status) is Trigger.SEEN_RESET or is_activating(status)
+        return self._was_ready and ledger.acts(entry) and is_activating(status)

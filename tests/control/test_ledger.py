@@ -1,0 +1,704 @@
+"""Which image a gripper shows, from when on it acts, what is another client's, and which axes rest."""
+
+from __future__ import annotations
+
+import gc
+import sys
+from collections.abc import Callable
+from types import FrameType
+from typing import Any, NamedTuple
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robotiq_async.control.adoption import DIRECTION_WAIT_S
+from robotiq_async.control.ledger import SILENT_S, WINDOW_S, Entry, Ledger
+from robotiq_async.control.rest import LAG_READS, LAG_S
+from robotiq_async.values.enums import NO_AXES, Finger
+from robotiq_async.values.model import THREE_FINGER
+from robotiq_async.values.request import AxisRequest, Request
+from robotiq_async.values.status import RobotiqStatus
+from tests.control.histories import EPSILON, image, shows
+from tests.register_words import status_of
+
+A, B, C, S = THREE_FINGER.axes
+
+
+class History(Ledger):
+    """Of a gripper that shows a position at first; it answers and acknowledges at once."""
+
+    def __init__(self, position: int = 0) -> None:
+        super().__init__(100, 50)
+        self.written: list[Entry] = []
+        self.look(shows(position, 0.0))
+        self.adopt(self.latest)
+        self.restart(self.latest)
+
+    def look(self, status: RobotiqStatus, asked: float | None = None) -> Entry | None:
+        """Take in a status; return the entry that it shows."""
+        self.latest = status
+        self.update(status, status.timestamp if asked is None else asked)
+        return self.match
+
+    def send(self, request: Request, at: float, moved: Finger = NO_AXES) -> Entry:
+        entry = self.write(request, moved, at)
+        self.written.append(entry)
+        return entry
+
+    def deliver(self, request: Request, at: float, moved: Finger = NO_AXES) -> Entry:
+        entry = self.send(request, at, moved)
+        self.acknowledge(at)
+        return entry
+
+    @property
+    def waiting(self) -> list[Entry]:
+        """The images written that do not act yet."""
+        return [each for each in self.written if not self.acts(each)]
+
+
+# -- what happens one after another ------------------------------------------------------------------------
+
+Event = Callable[[History, float], object]
+
+
+def writes(position: int, **options: Any) -> Event:
+    return lambda history, at: history.deliver(image(position, **options), at)
+
+
+def sends(position: int) -> Event:
+    """A write that is not acknowledged yet."""
+    return lambda history, at: history.send(image(position), at)
+
+
+def acknowledged(history: History, at: float) -> None:
+    history.acknowledge(at)
+
+
+def link_lost(history: History, _: float) -> None:
+    history.lost()
+
+
+def time_passes(history: History, at: float) -> None:
+    """Nothing shows that was not shown before."""
+    history.look(shows(history.latest.requested_position(A), at, go=history.latest.go_echo))
+
+
+def ours(position: int, *, go: bool = True, **options: Any) -> Event:
+    """A status that shows an image of ours."""
+
+    def look(history: History, at: float) -> None:
+        entry = history.look(shows(position, at, go=go))
+        assert entry is not None, at
+        assert entry.image == image(position, go=go, **options), at
+
+    return look
+
+
+def foreign(position: int) -> Event:
+    """A status that shows what another client wrote."""
+
+    def look(history: History, at: float) -> None:
+        assert history.look(shows(position, at)) is None, at
+
+    return look
+
+
+def adopts(position: int) -> Event:
+    return lambda history, at: history.adopt(shows(position, at))
+
+
+def restarts(position: int) -> Event:
+    return lambda history, at: history.restart(shows(position, at))
+
+
+class At(NamedTuple):
+    """What happens at a time, how many of the last images do not act yet, and whether one may never act."""
+
+    time: float
+    event: Event
+    waiting: int = 0
+    in_doubt: bool = False
+
+
+LOST = [At(1.0, sends(200), 1), At(1.0, link_lost, 1, in_doubt=True)]
+STORIES: dict[str, tuple[int, list[At]]] = {
+    "what shows at the start": (30, [At(0.0, ours(30))]),
+    # One write acts when its echo is seen, or some time after its acknowledgement.
+    "an echo": (0, [At(1.0, writes(100), 1), At(1.005, ours(0), 1), At(1.01, ours(100))]),
+    "an echo before the acknowledgement": (0, [At(1.0, sends(100), 1), At(1.005, ours(100))]),
+    "no acknowledgement": (0, [At(1.0, sends(100), 1), At(100.0, time_passes, 1), At(101.0, ours(100))]),
+    "no echo": (
+        0,
+        [
+            At(1.0, writes(100), 1),
+            At(1.0 + WINDOW_S - EPSILON, time_passes, 1),
+            At(1.0 + WINDOW_S, time_passes),
+        ],
+    ),
+    "no echo after a late acknowledgement": (
+        0,
+        [
+            *(At(1.0, sends(100), 1), At(1.3, acknowledged, 1)),
+            *(At(1.3 + WINDOW_S - EPSILON, time_passes, 1), At(1.3 + WINDOW_S, time_passes)),
+        ],
+    ),
+    "a cleared rGTO": (
+        0,
+        [At(1.0, writes(0, go=False), 1), At(1.005, ours(0), 1), At(1.01, ours(0, go=False))],
+    ),
+    # Several writes act in their order.
+    "there and back": (
+        100,
+        [
+            *(At(1.0, writes(200), 1), At(1.01, writes(100), 2)),
+            *(At(1.015, ours(100), 2), At(1.02, ours(200), 1), At(1.025, ours(100))),
+        ],
+    ),
+    "there and back from elsewhere": (
+        0,
+        [
+            *(
+                At(1.0, writes(100), 1),
+                At(1.01, writes(200), 2),
+                At(1.02, writes(100), 3),
+                At(1.04, ours(0), 3),
+            ),
+            *(At(1.05, ours(100), 2), At(1.06, ours(100), 2), At(1.07, ours(200), 1), At(1.08, ours(100))),
+        ],
+    ),
+    "there and back that never shows": (
+        100,
+        [
+            *(At(1.0, writes(200), 1), At(1.01, writes(100), 2)),
+            *(At(1.0 + WINDOW_S - EPSILON, ours(100), 2), At(1.01 + WINDOW_S, time_passes)),
+        ],
+    ),
+    "a slow gripper shows the image before the last": (
+        0,
+        [
+            *(At(1.0, writes(10), 1), At(1.1, writes(20), 2), At(1.2, writes(30), 3)),
+            *(At(1.21, ours(10), 2), At(1.22, ours(10), 2), At(1.31, ours(20), 1), At(1.41, ours(30))),
+        ],
+    ),
+    "a gripper skips an image": (
+        0,
+        [At(1.0, writes(10), 1), At(1.01, writes(20), 2), At(1.02, ours(0), 2), At(1.03, ours(20))],
+    ),
+    # Speed and force have no echo.
+    "a speed": (
+        0,
+        [
+            *(At(1.0, writes(0, speed=200), 1), At(1.005, ours(0), 1)),
+            *(At(1.0 + SILENT_S - EPSILON, time_passes, 1), At(1.0 + SILENT_S, time_passes)),
+        ],
+    ),
+    "a force": (
+        0,
+        [
+            *(At(1.0, writes(0, force=200), 1), At(1.005, ours(0), 1)),
+            *(At(1.0 + SILENT_S - EPSILON, time_passes, 1), At(1.0 + SILENT_S, time_passes)),
+        ],
+    ),
+    "an identical image": (0, [At(1.0, writes(0))]),
+    "a speed behind a position waits for it": (
+        0,
+        [
+            *(At(1.0, writes(100), 1), At(1.01, writes(100, speed=200), 2)),
+            *(At(1.01 + SILENT_S, time_passes, 2), At(1.02 + SILENT_S, ours(100))),
+        ],
+    ),
+    "a speed right behind a position has its time after the echo": (
+        0,
+        [
+            *(At(1.0, writes(100), 1), At(1.001, writes(100, speed=200), 2)),
+            *(At(1.01, ours(100), 1), At(1.001 + SILENT_S, time_passes)),
+        ],
+    ),
+    "a position behind a speed shows that both act": (
+        0,
+        [
+            *(At(1.0, writes(0, speed=200), 1), At(1.01, writes(100, speed=200), 2)),
+            At(1.02, ours(100, speed=200)),
+        ],
+    ),
+    # Another client's image is foreign until it is adopted, an older one of ours after the window.
+    "another client": (
+        0,
+        [At(1.0, foreign(77)), At(1.1, foreign(77)), At(1.1, adopts(77)), At(1.2, ours(77))],
+    ),
+    "another client that undoes a write before it shows": (
+        100,
+        [At(1.0, writes(200), 1), At(1.005, ours(100), 1), At(1.0 + WINDOW_S + EPSILON, foreign(100))],
+    ),
+    "the image before the last comes back": (
+        100,
+        [
+            *(At(1.0, writes(200), 1), At(1.01, ours(200))),
+            *(At(1.0 + WINDOW_S, ours(100)), At(1.0 + WINDOW_S + EPSILON, foreign(100)), At(1e6, ours(200))),
+        ],
+    ),
+    "of older images the newest before the window is kept": (
+        0,
+        [
+            *(At(1.0, writes(10), 1), At(2.0, writes(20), 2), At(2.4, writes(30), 3), At(2.41, ours(30))),
+            *(At(2.6, ours(20)), At(2.6, foreign(10))),
+        ],
+    ),
+    "what had shown before an adoption": (
+        100,
+        [
+            *(At(1.0, writes(200), 1), At(1.01, ours(200)), At(1.02, adopts(77))),
+            *(At(1.03, foreign(100)), At(1.03, foreign(200))),
+        ],
+    ),
+    "what was written before a restart": (
+        100,
+        [
+            *(At(1.0, sends(200), 1), At(1.1, restarts(50))),
+            *(At(1.12, foreign(200)), At(1.13, foreign(100))),
+        ],
+    ),
+    "a write that another client's overtook may still act": (
+        100,
+        [
+            *(At(1.0, writes(200), 1), At(1.01, foreign(77), 1), At(1.01, adopts(77), 1, in_doubt=True)),
+            At(1.02, ours(200)),
+        ],
+    ),
+    # A write that was lost with the link is in doubt until it shows, or as long as the window.
+    "an acknowledged write is not lost": (100, [At(1.0, writes(200), 1), At(1.0, link_lost, 1)]),
+    "a lost write had arrived": (100, [*LOST, At(1.0 + WINDOW_S, ours(200))]),
+    "a lost write arrives": (
+        100,
+        [
+            *(
+                *LOST,
+                At(1.1, ours(100), 1, True),
+                At(1.1, adopts(100), 1, True),
+                At(1.12, ours(100), 1, True),
+            ),
+            At(1.15, ours(200)),
+        ],
+    ),
+    "a lost write does not arrive": (
+        100,
+        [
+            *(*LOST, At(1.1, adopts(100), 1, True), At(1.0 + WINDOW_S - EPSILON, time_passes, 1, True)),
+            *(At(1.0 + WINDOW_S + EPSILON, ours(100)), At(1.6, foreign(200))),
+        ],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", STORIES)
+def test_a_history_of_writes(name: str) -> None:
+    position, story = STORIES[name]
+    history = History(position)
+    for at, event, waiting, in_doubt in story:
+        event(history, at)
+        assert history.waiting == history.written[len(history.written) - waiting :], at
+        assert any(each.is_doubtful for each in history.waiting) == in_doubt, at
+
+
+@pytest.mark.parametrize(
+    "status",
+    [
+        shows(77, 1.0),
+        shows(0, 1.0, go=False),
+        status_of(0x38, echo=0, at=1.0),
+        status_of(0x39, echo=(0, 0, 0, 1), at=1.0),
+    ],
+    ids=["positions", "go", "activation", "one axis"],
+)
+def test_an_echo_that_was_never_written_is_foreign(status: RobotiqStatus) -> None:
+    history = History()
+    history.deliver(image(50), 0.9)
+    assert history.look(status) is None
+
+
+def test_a_long_life_does_not_make_the_history_remember_more() -> None:
+    history = History()
+    for n in range(2000):
+        entry = history.deliver(image(n % 256), n / 10)
+        shown = history.look(shows(n % 256, n / 10 + 0.01))
+        assert shown is not None
+        assert shown.image == entry.image
+        history.update_rest(history.latest)
+    assert len(history._entries) + len(history._past) <= WINDOW_S * 10 + 2 + LAG_READS
+
+
+def test_an_adopted_image_may_differ_from_its_echo() -> None:
+    """Simple control: B, C and the scissor echo 0 and are asked for something else."""
+    ledger, status = Ledger(100, 50), status_of(0x39, 0xFF, echo=(80, 0, 0, 0), position=(80, 80, 80, 60))
+    ledger.update(status, 0.0)
+    assert ledger.match is None
+    ledger.adopt(status)
+    ledger.update(status, 0.1)
+    assert ledger.match is not None
+    assert [asked.position for asked in ledger.base.axes] == [80, 80, 80, 60]
+
+
+def test_an_old_status_that_is_looked_at_late_is_compared_with_what_was_written_then() -> None:
+    """What it shows is as old as its request, however late the reply was looked at."""
+    history = History(100)
+    entry = history.deliver(image(200), 1.0)
+    shown = history.look(shows(100, 1.7), 1.0)
+    assert shown is not None
+    assert shown.image == image(100)
+    assert not history.acts(entry)
+
+
+def test_a_lost_write_that_shows_after_a_long_outage_is_ours() -> None:
+    """Nothing else was written since: the gripper has it."""
+    history = History(100)
+    entry = history.send(image(200), 1.0, A)
+    history.lost()
+    assert history.look(shows(200, 60.0)) is entry
+    assert history.base == image(200)
+
+
+def test_after_a_silence_no_echo_of_long_ago_is_ours() -> None:
+    history = History(100)
+    history.deliver(image(200), 1.0)
+    history.look(shows(200, 1.01))
+    assert history.look(shows(100, 60.0)) is None
+
+
+# -- what cannot be told apart -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("arrives", [True, False])
+def test_of_images_that_show_alike_the_newest_that_has_arrived_is_the_one_in_force(arrives: bool) -> None:
+    """The speed and force of one that may not have arrived have no echo that could tell."""
+    history = History(100)
+    history.send(image(100, speed=7), 1.0)
+    if arrives:
+        history.acknowledge(1.0)
+    else:
+        history.lost()
+    assert history.look(shows(100, 1.01)) is not None
+    assert history.base == (image(100, speed=7) if arrives else image(100))
+
+
+# -- what the next image is made from ----------------------------------------------------------------------
+
+
+def test_before_anything_is_known_every_axis_has_the_settings_of_the_hand() -> None:
+    assert Ledger(128, 64).base == Request(axes=(AxisRequest(0, 128, 64),) * 4)
+
+
+def found(status: RobotiqStatus) -> Ledger:
+    """Of a gripper that another client has commanded, and that the hand has found."""
+    ledger = Ledger(100, 50)
+    ledger.update(status, status.timestamp)
+    ledger.adopt(status)
+    return ledger
+
+
+@pytest.mark.parametrize("status", [shows(100, 1.0), status_of(0x00, at=1.0)], ids=["active", "reset"])
+def test_the_first_image_shown_is_not_ours_but_settled(status: RobotiqStatus) -> None:
+    ledger = found(status)
+    assert ledger.ours == NO_AXES
+    assert ledger.resting == Finger.ALL
+    assert not ledger.may_begin_to_move
+    assert ledger.acts()
+    assert ledger.is_certain
+
+
+def test_a_moving_gripper_that_is_found_is_not_certain_before_it_has_shown_its_direction() -> None:
+    ledger = found(moving := status_of(0x39, 0x00, echo=100, position=50, at=1.0))
+    assert not ledger.is_certain
+    ledger.update(moving, 1.0 + DIRECTION_WAIT_S)
+    assert ledger.is_certain
+
+
+def test_a_write_is_what_the_next_is_made_from_and_acts_once_it_shows() -> None:
+    ledger = found(shows(100, 1.0))
+    entry = ledger.write(image(200), Finger.ALL, 1.0)
+    ledger.acknowledge(1.0)
+    assert ledger.base == image(200)
+    assert ledger.ours == Finger.ALL
+    ledger.update(shows(100, 1.01), 1.01)
+    assert not ledger.acts(entry)
+    assert ledger.may_begin_to_move
+    ledger.update(status := shows(200, 1.02), 1.02)
+    assert ledger.acts(entry)
+    assert ledger.may_begin_to_move, "until gDT can be believed"
+    ledger.update_rest(status)
+    assert not ledger.may_begin_to_move
+
+
+def test_the_age_of_a_write_counts_until_the_status_was_asked_for() -> None:
+    """The reply may have been looked at long after."""
+    history = History(100)
+    entry = history.deliver(image(100, speed=7), 1.0)
+    history.look(shows(100, 9.0), 1.0 + SILENT_S - EPSILON)
+    assert not history.acts(entry)
+    history.look(shows(100, 9.1), 1.0 + SILENT_S)
+    assert history.acts(entry)
+
+
+def test_a_speed_that_does_not_act_yet_sets_nothing_in_motion_while_rgto_is_clear() -> None:
+    history = History(200)
+    history.deliver(image(200, go=False), 1.0)
+    for at in (1.01, 1.1 + WINDOW_S):
+        history.look(shows(200, at, go=False))
+    history.deliver(image(200, go=False, speed=7), 2.0)
+    assert not history.acts()
+    assert not history.may_begin_to_move
+    history.deliver(image(200, speed=7), 2.0)
+    assert history.may_begin_to_move
+
+
+# -- another client beside us ------------------------------------------------------------------------------
+
+
+def test_the_requests_of_another_client_are_what_the_next_image_is_made_from() -> None:
+    history = History(200)
+    assert history.look(shows(77, 1.2)) is None
+    history.adopt(history.latest)
+    assert history.base == image(77), "speed and force stay as we last wrote them: they have no echo"
+    assert history.look(shows(77, 1.3)) is not None
+
+
+def test_an_axis_that_another_client_leaves_alone_stays_ours() -> None:
+    ledger = found(shows(100, 1.0))
+    ledger.write(image(200), A | B, 1.0)
+    ledger.acknowledge(1.0)
+    ledger.update(shows(200, 1.1), 1.1)
+    other = status_of(0x39, 0xFF, echo=(200, 77, 200, 200), position=(200, 77, 200, 200), at=1.2)
+    ledger.update(other, 1.2)
+    ledger.adopt(other)
+    assert ledger.ours == A, "B is asked for something else, and C was never moved by us"
+
+
+def test_our_write_that_shows_after_another_clients_is_gone_on_from() -> None:
+    history = History(200)
+    history.deliver(image(30), 1.1, Finger.ALL)
+    history.look(shows(77, 1.2))
+    history.adopt(history.latest)
+    assert history.has_lost_write, "our write may still act"
+    assert history.ours == NO_AXES
+    history.look(shows(30, 1.3))
+    assert history.base == image(30)
+    assert history.ours == Finger.ALL
+    assert history.is_certain
+
+
+def test_of_two_overtaken_writes_the_newest_is_what_the_gripper_has_once_the_first_shows() -> None:
+    """It has acknowledged both and takes them in their order."""
+    history = History(200)
+    for position in (30, 40):
+        history.deliver(image(position), 1.1)
+    history.look(shows(77, 1.2))
+    history.adopt(history.latest)
+    history.look(shows(30, 1.21))
+    assert history.base == image(40)
+
+
+def test_a_client_that_keeps_writing_does_not_delay_us_anew() -> None:
+    """A moving axis is given its time once, or nothing of ours would ever be written."""
+    history = History(100)
+    for n in range(10):
+        moving = status_of(0x39, 0x00, echo=150 + n, position=50, at=2.0 + n * DIRECTION_WAIT_S / 5)
+        assert history.look(moving) is None
+        history.adopt(moving)
+    assert history.is_certain
+
+
+# -- the end of a procedure --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shown", [30, 77])
+def test_a_procedure_ends_with_what_was_written_last_or_another_client_has_written(shown: int) -> None:
+    history = History(200)
+    history.deliver(image(30), 1.1)
+    history.look(shows(shown, 1.2))
+    assert history.restart(history.latest) == (shown == 30)
+    assert history.acts()
+
+
+# -- axes that grip, and axes at rest ----------------------------------------------------------------------
+
+GRIP = status_of(0x39, 0b10_11_10_10, echo=200, position=(150, 150, 200, 150))
+"""A, B and the scissor touch something."""
+HALTED = status_of(0x31, 0b10_11_10_10, echo=200, position=(150, 150, 200, 150))
+
+
+@pytest.fixture
+def later() -> History:
+    """Of a gripper that we have sent from 100 to 200, when no status can be from before that."""
+    history = History(100)
+    history.deliver(image(200), 1.0, Finger.ALL)
+    for n in range(LAG_READS + 2):
+        history.look(status_of(0x39, 0x00, echo=200, position=150, at=1.1 + n * LAG_S))
+        history.update_rest(history.latest)
+    return history
+
+
+def gripping(history: History, status: RobotiqStatus = HALTED) -> Finger:
+    return history.grips.held(status, history.base)
+
+
+def test_axes_that_gripped_when_rgto_was_set_still_grip(later: History) -> None:
+    later.update_rest(GRIP)
+    assert gripping(later, GRIP) == A | B | S
+    later.update_rest(status_of(0x31, 0xFF, echo=200, position=150))
+    assert gripping(later) == A | B | S, "gDT is not worth reading while rGTO is clear"
+
+
+def test_an_axis_that_is_somewhere_else_by_now_does_not_grip(later: History) -> None:
+    later.update_rest(GRIP)
+    assert gripping(later, status_of(0x31, 0xFF, position=(150, 6, 6, 152))) == A | S
+
+
+def test_a_grip_by_a_request_no_longer_in_force_does_not_count(later: History) -> None:
+    """A motion that was halted must not come back because the axis had gripped."""
+    later.update_rest(GRIP)
+    later.deliver(image(200).with_positions({A: 20}), 9.0)
+    assert gripping(later) == B | S
+
+
+@pytest.mark.parametrize(("how", "left"), [("moved", B | S), ("adopted", NO_AXES)])
+def test_a_grip_ends(later: History, how: str, left: Finger) -> None:
+    later.update_rest(GRIP)
+    if how == "moved":
+        later.deliver(image(200), 9.0, A)
+    else:
+        later.adopt(GRIP)
+    assert gripping(later) == left
+
+
+def test_an_axis_has_arrived_when_it_was_seen_at_rest_under_what_it_was_asked_last(later: History) -> None:
+    assert later.resting & Finger.ALL == Finger.ALL & ~later.unrested
+    assert later.unrested == A | B | C | S
+    later.update_rest(status_of(0x39, 0b11_11_10_00, echo=200, position=(100, 150, 199, 200)))
+    assert later.unrested == A
+    later.deliver(image(200).with_positions({B: 190}), 9.0, B)
+    assert later.unrested == A | B
+
+
+def test_no_axis_arrives_under_what_does_not_act_yet_nor_while_rgto_is_clear() -> None:
+    history = History(200)
+    history.deliver(image(200).with_positions({A: 30}), 1.1, A)
+    history.look(shows(200, 1.2))
+    history.update_rest(history.latest)
+    assert history.unrested == A
+    history.deliver(image(200, go=False).with_positions({A: 30}), 1.2)
+    history.look(status_of(0x31, 0xFF, echo=(30, 200, 200, 200), position=30, at=1.3))
+    history.update_rest(history.latest)
+    assert history.unrested == A
+
+
+# -- any sequence ------------------------------------------------------------------------------------------
+
+
+class Device:
+    """Takes over the newest image at each tick of a clock of its own, and skips the ones between."""
+
+    def __init__(self, cycle: float) -> None:
+        self.cycle = cycle
+        self.arrived: list[tuple[float, Entry]] = []
+
+    def write(self, entry: Entry, at: float) -> None:
+        self.arrived.append((at, entry))
+
+    def acting(self, now: float) -> Entry:
+        refreshed = now if self.cycle == 0 else now // self.cycle * self.cycle
+        return next(entry for at, entry in reversed(self.arrived) if at <= refreshed)
+
+
+STEPS = st.lists(
+    st.tuples(
+        st.sampled_from([0.001, 0.005, 0.02, 0.06, 0.3]),
+        st.none()
+        | st.builds(image, st.sampled_from([0, 100, 200]), speed=st.sampled_from([1, 2]), go=st.booleans()),
+    ),
+    max_size=40,
+)
+
+
+def status_from(device: Device, now: float) -> RobotiqStatus:
+    request = device.acting(now).image
+    return shows(request.axes[0].position, now, go=request.go)
+
+
+@settings(deadline=None)
+@given(st.sampled_from([0.0, 0.005, 0.01, 0.05, 0.2]), STEPS)
+def test_our_own_writes_are_never_foreign_and_never_act_too_early(
+    cycle: float, steps: list[tuple[float, Request | None]]
+) -> None:
+    history, device, now = History(), Device(cycle), 0.0
+    device.write(history.last, -1.0)
+    written = [history.last]
+    for pause, request in steps:
+        now += pause
+        if request is not None:
+            entry = history.deliver(request, now)
+            written.append(entry)
+            device.write(entry, now)
+        status = status_from(device, now)
+        shown = history.look(status)
+        assert shown is not None, "our own write was taken for another client"
+        acting = device.acting(now)
+        assert shown.echo == acting.echo
+        for each in written:
+            # A silent change is given five cycles of a 100 Hz device; a slower one may need longer.
+            silent = each.echo == acting.echo
+            if history.acts(each) and not (silent and cycle > SILENT_S):
+                assert acting.number >= each.number or acting.image == each.image
+    now += WINDOW_S + cycle
+    assert history.look(status_from(device, now)) is not None
+    assert history.acts()
+
+
+@given(STEPS, st.integers(1, 99))
+def test_a_position_that_was_never_written_is_foreign_at_any_time(
+    steps: list[tuple[float, Request | None]], foreign: int
+) -> None:
+    history, now = History(), 0.0
+    for pause, request in steps:
+        now += pause
+        if request is not None:
+            history.deliver(request, now)
+        assert history.look(shows(foreign, now)) is None
+
+
+# -- what a look costs, in calls: the same on every machine ------------------------------------------------
+
+
+def calls(what: Callable[[], object]) -> int:
+    """How many functions of Python are called."""
+    count = 0
+
+    def see(_frame: FrameType, event: str, _argument: object) -> None:
+        nonlocal count
+        count += event == "call"
+
+    gc.disable()  # a collection calls what others have registered for it, and these calls would count
+    sys.setprofile(see)
+    try:
+        what()
+    finally:
+        sys.setprofile(None)
+        gc.enable()
+    return count
+
+
+def cost_of_a_look(writes: int) -> int:
+    """That of the status after so many writes, none of which shows."""
+    history, now = History(255), 0.0
+    for number in range(writes):
+        now += 0.005
+        history.deliver(image(number % 200), now)
+
+    def look() -> None:
+        history.update(shows(255, now), now)
+        assert not history.has_lost_write
+
+    return calls(look)
+
+
+def test_a_look_at_a_status_calls_nothing_for_each_write_of_the_last_half_second() -> None:
+    assert cost_of_a_look(90) <= cost_of_a_look(10)
