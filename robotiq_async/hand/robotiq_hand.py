@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import asyncio
 import inspect
 from collections.abc import Callable, Collection
 from typing import Final, Literal
 
 import anyio
 
-from ..control.motion import Move
 from ..control.pending import Command
 from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
 from ..link.transport import Transport
-from ..runtime.clock import now
 from ..session.options import (
     ACTIVATION_TIMEOUT_S,
     CONNECT_TIMEOUT_S,
@@ -199,25 +196,12 @@ class RobotiqHand(Hand):
         self, axes: Finger, target: int, speed: int | None, force: int | None, timeout: float | None
     ) -> MoveResult:
         session = self._asked()
-        controller = session.controller
-        ended: asyncio.Future[MoveResult] = session.waiter()
-        move = Move(target, axes, now(), ended)
-        usual = session.ask(controller.move, move, speed, force)
-        limit = usual if timeout is None else timeout
-        with session.counters.move() as note:
-            try:
-                with anyio.move_on_after(limit):
-                    result = await ended
-                    note(result)
-                    return result
-            except asyncio.CancelledError:
-                session.ask(controller.abandon, move, unseen=True)
-                if ended.done() and not ended.cancelled():
-                    ended.exception()  # retrieved: asyncio would log it as never looked at
-                raise
-            finally:
-                # Also after a timeout: the axes that still move are held.
-                session.ask(controller.abandon, move)
+        with session.moving(target, axes, speed, force) as (ended, usual), session.counters.move() as note:
+            limit = usual if timeout is None else timeout
+            with anyio.move_on_after(limit):
+                result = await ended
+                note(result)
+                return result
             raise MoveTimeoutError(
                 f"{axes} still moved after {limit:.2f} s on the way to {target}", self.status
             )

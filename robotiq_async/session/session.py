@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, ClassVar, ParamSpec, TypeVar
 
 import anyio
 
 from ..control.controller import Controller
+from ..control.motion import Move
 from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
 from ..control.waiters import Waiter
 from ..runtime.clock import now
 from ..runtime.concurrency import check_loop, wait_shielded
-from ..values.enums import Fault, State, Trigger
+from ..values.enums import Fault, Finger, State, Trigger
 from ..values.errors import (
     ActivationTimeoutError,
     ConnectionLostError,
@@ -26,6 +28,7 @@ from ..values.errors import (
     StateTimeoutError,
 )
 from ..values.events import Transition
+from ..values.move_result import MoveResult
 from ..values.statistics import Counters
 from ..values.status import RobotiqStatus
 from .gripper_link import Claims
@@ -225,6 +228,27 @@ class Session:
         self.ask(request, waiter)
         self._poller.hurry()
         await waiter
+
+    @contextmanager
+    def moving(
+        self, position: int, axes: Finger, speed: int | None, force: int | None
+    ) -> Iterator[tuple[asyncio.Future[MoveResult], float]]:
+        """Move axes; yield the future of the result, and the seconds that it may take by default.
+
+        However the block is left, a move that has not ended is given up, and its axes that move are held.
+        """
+        ended: asyncio.Future[MoveResult] = self.waiter()
+        move, is_cancelled = Move(position, axes, now(), ended), False
+        usual = self.ask(self.controller.move, move, speed, force)
+        try:
+            yield ended, usual
+        except asyncio.CancelledError:
+            is_cancelled = True
+            if ended.done() and not ended.cancelled():
+                ended.exception()  # retrieved: asyncio would log it as never looked at
+            raise
+        finally:
+            self.ask(self.controller.abandon, move, unseen=is_cancelled)
 
     async def reach(
         self,
