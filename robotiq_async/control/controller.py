@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
-from ..values.enums import NO_AXES, Finger, Severity, State, Trigger
+from ..values.enums import NO_AXES, Finger, Severity, State, StopLevel, Trigger
 from ..values.errors import (
     ConnectionLostError,
     GripperFaultError,
@@ -35,7 +35,7 @@ from .open_requests import OpenRequests
 from .pending import Command, Pending, merged
 from .procedures import Procedure
 from .state_machine import RUNNING, StateMachine
-from .stops import Level, Stop
+from .stops import Stop
 from .waiters import Waiter, fail, resolve
 
 WARNING_S: Final = 1.0
@@ -161,7 +161,7 @@ class Controller:
             self._begin_reset(Trigger.ASK_HALT, MoveSupersededError("halt() took over"))
         self._requests.supersede(Finger.ALL, MoveSupersededError("halt() stopped the fingers"))
         if self._stop is None or self._stop.is_delivered:  # a new halt is sent anew
-            self._stop = Stop(Level.HALT, [] if self._stop is None else self._stop.waiters)
+            self._stop = Stop(StopLevel.HALT, [] if self._stop is None else self._stop.waiters)
         self._stop.waiters.append(waiter)
         self._show(Trigger.ASK_HALT)
 
@@ -206,7 +206,7 @@ class Controller:
     def stop(self) -> None:
         """Begin to stop the hand: refuse new requests, and fail those that are not sent."""
         state, stop = self.machine.state, self._stop
-        halts = stop is not None and stop.level is Level.HALT and stop.entry is None
+        halts = stop is not None and stop.level is StopLevel.HALT and stop.entry is None
         was_elsewhere = "" if state in RUNNING else f"the hand was in {state.name}"
         self._doubt = "halt() was asked for" if halts else was_elsewhere
         if not self._requests.pending.is_empty or halts:
@@ -226,22 +226,21 @@ class Controller:
         """Make the shutdown under way clear rGTO after all."""
         self._doubt = why
         if isinstance(self._stop, Keeping):
-            self._stop = Stop(Level.SHUTDOWN)
+            self._stop = Stop(StopLevel.SHUTDOWN)
 
-    def shut_down(self, *, keep_grip: bool = False) -> None:
-        """Begin to stop the fingers, if any may move.
+    def shut_down(self, level: StopLevel = StopLevel.SHUTDOWN) -> None:
+        """Begin to stop the fingers, if any may move, by KEEP or SHUTDOWN.
 
-        An activation that this hand began is taken back with rACT = 0: clearing rGTO would not stop it. With
-        ``keep_grip`` rGTO stays set if every axis is known to rest.
+        An activation that this hand began is taken back with rACT = 0: clearing rGTO would not stop it.
         """
         self._procedure, status = None, self._evidence.status
         if self._activation is not None:
-            self._stop = Stop(Level.RESET)
-        elif status is not None and keep_grip:
+            self._stop = Stop(StopLevel.RESET)
+        elif status is not None and level is StopLevel.KEEP:
             self._stop = keeping = Keeping(status, self._doubt)
             self._advance_keeping(keeping)
         elif status is not None:
-            self._stop = Stop(Level.SHUTDOWN)
+            self._stop = Stop(StopLevel.SHUTDOWN)
 
     # -- what follows from that ------------------------------------------------------------------------
 
@@ -256,7 +255,7 @@ class Controller:
     def _begin_reset(self, trigger: Trigger, error: RobotiqError) -> None:
         """Reset; ``error`` is what the callers get whose requests end with it."""
         self._fail_all(error)
-        self._procedure, self._stop = None, Stop(Level.RESET)
+        self._procedure, self._stop = None, Stop(StopLevel.RESET)
         self._ledger.grips.forget()
         self._show(trigger)
 
@@ -266,7 +265,7 @@ class Controller:
         stop = self._stop
         if stop is not None:
             fail(stop.waiters, error)
-            self._stop = None if stop.level is Level.HALT else stop
+            self._stop = None if stop.level is StopLevel.HALT else stop
 
     # -- what is known ---------------------------------------------------------------------------------
 
@@ -285,7 +284,7 @@ class Controller:
     @property
     def is_busy(self) -> bool:
         """Whether a procedure, a reset or the end of the hand is under way."""
-        is_stopping = self._stop is not None and self._stop.level is not Level.HALT
+        is_stopping = self._stop is not None and self._stop.level is not StopLevel.HALT
         return is_stopping or self._procedure is not None
 
     @property
@@ -312,7 +311,7 @@ class Controller:
         if self._evidence.condition is None:
             return State.DISCONNECTED
         stop = self._stop
-        if stop is not None and stop.level is Level.RESET:
+        if stop is not None and stop.level is StopLevel.RESET:
             return State.WF_RESET if stop.is_delivered else State.DO_RESET
         if self._procedure is not None:
             return self._procedure.state
@@ -364,7 +363,7 @@ class Controller:
             self._advance_keeping(stop)
         elif stop is not None:
             self._advance_stop(stop, status)
-        hides = stop is not None and stop.level is not Level.HALT
+        hides = stop is not None and stop.level is not StopLevel.HALT
         return hides or self.is_busy or self.machine.state in _OFF
 
     def _advance_stop(self, stop: Stop, status: RobotiqStatus) -> None:
@@ -375,7 +374,7 @@ class Controller:
         elif stop.is_reached(self._ledger, status):
             self._stop = None
             resolve(stop.waiters)
-            if stop.level is not Level.HALT:
+            if stop.level is not StopLevel.HALT:
                 self._finish(status, has_written=True)
 
     def _advance_keeping(self, keeping: Keeping) -> None:
@@ -385,7 +384,7 @@ class Controller:
             ledger.update_rest(status)
         keeping.judge(ledger, status)
         if keeping.doubt:
-            self._stop = stop = Stop(Level.SHUTDOWN)
+            self._stop = stop = Stop(StopLevel.SHUTDOWN)
             if ledger.match is None and classify(status) is Trigger.SEEN_READY:
                 ledger.adopt(status)
             if stop.image(ledger, status) is not None:
@@ -472,7 +471,7 @@ class Controller:
 
     def _wait(self, now: float) -> float:
         stop = self._stop
-        if stop is not None and stop.level is not Level.KEEP and stop.entry is None:
+        if stop is not None and stop.level is not StopLevel.KEEP and stop.entry is None:
             return 0.0
         return max(0.0, self._written_at + self._spacing - now)
 
@@ -493,21 +492,21 @@ class Controller:
         ledger = self._ledger
         if stop.entry is not None:
             image = stop.again(ledger, status)
-        elif stop.level is Level.HALT and self._evidence.condition not in FOLLOWS:
+        elif stop.level is StopLevel.HALT and self._evidence.condition not in FOLLOWS:
             image = None
         else:
             is_ready = self._evidence.condition is Trigger.SEEN_READY
-            if stop.level is Level.SHUTDOWN and ledger.match is None and is_ready:
+            if stop.level is StopLevel.SHUTDOWN and ledger.match is None and is_ready:
                 ledger.adopt(status)  # stop the fingers whichever client moves them
             image = stop.image(ledger, status)
-            if image is None and stop.level is Level.SHUTDOWN:
+            if image is None and stop.level is StopLevel.SHUTDOWN:
                 self._stop = None
                 self._finish(status, has_written=False)
         if image is None:
             return None
         is_early = now - self._written_at < self._spacing
         # A halt also stops the axes to be held, so the callers of hold() have their answer with it.
-        covered = self._requests.pending.take_holds() if stop.level is Level.HALT else Pending()
+        covered = self._requests.pending.take_holds() if stop.level is StopLevel.HALT else Pending()
         entry = self._send(image, covered, status, now)
         stop.written(entry, status, is_early=is_early)
         return entry.image

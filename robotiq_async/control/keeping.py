@@ -11,13 +11,13 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ..values.enums import Fault, Finger, Trigger
+from ..values.enums import Fault, Finger, StopLevel, Trigger
 from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .evidence import classify
 from .ledger import Ledger
 from .pending import Pending, merged
-from .stops import Level, Stop
+from .stops import Stop
 
 KEEP_S: Final = 0.5
 """Time for the axes to come to rest. The rest of the 2 s of a stop is enough to clear rGTO even on the
@@ -39,7 +39,7 @@ class Keeping(Stop):
     """
 
     def __init__(self, status: RobotiqStatus, doubt: str) -> None:
-        super().__init__(Level.KEEP)
+        super().__init__(StopLevel.KEEP)
         self.doubt = doubt
         # Rest is timed by when a status was asked for, because a busy loop may read the reply late.
         self._until = status.timestamp + KEEP_S

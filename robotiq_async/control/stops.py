@@ -10,10 +10,9 @@ not show. It is reached when its write acts and a status shows it: what shows ma
 from __future__ import annotations
 
 from dataclasses import replace
-from enum import IntEnum
 from typing import Final
 
-from ..values.enums import Trigger
+from ..values.enums import StopLevel, Trigger
 from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .evidence import classify, is_activating
@@ -23,19 +22,6 @@ from .waiters import Waiter
 
 HALTS: Final = 2
 """How often a halt is sent at most. Then its caller gets the answer, even if rGTO still shows."""
-
-
-class Level(IntEnum):
-    """Ordered by strength."""
-
-    KEEP = 1
-    """Hold what moves, and leave rGTO set if every axis rests: see keeping.py."""
-    HALT = 2
-    """Clear rGTO, and go on."""
-    SHUTDOWN = 3
-    """Clear rGTO, and see the whole last image."""
-    RESET = 4
-    """Clear rACT. This clears faults, releases the part and ends an activation."""
 
 
 class Stop:
@@ -49,7 +35,7 @@ class Stop:
         is_delivered: whether a write of it was acknowledged.
     """
 
-    def __init__(self, level: Level, waiters: list[Waiter[None]] | None = None) -> None:
+    def __init__(self, level: StopLevel, waiters: list[Waiter[None]] | None = None) -> None:
         self.level: Final = level
         self.waiters: Final = waiters or []
         self.entry: Entry | None = None
@@ -68,15 +54,15 @@ class Stop:
         """Whether it is to be written before the next read."""
         if self.entry is not None:
             return False
-        return self.level is not Level.SHUTDOWN or status.go_echo or not ledger.acts()
+        return self.level is not StopLevel.SHUTDOWN or status.go_echo or not ledger.acts()
 
     def image(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
         """The image to write first; None if there is nothing to stop."""
         base = ledger.base
         match self.level:
-            case Level.RESET:  # rACT = 0 clears faults and ends an activation or a release [manual]
+            case StopLevel.RESET:  # rACT = 0 clears faults and ends an activation or a release [manual]
                 return replace(at_rest(base, status), activate=False)
-            case Level.HALT:  # positions and speeds stay as they were asked
+            case StopLevel.HALT:  # positions and speeds stay as they were asked
                 return replace(base, go=False)
         # A write of ours that does not act yet may set rGTO after this status: then it is not settled.
         is_settled = ledger.acts()
@@ -95,9 +81,9 @@ class Stop:
         if not ledger.acts(entry):
             return None
         match self.level:
-            case Level.RESET:
+            case StopLevel.RESET:
                 is_due = status.activation_echo
-            case Level.HALT:
+            case StopLevel.HALT:
                 is_due = status.go_echo and self._times < HALTS
             case _:  # while another client resets the gripper it comes to rest, and rACT might cross that
                 is_due = not entry.image.activate or status.activation_echo
@@ -109,9 +95,9 @@ class Stop:
             return False
         is_reset = classify(status) is Trigger.SEEN_RESET
         match self.level:
-            case Level.RESET:
+            case StopLevel.RESET:
                 return is_reset
-            case Level.HALT:
+            case StopLevel.HALT:
                 return not status.go_echo or self._times >= HALTS
         # gGTO = 0 alone may be from before the write before, and the next client would adopt an echo that is
         # about to change.
@@ -125,6 +111,6 @@ class Stop:
         entry = self.entry
         if entry is None or not self.is_delivered or not entry.image.activate:
             return False
-        if self.level is Level.HALT:
+        if self.level is StopLevel.HALT:
             return classify(status) is Trigger.SEEN_RESET or is_activating(status)
         return self._was_ready and ledger.acts(entry) and is_activating(status)

@@ -24,7 +24,7 @@ from ..control.waiters import fail, resolve
 from ..link.transport import Link
 from ..link.watchdog import HELD_S
 from ..runtime.tick import Tick
-from ..values.enums import Ending
+from ..values.enums import StopLevel
 from ..values.errors import (
     ConnectionLostError,
     NotStartedError,
@@ -102,7 +102,7 @@ class Poller:
         """The time of day at which the link went down, if it is down."""
         self._stopping = False
         self._end_by = math.inf
-        self._ending = Ending.LEAVE
+        self._level = StopLevel.LEAVE
         """The strongest requested so far."""
         self._opener = Opener(self._connect, options)
         self._polling: anyio.CancelScope | None = None
@@ -114,26 +114,26 @@ class Poller:
         self._decided: tuple[Request, float] | None = None  # the last image decided on, and when
 
     def request_stop(self, *, halt: bool, keep_grip: bool = False) -> None:
-        """End the task as :class:`Ending` says; the strongest of several requests counts. Never blocks.
+        """End the task as a :class:`StopLevel` says; the strongest of several requests counts. Never blocks.
 
         From here on the controller refuses every request and has dropped those that were not sent.
         """
-        ending = Ending.of(halt=halt, keep_grip=keep_grip)
+        level = StopLevel.of(halt=halt, keep_grip=keep_grip)
         if not self._stopping:
             # A hold or a halt that was not delivered is dropped with the rest: this stop must replace it.
-            self._ending = max(ending, Ending.KEEP) if self._controller.has_undelivered_stop else ending
+            self._level = max(level, StopLevel.KEEP) if self._controller.has_undelivered_stop else level
             self._end_by = self._loop.time() + STOP_S
             if self._polling is not None:
                 self._polling.deadline = self._loop.time() + IN_FLIGHT_S
             self._refuse_requests()
-        elif ending > self._ending:
-            self._log.info("a stronger stop came meanwhile: the fingers are %s", ending.done)
-            self._ending = ending
+        elif level > self._level:
+            self._log.info("a stronger stop came meanwhile: the fingers are %s", level.done)
+            self._level = level
             self._end_by = self._loop.time() + STOP_S
-            if ending is Ending.HALT:
+            if level is StopLevel.SHUTDOWN:
                 self._controller.keep_no_grip("a stop() without keep_grip came meanwhile")
-        elif ending < self._ending:
-            self._log.warning("a stop that is under way is stronger: the fingers are %s", self._ending.done)
+        elif level < self._level:
+            self._log.warning("a stop that is under way is stronger: the fingers are %s", self._level.done)
         self._opener.end()
 
     def _refuse_requests(self) -> None:
@@ -375,16 +375,16 @@ class Poller:
 
     async def _end_motion_and_close(self) -> None:
         """Stop and close; again if a stronger stop is requested during this, or while the link closes."""
-        done = Ending.LEAVE
+        done = StopLevel.LEAVE
         while True:
             try:
-                while done < self._ending:
-                    done = self._ending
+                while done < self._level:
+                    done = self._level
                     await self._end_motion()
             finally:
                 if not self._loop.is_closed():
                     await self._transport.close()
-            if done == self._ending:
+            if done == self._level:
                 return
 
     async def _end_motion(self) -> None:
@@ -417,7 +417,7 @@ class Poller:
             # with rACT would activate it.
             await self._transport.open()
             await self._poll_once()
-        self._controller.shut_down(keep_grip=self._ending is Ending.KEEP)
+        self._controller.shut_down(self._level)
         while True:
             await self._cycle()
             if not self._controller.is_busy:

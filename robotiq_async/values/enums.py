@@ -313,24 +313,28 @@ class Trigger(Enum):
         return self.name.startswith("SEEN_")
 
 
-class Ending(IntEnum):
-    """Ordered by strength: of several stops under way the strongest counts."""
+class StopLevel(IntEnum):
+    """How much is to stop, ordered by strength: of several stops the strongest counts."""
 
     LEAVE = 0
-    """The fingers go on."""
+    """The end of a hand that leaves the fingers as they are."""
     KEEP = 1
-    """Axes that move are held, and rGTO stays set if every axis is seen at rest."""
+    """Hold axes that move, and leave rGTO set if every axis is seen at rest."""
     HALT = 2
-    """rGTO is cleared."""
+    """Clear rGTO, and go on."""
+    SHUTDOWN = 3
+    """Clear rGTO, and see the whole last image."""
+    RESET = 4
+    """Clear rACT. This clears faults, releases the part and ends an activation."""
 
     @classmethod
     def of(cls, *, halt: bool, keep_grip: bool) -> Self:
-        """The ending for the arguments of ``stop()``."""
+        """The level for the arguments of ``stop()``."""
         if not halt:
             return cls(cls.LEAVE)
-        return cls(cls.KEEP if keep_grip else cls.HALT)
+        return cls(cls.KEEP if keep_grip else cls.SHUTDOWN)
 
     @property
     def done(self) -> str:
         """The participle for messages: the fingers are ..."""
-        return ("left as they are", "held", "stopped")[self]
+        return {StopLevel.LEAVE: "left as they are", StopLevel.KEEP: "held"}.get(self, "stopped")

@@ -13,7 +13,7 @@ from robotiq_async.control.pending import Command
 from robotiq_async.control.state_machine import TABLE, StateMachine
 from robotiq_async.session.options import units_of
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.values.enums import Trigger
+from robotiq_async.values.enums import StopLevel, Trigger
 from robotiq_async.values.errors import RobotiqError
 from robotiq_async.values.model import THREE_FINGER, Model
 from robotiq_async.values.registers import Registers
@@ -224,7 +224,7 @@ class Scan:
 
     def stop(self, *, keep_grip: bool = False) -> None:
         self.controller.stop()
-        self.controller.shut_down(keep_grip=keep_grip)
+        self.controller.shut_down(StopLevel.KEEP if keep_grip else StopLevel.SHUTDOWN)
         self.until(lambda: not self.controller.is_busy, 1.0)
 
     # -- what has happened -----------------------------------------------------------------------------

@@ -16,6 +16,7 @@ from robotiq_async.control.motion import Move
 from robotiq_async.control.pending import Command
 from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.session.options import units_of
+from robotiq_async.values.enums import StopLevel
 from robotiq_async.values.model import MODELS, Model
 from robotiq_async.values.request import Request
 from robotiq_async.values.status import RobotiqStatus
@@ -52,7 +53,7 @@ CALLS: dict[str, Callable[[Controller, int], object]] = {
     "release": lambda hand, _: hand.release(),
     "lost": lambda hand, _: hand.lost(None),
     "stop": lambda hand, _: hand.stop(),
-    "shut down": lambda hand, value: hand.shut_down(keep_grip=value > 127),
+    "shut down": lambda hand, value: hand.shut_down(StopLevel.KEEP if value > 127 else StopLevel.SHUTDOWN),
 }
 words = st.integers(0, 0xFFFF)
 # Mostly of a gripper that is active, reset, in a fault or activating: random words seldom are.

@@ -9,6 +9,7 @@ import pytest
 
 from robotiq_async import Fault, Finger, NotStartedError, RobotiqStatus
 from robotiq_async.control.keeping import KEEP_S, REST_S
+from robotiq_async.values.enums import StopLevel
 from tests.control.other_client import image
 from tests.control.scan import POLL_S, Scan, started
 from tests.grippers import Restless
@@ -220,11 +221,11 @@ def test_on_any_doubt_rgto_is_cleared_and_a_word_says_why(
 def test_a_link_that_goes_down_meanwhile_is_a_doubt() -> None:
     scan = holding()
     scan.controller.stop()
-    scan.controller.shut_down(keep_grip=True)
+    scan.controller.shut_down(StopLevel.KEEP)
     scan.step()
     scan.controller.lost(None)
     scan.controller.see(scan.status())
-    scan.controller.shut_down(keep_grip=True)
+    scan.controller.shut_down(StopLevel.KEEP)
     scan.until(lambda: not scan.controller.is_busy, 1.0)
     assert not scan.gripper.grips
     assert not scan.last_image.go
@@ -234,7 +235,7 @@ def test_replies_that_were_looked_at_late_tell_of_no_rest(caplog: pytest.LogCapt
     """The loop was held up: they are as old as their requests."""
     scan = holding()
     scan.controller.stop()
-    scan.controller.shut_down(keep_grip=True)
+    scan.controller.shut_down(StopLevel.KEEP)
     images = []
     for late in (0.0, 0.3, 0.3, 0.6):
         status = scan.status()

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import pytest
 
 from robotiq_async.control.ledger import WINDOW_S, Ledger
-from robotiq_async.control.stops import Level, Stop
+from robotiq_async.control.stops import Stop
 from robotiq_async.values.enums import NO_AXES, Mode
+from robotiq_async.values.enums import StopLevel as Level
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 from tests.register_words import status_of
@@ -124,7 +125,11 @@ def test_a_shutdown_with_nothing_to_stop_writes_nothing() -> None:
         # The whole last image is echoed; gGTO = 0 alone is not enough.
         (Level.SHUTDOWN, [Again(status_of(0x39, 0xC0, echo=ECHO))], STOPPED),
         *(
-            (Level.SHUTDOWN, [Again(status_of(0x31, echo=echo)), Again(status_of(0x39, echo=ECHO))], STOPPED)
+            (
+                Level.SHUTDOWN,
+                [Again(status_of(0x31, echo=echo)), Again(status_of(0x39, echo=ECHO))],
+                STOPPED,
+            )
             for echo in ((11, 20, 30, 40), (10, 21, 30, 40), (10, 20, 31, 40), (10, 20, 30, 41), (0,) * 4)
         ),
         (Level.SHUTDOWN, [status_of(0x30, echo=ECHO)], STOPPED),

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ...runtime.clock import now
 from ...runtime.log import Log
-from ...values.enums import Ending
+from ...values.enums import StopLevel
 from ...values.errors import AgentError, ControlLostError, RobotiqError
 from ..limited_log import LimitedLog
 from ..network.bus import Bus, Undo
@@ -81,7 +81,7 @@ class LeaseKeeper:
         self._reacquiring: asyncio.Task[Any] | None = None
         self._checking: asyncio.Task[Any] | None = None
         self._releasing: asyncio.Task[Any] | None = None  # the present release, or the last one
-        self._ending: Ending | None = None
+        self._level: StopLevel | None = None
         self._is_ending = False
 
     async def begin(self, deadline: float) -> None:
@@ -93,12 +93,12 @@ class LeaseKeeper:
                 if getattr(error, "reason", "late") != "late" or now() >= deadline:
                     raise
 
-    def end(self, ending: Ending) -> None:
+    def end(self, level: StopLevel) -> None:
         """The run ends: release the lease at once; see :meth:`release`."""
         if not self._is_ending and self._releasing is not None and self._releasing.done():
             self._releasing = None  # an earlier release, which has ended
         self._is_ending = True
-        self.release(ending)
+        self.release(level)
 
     def abandon(self) -> None:
         # The event loop is closed: nothing can be sent.
@@ -117,28 +117,32 @@ class LeaseKeeper:
                 return  # asked for it again, the agent would end what is under way
             await self._acquire({"what": "take" if take else "acquire"})
 
-    def release(self, ending: Ending) -> None:
+    def release(self, level: StopLevel) -> None:
         """Release the lease, if this client holds it; the request is sent within this call.
 
-        Called again before the release is acknowledged, or before the run is over, the strongest ending
+        Called again before the release is acknowledged, or before the run is over, the strongest level
         applies.
         """
         self._wants_control = False
         if self.is_in_control:
             self.lose("released", "it was released")
-            self._releasing, self._ending = None, None
+            self._releasing, self._level = None, None
         elif self._releasing is None or (self._releasing.done() and not self._is_ending):
             self._releasing = None
             return
-        if self._ending is None or ending > self._ending:
-            self._ending = ending
-            what = {"what": "release", "halt": ending > Ending.LEAVE, "keep_grip": ending is Ending.KEEP}
+        if self._level is None or level > self._level:
+            self._level = level
+            what = {
+                "what": "release",
+                "halt": level > StopLevel.LEAVE,
+                "keep_grip": level is StopLevel.KEEP,
+            }
             posted = self._run.requests.post(self._run.call(what), "lease", timeout=RELEASE_S)
             self._releasing = self._run.spawn(self._run.answer(posted))
             # After a stronger release, callers wait for that one, so the error of this one may go unread.
             self._releasing.add_done_callback(lambda task: task.cancelled() or task.exception())
-        elif ending < self._ending:
-            self._log.warning("a stop that is under way is stronger: the fingers are %s", self._ending.done)
+        elif level < self._level:
+            self._log.warning("a stop that is under way is stronger: the fingers are %s", self._level.done)
 
     async def released(self) -> None:
         """Wait until the release is acknowledged; errors as of :meth:`RemoteHand.release`."""

@@ -14,7 +14,7 @@ from ...hand import Hand
 from ...session.options import units_of
 from ...values.calibration import ForceCalibration, SpeedCalibration
 from ...values.checks import check_flag, check_seconds
-from ...values.enums import Ending, Finger, State, Trigger
+from ...values.enums import Finger, State, StopLevel, Trigger
 from ...values.errors import (
     InvalidStateError,
     NotAllowedError,
@@ -143,7 +143,7 @@ class RemoteHand(Hand):
         if session is not None and not session.has_ended:
             session.check_loop()
             session.outbox.drop()
-            await session.close(Ending.of(halt=halt, keep_grip=keep_grip))
+            await session.close(StopLevel.of(halt=halt, keep_grip=keep_grip))
 
     async def _open_bus(self) -> Bus:
         if self._shared_bus is not None:
@@ -198,9 +198,9 @@ class RemoteHand(Hand):
             RobotiqError: not started, the agent does not answer, or the fingers were not seen to stop.
         """
         check_flag("halt", halt)
-        ending = Ending.of(halt=halt, keep_grip=self._keeps_grip(keep_grip))
+        level = StopLevel.of(halt=halt, keep_grip=self._keeps_grip(keep_grip))
         keeper = self._running_session().keeper
-        keeper.release(ending)
+        keeper.release(level)
         with no_answer_as_lost_connection():
             await keeper.released()
 

@@ -14,7 +14,7 @@ from ...runtime.log import Log
 from ...session.streams import Channels
 from ...session.waiting import StateWaiters
 from ...values.checks import check_seconds
-from ...values.enums import Ending, State, Trigger
+from ...values.enums import State, StopLevel, Trigger
 from ...values.errors import (
     AgentError,
     ConnectFailedError,
@@ -144,20 +144,20 @@ class RemoteSession:
         why = "no agent was found: none is running, or the network or a certificate prevents the connection"
         raise ConnectFailedError(str(self.name), why)
 
-    async def close(self, ending: Ending) -> None:
+    async def close(self, level: StopLevel) -> None:
         """End the run within 2 s, also if the caller is cancelled; every caller waits for the end.
 
-        From this call on only requests that end motion are sent. Of several calls the strongest ending
-        applies. A hold or a halt that is not acknowledged yet makes a gentle ending stronger.
+        From this call on only requests that end motion are sent. Of several calls the strongest level
+        applies. A hold or a halt that is not acknowledged yet makes a gentle level stronger.
         """
         if self._closing is None:
             self.is_over = True
             is_holding = self.requests.has_undelivered_hold
-            ending = max(ending, self.stops.undelivered, Ending.KEEP if is_holding else Ending.LEAVE)
+            level = max(level, self.stops.undelivered, StopLevel.KEEP if is_holding else StopLevel.LEAVE)
             self.mirror.shut_down(State.DO_SHUTDOWN, Trigger.ASK_STOP, now())
             self.requests.end()
             self._closing = self.loop.create_task(self._close())
-        self.keeper.end(ending)
+        self.keeper.end(level)
         await wait_shielded(self._closing)
         self._closing.result()
 

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from ...runtime.clock import now
-from ...values.enums import Ending
+from ...values.enums import StopLevel
 from ...values.errors import AgentError, NotAllowedError, ProtocolError, RobotiqError
 from ..network.bus import Urgency
 from ..wire.envelope import Call
@@ -36,11 +36,11 @@ class Stops:
         self._cancels: set[asyncio.Task[Any]] = set()
 
     @property
-    def undelivered(self) -> Ending:
+    def undelivered(self) -> StopLevel:
         """The ending that a run needs at least, because of stops that are not acknowledged yet."""
         if self._halts:
-            return Ending.HALT
-        return Ending.KEEP if self._cancels else Ending.LEAVE
+            return StopLevel.SHUTDOWN
+        return StopLevel.KEEP if self._cancels else StopLevel.LEAVE
 
     def halt(self) -> asyncio.Task[Any]:
         return self._begin(self._halts, until_answered(self._halt_once, HALT_S))
