@@ -25,17 +25,17 @@ from ..values.errors import (
 from ..values.model import THREE_FINGER, Model
 from ..values.request import Request
 from ..values.status import RobotiqStatus
+from .entry import Entry
 from .evidence import FOLLOWS, Evidence, classify
 from .gate import gate
-from .keeping import Keeping
-from .ledger import NEVER, Entry, Ledger
+from .ledger import NEVER, Ledger
 from .limits import Limits
 from .motion import Move
 from .open_requests import OpenRequests
 from .pending import Command, Pending, merged
 from .procedures import Procedure
 from .state_machine import RUNNING, StateMachine
-from .stops import Stop
+from .stops import Keeping, Stop
 from .waiters import Waiter, fail, resolve
 
 WARNING_S: Final = 1.0

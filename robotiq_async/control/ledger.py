@@ -21,8 +21,7 @@ No I/O and no clock: time is that of the newest status.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from itertools import chain
 from typing import Final
 
@@ -32,6 +31,7 @@ from ..values.registers import Echo
 from ..values.request import AxisRequest, Request
 from ..values.status import RobotiqStatus
 from .adoption import Adoption
+from .entry import Entry, NoLimits
 from .rest import LONG_AGO, Asked, Grips, Moment, Rest, is_doubtful, rest_of
 
 WINDOW_S: Final = 0.5
@@ -40,101 +40,6 @@ WINDOW_S: Final = 0.5
 SILENT_S: Final = 0.25
 """How long a change without an echo (speed, force) may take to act: the slowest device cycle and 0.05 s."""
 NEVER: Final = float("-inf")
-
-
-@dataclass(slots=True, eq=False)
-class Entry:
-    """One image. Callers keep the entry and not its number, which may change.
-
-    Attributes:
-        number: its place in the order in which the entries act.
-        image: what is asked.
-        before: the image that it replaces.
-        echo: what a status repeats of it.
-        is_ours: whether this hand has written it.
-        sent: when, in monotonic seconds.
-        acknowledged: when; None before that.
-        shown: the first status that showed that it acts, as far as that was needed.
-        is_doubtful: whether it may or may not act.
-        asks: the axes whose request it changes.
-        again: those of them that it lets try again: it sets rGTO or raises the force.
-        rested: those of them that were proven to rest before it.
-        started: those of these that have shown motion since, so that no status from before can follow.
-    """
-
-    number: int
-    image: Request
-    before: Request
-    echo: Echo
-    is_ours: bool
-    sent: float
-    acknowledged: float | None = None
-    shown: Moment | None = None
-    is_doubtful: bool = False
-    asks: Finger = NO_AXES
-    again: Finger = NO_AXES
-    rested: Finger = NO_AXES
-    started: Finger = NO_AXES
-
-    @property
-    def time(self) -> float:
-        """From when on it may act."""
-        return self.sent if self.acknowledged is None else self.acknowledged
-
-    @property
-    def is_in_flight(self) -> bool:
-        return self.acknowledged is None and not self.is_doubtful
-
-    def asked(self, axis: Finger, shown: Moment | None) -> Asked:
-        position = self.image.position(axis) if self.image.go else None
-        return Asked(position, bool(self.again & axis), shown)
-
-    def asked_before(self, axis: Finger) -> Asked:
-        """What it replaces. Nothing is known of what was asked before another client, if rGTO was clear."""
-        known = self.before if self.before.go or self.is_ours else self.image
-        return Asked(known.position(axis) if known.go else None)
-
-
-class NoLimits:
-    """A gripper that echoes each request as it was written. The base of software limits (see limits.py).
-
-    Attributes:
-        limited: the limit that the gripper shows in place of the last request, by axis.
-    """
-
-    def __init__(self) -> None:
-        self.limited: dict[Finger, int] = {}
-
-    @property
-    def has_alias(self) -> bool:
-        """Whether an entry that has not shown may show as another echo than its own."""
-        return False
-
-    def written(self, entry: Entry, moved: Finger) -> None:
-        """An entry is about to be sent, with new positions for some axes."""
-
-    def shows(self, entry: Entry, echo: Echo, *, is_new: bool, now: float) -> bool:  # noqa: ARG002
-        """Whether an echo that is not that of the entry shows it all the same."""
-        return False
-
-    def explains(
-        self,
-        shown: Entry,  # noqa: ARG002
-        waiting: Sequence[Entry],  # noqa: ARG002
-        status: RobotiqStatus,  # noqa: ARG002
-        now: float,  # noqa: ARG002
-    ) -> bool:
-        """Whether a status that shows no entry may show one of those that wait."""
-        return False
-
-    def settle(self, entry: Entry, last: Entry, echo: Echo) -> None:
-        """An entry shows for the first time; ``last`` is the newest one."""
-
-    def rests(self, axis: Finger, status: RobotiqStatus) -> None:
-        """An axis has come to rest."""
-
-    def note_other_client(self, now: float) -> None:
-        """Another client was seen."""
 
 
 class Ledger:

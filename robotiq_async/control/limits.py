@@ -25,7 +25,8 @@ from ..values.model import TOLERANCE
 from ..values.registers import Echo
 from ..values.request import Request
 from ..values.status import RobotiqStatus
-from .ledger import NEVER, SILENT_S, Entry, NoLimits
+from .entry import Entry, NoLimits
+from .ledger import NEVER, SILENT_S
 
 ALONE_S: Final = 10.0
 """If another client was seen within this time, it explains the echo better than a limit."""

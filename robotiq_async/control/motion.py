@@ -12,7 +12,7 @@ from ..values.enums import NO_AXES, Finger, ObjectStatus
 from ..values.errors import ConnectionLostError, RobotiqError
 from ..values.move_result import MoveResult
 from ..values.status import RobotiqStatus
-from .ledger import Entry
+from .entry import Entry
 from .waiters import Waiter, fail
 
 MARGIN_S: Final = 2.0

@@ -7,7 +7,7 @@ from typing import Final
 from ..runtime.log import Log, log
 from ..values.enums import Finger
 from ..values.errors import MoveSupersededError, RobotiqError
-from .ledger import Entry
+from .entry import Entry
 from .motion import LiveMoves
 from .pending import Command, Pending
 from .waiters import Waiter, fail, resolve

@@ -17,8 +17,9 @@ from ..values.enums import Fault, Severity, State, Trigger
 from ..values.errors import GripperFaultError, NotActivatedError
 from ..values.request import Request
 from ..values.status import RobotiqStatus
+from .entry import Entry
 from .evidence import classify
-from .ledger import WINDOW_S, Entry, Ledger
+from .ledger import WINDOW_S, Ledger
 from .pending import at_rest
 
 Steps = Generator[Request | None, RobotiqStatus, None]

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 
 from robotiq_async import Fault, Finger, NotStartedError, RobotiqStatus
-from robotiq_async.control.keeping import KEEP_S, REST_S
+from robotiq_async.control.stops import KEEP_S, REST_S
 from robotiq_async.values.enums import StopLevel
 from tests.control.other_client import image
 from tests.control.scan import POLL_S, Scan, started

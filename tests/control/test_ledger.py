@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robotiq_async.control.adoption import DIRECTION_WAIT_S
-from robotiq_async.control.ledger import SILENT_S, WINDOW_S, Entry, Ledger
+from robotiq_async.control.entry import Entry
+from robotiq_async.control.ledger import SILENT_S, WINDOW_S, Ledger
 from robotiq_async.control.rest import LAG_READS, LAG_S
 from robotiq_async.values.enums import NO_AXES, Finger
 from robotiq_async.values.model import THREE_FINGER

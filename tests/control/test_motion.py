@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.control.ledger import Entry, Ledger
+from robotiq_async.control.entry import Entry
+from robotiq_async.control.ledger import Ledger
 from robotiq_async.control.motion import LiveMoves, Move
 from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.enums import Finger, ObjectStatus

@@ -9,8 +9,8 @@ from contextlib import suppress
 from inspect import signature
 from typing import Final
 
-from ...control.keeping import KEEP_S
 from ...control.state_machine import RUNNING
+from ...control.stops import KEEP_S
 from ...hand.robotiq_hand import RobotiqHand
 from ...runtime.clock import now
 from ...runtime.log import Log
