@@ -592,6 +592,39 @@ def test_no_axis_arrives_under_what_does_not_act_yet_nor_while_rgto_is_clear() -
     assert history.unrested == A
 
 
+def test_a_short_move_before_another_client_wrote_does_not_end_the_next_one() -> None:
+    """The late status of the short move shows motion, and rest far from what is asked by then."""
+    history = History(100)
+
+    def shown(a: int, b: int, at: float, what: int = 0xFF) -> None:
+        status = status_of(0x39, what, echo=(a, b, 100, 100), position=(min(a, 102), 100, 100, 100), at=at)
+        if history.look(status) is None:
+            history.adopt(status)
+        history.update_rest(status)
+
+    history.deliver(image(100).with_positions({A: 102}), 1.0, A)
+    shown(102, 100, 1.01)
+    shown(102, 101, 1.02)  # another client moves B by a count
+    history.deliver(image(100).with_positions({A: 200, B: 101}), 1.03, A)
+    shown(200, 101, 1.04, what=0b11_11_11_00)
+    shown(200, 101, 1.05)
+    assert history.unrested & A
+
+
+def test_a_contact_that_shows_as_rgto_rises_may_be_from_before() -> None:
+    """With rGTO clear gDT says nothing, so nothing contradicts it."""
+    history = History(100)
+    history.deliver(image(100, go=False), 1.0)
+    history.look(shows(100, 1.01, go=False))
+    history.restart(history.latest)
+    history.deliver(image(100).with_positions({A: 200}), 1.1, A)
+    history.look(
+        status_of(0x39, 0b11_11_11_10, echo=(200, 100, 100, 100), position=(150, 100, 100, 100), at=1.11)
+    )
+    history.update_rest(history.latest)
+    assert history.unrested & A
+
+
 # -- any sequence ------------------------------------------------------------------------------------------
 
 

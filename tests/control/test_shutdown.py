@@ -67,6 +67,20 @@ def test_the_shutdown_takes_back_an_activation_of_ours_that_began_after_the_link
     assert not scan.status().activation_echo
 
 
+def test_the_shutdown_takes_back_an_activation_whose_image_the_gripper_had_before_its_power_cut() -> None:
+    """It was reset by the cut: an equal image from before it says nothing of what acts."""
+    scan = started(device_cycle=0.2)
+    scan.gripper.power_cycle()
+    scan.until(lambda: scan.state is State.RESET)
+    scan.controller.activate()
+    scan.step()
+    assert scan.written[-1] == scan.written[0]
+    scan.step()
+    scan.stop()
+    scan.run(0.5)
+    assert not scan.status().activation_echo
+
+
 def test_stop_leaves_the_activation_of_others_alone() -> None:
     scan = activated_by_another()
     pinch = Request(activate=True, go=True, individual_scissor=False, mode=Mode.PINCH, axes=asked(100))
