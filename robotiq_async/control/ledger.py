@@ -290,21 +290,29 @@ class Ledger:
 
     def _find(self, status: RobotiqStatus) -> Entry | None:
         """The entry that a status shows: of those that fit its echo the first after the one shown before."""
-        # A control loop leaves a hundred entries in the window: look at each once, and call nothing.
-        echo, shown, limits = status.echo, self.shown, self._limits
-        is_new, is_limited = shown.echo != echo, limits.has_alias
-        fitting = [
-            each
-            for each in self._entries
-            if each.echo == echo
-            or (is_limited and limits.shows(each, echo, is_new=is_new, now=self.now.time))
-        ]
-        newer = [each for each in fitting if each.number > shown.number]
-        if newer:
-            self._show(newer[0], echo)
-        elif not fitting and self._is_limit(status):
-            return self._find(status)
-        return next(iter(newer or fitting), None)
+        # A control loop leaves a hundred entries in the window. Those that wait are few, and looked at first.
+        waiting = self._waiting()
+        newer = next((each for each in waiting if self._fits(each, status.echo)), None)
+        if newer is not None:
+            self._show(newer, status.echo)
+            return newer
+        older = next((each for each in self._entries if self._fits(each, status.echo)), None)
+        return self._find(status) if older is None and self._is_limit(waiting, status) else older
+
+    def _fits(self, entry: Entry, echo: Echo) -> bool:
+        """Whether an echo shows an entry, or the software limits in place of its requests."""
+        if entry.echo == echo or not self._limits.has_alias:
+            return entry.echo == echo
+        return self._limits.shows(entry, echo, is_new=self.shown.echo != echo, now=self.now.time)
+
+    def _waiting(self) -> list[Entry]:
+        """The entries after the one that shows, the oldest first."""
+        waiting: list[Entry] = []
+        for each in reversed(self._entries):
+            if each.number <= self.shown.number:
+                break
+            waiting.append(each)
+        return waiting[::-1]
 
     def _show(self, entry: Entry, echo: Echo) -> None:
         """An entry shows for the first time."""
@@ -342,10 +350,9 @@ class Ledger:
         )
         self._has_doubtful = any(each.is_doubtful for each in self._entries)
 
-    def _is_limit(self, status: RobotiqStatus) -> bool:
-        waiting = [each for each in self._entries if each.number > self.shown.number]
+    def _is_limit(self, waiting: list[Entry], status: RobotiqStatus) -> bool:
         is_unknown = any(each.acknowledged is None or each.is_doubtful for each in waiting)
-        if self._adoption is not None or is_unknown:
+        if not waiting or is_unknown or self._adoption is not None:
             return False
         return self._limits.explains(self.shown, waiting, status, self.now.time)
 
@@ -366,7 +373,7 @@ class Ledger:
         for axis, old in before.by_axis:
             if old.position != image.position(axis):
                 self.ours &= ~axis
-        waiting = [each for each in self._entries if each.number > self.shown.number]
+        waiting = self._waiting()
         self._past.extend(each for each in self._entries if each.number <= self.shown.number)
         self._entries, self.shown, self.match = deque([other, *waiting]), other, other
         for number, each in enumerate(waiting, other.number + 1):
