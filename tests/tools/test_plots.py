@@ -54,7 +54,11 @@ def test_events_are_written_above_the_curves(tmp_path: Path) -> None:
     axis = {"position": 6, "requested_position": 0, "current_ma": 0}
     status = {str(each.name): axis for each in THREE_FINGER.axes}
     long = "X" * 2 * LONGEST
-    events = [{"kind": "state", "target": name} for name in ("FIRST", "SECOND", long)]
+    events: list[dict[str, object]] = [
+        {"kind": "state", "target": "FIRST"},
+        {"kind": "mark", "label": "SECOND", "values": {}},
+        {"kind": "state", "target": long},
+    ]
     messages = [("/gripper/status", status), *(("/gripper/event", each) for each in events)]
     messages.append(("/gripper/status", status))
     entries = [

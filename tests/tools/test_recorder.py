@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import csv
 import errno
+import io
 import json
 import os
 import signal
 import sys
 import threading
 from asyncio.subprocess import PIPE
-from itertools import pairwise
+from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,7 @@ from robotiq_async.tools.description.joint_states import SCHEMA_NAME, JointState
 from robotiq_async.tools.description.kinematics import JOINTS, joint_angles
 from robotiq_async.tools.recording.recorder import Recorder
 from robotiq_async.tools.recording.recordings import read_recording, recover
+from robotiq_async.tools.recording.table import export
 from robotiq_async.values.errors import RecordingError
 from tests.grippers import until
 
@@ -38,6 +41,10 @@ def file(tmp_path: Path) -> Path:
 
 def statuses(file: Path) -> list[dict[str, Any]]:
     return [entry.fields for entry in read_recording(file) if entry.topic == "/gripper/status"]
+
+
+def table(file: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(file.read_text())))
 
 
 # -- what is in it -----------------------------------------------------------------------------------------
@@ -109,6 +116,58 @@ async def test_an_event_has_the_time_of_what_it_tells(
     (fault,) = [entry.fields for entry in entries if entry.fields.get("kind") == "fault"]
     shown = next(entry.fields for entry in entries if entry.fields.get("fault_code") == 9)
     assert fault["timestamp"] == shown["timestamp"]
+
+
+async def test_marks_are_events_and_label_what_comes_after_them(hand: RobotiqHand, tmp_path: Path) -> None:
+    mcap, csv_file, exported = (tmp_path / name for name in ("it.mcap", "it.csv", "exported.csv"))
+    async with Recorder(hand, mcap) as one, Recorder(hand, csv_file) as other:
+        for recorder in (one, other):
+            recorder.mark("grasp 1", object="cup", weight=0.25, wet=False)
+        await hand.move(60)
+        position = hand.status.position(Finger.A)
+        for recorder in (one, other):
+            recorder.mark("grasp 2")
+        await hand.move(0)
+        for recorder in (one, other):
+            recorder.mark("")
+        await hand.move(10)
+    events = [entry.fields for entry in read_recording(mcap) if entry.topic == "/gripper/event"]
+    marks = [each for each in events if each["kind"] == "mark"]
+    assert [(each["label"], each["values"]) for each in marks] == [
+        ("grasp 1", {"object": "cup", "weight": 0.25, "wet": False}),
+        ("grasp 2", {}),
+        ("", {}),
+    ]
+    assert export(read_recording(mcap), "status", exported)
+    for file in (csv_file, exported):
+        rows = table(file)
+        labels = [row["label"] for row in rows]
+        assert [label for label, _ in groupby(labels)][-3:] == ["grasp 1", "grasp 2", ""]
+        at = [int(row["A.position"]) for row in rows if row["label"] == "grasp 1"]
+        assert (at[0], at[-1]) == (6, position)
+    assert export(read_recording(mcap), "event", exported)
+    row = next(each for each in table(exported) if each["label"] == "grasp 1")
+    assert json.loads(row["values"]) == {"object": "cup", "weight": 0.25, "wet": False}
+
+
+async def test_a_mark_needs_a_recording_with_events_and_plain_values(
+    hand: RobotiqHand, tmp_path: Path
+) -> None:
+    recorder = Recorder(hand, tmp_path / "it.csv")
+    with pytest.raises(RecordingError, match="async with"):
+        recorder.mark("early")
+    async with recorder:
+        with pytest.raises(TypeError, match="label"):
+            recorder.mark(7)  # type: ignore[arg-type]
+        with pytest.raises(TypeError, match="object must be a str, int, float or bool, got None"):
+            recorder.mark("grasp", object=None)  # type: ignore[arg-type]
+        with pytest.raises(ValueError, match="weight must be finite, got nan"):
+            recorder.mark("grasp", weight=float("nan"))
+    with pytest.raises(RecordingError, match="async with"):
+        recorder.mark("late")
+    async with Recorder(hand, tmp_path / "it.mcap", ros2=True) as joints:
+        with pytest.raises(RecordingError, match="joint states only"):
+            joints.mark("grasp")
 
 
 async def test_it_tells_which_hand_it_is_of(file: Path) -> None:

@@ -55,11 +55,13 @@ def command_line(fields: Fields) -> str:
 
 
 def event_line(fields: Fields) -> str:
-    """The line for the initial state, a transition, a fault, or a warning of the library."""
+    """The line for the initial state, a transition, a fault, a mark, or a warning of the library."""
     if fields["kind"] == "log":
         return f"log      {fields['message']}"
     if fields["kind"] == "state":
         return f"state    {fields['target']}"
+    if fields["kind"] == "mark":
+        return f"mark     {' '.join([fields['label'], *(f'{k}={v}' for k, v in fields['values'].items())])}"
     if fields["kind"] == "fault":
         return f"fault    0x{fields['fault_code']:02X} {fields['fault']}: {fields['description']}"
     trigger = fields["trigger"]

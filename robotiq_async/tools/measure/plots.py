@@ -198,6 +198,8 @@ def _event(fields: dict[str, Any]) -> tuple[str, bool] | None:
     if "RUNNING_CC" in (fields.get("source"), fields.get("target")):
         return None
     is_fault = fields["kind"] == "fault"
+    if fields["kind"] == "mark":
+        return (_short(printable(fields["label"])) or "end of mark"), False
     name = _short(printable(fields["fault"] if is_fault else fields["target"]))
     return "fault cleared" if name == "NONE" else name, is_fault
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -23,7 +23,7 @@ from ...values.model import THREE_FINGER
 from ...values.status import RobotiqStatus
 from ..description.joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
 from ..description.kinematics import joint_angles, joint_names, joint_velocities
-from .payloads import SCHEMAS, Fields, efforts, fault_event, transition_fields
+from .payloads import SCHEMAS, Fields, efforts, fault_event, mark_fields, transition_fields
 
 BUFFER: Final = 100_000
 """Statuses kept while the event loop is busy with something else: minutes."""
@@ -154,6 +154,17 @@ class Feed:
                 )
         for source in self._sources:
             source.drain()
+
+    def mark(self, label: str, values: Mapping[str, object]) -> None:
+        """Publish a mark of now, after the statuses that have come before it.
+
+        Raises:
+            TypeError: a value is no text, number or truth value.
+            ValueError: a value is not finite.
+        """
+        fields = mark_fields(label, values, now())
+        self._sources[0].drain()
+        self._publish_json(EVENT, fields["timestamp"], fields)
 
     def nanoseconds(self, timestamp: float) -> int:
         """Convert a timestamp in monotonic seconds to nanoseconds since 1970."""

@@ -5,9 +5,12 @@ Statuses and requests have the JSON form of their ``as_dict()``.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import Any, Final
 
 from ...hand import Hand
+from ...values.checks import repr_of
 from ...values.enums import JAW, Fault, Finger, State
 from ...values.errors import NotStartedError
 from ...values.events import Transition
@@ -64,12 +67,14 @@ SCHEMAS: Final = {
         **_for_each_axis(position=INTEGER, speed=INTEGER, force=INTEGER),
     ),
     "event": object_schema(
-        kind={"type": "string", "enum": ["state", "transition", "fault"]},
+        kind={"type": "string", "enum": ["state", "transition", "fault", "mark"]},
         timestamp=NUMBER,
         source=STRING,
         target=STRING,
         trigger=STRING,
         **_FAULT,
+        label=STRING,
+        values={"type": "object", "additionalProperties": True},
     ),
     "state": object_schema(
         name=STRING,
@@ -108,6 +113,23 @@ def title(hand: Hand) -> str:
 def transition_fields(transition: Transition) -> Fields:
     """The event for a transition."""
     return {"kind": "transition", **transition.as_dict()}
+
+
+def mark_fields(label: str, values: Mapping[str, object], timestamp: float) -> Fields:
+    """The event for a mark of the program that records.
+
+    Raises:
+        TypeError: the label is no text, or a value no text, number or truth value.
+        ValueError: a value is infinite or not a number.
+    """
+    if not isinstance(label, str):
+        raise TypeError(f"label must be a str, got {repr_of(label)}")
+    for name, value in values.items():
+        if not isinstance(value, str | int | float):
+            raise TypeError(f"{name} must be a str, int, float or bool, got {repr_of(value)}")
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ValueError(f"{name} must be finite, got {value}")
+    return {"kind": "mark", "timestamp": timestamp, "label": label, "values": dict(values)}
 
 
 def is_command(event: Fields) -> bool:

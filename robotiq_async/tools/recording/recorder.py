@@ -7,10 +7,10 @@
 In this order the file contains start and stop, and a slow disk does not delay the stop.
 
 Four channels: ``/gripper/status`` (every poll), ``/gripper/command`` (every request that was written) and
-``/gripper/event`` (transitions and faults) as JSON with a JSON Schema; ``/joint_states`` as ROS 2 encodes it.
-Tools of ROS 2 refuse a file with other channels than ROS's: ``ros2=True`` leaves them out. A table has a row
-for every poll, and no commands. A thread writes to the disk twice a second. A killed program loses no more
-than that, and ``robotiq-async recover`` repairs its file.
+``/gripper/event`` (transitions, faults and marks) as JSON with a JSON Schema; ``/joint_states`` as ROS 2
+encodes it. Tools of ROS 2 refuse a file with other channels than ROS's: ``ros2=True`` leaves them out. A
+table has a row for every poll, and no commands. A thread writes to the disk twice a second. A killed program
+loses no more than that, and ``robotiq-async recover`` repairs its file.
 """
 
 from __future__ import annotations
@@ -114,6 +114,8 @@ class Recorder:
         self._hand = hand
         self._feed = Feed(hand, self._take)
         self._outbox = _Outbox()
+        self._joints_only = ros2
+        self._is_open = False
         self._format = self._make_format(ros2=ros2)
         self._file: FileIO
         self._saving: asyncio.Task[None]
@@ -157,6 +159,7 @@ class Recorder:
         except OSError as error:
             raise RecordingError(f"{self.path}: {error.strerror}") from error
         self._feed.start()
+        self._is_open = True
         self._saving = loop.create_task(self._save_again_and_again(), name="robotiq_async recorder")
         return self
 
@@ -171,6 +174,26 @@ class Recorder:
         await wait_shielded(asyncio.ensure_future(self._end()))
         if self._failed.done() and error is None:
             raise self._failed.result()
+
+    def mark(self, label: str, **values: str | float | bool) -> None:
+        """Write a mark: what happens from now on has this label, until the next mark. Never blocks.
+
+        Every row of a table has the label as of its poll; the values are with the events. ``mark("")`` ends
+        the last one.
+
+        Args:
+            label: such as ``"grasp 7"``.
+            **values: such as ``object="cup"``; text, finite numbers and truth values.
+
+        Raises:
+            TypeError: a label or a value of another type.
+            ValueError: an infinite value, or not a number.
+            RecordingError: the block is not entered or over, or the recording has joint states only.
+        """
+        if not self._is_open or self._joints_only:
+            why = "joint states only" if self._joints_only else "not recording: use 'async with'"
+            raise RecordingError(f"{self.path}: {why}")
+        self._feed.mark(label, values)
 
     async def failure(self) -> RecordingError:
         """Wait until a write fails (a full disk, for example); everything saved before stays readable."""
@@ -201,6 +224,7 @@ class Recorder:
                     await self._over.wait()
 
     async def _end(self) -> None:
+        self._is_open = False
         await self._feed.stop()
         self._over.set()
         try:

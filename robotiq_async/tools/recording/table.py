@@ -30,6 +30,8 @@ _MAY_LACK: Final = ("B", "C", "SCISSOR")
 """The axes that a sibling of the 3-Finger does not have."""
 STATE: Final = "state"
 """The column with the state of the hand as of the last event; the JSON of a status does not have it."""
+LABEL: Final = "label"
+"""The column with the label of the last mark."""
 
 NEARBY: Final = 100  # entries in the window for sorting
 PREFIX: Final = "/gripper/"
@@ -38,13 +40,13 @@ PREFIX: Final = "/gripper/"
 def _names(schema: Mapping[str, Any], prefix: str = "") -> list[str]:
     names: list[str] = []
     for name, part in schema["properties"].items():
-        is_axis = part.get("type") == "object"
+        is_axis = "properties" in part
         names += _names(part, f"{prefix}{name}.") if is_axis else [f"{prefix}{name}"]
     return names
 
 
 COLUMNS: Final = {
-    "status": ["time", STATE, *_names(SCHEMAS["status"])],
+    "status": ["time", STATE, LABEL, *_names(SCHEMAS["status"])],
     "command": ["time", *_names(SCHEMAS["command"])],
     "event": ["time", *_names(SCHEMAS["event"])],
 }
@@ -58,14 +60,19 @@ class Table:
         self._kind = kind
         self._names = COLUMNS[kind]
         self._state = ""
+        self._label = ""
 
     def row(self, kind: str, nanoseconds: int, fields: Fields) -> list[object] | None:
         """The row of a message of this kind, with its time since 1970; None if it has none."""
         if kind == "event" and "target" in fields:
             self._state = fields["target"]
+        if kind == "event" and fields.get("kind") == "mark":
+            self._label = str(fields["label"])
         if kind != self._kind:
             return None
-        given = {"time": wall_clock(nanoseconds), STATE: self._state}
+        given = {"time": wall_clock(nanoseconds)}
+        if kind == "status":
+            given |= {STATE: self._state, LABEL: self._label}
         return [_cell(given[name] if name in given else _value(fields, name, kind)) for name in self._names]
 
 
