@@ -12,7 +12,7 @@ from ipaddress import IPv4Address, IPv6Address
 from typing import Final, Literal
 
 from ..values.checks import check_byte, repr_of
-from ..values.model import Model, model_of
+from ..values.model import MODELS, Model, model_of
 
 TCP_PORT: Final = 502  # the port of Modbus TCP, and the gripper's
 
@@ -24,6 +24,8 @@ FORMS: Final = (
     "zenoh://SITE/HOST/GRIPPER (on another host: for robotiq_async.fleet.RemoteHand and for commands); "
     "?model=2f85, 2f140 or hand-e at the end for a sibling of the 3-Finger"
 )
+
+LINE: Final = "the line runs at 115200 baud, 8N1, as a gripper does out of the box (manual)"
 
 SLOWEST: Final = 0.01
 FASTEST: Final = 1000.0
@@ -104,6 +106,8 @@ def parse_address(address: object) -> Address:
     scheme, separator, rest = address.partition("://")
     scheme = scheme.lower()
     if not separator:
+        if meant := _meant(address):
+            raise ValueError(f"malformed address {address!r}: {meant}; accepted: {FORMS}")
         scheme, rest = "tcp", address
     try:
         rest, model = _without_model(rest)
@@ -114,6 +118,9 @@ def parse_address(address: object) -> Address:
     if scheme == "rtu" and rest.strip("/") and rest == rest.strip() and rest.isprintable():
         if "://" in rest:  # pyserial would open it, and block the event loop for seconds
             what = f"{rest} is no serial port; for one behind a TCP socket use rtu+tcp://HOST:PORT"
+            raise ValueError(f"malformed address {address!r}: {what}; accepted: {FORMS}")
+        if "=" in rest.partition("?")[2]:
+            what = f"a serial port has no option but model, got {rest.partition('?')[2]!r}; {LINE}"
             raise ValueError(f"malformed address {address!r}: {what}; accepted: {FORMS}")
         return Address("rtu", rest, model=model)
     if scheme in ("tcp", "rtu+tcp"):
@@ -129,6 +136,23 @@ def parse_address(address: object) -> Address:
             f"{address!r} is a gripper on another host: use robotiq_async.fleet.RemoteHand; accepted: {FORMS}"
         )
     raise ValueError(f"malformed address {address!r}; accepted: {FORMS}")
+
+
+def _meant(address: str) -> str:
+    """What somebody may have meant by an address without a scheme; empty if it may be a host."""
+    if re.fullmatch(r"com[0-9]{1,3}", address, re.IGNORECASE):
+        return f"a serial port is rtu://{address.upper()}"
+    if address.startswith("/dev/"):
+        return f"a serial port is rtu://{address}"
+    name = next((name for name in MODELS if _plain(name) == _plain(address)), None)
+    if name is None:
+        return ""
+    return f"a model is part of an address: tcp://192.168.1.11?model={name}, or sim://?model={name}"
+
+
+def _plain(model: str) -> str:
+    """The name of a model as people type it: Hand-E, hande, hand_e."""
+    return re.sub(r"[-_ ]", "", model).lower()
 
 
 def _without_model(text: str) -> tuple[str, Model | None]:

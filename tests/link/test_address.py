@@ -166,6 +166,30 @@ def test_a_malformed_address_is_a_value_error_that_shows_it(what: str) -> None:
 PORTS_THAT_ARE_NONE = ["", "0", "65536", "-1", "+502", " 502", "502 ", "5_02", "5.02", "1e3", "0x1F6", "x"]
 
 
+@pytest.mark.parametrize(
+    ("what", "meant"),
+    [
+        ("COM3", "rtu://COM3"),
+        ("com12", "rtu://COM12"),
+        ("/dev/ttyUSB0", "rtu:///dev/ttyUSB0"),
+        ("2f85", "tcp://192.168.1.11?model=2f85"),
+        ("2F-140", "?model=2f140"),
+        ("HandE", "?model=hand-e"),
+        ("rtu:///dev/ttyUSB0?baudrate=9600", "115200 baud"),
+        ("rtu://COM3?baudrate=9600&model=2f85", "got 'baudrate=9600'"),
+    ],
+)
+def test_what_somebody_may_have_meant_is_told(what: str, meant: str) -> None:
+    message = refusal(what)
+    assert message.startswith(f"malformed address {what!r}: ")
+    assert meant in message.partition("; accepted")[0]
+
+
+@pytest.mark.parametrize("host", ["com", "com3.lab", "2f85.lab", "dev"])
+def test_a_host_that_only_looks_like_that_is_a_host(host: str) -> None:
+    assert parse_address(host).host == host
+
+
 @pytest.mark.parametrize("port", [*PORTS_THAT_ARE_NONE, "502:502", "502\n", "\u0665", "50\u00b2", "9" * 5000])
 def test_a_malformed_port_is_a_value_error(port: str) -> None:
     for host in ("192.168.1.11", "tcp://gripper", "tcp://[::1]", "rtu+tcp://host"):
