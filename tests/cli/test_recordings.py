@@ -235,6 +235,13 @@ def test_recover_makes_a_broken_one_whole(grasp: Path, call: Call) -> None:
     call("recover", str(grasp)).assert_failed(1, "File exists")
 
 
+def test_a_part_of_a_recording_is_drawn(grasp: Path, call: Call) -> None:
+    call("plot", str(grasp), "--from", "0", "--to", "1e6").assert_succeeded()
+    picture = str(grasp.with_name("part"))
+    call("plot", str(grasp), picture, "--from", "1e6").assert_failed(1, "between --from and --to")
+    call("plot", str(grasp), picture, "--from", "2", "--to", "1").assert_failed(2, "less than --to")
+
+
 @pytest.mark.parametrize("command", ["replay", "plot"])
 def test_of_a_broken_one_it_is_said_that_it_is(command: str, grasp: Path, call: Call) -> None:
     assert call(command, str(grasp)).err == ""

@@ -50,25 +50,39 @@ def test_currents_over_time_are_drawn_near_the_usual_force_values(
     assert [int(each.split()[1]) for each in words(picture) if each.startswith("force ")] == drawn
 
 
-def test_events_are_written_above_the_curves(tmp_path: Path) -> None:
+LONG = "X" * 2 * LONGEST
+
+
+def recorded() -> list[Entry]:
+    """A status, three events and a status, each a second after the other."""
     axis = {"position": 6, "requested_position": 0, "current_ma": 0}
     status = {str(each.name): axis for each in THREE_FINGER.axes}
-    long = "X" * 2 * LONGEST
     events: list[dict[str, object]] = [
         {"kind": "state", "target": "FIRST"},
         {"kind": "mark", "label": "SECOND", "values": {}},
-        {"kind": "state", "target": long},
+        {"kind": "state", "target": LONG},
     ]
     messages = [("/gripper/status", status), *(("/gripper/event", each) for each in events)]
     messages.append(("/gripper/status", status))
-    entries = [
+    return [
         Entry(topic, second * 10**9, 0, json.dumps(fields).encode(), is_json=True)
         for second, (topic, fields) in enumerate(messages)
     ]
-    _, picture = plot_recording(tmp_path / "it", entries)
+
+
+def test_events_are_written_above_the_curves(tmp_path: Path) -> None:
+    _, picture = plot_recording(tmp_path / "it", recorded())
     text = picture.read_text(encoding="utf-8")
     places = [text.index(f'id="{each}"') for each in ("axes_1", "axes_2", "axes_3")]
-    for name in ("FIRST", "SECOND", long[: LONGEST - 3] + "..."):
+    for name in ("FIRST", "SECOND", LONG[: LONGEST - 3] + "..."):
         assert places[0] < text.index(f"<!-- {name} -->") < places[1], "not above the positions"
     assert all(before < after for before, after in pairwise(places))
     assert Finger.A.name in words(picture)
+
+
+def test_a_part_is_drawn_with_the_times_of_the_whole(tmp_path: Path) -> None:
+    _, picture = plot_recording(tmp_path / "it", recorded(), begin=1.5, end=4)
+    text = picture.read_text(encoding="utf-8")
+    assert "<!-- FIRST -->" not in text
+    assert "<!-- SECOND -->" in text
+    assert plot_recording(tmp_path / "none", recorded(), begin=1.5, end=3) == []

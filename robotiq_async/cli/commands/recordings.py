@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -150,17 +151,30 @@ def _keep(*files: Path, overwrite: bool) -> None:
             raise CommandError(f"{file}: File exists; --overwrite replaces it")
 
 
-def plot(file: Path, picture: Path | None = None, /, *, overwrite: Overwrite = False) -> None:
-    """Draw positions, currents and events of a recording over time, as PNG and SVG.
+def plot(
+    file: Path,
+    picture: Path | None = None,
+    /,
+    *,
+    begin: Annotated[float, Parameter(name="--from", metavar="SECONDS", show_default=False)] = 0.0,
+    end: Annotated[float, Parameter(name="--to", metavar="SECONDS", show_default=False)] = math.inf,
+    overwrite: Overwrite = False,
+) -> None:
+    """Draw positions, currents, events and marks of a recording over time, as PNG and SVG.
 
     For example:
 
         robotiq-async plot grasp.mcap
+        robotiq-async plot grasp.mcap first --from 2 --to 7.5
 
     Args:
         file: The recording.
         picture: Name of the plot without suffix (default: that of the recording).
+        begin: Draw what came after this time; the time axis begins with the recording.
+        end: Draw what came before this time.
     """
+    if not 0 <= begin < end:
+        raise UsageError(f"--from must be 0 or more and less than --to, got {begin:g} and {end:g}")
     entries = _entries(file)
     need("matplotlib", "plot")
     from ...tools.measure.plots import plot_recording
@@ -170,9 +184,10 @@ def plot(file: Path, picture: Path | None = None, /, *, overwrite: Overwrite = F
         target = target.with_suffix("")
     _keep(*(target.with_name(f"{target.name}.{suffix}") for suffix in ("png", "svg")), overwrite=overwrite)
     with file_errors(target):
-        pictures = plot_recording(target, entries)
+        pictures = plot_recording(target, entries, begin=begin, end=end)
     if not pictures:
-        raise CommandError(f"{file}: it contains no status")
+        is_part = begin > 0 or end < math.inf
+        raise CommandError(f"{file}: it contains no status{' between --from and --to' if is_part else ''}")
     for written in pictures:
         print(written)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from array import array
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -128,12 +129,21 @@ def plot_current_over_time(path: Path, by_surface: Mapping[str, Currents], label
     return files
 
 
-def plot_recording(path: Path, entries: Iterable[Entry]) -> list[Path]:
-    """Plot positions, currents and events of a recording, its JSON messages, over time.
+def plot_recording(
+    path: Path, entries: Iterable[Entry], *, begin: float = 0.0, end: float = math.inf
+) -> list[Path]:
+    """Plot positions, currents, events and marks of a recording, its JSON messages, over time.
 
     Only the plotted values are kept in memory. Writes no files when there is no status to draw.
+
+    Args:
+        path: of the pictures, without suffix.
+        entries: of the recording.
+        begin: seconds from the first message on; what came before is not drawn.
+        end: in the same seconds.
     """
-    seconds, began = array("d"), 0
+    seconds = array("d")
+    first: int | None = None
     events: list[Event] = []
     drawn = {axis: {what: array("h") for what in DRAWN} for axis in WIDTHS}
 
@@ -145,8 +155,10 @@ def plot_recording(path: Path, entries: Iterable[Entry]) -> list[Path]:
                 column.append(status[axis][what])
 
     for entry in entries:
-        began = began or entry.nanoseconds
-        at = (entry.nanoseconds - began) / 1e9
+        first = entry.nanoseconds if first is None else first
+        at = (entry.nanoseconds - first) / 1e9
+        if not begin <= at <= end:
+            continue
         if entry.topic == "/gripper/event" and (event := entry.read(_event)):
             events.append((at, *event))
         if entry.topic == "/gripper/status":
@@ -154,7 +166,7 @@ def plot_recording(path: Path, entries: Iterable[Entry]) -> list[Path]:
             seconds.append(at)
     if not seconds:
         return []
-    labels = list(_labels(events, apart=LABEL * seconds[-1]))
+    labels = list(_labels(events, apart=LABEL * (seconds[-1] - seconds[0])))
     height = STRIP * max((len(words) for _, words, _ in labels), default=1)
     with _figure(path, path.name, rows=3, ratios=(height, 3, 3)) as (axes, files):
         strip, positions, currents = axes
