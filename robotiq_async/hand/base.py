@@ -312,7 +312,7 @@ class Hand(ABC):
     async def halt(self) -> None:
         """Stop every axis now (rGTO = 0). The next command goes again, and moves only the axes it names.
 
-        Returns when the gripper shows that it has stopped, at most 0.5 s after the acknowledgement. Awaited
+        Returns when the gripper shows that it has stopped, at most 1 s after the acknowledgement. Awaited
         moves end with MoveSupersededError. When cancelled, the halt is sent all the same. In RESET and
         ATR_DONE nothing moves and nothing is sent. rGTO does not stop an activation or an automatic release:
         during these, halt() clears rACT, as :meth:`reset` does, and returns in RESET.
