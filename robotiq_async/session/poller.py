@@ -252,12 +252,13 @@ class Poller:
 
     async def _cycle(self) -> None:
         """Read, decide, write. Write a stop before reading, too: a gripper may obey and not answer."""
-        if await self._is_due(LONGEST_SPACING_S, urgent=True):
+        controller = self._controller
+        if controller.has_request and await self._is_due(LONGEST_SPACING_S, urgent=True):
             await self._write()
         for _ in range(READS):
             await self._poll_once()
-            if not await self._is_due(SOON_S):
-                return
+            if not (controller.has_request and await self._is_due(SOON_S)):
+                return  # most cycles end here
             if not self._is_held_up():
                 break
         await self._write()
