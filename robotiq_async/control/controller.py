@@ -41,6 +41,7 @@ from .waiters import Waiter, fail, resolve
 WARNING_S: Final = 1.0
 """Seconds between two warnings about another client."""
 _OFF: Final = frozenset({State.DO_SHUTDOWN, State.SHUTDOWN})
+_CALLS: Final = frozenset({Trigger.ASK_COMMAND, Trigger.ASK_HOLD, Trigger.ASK_HALT})
 _STATES: Final = {
     Trigger.SEEN_BUSY: State.WF_ACTIVATION,
     Trigger.SEEN_RESET: State.RESET,
@@ -321,7 +322,10 @@ class Controller:
         return State.RUNNING_CC if halts or self._requests.is_asked else State.RUNNING_IDLE
 
     def _show(self, trigger: Trigger) -> None:
-        self.machine.show(self._view(), trigger)
+        state = self._view()
+        if state is State.RUNNING_CC and trigger not in _CALLS and self.machine.state is not state:
+            state = State.RUNNING_IDLE  # a call begins it, and not a fault that clears while a hold waits
+        self.machine.show(state, trigger)
 
     # -- what a status says ----------------------------------------------------------------------------
 

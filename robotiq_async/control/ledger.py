@@ -155,6 +155,11 @@ class Ledger:
                 yield each
 
     @property
+    def may_set_go(self) -> bool:
+        """Whether an image that does not show yet sets rGTO."""
+        return any(each.image.go for each in self._waiting())
+
+    @property
     def may_begin_to_move(self) -> bool:
         """Whether an image that does not act yet, or does not show in gDT yet, may start an axis.
 

@@ -99,7 +99,11 @@ class Stop:
 
     def is_reached(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         entry = self.entry
-        if entry is None or entry.acknowledged is None or self.is_early or not ledger.acts(entry):
+        if entry is None or entry.acknowledged is None or self.is_early:
+            return False
+        if self.level is StopLevel.HALT and not status.go_echo and not ledger.may_set_go:
+            return True  # nothing that may act later sets rGTO, so it need not act
+        if not ledger.acts(entry):
             return False
         is_reset = classify(status) is Trigger.SEEN_RESET
         match self.level:

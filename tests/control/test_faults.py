@@ -6,6 +6,7 @@ import pytest
 
 from robotiq_async import Fault, Finger, GripperFaultError, NotActivatedError, State
 from robotiq_async.control.evidence import LASTS_READS
+from robotiq_async.values.enums import Trigger
 from robotiq_async.values.request import Request
 from tests.control.other_client import moved_by_another
 from tests.control.scan import POLL_S, Scan, started
@@ -188,3 +189,19 @@ def test_stops_pending_in_fault_are_not_written_once_the_activation_is_lost(scan
     assert scan.state is State.RESET
     assert len(scan.written) == writes
     assert not scan.gripper.is_moving
+
+
+@pytest.mark.parametrize("stop", ["hold", "halt"])
+def test_a_fault_that_clears_before_a_stop_is_sent_leads_to_where_the_table_says(stop: str) -> None:
+    scan = started()
+    scan.command(A, position=255, speed=0)
+    scan.run(0.2)
+    scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    scan.until(lambda: scan.state is State.FAULT)
+    scan.gripper.clear_faults()
+    outcome = scan.hold(A) if stop == "hold" else scan.halt()
+    scan.step()
+    assert scan.transitions[-1] == (State.FAULT, State.RUNNING_IDLE, Trigger.SEEN_READY)
+    scan.run(0.1)
+    assert outcome.answers == [None]
+    assert scan.state is State.RUNNING_IDLE

@@ -129,6 +129,19 @@ def test_a_speed_after_a_halt_waits_until_the_gripper_has_stopped() -> None:
     assert (scan.last_image.go, scan.last_image.axes[0].speed) == (False, 9)
 
 
+def test_a_motion_after_a_halt_at_rest_does_not_wait() -> None:
+    """A force that does not act yet sets nothing in motion."""
+    scan = started()
+    scan.command(A, force=200)
+    scan.step()
+    halter = scan.halt()
+    scan.step()
+    scan.command(A, position=100)
+    scan.run(0.02)
+    assert halter.answers == [None]
+    assert scan.last_image.go
+
+
 def test_a_halt_fails_with_the_link_and_is_not_sent_later() -> None:
     scan = started(device_cycle=0.2)
     scan.command(A, position=255, speed=0)
