@@ -61,7 +61,8 @@ def event_line(fields: Fields) -> str:
     if fields["kind"] == "state":
         return f"state    {fields['target']}"
     if fields["kind"] == "mark":
-        return f"mark     {' '.join([fields['label'], *(f'{k}={v}' for k, v in fields['values'].items())])}"
+        values = (f"{name}={value}" for name, value in fields["values"].items())
+        return f"mark     {' '.join([fields['label'] or '(end)', *values])}"
     if fields["kind"] == "fault":
         return f"fault    0x{fields['fault_code']:02X} {fields['fault']}: {fields['description']}"
     trigger = fields["trigger"]
