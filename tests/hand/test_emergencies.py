@@ -94,6 +94,19 @@ async def test_a_release_ended_by_an_activation_of_another_client_fails_at_once(
     assert hand.state in (State.WF_ACTIVATION, State.RUNNING_IDLE)
 
 
+@pytest.mark.parametrize("how", ["reset", "halt"])
+async def test_a_release_that_was_ended_from_here_says_by_what(
+    hand: RobotiqHand, gripper: SimulatedGripper, how: str
+) -> None:
+    gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    await hand.wait_for_state(State.FAULT)
+    releasing = asyncio.create_task(hand.atr())
+    await hand.wait_for_state(State.WF_ATR)
+    await (hand.reset() if how == "reset" else hand.halt())
+    with pytest.raises(InvalidStateError, match="took over"):
+        await releasing
+
+
 async def test_a_halt_in_the_first_activation_ends_the_start(
     server: SimulatorServer, gripper: SimulatedGripper
 ) -> None:
