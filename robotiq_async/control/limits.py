@@ -16,7 +16,7 @@ position at which the axis came to rest, and not with MoveSupersededError.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 from ..runtime.log import Log, log
@@ -79,7 +79,7 @@ class Limits(NoLimits):
     def settle(self, entry: Entry, last: Entry, echo: Echo) -> None:
         """If an entry shows as limits in place of requests, make it an entry of these limits."""
         if echo == entry.echo:
-            self.forget(entry.image, echo)
+            self.forget(entry.image)
         else:
             # Later entries with the same request would echo the limit as well; the last is the base.
             for axis, limit in self.apply(entry.image).items():
@@ -148,9 +148,9 @@ class Limits(NoLimits):
                 return limit
         return None
 
-    def forget(self, image: Request, echo: Echo) -> None:
-        """Drop the limits that a status refutes by showing the image as it was written."""
-        beyond: Mapping[Finger, int] = self.apply(image) if echo == image.echo else {}
+    def forget(self, image: Request) -> None:
+        """Drop the limits that a status refutes by showing an image as it was written."""
+        beyond = self.apply(image)
         self._known = {key: limit for key, limit in self._known.items() if key[0] not in beyond}
 
 

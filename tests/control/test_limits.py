@@ -262,7 +262,7 @@ def test_unproven_limits_are_dropped_when_another_client_is_seen() -> None:
     assert limits.prove(S, 219) is None, "no news"
     limits.note_other_client(0.0)
     assert limits.apply(image) == {S: 220}
-    limits.forget(image, image.echo)
+    limits.forget(image)
     assert not limits.apply(image)
 
 
@@ -270,7 +270,7 @@ def test_unproven_limits_are_dropped_when_another_client_is_seen() -> None:
 def test_a_request_at_a_limit_does_not_refute_it_and_one_beyond_does(asked: int, limit: int) -> None:
     limits, beyond, at = Limits(), BEFORE.with_positions({S: asked}), BEFORE.with_positions({S: limit})
     assert limits.learn(BEFORE, beyond, status_of(0x39, 0xFF, echo=(0, 0, 0, limit), position=130))
-    limits.forget(at, at.echo)
+    limits.forget(at)
     assert limits.apply(beyond) == {S: limit}
-    limits.forget(beyond, beyond.echo)
+    limits.forget(beyond)
     assert not limits.apply(beyond)

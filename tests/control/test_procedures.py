@@ -12,6 +12,7 @@ from robotiq_async.values.enums import Fault, Mode
 from robotiq_async.values.errors import GripperFaultError, NotActivatedError
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
+from tests.control.histories import BUSY, FAULTY, READY, RELEASED, RESET, RUNNING
 from tests.register_words import status_of
 
 IMAGE = Request(
@@ -23,13 +24,7 @@ IMAGE = Request(
 )
 """An image with something in every field, so that what a procedure keeps can be told from what it sets."""
 
-RESET = status_of(0x00)
-BUSY = status_of(0x11)
-READY = status_of(0x31)
-RUNNING = status_of(0x39, 0xC0)
-FAULTY = status_of(0x39, fault=0x0E)
 RELEASING = status_of(0x11, fault=0x0B)
-RELEASED = status_of(0x01, fault=0x0F)
 
 Begin = Callable[[Callable[[RobotiqStatus], Request]], Steps]
 BEGIN_WITH: dict[Begin, RobotiqStatus] = {activation: RESET, automatic_release: FAULTY}

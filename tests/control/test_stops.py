@@ -13,6 +13,7 @@ from robotiq_async.values.enums import NO_AXES, Mode
 from robotiq_async.values.enums import StopLevel as Level
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
+from tests.control.histories import BUSY, FAULTY, READY, RELEASED, RESET, RUNNING
 from tests.register_words import status_of
 
 IMAGE = Request(
@@ -24,12 +25,6 @@ IMAGE = Request(
 ECHO = (10, 20, 30, 40)
 HERE = (1, 2, 3, 4)
 
-RESET = status_of(0x00)
-BUSY = status_of(0x11)
-READY = status_of(0x31)
-RUNNING = status_of(0x39, 0xC0)
-FAULTY = status_of(0x39, fault=0x0E)
-RELEASED = status_of(0x01, fault=0x0F)
 BEFORE = status_of(0x39, 0xC0, echo=ECHO, position=HERE)
 STOPPED = status_of(0x31, 0xC0, echo=ECHO)
 

@@ -74,13 +74,18 @@ async def test_halts_and_resets_at_once_all_end(hand: RobotiqHand, gripper: Simu
     assert not gripper.is_moving
 
 
+async def begun_release(hand: RobotiqHand, gripper: SimulatedGripper) -> asyncio.Task[None]:
+    """A call of atr() in a fault."""
+    gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    await hand.wait_for_state(State.FAULT)
+    return asyncio.create_task(hand.atr())
+
+
 async def test_a_release_ended_by_an_activation_of_another_client_fails_at_once(
     hand: RobotiqHand, gripper: SimulatedGripper, clock: Clock
 ) -> None:
     """It waited out its 60 s when the reset fell between two polls."""
-    gripper.inject_fault(Fault.SCISSOR_BLOCKED)
-    await hand.wait_for_state(State.FAULT)
-    releasing = asyncio.create_task(hand.atr())
+    releasing = await begun_release(hand, gripper)
     async for status in hand.statuses():
         if status.fault is Fault.AUTOMATIC_RELEASE:
             break
@@ -98,9 +103,7 @@ async def test_a_release_ended_by_an_activation_of_another_client_fails_at_once(
 async def test_a_release_that_was_ended_from_here_says_by_what(
     hand: RobotiqHand, gripper: SimulatedGripper, how: str
 ) -> None:
-    gripper.inject_fault(Fault.SCISSOR_BLOCKED)
-    await hand.wait_for_state(State.FAULT)
-    releasing = asyncio.create_task(hand.atr())
+    releasing = await begun_release(hand, gripper)
     await hand.wait_for_state(State.WF_ATR)
     await (hand.reset() if how == "reset" else hand.halt())
     with pytest.raises(InvalidStateError, match="took over"):
