@@ -51,7 +51,7 @@ _STATES: Final = {
 
 
 class Due(NamedTuple):
-    """What there is to write.
+    """The next write: when it may leave, and whether it is urgent.
 
     Attributes:
         wait: seconds until it may leave, because of write_spacing.
@@ -272,7 +272,7 @@ class Controller:
 
     @property
     def passing_faults(self) -> int:
-        """How often 0x09 was shown in passing."""
+        """The number of times that 0x09 has passed."""
         return self._evidence.passed
 
     @property
@@ -466,7 +466,7 @@ class Controller:
     # -- what is written -------------------------------------------------------------------------------
 
     def due(self, now: float) -> Due | None:
-        """What there is to write; None for nothing."""
+        """The next write, if there is one to make."""
         if not self.has_request:
             return None
         stop, status = self._stop, self._evidence.status
@@ -577,7 +577,7 @@ class Controller:
         return entry
 
     def acknowledged(self, now: float) -> None:
-        """What decide() gave was acknowledged."""
+        """The image that decide() returned was acknowledged."""
         self._written_at = now
         entry = self._ledger.acknowledge(now)
         self._requests.acknowledged()

@@ -60,7 +60,7 @@ class Entry:
         return Asked(position, bool(self.again & axis), shown)
 
     def asked_before(self, axis: Finger) -> Asked:
-        """What it replaces. Nothing is known of what was asked before another client, if rGTO was clear."""
+        """The request that it replaces: unknown before another client's, if rGTO was clear."""
         known = self.before if self.before.go or self.is_ours else self.image
         return Asked(known.position(axis) if known.go else None)
 

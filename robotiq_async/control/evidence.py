@@ -78,7 +78,7 @@ class Evidence:
 
     @property
     def passed(self) -> int:
-        """How often 0x09 was shown in passing."""
+        """The number of times that 0x09 has passed."""
         return self._passing.passed
 
     @property

@@ -90,7 +90,7 @@ class Ledger:
 
     @property
     def last(self) -> Entry:
-        """What the gripper has, or is about to have."""
+        """The entry that the gripper has, or is about to have."""
         if not self._has_doubtful:
             return self._entries[-1]
         return next(each for each in reversed(self._entries) if not each.is_doubtful)

@@ -57,7 +57,7 @@ class OpenRequests:
     # -- what becomes of it ----------------------------------------------------------------------------
 
     def sending(self, sent: Pending, entry: Entry) -> None:
-        """What was taken from the pending changes goes out with this entry."""
+        """The changes taken from the pending ones go out with this entry."""
         self._sent = sent
         if sent.positions:
             self.moves.written(entry)

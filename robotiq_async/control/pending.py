@@ -1,4 +1,4 @@
-"""What callers have asked for and is not written yet, and the images that it makes of the last one.
+"""Requests of callers that are not written yet, and the images that they make of the last one.
 
 All requests between two polls are merged into one write; the last value wins. A position, a speed or a force
 is written once and never again: it may move an axis. A hold remains until it is acknowledged, also over a

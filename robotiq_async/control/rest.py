@@ -64,7 +64,7 @@ class Asked(NamedTuple):
 
 
 class Rest(Enum):
-    """What is known of an axis that shows rest."""
+    """The certainty with which an axis that shows rest is at rest."""
 
     __hash__ = object.__hash__  # see State
 

@@ -29,7 +29,7 @@ REST_S: Final = 0.05
 """Time for which every axis must rest: ten polls. rest.py waits, besides, for recent requests that gDT may
 not show yet."""
 HALTS: Final = 2
-"""How often a halt is sent at most. Then its caller gets the answer, even if rGTO still shows."""
+"""The most times that a halt is sent. Then its caller gets the answer, even if rGTO still shows."""
 
 
 class Stop:
@@ -188,7 +188,7 @@ class Keeping(Stop):
         return None if held == base else held
 
     def _trouble(self, ledger: Ledger, status: RobotiqStatus) -> str:
-        """Why the condition of the gripper forbids it; empty for no reason."""
+        """The reason that the condition of the gripper gives against it; empty for none."""
         # Any fault, also a minor one: its clearing is an event that nobody would be there to see.
         condition = classify(status)
         if condition is not Trigger.SEEN_READY or status.fault is not Fault.NONE:
@@ -196,7 +196,7 @@ class Keeping(Stop):
         return "another client commands the gripper" if ledger.match is None else ""
 
     def _unrest(self, ledger: Ledger, status: RobotiqStatus) -> str:
-        """Why the axes do not allow it; empty for no reason."""
+        """The reason that the axes give against it; empty for none."""
         if status.timestamp - ledger.now.time > KEEP_S:
             return "the newest status is old: something holds up the event loop"
         # A late object status is worth a wait. A write that was lost with the link is not.

@@ -139,7 +139,7 @@ def parse_address(address: object) -> Address:
 
 
 def _meant(address: str) -> str:
-    """What somebody may have meant by an address without a scheme; empty if it may be a host."""
+    """A guess at an address without a scheme that names no host; empty if it may be one."""
     if re.fullmatch(r"com[0-9]{1,3}", address, re.IGNORECASE):
         return f"a serial port is rtu://{address.upper()}"
     if address.startswith("/dev/"):
