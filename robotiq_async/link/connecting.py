@@ -16,10 +16,10 @@ from ..values.errors import ConnectFailedError
 from .address import Address
 from .host_names import addresses_of, why_no_socket, why_unreachable
 from .serial_ports import hasten, why_no_port
+from .silence import BAUD
 
 Client = AsyncModbusTcpClient | AsyncModbusSerialClient
 
-BAUD: Final = 115200  # baud rate of the gripper's serial line; 8 data bits, no parity, 1 stop bit (manual)
 LARGEST_READ: Final = 4096  # bytes read from the socket at a time; the longest Modbus frame has 260
 KEEPALIVE: Final = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 5}
 """TCP keepalive: seconds of silence before the first probe, seconds between probes, probes without an answer.

@@ -26,6 +26,10 @@ _EXCEPTIONS = {
     10: "gateway path unavailable",
     11: "gateway target does not respond",
 }
+_FROM_GATEWAYS: Final = (10, 11)
+"""The exceptions that only a gateway sends (Modbus Application Protocol 7)."""
+_PASSING: Final = (5, 6, 11)
+"""The exceptions of a device that may answer the next time: it works, is busy, or was not heard in time."""
 
 
 _CHECKSUM: Final = 2
@@ -34,12 +38,11 @@ _WRITE: Final = 16
 """Function code of a write of several registers."""
 _READ_REQUEST: Final = Struct(">BBHH")
 """Unit, function, address, count."""
-_WRITE_REQUEST: Final = Struct(f">BBHHB{REGISTER_COUNT}H")
-"""Unit, function, address, count, number of bytes, registers."""
+_WRITE_REQUEST: Final = Struct(">BBHHB")
+"""Unit, function, address, count, number of bytes; the registers follow."""
 _HEADER: Final = Struct(">HHH")
 """Before a request over TCP: transaction, protocol 0, bytes that follow."""
 _BLOCK: Final = Struct(f">{REGISTER_COUNT}H")
-_WHOLE: Final = f": a hand writes all {REGISTER_COUNT} at once, and a gateway must let that through"
 
 
 def read_request(registers: RegisterMap, count: int) -> bytes:
@@ -48,9 +51,10 @@ def read_request(registers: RegisterMap, count: int) -> bytes:
 
 
 def write_request(registers: RegisterMap, image: Sequence[int]) -> bytes:
-    """Unit and PDU of the write of a whole image (FC16)."""
-    size = 2 * REGISTER_COUNT
-    return _WRITE_REQUEST.pack(registers.device_id, _WRITE, registers.request, REGISTER_COUNT, size, *image)
+    """Unit and PDU of the write of an image of eight registers (FC16), as many of them as the gripper has."""
+    count = registers.count
+    head = _WRITE_REQUEST.pack(registers.device_id, _WRITE, registers.request, count, 2 * count)
+    return head + _BLOCK.pack(*image)[: 2 * count]
 
 
 def tcp_frame(number: int, request: bytes) -> bytes:
@@ -75,8 +79,24 @@ def check_sum(frame: bytes) -> None:
 
 
 def registers_in(reply: bytes, *, serial: bool) -> Registers:
-    """The eight registers in a complete reply to a read of all."""
-    return _BLOCK.unpack_from(reply, 3 if serial else 9)
+    """The registers in a complete reply to a read; those that it did not ask for are 0."""
+    at = 3 if serial else 9
+    return _BLOCK.unpack(reply[at : at + reply[at - 1]].ljust(_BLOCK.size, b"\0"))
+
+
+def is_write(frame: bytes) -> bool:
+    """Whether a request frame of a serial line writes."""
+    return frame[1] == _WRITE
+
+
+class RefusedError(ProtocolError):
+    """A whole reply that refuses the request.
+
+    Attributes:
+        is_passing: whether the same request may be answered the next time.
+    """
+
+    is_passing = False
 
 
 class MisfitError(ProtocolError):
@@ -103,27 +123,50 @@ class Expected(NamedTuple):
 
         Raises:
             MisfitError: the bytes cannot become the answer.
-            ProtocolError: more bytes than the answer, or the device refuses the request.
+            RefusedError: the device refuses the request.
         """
         if len(frame) == self.size and frame.startswith(self.start):
             return True  # the usual case
         if _agree(frame, self.start):
             if len(frame) > self.size:
-                raise ProtocolError(f"{len(frame) - self.size} bytes more than the answer: {show(frame)}")
+                raise MisfitError(f"{len(frame) - self.size} bytes more than the answer: {show(frame)}")
             return len(frame) == self.size
         if not _agree(frame, self.refusal):
             raise self._misfit(frame)
         if len(frame) < self.refusal_size:
             return False
-        raise ProtocolError(_refused(self.refusal[-1] & 0x7F, frame[len(self.refusal)]))
+        code = frame[len(self.refusal)]
+        refused = RefusedError(self._refused(code))
+        refused.is_passing = code in _PASSING
+        raise refused
+
+    @property
+    def _function(self) -> int:
+        return self.refusal[-1] & 0x7F
+
+    @property
+    def _count(self) -> int:
+        """The number of registers that the good answer to a write confirms."""
+        return int.from_bytes(self.start[-2:], "big")
+
+    def _refused(self, code: int) -> str:
+        """The message for an exception reply, with advice where there is some."""
+        function = self._function
+        who = "gateway" if code in _FROM_GATEWAYS else "gripper"
+        said = f"the {who} refuses function {function}: exception {code} ({_EXCEPTIONS.get(code, 'unknown')})"
+        if function == _WRITE and code in (1, 2, 3):
+            return said + _whole(self._count)
+        if function != _WRITE and code == 1:
+            return f"{said}: read_function={7 - function} asks with the other one"
+        return said
 
     def _misfit(self, frame: bytes) -> MisfitError:
         """The error for bytes that are not the answer."""
-        function, at = self.refusal[-1] & 0x7F, len(self.start) - 2
+        at = len(self.start) - 2
         count = int.from_bytes(frame[at : at + 2], "big")  # of registers, in the answer to a write
-        is_shorter = len(frame) == self.size and frame.startswith(self.start[:at]) and count < REGISTER_COUNT
-        if function == _WRITE and is_shorter:
-            what = f"it reports {count} registers written, and not {REGISTER_COUNT}{_WHOLE}"
+        is_shorter = len(frame) == self.size and frame.startswith(self.start[:at]) and count < self._count
+        if self._function == _WRITE and is_shorter:
+            what = f"it reports {count} registers written, and not {self._count}{_whole(self._count)}"
             return MisfitError(f"not the answer: {what}")
         return MisfitError(f"not the answer: {show(frame)}, expected {show(self.start)}...")
 
@@ -157,14 +200,8 @@ def _expected(request: bytes, checksum: int) -> Expected:
     return Expected(unit + pdu, 1 + len(pdu) + payload + checksum, refusal, 3 + checksum)
 
 
-def _refused(function: int, code: int) -> str:
-    """The message for an exception reply, with advice where there is some."""
-    said = f"the gripper refuses function {function}: exception {code} ({_EXCEPTIONS.get(code, 'unknown')})"
-    if function == _WRITE and code in (1, 2, 3):
-        return said + _WHOLE
-    if function != _WRITE and code == 1:
-        return f"{said}: read_function={7 - function} asks with the other one"
-    return said
+def _whole(count: int) -> str:
+    return f": a hand writes all {count} at once, and a gateway must let that through"
 
 
 def _length(size: int) -> bytes:

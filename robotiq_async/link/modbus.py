@@ -4,15 +4,17 @@ pymodbus's asynchronous client opens and closes the connection, TCP or serial. T
 here, because a client that may retry, reconnect or accept a doubtful reply could send a motion twice:
 
 * One client object per connection, without retries and without reconnecting.
-* Every byte that arrives is checked against the one reply expected (frames.py). Anything but the whole right
-  answer, in time, ends the exchange *and* the connection: on a link that is out of step the next reply could
-  be the answer to this request.
+* Every byte that arrives is checked against the one reply expected (exchange.py, frames.py). Anything but the
+  whole right answer, in time, ends the exchange *and* the connection: on a link that is out of step the next
+  reply could be the answer to this request.
 * Transaction ids start at random and continue over connections, so that a reply left over from an earlier
   connection is recognised. They repeat after 65,535 requests.
 * Timeouts come from a watchdog that looks once in a while (watchdog.py). ``asyncio.wait_for`` costs more, on
   Python 3.11 swallows a cancellation that lands together with the reply, and takes a blocked loop for silence
   although the reply is waiting in the socket.
-* On a serial line a read whose answer is missing or damaged is asked once more; see :meth:`_read_again`.
+* A read, the first one of a connection too, is asked once more where its answer can be missing or damaged
+  without harm: on a serial line, and when a gateway or a gripper says that it is busy (:meth:`_read_again`).
+  A write is never repeated: whether the first one was carried out is unknown.
 * Foreign exceptions stop here.
 """
 
@@ -27,6 +29,7 @@ from typing import Any, Final
 
 import anyio
 
+from ..runtime.clock import clock_of
 from ..runtime.log import Log, log
 from ..values.errors import (
     ConnectFailedError,
@@ -38,18 +41,17 @@ from ..values.errors import (
 from ..values.registers import REGISTER_COUNT, RegisterMap, Registers
 from .address import Address
 from .connecting import Client, connected_client, disconnect
+from .exchange import Exchange, strays
 from .frames import (
-    Expected,
     MisfitError,
-    check_sum,
-    expected_reply,
+    RefusedError,
     read_request,
     registers_in,
     serial_frame,
-    show,
     tcp_frame,
     write_request,
 )
+from .silence import Silence
 from .watchdog import Watchdog
 
 # pymodbus logs every failed connection attempt; our exceptions say the same. A level that the application
@@ -62,11 +64,6 @@ LAST_NUMBER: Final = 0xFFFF
 """Transaction ids are 1 to this."""
 SETTLE_S: Final = 0.02
 """From connecting to the first request over TCP: a few round trips of a network in a building."""
-SILENCE_S: Final = 0.00175
-"""Least silence between two frames on a serial line: 3.5 characters, above 19200 baud this fixed time (Modbus
-over Serial Line 2.5.1.1)."""
-TIMER_S: Final = 0.0001
-"""How early a timer of the loop may fire."""
 HUSH_S: Final = 0.02
 """Silence after which the rest of a damaged reply is over: a USB adapter may hold bytes back for 16 ms (the
 usual latency timer of FTDI chips)."""
@@ -76,11 +73,20 @@ REPEAT_S: Final = 0.15
 """Time for a repeated read, so that a write after it still fails within a second."""
 USUAL_RESPONSE_S: Final = 0.4
 """A longer response timeout means a slow line: a repeated read then gets that timeout instead of REPEAT_S."""
+SHORT_READS: Final = 3
+"""Reads after the short silence, at opening, before a line is trusted with it."""
 REPEAT_WARNING_S: Final = 60.0
 """At most one warning about repeated reads in this time."""
 
 NOISE: Final = (MisfitError, ResponseTimeoutError)
 """Errors that a lost or damaged byte can cause."""
+
+
+Bears = Callable[[RobotiqConnectionError], bool]
+
+
+def _nothing(_: RobotiqConnectionError) -> bool:
+    return False
 
 
 class ModbusTransport:
@@ -116,26 +122,28 @@ class ModbusTransport:
         self._client: Client | None = None
         self._line: Any = None
         """The asyncio transport of the connection; pymodbus's class for serial ports is not typed."""
-        self._answer: asyncio.Future[bytes] | None = None
-        """The reply of the exchange in flight."""
-        self._expected: Expected | None = None
-        self._received = b""
-        """The part of the reply that has arrived."""
+        self._exchange: Exchange | None = None
+        """The exchange in flight."""
         self._failure: RobotiqConnectionError | None = None
-        """Why the link broke between two exchanges; the next exchange raises it."""
+        """What happened to the link between two exchanges; the next exchange raises it."""
         self._number = secrets.randbelow(LAST_NUMBER)
         """Transaction id of the last request; starts at random to differ from those of other programs."""
+        self._poll = read_request(registers, registers.count)
         self._probe = 0
         """Number of registers that the last read for :meth:`_resynchronise` asked for."""
-        self._poll = read_request(registers, REGISTER_COUNT)
+        self._rest: Registers = ()
+        """The registers after those that a poll reads, as they were at opening, if any was not 0."""
         self._loop: asyncio.AbstractEventLoop
+        self._clock: Callable[[], float]
         self._watchdog: Watchdog
-        self._heard = -math.inf
-        """When the last bytes arrived, in the loop's time; kept for serial lines only."""
+        self._silence: Silence
+        self._needs_long_silence = False
+        self._is_echoed: bool | None = False
+        """Whether the line echoes what is sent; None until the first exchange of a connection tells."""
         self._is_hushing = False
         """Whether arriving bytes are dropped as the rest of a damaged reply."""
         self._warned = -math.inf
-        """When the last warning about a repeated read was logged, in the loop's time."""
+        """When the last warning about a repeated read was logged."""
 
     @property
     def is_open(self) -> bool:
@@ -152,9 +160,11 @@ class ModbusTransport:
         """
         await self.close()
         self._loop = loop = asyncio.get_running_loop()
+        self._clock = clock_of(loop)
         self._watchdog = Watchdog(loop, self._response_timeout, lambda: self._is_waiting, self._on_timeout)
-        self._failure = self._expected = None
-        self._received = b""
+        self._silence = Silence(self._clock)
+        self._silence.is_long = self._needs_long_silence
+        self._failure, self._is_echoed = None, None if self._rtu else False
         try:
             with anyio.fail_after(self._connect_timeout):
                 client = await connected_client(
@@ -167,16 +177,20 @@ class ModbusTransport:
         self._client, self._line = client, client.ctx.transport
         if self._address.is_socket:
             await self._settle(SETTLE_S)
-        await self._resynchronise()
+        self._silence.heard = self._clock()  # whatever the line carried for the last connection
+        await self._greet()
+        if self._keeps_silence and not self._needs_long_silence:
+            await self._try_short_silence()
 
     async def read(self) -> Registers:
-        if not self._rtu:
-            return registers_in(await self._exchange(self._poll), serial=False)
         try:
-            answer = await self._exchange(self._poll, bears_noise=True)
-        except NOISE as error:
+            answer = await self._ask(self._poll, bears=self._can_repeat)
+        except RobotiqConnectionError as error:
+            if not self._can_repeat(error):
+                raise
             answer = await self._read_again(_plain(error))
-        return registers_in(answer, serial=True)
+        registers = registers_in(answer, serial=self._rtu)
+        return registers[: self._map.count] + self._rest if self._rest else registers
 
     async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
         """Write what ``decide`` returns, if anything; on a serial line after the silence between frames.
@@ -184,8 +198,9 @@ class ModbusTransport:
         Raises:
             RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
         """
-        if self._keeps_silence:
-            await self._pause()
+        if self._can_repeat(self._failure):  # a write must not meet what is left of a disturbance
+            await self._bring_in_step(math.inf)
+        await self._pause()
         registers = decide()
         if registers is None:
             return False
@@ -193,12 +208,12 @@ class ModbusTransport:
         return True
 
     async def write(self, registers: Sequence[int]) -> None:
-        """Write the eight request registers with one FC16, exactly once.
+        """Write the request registers with one FC16, exactly once; a jaw has three of the eight.
 
         Raises:
             RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
         """
-        await self._exchange(write_request(self._map, registers))
+        await self._ask(write_request(self._map, registers))
 
     async def close(self) -> None:
         """Disconnect; does nothing when closed."""
@@ -211,32 +226,34 @@ class ModbusTransport:
             # Between two requests the link broke, or bytes arrived without a request.
             failure, self._failure = self._failure, None
             self._drop()
-            raise failure
+            raise _plain(failure)
         if self._client is None:
             raise ConnectionLostError(f"not connected to {self._address}")
 
-    async def _exchange(self, request: bytes, *, by: float = math.inf, bears_noise: bool = False) -> bytes:
+    async def _ask(self, request: bytes, *, by: float = math.inf, bears: Bears = _nothing) -> bytes:
         """Send one request and wait for its reply; every other outcome closes the connection.
 
         Args:
             request: unit and PDU.
             by: when it must be over, in the loop's time, even if the response timeout is longer.
-            bears_noise: keep the connection after an error of NOISE and raise it as it is: the caller brings
-                the line back in step.
+            bears: tells errors after which the connection stays open. They are raised as they are: the caller
+                brings the line back in step.
         """
+        failure = self._failure
+        if failure is not None and bears(failure):
+            self._failure = None
+            raise failure
         self._check_connected()
-        if self._keeps_silence:
-            await self._pause()
+        await self._pause()
         frame = serial_frame(request) if self._rtu else tcp_frame(self._next_number(), request)
-        self._expected = expected_reply(frame, serial=self._rtu)
-        answer: asyncio.Future[bytes] = self._loop.create_future()
-        self._answer = answer
+        exchange = Exchange(frame, self._loop, serial=self._rtu, is_echoed=self._is_echoed)
+        self._exchange = exchange
         self._watchdog.watch(by)
         try:
             self._line.write(frame)
-            return await answer
+            answer = await exchange.answer
         except RobotiqConnectionError as error:
-            if bears_noise and isinstance(error, NOISE):
+            if bears(error):
                 raise
             self._drop()
             raise _plain(error) from None
@@ -246,12 +263,23 @@ class ModbusTransport:
         except BaseException:
             # Cancelled in the middle of an exchange: its answer must not become that of another one.
             self._drop()
-            if answer.done() and not answer.cancelled():
-                answer.exception()  # asyncio reports an exception that was never looked at
+            if exchange.answer.done() and not exchange.answer.cancelled():
+                exchange.answer.exception()  # asyncio reports an exception that was never looked at
             raise
         finally:
-            self._answer = self._expected = None
-            self._received = b""
+            self._exchange = None
+        self._is_echoed = bool(exchange.is_echoed)
+        return answer
+
+    def _can_repeat(self, error: Exception | None) -> bool:
+        """Whether a read can be asked again after this error."""
+        if isinstance(error, RefusedError):
+            return error.is_passing
+        return self._rtu and isinstance(error, NOISE)
+
+    def _can_do_without(self, error: RobotiqConnectionError) -> bool:
+        """Whether the error may only mean that a jaw does not serve eight registers."""
+        return self._can_repeat(error) or isinstance(error, RefusedError | ResponseTimeoutError)
 
     def _next_number(self) -> int:
         """A transaction id. Never 0, which some devices answer to anything."""
@@ -260,7 +288,7 @@ class ModbusTransport:
 
     @property
     def _is_waiting(self) -> bool:
-        return self._answer is not None and not self._answer.done()
+        return self._exchange is not None and self._exchange.is_waiting
 
     def _on_timeout(self) -> None:
         self._fail(
@@ -269,10 +297,10 @@ class ModbusTransport:
 
     def _fail(self, error: RobotiqConnectionError) -> None:
         """End the exchange in flight with an error; without one, keep the error for the next exchange."""
-        if self._answer is not None and not self._answer.done():
-            self._answer.set_exception(error)
-        elif self._failure is None:
-            self._failure = _plain(error)
+        if self._exchange is not None and self._exchange.is_waiting:
+            self._exchange.fail(error)
+        elif self._failure is None or not self._can_repeat(error):
+            self._failure = error
 
     def _drop(self) -> None:
         client, self._client = self._client, None
@@ -285,24 +313,13 @@ class ModbusTransport:
     def _on_data(self, data: bytes) -> None:
         """Take what has arrived; the last byte of the reply ends the exchange, or the first wrong one."""
         if self._rtu:
-            self._heard = self._loop.time()
+            self._silence.heard = self._clock()
             if self._is_hushing:
                 return
-        frame, self._received = self._received + data, b""
-        try:
-            if self._expected is None or self._answer is None:
-                raise ProtocolError(f"{len(frame)} bytes without a request: {show(frame)}")
-            if not self._expected.is_complete(frame):
-                self._received = frame
-                return
-            if self._rtu:
-                check_sum(frame)
-        except ProtocolError as error:
+        if self._exchange is None or not self._exchange.is_waiting:
+            self._fail(strays(data))
+        elif (error := self._exchange.take(data)) is not None:
             self._fail(error)
-            return
-        self._expected = None  # every byte after this one has no request
-        if not self._answer.done():
-            self._answer.set_result(frame)
 
     def _on_connection(self, connected: bool) -> None:
         if not connected:
@@ -324,16 +341,58 @@ class ModbusTransport:
             raise
         self._check_connected()
 
-    async def _resynchronise(self, by: float = math.inf) -> None:
+    async def _greet(self) -> None:
+        """Make the first exchange of a connection, twice if the first one fails harmlessly.
+
+        The tool port of some arms loses the first request of a connection, and ``socat`` with ``waitslave``
+        connects only when it sees one. A device with three registers may refuse the read of eight, or not
+        answer it.
+        """
+        asks_for_rest = not self._probe and self._map.count < REGISTER_COUNT
+        bears = self._can_do_without if asks_for_rest else self._can_repeat
+        try:
+            await self._resynchronise(bears=bears)
+        except RobotiqConnectionError as error:
+            if not bears(error):
+                raise
+            try:
+                await self._bring_in_step(self._repeat_by())
+            except RobotiqConnectionError as again:
+                raise _plain(error) from again
+            if asks_for_rest:
+                self._log.info("%s did not answer a read of all registers: %s", self._address, _plain(error))
+
+    async def _try_short_silence(self) -> None:
+        """Read a few times after 3.5 characters of silence; take the longer one if an answer is missing."""
+        try:
+            for _ in range(SHORT_READS):
+                await self._resynchronise(bears=self._can_repeat)
+        except NOISE as error:
+            self._needs_long_silence = self._silence.is_long = True
+            self._log.warning(
+                "%s does not answer after a silence of 0.3 ms, so it gets 1.75 ms: %s", self._address, error
+            )
+            await self._bring_in_step(math.inf)
+
+    async def _resynchronise(self, by: float = math.inf, *, bears: Bears = _nothing) -> None:
         """Make sure that no answer to an earlier request is still on its way.
 
         Serial replies carry no transaction id, and a gateway from TCP to a serial line gives a late reply the
-        id of the next request. So this reads one to seven registers instead of eight, a different count each
-        time. A late answer has another length and ends the connection. The gripper answers in order, so
-        after an answer of the right length nothing older can follow.
+        id of the next request. So this reads fewer registers than a poll, another number each time. A late
+        answer to a poll has another length. The gripper answers in order, so after an answer of the right
+        length nothing older than the last of these reads can follow, and so no status.
+
+        The first one of all asks a jaw for eight registers, which show a wrong model.
         """
-        self._probe = self._probe % (REGISTER_COUNT - 1) + 1
-        await self._exchange(read_request(self._map, self._probe), by=by)
+        count, all_asked = self._map.count, not self._probe
+        if all_asked and count < REGISTER_COUNT:
+            self._probe = REGISTER_COUNT
+            answer = await self._ask(read_request(self._map, REGISTER_COUNT), by=by, bears=bears)
+            rest = registers_in(answer, serial=self._rtu)[count:]
+            self._rest = rest if any(rest) else ()
+            return
+        self._probe = self._probe % (count - 1) + 1
+        await self._ask(read_request(self._map, self._probe), by=by, bears=bears)
 
     async def _read_again(self, why: RobotiqConnectionError) -> bytes:
         """Read once more on a line that lost or damaged a byte, as USB adapters occasionally do.
@@ -341,7 +400,7 @@ class ModbusTransport:
         The second answer must not be the first one that was only late. So first wait for silence and drop the
         rest of a damaged reply. Then bring the line in step as after opening, with a read of another length:
         if the first answer arrives now, it has the wrong length and ends the connection. Only then read the
-        status. A write is never repeated: whether the first one was carried out is unknown.
+        status.
 
         Args:
             why: the error of the first read.
@@ -349,19 +408,26 @@ class ModbusTransport:
         Raises:
             RobotiqConnectionError: ``why``, if there is again no clean answer; the connection is closed.
         """
-        is_slow = self._response_timeout > USUAL_RESPONSE_S
-        by = self._loop.time() + (self._response_timeout if is_slow else REPEAT_S)
+        by = self._repeat_by()
         try:
-            await self._hush()
-            await self._resynchronise(by)
-            answer = await self._exchange(self._poll, by=by)
+            await self._bring_in_step(by)
+            answer = await self._ask(self._poll, by=by)
         except RobotiqConnectionError as error:
             raise why from error
         self.repeats += 1
-        if self._heard - self._warned >= REPEAT_WARNING_S:
-            self._warned = self._heard
+        if (now := self._clock()) - self._warned >= REPEAT_WARNING_S:
+            self._warned = now
             self._log.warning("a read was repeated: %s (%d times so far)", why, self.repeats)
         return answer
+
+    def _repeat_by(self) -> float:
+        """When a repeated read must be over, in the loop's time."""
+        is_slow = self._response_timeout > USUAL_RESPONSE_S
+        return self._loop.time() + (self._response_timeout if is_slow else REPEAT_S)
+
+    async def _bring_in_step(self, by: float) -> None:
+        await self._hush()
+        await self._resynchronise(by)
 
     async def _hush(self) -> None:
         """Drop what arrives until the line is silent.
@@ -369,17 +435,16 @@ class ModbusTransport:
         Raises:
             ProtocolError: the line does not become silent; the connection is closed.
         """
-        loop = self._loop
-        began = loop.time()
+        began = self._clock()
         self._is_hushing, until = True, began + HUSH_S
         if isinstance(self._failure, ProtocolError):
             self._failure = None  # more of the damaged reply came before this task ran
         try:
-            while (left := until - loop.time()) > 0:
-                if loop.time() - began > LONGEST_HUSH_S:
+            while (left := until - self._clock()) > 0:
+                if self._clock() - began > LONGEST_HUSH_S:
                     raise ProtocolError(f"{self._address}: the line does not become silent")
                 await asyncio.sleep(left)
-                until = max(until, self._heard + HUSH_S)
+                until = max(until, self._silence.heard + HUSH_S)
         except BaseException:
             self._drop()
             raise
@@ -388,11 +453,17 @@ class ModbusTransport:
 
     async def _pause(self) -> None:
         """Keep the silence between frames: what follows sooner may be taken for part of the last frame."""
-        left = self._heard + SILENCE_S - self._loop.time()
-        if left > TIMER_S:
-            await self._settle(left)
+        if not self._keeps_silence:
+            return
+        self._check_connected()
+        try:
+            await self._silence.keep()
+        except BaseException:
+            self._drop()
+            raise
+        self._check_connected()
 
 
 def _plain(error: RobotiqConnectionError) -> RobotiqConnectionError:
-    """The error as users see it: MisfitError is for this link alone."""
-    return ProtocolError(error.message) if isinstance(error, MisfitError) else error
+    """The error as users see it: some kinds are for this link alone."""
+    return ProtocolError(error.message) if isinstance(error, MisfitError | RefusedError) else error

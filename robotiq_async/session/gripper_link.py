@@ -121,6 +121,7 @@ def registers_of(
         status=_int_or("status_address", status_address, 0, LAST_BLOCK, usual.status),
         read_function=_int_or("read_function", read_function, 3, 4, usual.read_function),
         device_id=_int_or("device_id", device_id, *units, usual.device_id),
+        count=usual.count,
     )
 
 

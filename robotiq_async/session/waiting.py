@@ -105,7 +105,8 @@ class StallWatch:
             return
         state, is_priority = self._machine.state, item.fault.severity is Severity.PRIORITY
         waits = state is State.WF_ATR or (state is State.WF_ACTIVATION and is_priority)
-        shown = (*item.registers[:-1], item.registers[-1] >> 8)  # the low byte of the last one is reserved
+        first, fault, *middle, last = item.registers
+        shown = (first, fault & 0x0FFF, *middle, last >> 8)  # without the reserved bits
         if not waits or shown != self._shown:
             self._shown, self._since = shown, item.timestamp
         elif item.timestamp - self._since >= STALLED_S and self._scope is not None:

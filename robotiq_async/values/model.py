@@ -229,7 +229,8 @@ _JAW: Final = (Finger.A,)
 _ADAPTIVE_FAULTS: Final = tuple(Fault.adaptive(code) for code in range(16))
 # No model of these speaks Modbus TCP (but for the retired universal controller): a gateway passes on the
 # registers of the serial line. The vendor's software reads with function 3, newer manuals list 4 and 23.
-_GATEWAY: Final = RegisterMap(request=0x03E8, status=0x07D0, read_function=3, device_id=9)
+# Manuals and public drivers know three registers of either block; no source tells what happens with more.
+_GATEWAY: Final = RegisterMap(request=0x03E8, status=0x07D0, read_function=3, device_id=9, count=3)
 
 
 def _with_jaw(

@@ -101,12 +101,14 @@ class RegisterMap:
         status: address of the first status register.
         read_function: Modbus function that reads the status block, 3 or 4.
         device_id: the unit id the gripper is shipped with.
+        count: registers of either block that are read and written, 1..8; the others are 0.
     """
 
     request: int
     status: int
     read_function: int
     device_id: int
+    count: int = REGISTER_COUNT
 
 
 TCP_REGISTERS: Final = RegisterMap(request=0x0000, status=0x0000, read_function=4, device_id=2)

@@ -37,7 +37,9 @@ class HeldLoopError(AssertionError):
 
 
 class StampedGripper(SimulatedGripper):
-    """Writes a number into the reserved last byte of each status, so that no two are alike.
+    """Writes a number into reserved bits of each status, so that no two in a row are alike.
+
+    These are the last byte; on a jaw, of which only three registers are read, the upper half of the fault's.
 
     Attributes:
         stamps: when each status was given out, and its number.
@@ -52,13 +54,21 @@ class StampedGripper(SimulatedGripper):
 
     def status_registers(self) -> Registers:
         registers = super().status_registers()
-        self._number = (self._number + 1) % 256
+        self._number = (self._number + 1) % (256 if len(self.model.axes) > 1 else 16)
         self.stamps.append((self._clock(), self._number))
-        return (*registers[:7], registers[7] & 0xFF00 | self._number)
+        if len(self.model.axes) > 1:
+            return (*registers[:7], registers[7] & 0xFF00 | self._number)
+        return (registers[0], registers[1] & 0x0FFF | self._number << 12, *registers[2:])
 
     def write(self, address_offset: int, registers: Sequence[int]) -> None:
         super().write(address_offset, registers)
         self.images.append((self.request_registers, tuple(map(self.position, self.model.axes))))
+
+
+def stamp_of(status: RobotiqStatus) -> int:
+    """The number that the gripper wrote into a status."""
+    registers = status.registers
+    return registers[7] & 0xFF if len(status.model.axes) > 1 else registers[1] >> 12
 
 
 class Heard:
@@ -152,7 +162,7 @@ class World:
         given_at = [at for at, _ in self.gripper.stamps]
         for status in self.statuses:
             index = bisect_right(given_at, status.timestamp) - 1
-            while index >= 0 and self.gripper.stamps[index][1] != status.registers[7] & 0xFF:
+            while index >= 0 and self.gripper.stamps[index][1] != stamp_of(status):
                 index -= 1
             assert index >= 0, f"never sent: {status!r}"
             newer = bisect_right(self.server.heard, given_at[index])

@@ -304,6 +304,9 @@ async def test_a_line_that_loses_its_first_requests_needs_no_option(
     assert left[0] < 0
     assert [each.what for each in found.values() if "Pass" in each.advice] == []
     assert found["registers"].level is found["unit id"].level is Level.GOOD
+    if server_of is RtuOverTcpSimulatorServer and lost == 1:
+        assert found["Modbus"].level is Level.GOOD, "on a serial line the first exchange is repeated"
+        return
     assert found["Modbus"].level is Level.DOUBT
     assert "answers when asked" in found["Modbus"].found
 

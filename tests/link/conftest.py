@@ -1,0 +1,30 @@
+"""A scripted device on a serial line in virtual time, and a transport that is open to it."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+
+import pytest
+import serial
+
+from robotiq_async.link.modbus import ModbusTransport
+from tests.link.scripted_device import Device, unopened
+from tests.virtual_line import VirtualLine
+
+
+@pytest.fixture
+async def device(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Device]:
+    """At the far end of a line, in virtual time."""
+    VirtualLine(monkeypatch)
+    device = Device(serial.serial_for_url(VirtualLine.FAR))
+    yield device
+    device.close()
+
+
+@pytest.fixture
+async def transport(device: Device) -> AsyncIterator[ModbusTransport]:
+    """At the near end, open."""
+    transport = unopened(VirtualLine.NEAR)
+    await transport.open()
+    yield transport
+    await transport.close()
