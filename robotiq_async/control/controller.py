@@ -56,10 +56,12 @@ class Due(NamedTuple):
     Attributes:
         wait: seconds until it may leave, because of write_spacing.
         is_urgent: whether it is a stop, which does not wait for a status that may never come.
+        is_command: whether it is a command or a hold, and no step of something longer.
     """
 
     wait: float
     is_urgent: bool
+    is_command: bool
 
 
 class Controller:
@@ -70,8 +72,8 @@ class Controller:
         speed: what every axis gets until set otherwise, 0..255.
         force: what every axis gets until set otherwise, 0..255.
         closing_time: gives the seconds of a full closing at a speed; default timeouts of moves come from it.
-        write_spacing: seconds from the acknowledgement of a write to the next one: a gripper may acknowledge
-            one that comes sooner and forget it. A stop does not wait; it is repeated.
+        write_spacing: seconds from sending a write to the next one: a gripper may acknowledge one that comes
+            sooner and forget it. A stop does not wait; it is repeated.
         model: of the gripper.
 
     Attributes:
@@ -104,9 +106,7 @@ class Controller:
         self._activation: Entry | None = None
         # Why a hand that is being stopped must not leave rGTO set.
         self._doubt = ""
-        # When a write was last acknowledged.
-        self._written_at = NEVER
-        self._warned = NEVER
+        self._written_at = self._warned = NEVER  # when the last image was given to be written, and a warning
 
     # -- what is asked ---------------------------------------------------------------------------------
 
@@ -471,7 +471,7 @@ class Controller:
             return None
         stop, status = self._stop, self._evidence.status
         urgent = stop is not None and status is not None and stop.is_urgent(self._ledger, status)
-        return Due(self._wait(now), urgent)
+        return Due(self._wait(now), urgent, stop is None and self._procedure is None)
 
     def _wait(self, now: float) -> float:
         stop = self._stop
@@ -574,11 +574,11 @@ class Controller:
         image = gate(image, status, activates=activates, releases=releases)
         entry = self._ledger.write(image, sent.moved, now)
         self._requests.sending(sent, entry)
+        self._written_at = now
         return entry
 
     def acknowledged(self, now: float) -> None:
         """The image that decide() returned was acknowledged."""
-        self._written_at = now
         entry = self._ledger.acknowledge(now)
         self._requests.acknowledged()
         if self._stop is not None and self._stop.entry is entry:

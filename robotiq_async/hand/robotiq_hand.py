@@ -76,10 +76,12 @@ class RobotiqHand(Hand):
             behind the gateway.
         read_function: Modbus function that reads the status, 3 or 4; by default 4 over TCP and 3 over
             RTU, of a jaw 3 on either.
-        poll_interval: seconds between polls, 0.001..0.1; over RTU 0.015 unless given.
-        write_spacing: seconds from the acknowledgement of a write to the next one, 0..0.1; requests made
-            meanwhile are merged. The manual of 2014 says that a gripper may lose writes less than 10 ms
-            apart; pass 0 for one that does not. A stop and a halt do not wait.
+        poll_interval: seconds between polls, 0.001..0.1. On a serial line a read and a write may take longer
+            than the default; the next poll follows at once then, and no poll counts as missed.
+        write_spacing: seconds from sending a write to the next one, 0..0.1; 0.005 unless given for a jaw.
+            Requests made meanwhile are merged. A gripper may lose writes that come sooner (3-Finger manual of
+            2014: 10 ms; manual of the 2F-85: 5 ms); pass 0 for one that does not. A stop and a halt do not
+            wait.
         connect_timeout: seconds for opening the link, 0.01..5.
         response_timeout: seconds for one answer, 0.005..5. A write fails within twice that, and over RTU,
             where a read may be asked again, within 0.15 s more (three times that if it is above 0.4).

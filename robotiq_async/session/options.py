@@ -25,23 +25,29 @@ from .gripper_link import LAST_BLOCK, GripperLink, gripper_link
 
 
 class Usual(float):
-    """A default that stands for the network; on a serial line it is another.
+    """A default that stands for the 3-Finger; a jaw has another.
 
-    The same figure given on purpose is a plain float, and is kept on any link.
+    The same figure given on purpose is a plain float, and is kept for any model.
     """
 
     __slots__ = ()
 
 
-POLL_INTERVAL_S: Final = Usual(0.005)
-"""200 Hz, as the thesis polled; the manual names 200 Hz for RTU and 100 Hz for TCP."""
-SERIAL_POLL_INTERVAL_S: Final = 0.015
-"""The bytes of a read and a write take 5.38 ms at 115200 baud, and the silences that the standard wants
-after each of the four frames 7 ms: 12.4 ms. In 15 ms they fit, with what an adapter needs to pass on two
-replies, so that a stream of commands misses no polls."""
-WRITE_SPACING_S: Final = 0.01
-"""The manual of 2014 (chapters on TCP and RTU): registers are renewed at 100 Hz; leave 10 ms, or some writes
-are lost. Users of two-finger grippers on two arms saw that."""
+POLL_INTERVAL_S: Final = 0.005
+"""200 Hz, as the thesis polled; the manual names 200 Hz for RTU and 100 Hz for TCP. On a serial line, where a
+read and a write take longer, the next cycle begins later, and that is no miss."""
+WRITE_SPACING_S: Final = Usual(0.01)
+"""3-Finger manual of 2014 (chapters on TCP and RTU): registers are renewed at 100 Hz; leave 10 ms, or some
+writes are lost."""
+JAW_WRITE_SPACING_S: Final = 0.005
+"""Manual of the 2F-85 and 2F-140: commands may come every 5 ms, at 200 Hz (function 23)."""
+
+
+def usual_write_spacing(model: Model) -> float:
+    """The seconds between two writes to a model, unless given."""
+    return JAW_WRITE_SPACING_S if len(model.axes) == 1 else float(WRITE_SPACING_S)
+
+
 LATE_POLLS: Final = "polling was late"  # how the warning about late polls begins
 LONGEST_SPACING_S: Final = 0.1  # a command waits that long at most before it is written
 CONNECT_TIMEOUT_S: Final = 2.0
@@ -208,7 +214,7 @@ class HandOptions:
     poll_interval: Annotated[
         float,
         _seconds(
-            f"Seconds between polls; the default is {SERIAL_POLL_INTERVAL_S} on a serial line",
+            "Seconds between polls, at least; a serial line may take longer",
             0.001,
             0.1,
             Place.FILE | Place.ROS,
@@ -217,7 +223,8 @@ class HandOptions:
     write_spacing: Annotated[
         float,
         _seconds(
-            "Seconds from one write to the next; 0 for a gripper that loses none. Stops do not wait",
+            f"Seconds from one write to the next ({JAW_WRITE_SPACING_S} unless given for a 2F or Hand-E), 0 "
+            "for one that loses none. Stops do not wait",
             0.0,
             LONGEST_SPACING_S,
             Place.FILE | Place.ROS,
@@ -269,11 +276,10 @@ class HandOptions:
             registers = {name: getattr(self, name) for name, each in OPTIONS.items() if each.tcp is not None}
             self._keep("link", gripper_link(self.address, registers, self.given_name, self.model))
         self._keep("model", self.link.model)
-        on_purpose = not isinstance(self.poll_interval, Usual)
+        if isinstance(self.write_spacing, Usual):
+            self._keep("write_spacing", usual_write_spacing(self.model))
         for name, option in OPTIONS.items():
             self._keep(name, option.check(name, getattr(self, name)))
-        if self.link.is_rtu and not on_purpose:
-            self._keep("poll_interval", SERIAL_POLL_INTERVAL_S)
         self._keep("units", units_of(self.calibration, self.force_calibration, self.model))
         self._keep("log", Log(self.given_name or self.link.address))
 

@@ -1,7 +1,9 @@
 """The one task that owns the link: it connects, polls, writes, reconnects and shuts down.
 
 Every cycle reads the status, decides and writes at once, like the scan of a PLC, so each decision is made on
-what the gripper has just shown. Only what stops the gripper does not wait for the read. No other task touches
+what the gripper has just shown. What stops the gripper does not wait for the read. Nor does a command on a
+serial line while the newest status is fresh: a read takes as long there as the status is old, and the read
+after the write shows the command's echo. No other task touches
 the transport: callers leave their requests with the controller and wait. So no exchange is cancelled in
 flight, except when a stop has waited for it long enough; then the link is closed with it. start() and stop()
 may be called from different tasks.
@@ -56,6 +58,9 @@ IN_FLIGHT_S: Final = 0.9
 SHUTDOWN_S: Final = 1.2  # of STOP_S: time to reach the gripper and to see the fingers stop
 SHUTDOWN_PAUSE_S: Final = 0.05  # between two attempts at that
 READS: Final = 3  # the most reads in a cycle that has a request to write, while the loop is held up
+FRESH_S: Final = 0.006
+"""On a serial line a command is decided on the newest status if that was asked for within this time: the poll
+interval and a bit. A read of three registers takes half of it."""
 SOON_S: Final = 0.0025
 """How long a cycle waits for write_spacing: half of a usual period, so that its status is still fresh."""
 LATE_S: Final = 0.05
@@ -108,6 +113,7 @@ class Poller:
         self._polling: anyio.CancelScope | None = None
         self._tick = Tick(options.poll_interval)
         self._last_poll = 0.0
+        self._asked = -math.inf  # when the newest status was asked for
         self._warned = -math.inf
         self._late: list[float] = []
         """The seconds of each late poll since the last warning about them."""
@@ -147,9 +153,9 @@ class Poller:
         self._channels.publish_changes()
 
     def hurry(self) -> None:
-        """Begin the next cycle at once, and not with the tick, if there is a stop to write."""
+        """Begin the next cycle at once, and not with the tick, if it may begin with a write."""
         due = self._controller.due(self._tick.time())
-        if due is not None and due.is_urgent:
+        if due is not None and (due.is_urgent or (self._options.link.is_rtu and due.wait <= SOON_S)):
             self._tick.hurry()
 
     def abandon(self) -> None:
@@ -253,8 +259,13 @@ class Poller:
     async def _cycle(self) -> None:
         """Read, decide, write. Write a stop before reading, too: a gripper may obey and not answer."""
         controller = self._controller
-        if controller.has_request and await self._is_due(LONGEST_SPACING_S, urgent=True):
-            await self._write()
+        if controller.has_request and not self._is_held_up():
+            if await self._is_urgent():
+                await self._write()
+            elif await self._is_fresh():
+                await self._write()
+                await self._poll_once()  # shows the echo; a command that came meanwhile begins the next cycle
+                return
         for _ in range(READS):
             await self._poll_once()
             if not (controller.has_request and await self._is_due(SOON_S)):
@@ -263,13 +274,23 @@ class Poller:
                 break
         await self._write()
 
-    async def _is_due(self, soon: float, *, urgent: bool = False) -> bool:
-        """Whether there is something to write in this cycle; waits for write_spacing for ``soon`` seconds.
-
-        ``urgent`` for a stop that is to be written before the read.
-        """
+    async def _is_urgent(self) -> bool:
+        """Whether there is a stop to write; waits for write_spacing."""
         due = self._controller.due(self._tick.time())
-        if due is None or due.wait > soon or (urgent and (not due.is_urgent or self._is_held_up())):
+        return due is not None and due.is_urgent and await self._is_due(LONGEST_SPACING_S)
+
+    async def _is_fresh(self) -> bool:
+        """Whether there is a command to write, and a status of a serial line that is new enough for it."""
+        now = self._tick.time()
+        due = self._controller.due(now)
+        if due is None or not due.is_command or not self._options.link.is_rtu:
+            return False
+        return now + due.wait - self._asked <= FRESH_S and await self._is_due(SOON_S)
+
+    async def _is_due(self, soon: float) -> bool:
+        """Whether there is something to write in this cycle; waits for write_spacing for ``soon`` seconds."""
+        due = self._controller.due(self._tick.time())
+        if due is None or due.wait > soon:
             return False
         if due.wait:
             await asyncio.sleep(due.wait)
@@ -278,6 +299,7 @@ class Poller:
     async def _write(self) -> None:
         self._decided = None
         # Listeners hear of changes after the write: a request of theirs would come too late for this one.
+        began = self._tick.time()
         try:
             is_written = await self._transport.send(self._decide)
         except RobotiqConnectionError:
@@ -287,8 +309,9 @@ class Poller:
             raise
         if not is_written or self._decided is None:
             return
-        self._counters.writes += 1
-        self._controller.acknowledged(self._tick.time())
+        answered = self._tick.time()
+        self._counters.note_write(answered - began, self._decided[1] - self._asked)
+        self._controller.acknowledged(answered)
         self._channels.publish_changes()
         self._channels.requests.push(SentRequest(*self._decided, acknowledged=True))
 
@@ -314,11 +337,8 @@ class Poller:
                 f"this is no {self._model.title}: its registers show {why}; {names_that_fit(registers)}"
             )
         status = RobotiqStatus(registers, answered, next(self._channels.numbers), self._model)
-        counters.polls += 1
-        counters.round_trips.append(answered - asked)
-        if self._last_poll:
-            counters.periods.append(asked - self._last_poll)
-        self._last_poll = asked
+        counters.note_poll(asked, answered, period=asked - self._last_poll if self._last_poll else None)
+        self._last_poll = self._asked = asked
         self._controller.see(status, asked)
         self._channels.publish_changes()
         self._channels.statuses.push(status)
@@ -340,12 +360,18 @@ class Poller:
             self._last_poll = 0.0  # a hurried cycle breaks the period
             return passed
         missed = passed - 1
+        if missed * self._options.poll_interval < LATE_S and self._is_line_the_limit():
+            missed = 0
         self._counters.longest_stall = self._tick.longest_late
         if missed:
             self._counters.overruns += missed
             if missed * self._options.poll_interval >= LATE_S:
                 self._warn_late(missed * self._options.poll_interval)
         return passed
+
+    def _is_line_the_limit(self) -> bool:
+        """Whether a cycle that outlasts the interval is the line's doing, and not that of a loop held up."""
+        return self._options.link.is_rtu and self._tick.late <= HELD_S
 
     def _warn_late(self, late: float) -> None:
         self._late.append(late)

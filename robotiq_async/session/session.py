@@ -221,12 +221,12 @@ class Session:
             return request(*args, **kwargs)
         finally:
             self._channels.publish_changes()
+            self._poller.hurry()
 
     async def answered(self, request: Callable[[Waiter[None]], None]) -> None:
         """Make a request and wait for its acknowledgement; raises RobotiqError if there is none."""
         waiter = self.waiter()
         self.ask(request, waiter)
-        self._poller.hurry()
         await waiter
 
     @contextmanager
@@ -272,7 +272,6 @@ class Session:
         with self._waiters.watching(states, ends) as reached:
             if ask is not None:
                 self.ask(ask)
-                self._poller.hurry()
             with anyio.move_on_after(timeout):
                 return await reached
         raise StateTimeoutError(f"{what} within {timeout:g} s (now {self.machine.state.name})")

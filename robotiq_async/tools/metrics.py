@@ -48,7 +48,10 @@ _GAUGES: Final = {
     "round_trip_p50": "Median time from a read to its reply.",
     "round_trip_p99": "99th percentile of the time from a read to its reply.",
     "longest_stall": "Longest time the event loop was blocked.",
+    "status_age_p50": "Median time from asking for a status to the write that was decided on it.",
+    "status_age_p99": "99th percentile of the time from asking for a status to the write decided on it.",
 }
+_SHARES: Final = {"link_use": "Share of the time in which the hand waits for an answer, 0..1."}
 
 
 class HandCollector(Collector):
@@ -80,6 +83,7 @@ class HandCollector(Collector):
         for family, unit, names in (
             (CounterMetricFamily, "", _COUNTERS),
             (GaugeMetricFamily, "_seconds", _GAUGES),
+            (GaugeMetricFamily, "_ratio", _SHARES),
         ):
             for name, meaning in names.items():
                 metric = family(f"robotiq_{name}{unit}", meaning, labels=["hand"])

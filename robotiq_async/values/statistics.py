@@ -35,6 +35,11 @@ class Statistics:
             name of the error.
         passing_faults: times fault 0x09 was shown only briefly and ignored, as some grippers show it after a
             second without a poll.
+        link_use: share of the time, 0..1, in which the hand waits for an answer; 1 for a link that is the
+            limit.
+        status_age_p50: median seconds from asking for a status to the write that was decided on it; 0 before
+            the first write.
+        status_age_p99: 99th percentile of that time.
     """
 
     polls: int
@@ -51,6 +56,9 @@ class Statistics:
     faults: int
     moves: Mapping[str, int]
     passing_faults: int = 0
+    link_use: float = 0.0
+    status_age_p50: float = 0.0
+    status_age_p99: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "moves", FrozenMapping(self.moves))
@@ -83,6 +91,25 @@ class Counters:
     moves: Counter[str] = field(default_factory=Counter)
     periods: deque[float] = field(default_factory=lambda: deque(maxlen=SAMPLES))
     round_trips: deque[float] = field(default_factory=lambda: deque(maxlen=SAMPLES))
+    status_ages: deque[float] = field(default_factory=lambda: deque(maxlen=SAMPLES))
+    _busy: float = 0.0  # seconds spent in exchanges since the last period began
+    _shares: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=SAMPLES))
+    """Of each period its seconds, and those spent in exchanges."""
+
+    def note_poll(self, asked: float, answered: float, period: float | None) -> None:
+        """Count a poll; ``period`` is the time since the one before it, None if that is not to be counted."""
+        self.polls += 1
+        self.round_trips.append(answered - asked)
+        if period is not None:
+            self.periods.append(period)
+            self._shares.append((period, min(self._busy, period)))
+        self._busy = answered - asked
+
+    def note_write(self, took: float, age: float) -> None:
+        """Count a write that was acknowledged; ``age`` is that of the status it was decided on."""
+        self.writes += 1
+        self._busy += took
+        self.status_ages.append(age)
 
     @contextmanager
     def move(self) -> Iterator[Callable[[MoveResult], None]]:
@@ -103,6 +130,8 @@ class Counters:
 
     def snapshot(self, foreign_commands: int, passing_faults: int = 0) -> Statistics:
         periods, round_trips = sorted(self.periods), sorted(self.round_trips)
+        ages = sorted(self.status_ages)
+        time, busy = (sum(each) for each in zip(*self._shares, strict=True)) if self._shares else (1.0, 0.0)
         return Statistics(
             polls=self.polls,
             writes=self.writes,
@@ -118,4 +147,7 @@ class Counters:
             faults=self.faults,
             moves=self.moves,
             passing_faults=passing_faults,
+            link_use=busy / time,
+            status_age_p50=percentile(ages, 0.50),
+            status_age_p99=percentile(ages, 0.99),
         )

@@ -22,7 +22,6 @@ from functools import partial
 from pathlib import Path
 
 from robotiq_async import Finger, RobotiqHand
-from robotiq_async.session.options import SERIAL_POLL_INTERVAL_S
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
 from robotiq_async.values.statistics import percentile
 from tests.benchmarks import program
@@ -30,7 +29,7 @@ from tests.benchmarks.program import ROOT, Row, figures_of, median_of
 from tests.serial_line import SerialLine
 
 PARTS = ("idle", "stream")
-INTERVALS = (0.005, 0.01, SERIAL_POLL_INTERVAL_S, 0.02)
+INTERVALS = (0.005, 0.01, 0.02)
 STREAM_S = 0.002
 """From one command of a stream to the next: more than any line can carry."""
 

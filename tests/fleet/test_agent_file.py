@@ -152,12 +152,12 @@ def test_a_bad_file_is_reported_in_one_line(text: str, words: list[str], tmp_pat
         assert word in message
 
 
-def test_a_gripper_on_a_serial_line_gets_the_defaults_of_the_line(tmp_path: Path) -> None:
+def test_a_gripper_on_a_serial_line_is_polled_as_often_as_any(tmp_path: Path) -> None:
     line = '[grippers.left]\naddress = "rtu+tcp://192.168.1.20:54321"\nread_function = 4\n'
     grippers = read(tmp_path, f'site = "lab"\n{line}').grippers
-    assert grippers["left"].poll_interval == 0.015
-    grippers = read(tmp_path, f'site = "lab"\n{line}poll_interval = 0.005\n').grippers
     assert grippers["left"].poll_interval == 0.005
+    grippers = read(tmp_path, f'site = "lab"\n{line}poll_interval = 0.015\n').grippers
+    assert grippers["left"].poll_interval == 0.015
     assert grippers["left"].read_function == 4
 
 

@@ -55,9 +55,19 @@ def test_intervals_and_time_outs_of_a_line_and_of_a_network() -> None:
     assert figures("tcp://192.168.1.11") == (0.005, 0.4)
     assert figures("tcp://192.168.1.11", response_timeout=5) == (0.005, 5.0)
     for line in ("rtu:///dev/ttyUSB0", "rtu+tcp://192.168.1.11:54321"):
-        assert figures(line) == (0.015, 0.4)
-        assert figures(line, poll_interval=0.005, response_timeout=0.3) == (0.005, 0.3), "as asked"
-        assert figures(line, poll_interval=0.1) == (0.1, 0.4)
+        assert figures(line) == (0.005, 0.4)
+        assert figures(line, poll_interval=0.1, response_timeout=0.3) == (0.1, 0.3), "as asked"
+
+
+@pytest.mark.parametrize("address", ["tcp://192.168.1.11", "rtu:///dev/ttyUSB0"])
+def test_a_jaw_takes_writes_twice_as_often(address: str) -> None:
+    def spacing(model: str, **given: Any) -> float:
+        return RobotiqHand(address, model=model, **given)._options.write_spacing
+
+    assert spacing("3f") == 0.01
+    assert spacing("2f85") == spacing("hand-e") == 0.005
+    assert spacing("2f85", write_spacing=0.01) == 0.01, "as asked"
+    assert spacing("2f85", write_spacing=0) == 0
 
 
 @pytest.mark.parametrize("wait", [-1, 86401, math.inf, math.nan, "1", None, True])

@@ -21,7 +21,7 @@ async def test_a_move_through_a_serial_server() -> None:
         result = await hand.move(200)
         assert result.positions[A] == pytest.approx(200, abs=2)
         assert hand.statistics.reconnects == 0
-        assert hand.statistics.period_p50 == pytest.approx(0.015, abs=1e-6)
+        assert hand.statistics.period_p50 == pytest.approx(0.005, abs=1e-6)
 
 
 @pytest.mark.parametrize("words", ["reset", "close", "accept-silence", "refuse", "silence", "wrong-checksum"])

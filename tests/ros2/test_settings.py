@@ -61,7 +61,7 @@ def test_bad_parameters_are_refused_with_the_reason(name: str, value: object, re
     [
         ({}, (2, 4, 0.005, 0.4)),
         ({"device_id": 0, "read_function": 3, "response_timeout": 5.0}, (0, 3, 0.005, 5.0)),
-        ({"address": "rtu:///dev/ttyUSB0"}, (9, 3, 0.015, 0.4)),
+        ({"address": "rtu:///dev/ttyUSB0"}, (9, 3, 0.005, 0.4)),
         ({"address": "rtu:///dev/ttyUSB0", "poll_interval": 0.01}, (9, 3, 0.01, 0.4)),
     ],
 )

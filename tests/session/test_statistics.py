@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -27,6 +28,7 @@ def test_a_snapshot_tells_each_counter_under_its_own_name() -> None:
     counters.moves["reached"] = 10
     counters.periods.append(0.006)
     counters.round_trips.append(0.007)
+    counters.status_ages.append(0.004)
     assert dataclasses.asdict(counters.snapshot(8, 11)) == {
         "polls": 1,
         "writes": 2,
@@ -42,7 +44,29 @@ def test_a_snapshot_tells_each_counter_under_its_own_name() -> None:
         "faults": 9,
         "moves": {"reached": 10},
         "passing_faults": 11,
+        "link_use": 0.0,
+        "status_age_p50": 0.004,
+        "status_age_p99": 0.004,
     }
+
+
+def test_the_link_is_in_use_while_an_answer_is_awaited() -> None:
+    counters = Counters()
+    counters.note_poll(10.000, 10.002, None)
+    counters.note_write(0.001, age=0.002)
+    counters.note_poll(10.006, 10.008, 0.006)
+    counters.note_poll(10.012, 10.014, 0.006)
+    figures = counters.snapshot(0)
+    assert figures.link_use == pytest.approx((0.003 + 0.002) / 0.012)
+    assert (figures.polls, figures.writes) == (3, 1)
+    assert figures.status_age_p50 == 0.002
+
+
+def test_a_hurried_cycle_is_no_period() -> None:
+    counters = Counters()
+    counters.note_poll(10.000, 10.002, None)
+    counters.note_poll(10.003, 10.005, None)
+    assert counters.snapshot(0).link_use == 0
 
 
 def test_percentiles_of_round_trips_are_those_of_periods() -> None:

@@ -6,6 +6,7 @@ a request is its registers and its model.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Final
@@ -190,6 +191,8 @@ def read_request(fields: Mapping[str, Any], clock: Clock) -> SentRequest:
 
 
 def read_statistics(fields: Mapping[str, Any]) -> Statistics:
-    # An older agent does not count passing faults; figures of a newer one that are unknown here are ignored.
-    figures = {"passing_faults": 0, **fields}
-    return Statistics(**{name: figures[name] for name in Statistics.__dataclass_fields__})
+    # An older agent lacks the figures that have a default; those of a newer one that are unknown here are
+    # ignored.
+    figures = dataclasses.fields(Statistics)
+    told = [each.name for each in figures if each.name in fields or each.default is dataclasses.MISSING]
+    return Statistics(**{name: fields[name] for name in told})

@@ -53,6 +53,8 @@ def _link(hand: Hand, now: float) -> Diagnosis:
         "overruns": str(figures.overruns),
         "period p99 [ms]": f"{figures.period_p99 * 1e3:.1f}",
         "round trip p99 [ms]": f"{figures.round_trip_p99 * 1e3:.1f}",
+        "link use [%]": f"{figures.link_use * 100:.0f}",
+        "status age at a write p99 [ms]": f"{figures.status_age_p99 * 1e3:.1f}",
         "reconnects": str(figures.reconnects),
         "foreign commands": str(figures.foreign_commands),
     }

@@ -16,7 +16,7 @@ from ...link.modbus import ModbusTransport
 from ...link.serial_ports import USB_SERIAL, latency_file, latency_timer
 from ...link.transport import Link
 from ...session.gripper_link import registers_of
-from ...session.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S, SERIAL_POLL_INTERVAL_S
+from ...session.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S
 from ...values.enums import Severity
 from ...values.errors import ConnectionLostError, RobotiqConnectionError
 from ...values.model import MODELS, Model, model_of, names_that_fit
@@ -47,7 +47,7 @@ async def examine(address: Address, report: Report, *, device_id: int | None = N
         try:
             if address.kind == "rtu":
                 report_adapter(address, report)
-            await _timing(link, SERIAL_POLL_INTERVAL_S if address.is_rtu else POLL_INTERVAL_S, report)
+            await _timing(link, POLL_INTERVAL_S, report)
             _check_model(model, await link.read(), report)
             report_state(RobotiqStatus.from_registers(await link.read(), model=model), report)
             await _others(link, report)

@@ -96,6 +96,9 @@ SCHEMAS: Final = {
         faults=INTEGER,
         moves={"type": "object", "additionalProperties": INTEGER},
         passing_faults=INTEGER,
+        link_use=NUMBER,
+        status_age_p50=NUMBER,
+        status_age_p99=NUMBER,
     ),
 }
 """A JSON Schema for each kind of object."""

@@ -8,7 +8,7 @@ from typing import Final
 
 from ...link.address import Address
 from ...link.modbus import ModbusTransport
-from ...session.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S, SERIAL_POLL_INTERVAL_S
+from ...session.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S
 from ...values.enums import Finger
 from ...values.model import Model, model_of
 from ...values.registers import RegisterMap
@@ -64,7 +64,7 @@ class Bench:
     @property
     def interval(self) -> float:
         """The usual seconds between two reads on such a link."""
-        return SERIAL_POLL_INTERVAL_S if self.address.is_rtu else float(POLL_INTERVAL_S)
+        return POLL_INTERVAL_S
 
     def another_link(
         self, registers: RegisterMap, keep: Callable[[Frame], None] | None = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import Final
 
-from ....session.options import LONGEST_SPACING_S, WRITE_SPACING_S
+from ....session.options import LONGEST_SPACING_S, usual_write_spacing
 from ....values.enums import Finger
 from ....values.request import Request
 from ....values.statistics import percentile
@@ -178,7 +178,7 @@ def _judge_spacing(bench: Bench, kept: list[Figure], enough: list[float]) -> Non
     found += "" if kept_at is None else f", and one {1000 * kept_at:.0f} ms after it acts"
     options: Options = NO_OPTIONS
     follows = "No option is needed: a hand leaves enough time. Programs that write faster lose commands."
-    if forgotten >= WRITE_SPACING_S:
+    if forgotten >= usual_write_spacing(bench.model):
         spacing = min(LONGEST_SPACING_S, 2 * forgotten)
         bench.spacing = max(bench.spacing, spacing)
         options, follows = {"write_spacing": round(spacing, 3)}, "Leave more time between writes."
