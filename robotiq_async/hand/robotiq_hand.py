@@ -76,6 +76,9 @@ class RobotiqHand(Hand):
             behind the gateway.
         read_function: Modbus function that reads the status, 3 or 4; by default 4 over TCP and 3 over
             RTU, of a jaw 3 on either.
+        write_function: Modbus function that writes the request, 16 or 23; by default 16, and over RTU to a
+            jaw 23, which reads the status in the same exchange. A gripper that does not serve 23 gets 16. No
+            source says whether a 3-Finger serves it.
         poll_interval: seconds between polls, 0.001..0.1. On a serial line a read and a write may take longer
             than the default; the next poll follows at once then, and no poll counts as missed.
         write_spacing: seconds from sending a write to the next one, 0..0.1; 0.005 unless given for a jaw.
@@ -117,6 +120,7 @@ class RobotiqHand(Hand):
         name: str | None = None,
         device_id: int | None = None,
         read_function: int | None = None,
+        write_function: int | None = None,
         poll_interval: float = POLL_INTERVAL_S,
         write_spacing: float = WRITE_SPACING_S,
         connect_timeout: float = CONNECT_TIMEOUT_S,
@@ -137,6 +141,7 @@ class RobotiqHand(Hand):
             name=name,
             device_id=device_id,
             read_function=read_function,
+            write_function=write_function,
             poll_interval=poll_interval,
             write_spacing=write_spacing,
             connect_timeout=connect_timeout,

@@ -28,6 +28,7 @@ _EXCEPTIONS = {
 }
 _FROM_GATEWAYS: Final = (10, 11)
 """The exceptions that only a gateway sends (Modbus Application Protocol 7)."""
+_ILLEGAL_FUNCTION: Final = 1
 _PASSING: Final = (5, 6, 11)
 """The exceptions of a device that may answer the next time: it works, is busy, or was not heard in time."""
 
@@ -36,10 +37,14 @@ _CHECKSUM: Final = 2
 """Bytes of the checksum at the end of a frame on a serial line."""
 _WRITE: Final = 16
 """Function code of a write of several registers."""
+_WRITE_AND_READ: Final = 23
+"""Function code of a write and a read in one exchange; the device writes first."""
 _READ_REQUEST: Final = Struct(">BBHH")
 """Unit, function, address, count."""
 _WRITE_REQUEST: Final = Struct(">BBHHB")
 """Unit, function, address, count, number of bytes; the registers follow."""
+_WRITE_PART: Final = Struct(">HHB")
+"""Address, count, number of bytes."""
 _HEADER: Final = Struct(">HHH")
 """Before a request over TCP: transaction, protocol 0, bytes that follow."""
 _BLOCK: Final = Struct(f">{REGISTER_COUNT}H")
@@ -54,6 +59,14 @@ def write_request(registers: RegisterMap, image: Sequence[int]) -> bytes:
     """Unit and PDU of the write of an image of eight registers (FC16), as many of them as the gripper has."""
     count = registers.count
     head = _WRITE_REQUEST.pack(registers.device_id, _WRITE, registers.request, count, 2 * count)
+    return head + _BLOCK.pack(*image)[: 2 * count]
+
+
+def write_and_read_request(registers: RegisterMap, image: Sequence[int]) -> bytes:
+    """Unit and PDU of a write of an image and a read of the status in one exchange (FC23)."""
+    count = registers.count
+    head = _READ_REQUEST.pack(registers.device_id, _WRITE_AND_READ, registers.status, count)
+    head += _WRITE_PART.pack(registers.request, count, 2 * count)
     return head + _BLOCK.pack(*image)[: 2 * count]
 
 
@@ -86,7 +99,7 @@ def registers_in(reply: bytes, *, serial: bool) -> Registers:
 
 def is_write(frame: bytes) -> bool:
     """Whether a request frame of a serial line writes."""
-    return frame[1] == _WRITE
+    return frame[1] in (_WRITE, _WRITE_AND_READ)
 
 
 class RefusedError(ProtocolError):
@@ -94,9 +107,11 @@ class RefusedError(ProtocolError):
 
     Attributes:
         is_passing: whether the same request may be answered the next time.
+        is_unknown_function: whether the device does not serve the function.
     """
 
     is_passing = False
+    is_unknown_function = False
 
 
 class MisfitError(ProtocolError):
@@ -138,6 +153,7 @@ class Expected(NamedTuple):
         code = frame[len(self.refusal)]
         refused = RefusedError(self._refused(code))
         refused.is_passing = code in _PASSING
+        refused.is_unknown_function = code == _ILLEGAL_FUNCTION
         raise refused
 
     @property
@@ -172,7 +188,7 @@ class Expected(NamedTuple):
 
 
 def expected_reply(request: bytes, *, serial: bool) -> Expected:
-    """The reply that answers a request frame of function 3, 4 or 16."""
+    """The reply that answers a request frame of function 3, 4, 16 or 23."""
     if serial:
         return _expected(request, _CHECKSUM)
     # Over TCP a header precedes it: transaction and protocol as in the request, then the length.

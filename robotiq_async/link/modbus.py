@@ -49,9 +49,11 @@ from .frames import (
     registers_in,
     serial_frame,
     tcp_frame,
+    write_and_read_request,
     write_request,
 )
 from .silence import Silence
+from .transport import Answer
 from .watchdog import Watchdog
 
 # pymodbus logs every failed connection attempt; our exceptions say the same. A level that the application
@@ -129,6 +131,9 @@ class ModbusTransport:
         self._number = secrets.randbelow(LAST_NUMBER)
         """Transaction id of the last request; starts at random to differ from those of other programs."""
         self._poll = read_request(registers, registers.count)
+        self._writes_with_23 = registers.write_function == 23
+        self._has_23 = False
+        """Whether function 23 was answered once."""
         self._probe = 0
         """Number of registers that the last read for :meth:`_resynchronise` asked for."""
         self._rest: Registers = ()
@@ -189,6 +194,9 @@ class ModbusTransport:
             if not self._can_repeat(error):
                 raise
             answer = await self._read_again(_plain(error))
+        return self._status_in(answer)
+
+    def _status_in(self, answer: bytes) -> Registers:
         registers = registers_in(answer, serial=self._rtu)
         return registers[: self._map.count] + self._rest if self._rest else registers
 
@@ -198,14 +206,50 @@ class ModbusTransport:
         Raises:
             RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
         """
-        if self._can_repeat(self._failure):  # a write must not meet what is left of a disturbance
-            await self._bring_in_step(math.inf)
-        await self._pause()
+        await self._prepare_write()
         registers = decide()
         if registers is None:
             return False
         await self.write(registers)
         return True
+
+    @property
+    def reads_with_writes(self) -> bool:
+        return self._writes_with_23
+
+    async def send_and_read(self, decide: Callable[[], Sequence[int] | None]) -> Answer | None:
+        """Write what ``decide`` returns, if anything, and read the status, with function 23.
+
+        After a reply that is missing or damaged the write is in doubt, and the status is read on its own. A
+        device that refuses the function, or does not answer the first of these, gets function 16 from then
+        on. The write is repeated with it only if it was refused, and so not carried out.
+
+        Raises:
+            RobotiqConnectionError: no clean answer in time, and no status after it; the transport is closed.
+        """
+        await self._prepare_write()
+        registers = decide()
+        if registers is None:
+            return None
+        try:
+            reply = await self._ask(write_and_read_request(self._map, registers), bears=self._leaves_doubt)
+        except RobotiqConnectionError as error:
+            if not self._leaves_doubt(error):
+                raise
+            if not self._has_23 and not isinstance(error, MisfitError):
+                self._writes_with_23 = False
+                self._log.warning("%s is written with function 16: %s", self._address, _plain(error))
+            if isinstance(error, RefusedError) and error.is_unknown_function:
+                await self.write(registers)
+                return Answer(await self.read(), None)
+            return Answer(self._status_in(await self._read_again(_plain(error))), _plain(error))
+        self._has_23 = True
+        return Answer(self._status_in(reply), None)
+
+    async def _prepare_write(self) -> None:
+        if self._failure is not None and self._can_repeat(self._failure):
+            await self._bring_in_step(math.inf)  # a write must not meet what is left of a disturbance
+        await self._pause()
 
     async def write(self, registers: Sequence[int]) -> None:
         """Write the request registers with one FC16, exactly once; a jaw has three of the eight.
@@ -276,6 +320,10 @@ class ModbusTransport:
         if isinstance(error, RefusedError):
             return error.is_passing
         return self._rtu and isinstance(error, NOISE)
+
+    def _leaves_doubt(self, error: RobotiqConnectionError) -> bool:
+        """Whether the connection can go on after this end of a write with function 23."""
+        return isinstance(error, RefusedError) or (self._rtu and isinstance(error, NOISE))
 
     def _can_do_without(self, error: RobotiqConnectionError) -> bool:
         """Whether the error may only mean that a jaw does not serve eight registers."""

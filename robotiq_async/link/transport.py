@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
+from ..values.errors import RobotiqConnectionError
 from ..values.registers import Registers
 
 
@@ -45,6 +46,18 @@ class Transport(Protocol):
         """Disconnect; never fails, and does nothing when closed."""
 
 
+class Answer(NamedTuple):
+    """What came of a write that also reads.
+
+    Attributes:
+        registers: the status registers, read after the write.
+        doubt: why it is unknown whether the write was carried out; None if it was acknowledged.
+    """
+
+    registers: Registers
+    doubt: RobotiqConnectionError | None
+
+
 class Link(Protocol):
     """A transport as the poller uses it: the image is decided in the moment of the write."""
 
@@ -70,3 +83,19 @@ class Link(Protocol):
         """
 
     async def close(self) -> None: ...
+
+
+@runtime_checkable
+class CyclicLink(Link, Protocol):
+    """A link that can write and read in one exchange."""
+
+    @property
+    def reads_with_writes(self) -> bool:
+        """Whether the gripper can, too, as far as is known."""
+
+    async def send_and_read(self, decide: Callable[[], Sequence[int] | None]) -> Answer | None:
+        """As :meth:`send`, and read the status in the same exchange; None if there was nothing to write.
+
+        Raises:
+            RobotiqConnectionError: no clean answer in time, and no status after it; the transport is closed.
+        """

@@ -21,6 +21,7 @@ from ..values.registers import REGISTER_COUNT, RegisterMap
 
 LAST_BLOCK: Final = 0x10000 - REGISTER_COUNT
 """The highest first register of a block: registers are numbered to 0xFFFF."""
+_WRITE_FUNCTIONS: Final = (16, 23)
 _GATEWAY: Final = " (two grippers behind one gateway: give each of the hands its device_id)"
 _LINE: Final = " (a serial port has one owner, whatever the device_id: two would read each other's replies)"
 
@@ -107,6 +108,7 @@ def registers_of(
     *,
     device_id: object = None,
     read_function: object = None,
+    write_function: object = None,
     request_address: object = None,
     status_address: object = None,
 ) -> RegisterMap:
@@ -122,7 +124,18 @@ def registers_of(
         read_function=_int_or("read_function", read_function, 3, 4, usual.read_function),
         device_id=_int_or("device_id", device_id, *units, usual.device_id),
         count=usual.count,
+        write_function=check_write_function(
+            usual.write_function if write_function is None else write_function
+        ),
     )
+
+
+def check_write_function(value: object) -> int:
+    """A Modbus function that writes the request registers."""
+    function = check_int("write_function", value, *_WRITE_FUNCTIONS)
+    if function not in _WRITE_FUNCTIONS:
+        raise ValueError(f"write_function must be 16 or 23, got {function}")
+    return function
 
 
 def _int_or(name: str, value: object, low: int, high: int, usual: int) -> int:

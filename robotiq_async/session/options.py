@@ -21,7 +21,7 @@ from ..values.checks import check_byte, check_flag, check_int, check_seconds, re
 from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..values.model import MODELS, THREE_FINGER, Model, model_of
 from ..values.registers import RTU_REGISTERS, TCP_REGISTERS
-from .gripper_link import LAST_BLOCK, GripperLink, gripper_link
+from .gripper_link import LAST_BLOCK, GripperLink, check_write_function, gripper_link
 
 
 class Usual(float):
@@ -124,6 +124,10 @@ def _check_address(_: str, value: object) -> object:
     return value  # gripper_link() has parsed it
 
 
+def _check_write_function(_: str, value: object) -> object:
+    return None if value is None else check_write_function(value)
+
+
 def _check_model(name: str, model: object) -> Model:
     return model_of(model, name)
 
@@ -210,6 +214,18 @@ class HandOptions:
     ] = None
     read_function: Annotated[
         int | None, _by_link("Modbus function that reads the status", "read_function", 3, 4, Place.ROS)
+    ] = None
+    write_function: Annotated[
+        int | None,
+        Option(
+            "Modbus function that writes the request: 16, or 23, which also reads the status",
+            _check_write_function,
+            Place.FILE | Place.COMMAND_LINE | Place.ROS,
+            16,
+            23,
+            TCP_REGISTERS.write_function,
+            RTU_REGISTERS.write_function,
+        ),
     ] = None
     poll_interval: Annotated[
         float,

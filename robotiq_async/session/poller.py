@@ -23,7 +23,7 @@ import anyio
 
 from ..control.controller import Controller
 from ..control.waiters import fail, resolve
-from ..link.transport import Link
+from ..link.transport import CyclicLink, Link
 from ..link.watchdog import HELD_S
 from ..runtime.tick import Tick
 from ..values.enums import StopLevel
@@ -93,6 +93,7 @@ class Poller:
     ) -> None:
         self._wait = wait
         self._transport = transport
+        self._cyclic = transport if isinstance(transport, CyclicLink) else None
         self._controller = controller
         self._counters = counters
         self._channels = channels
@@ -263,15 +264,17 @@ class Poller:
             if await self._is_urgent():
                 await self._write()
             elif await self._is_fresh():
-                await self._write()
-                await self._poll_once()  # shows the echo; a command that came meanwhile begins the next cycle
+                # What is read shows the echo. A command that came meanwhile begins the next cycle.
+                if not await self._write_and_read():
+                    await self._poll_once()
                 return
         for _ in range(READS):
             await self._poll_once()
             if not (controller.has_request and await self._is_due(SOON_S)):
                 return  # most cycles end here
             if not self._is_held_up():
-                break
+                await self._write_and_read()
+                return
         await self._write()
 
     async def _is_urgent(self) -> bool:
@@ -296,6 +299,42 @@ class Poller:
             await asyncio.sleep(due.wait)
         return True
 
+    async def _write_and_read(self) -> bool:
+        """Write, and read in the same exchange if link and request allow that; whether a status was read."""
+        link, due = self._cyclic, self._controller.due(self._tick.time())
+        if link is None or not link.reads_with_writes or due is None or not due.is_command:
+            await self._write()
+            return False
+        self._decided, self._tick.late = None, 0.0
+        try:
+            answer = await link.send_and_read(self._decide)
+            if answer is None or self._decided is None:
+                return False
+            answered = self._tick.time()
+            request, decided = self._decided
+            status = self._status(answer.registers, answered)
+            if answer.doubt is not None and not self._shows(status, request):
+                await link.close()
+                raise answer.doubt
+        except RobotiqConnectionError:
+            self._note_unacknowledged()
+            raise
+        self._counters.note_write(0.0, decided - self._asked)
+        self._controller.acknowledged(decided)
+        self._channels.requests.push(SentRequest(request, decided, acknowledged=True))
+        self._take(status, decided)
+        return True
+
+    def _shows(self, status: RobotiqStatus, request: Request) -> bool:
+        """Whether a status is the first with the echo of a request in doubt, which was carried out then."""
+        newest = self._controller.status
+        return status.echo == request.echo and newest is not None and newest.echo != request.echo
+
+    def _note_unacknowledged(self) -> None:
+        self._channels.publish_changes()
+        if self._decided is not None:
+            self._channels.requests.push(SentRequest(*self._decided, acknowledged=False))
+
     async def _write(self) -> None:
         self._decided = None
         # Listeners hear of changes after the write: a request of theirs would come too late for this one.
@@ -303,9 +342,7 @@ class Poller:
         try:
             is_written = await self._transport.send(self._decide)
         except RobotiqConnectionError:
-            self._channels.publish_changes()
-            if self._decided is not None:
-                self._channels.requests.push(SentRequest(*self._decided, acknowledged=False))
+            self._note_unacknowledged()
             raise
         if not is_written or self._decided is None:
             return
@@ -327,17 +364,23 @@ class Poller:
         return request.registers
 
     async def _poll_once(self, *, is_first: bool = False) -> None:
-        tick, counters = self._tick, self._counters
-        tick.late = 0.0
-        asked = tick.time()
+        self._tick.late = 0.0
+        asked = self._tick.time()
         registers = await self._transport.read()
-        answered = tick.time()
+        answered = self._tick.time()
         if is_first and (why := self._model.contradiction(registers)):
             raise WrongModelError(
                 f"this is no {self._model.title}: its registers show {why}; {names_that_fit(registers)}"
             )
-        status = RobotiqStatus(registers, answered, next(self._channels.numbers), self._model)
-        counters.note_poll(asked, answered, period=asked - self._last_poll if self._last_poll else None)
+        self._take(self._status(registers, answered), asked)
+
+    def _status(self, registers: Registers, answered: float) -> RobotiqStatus:
+        return RobotiqStatus(registers, answered, next(self._channels.numbers), self._model)
+
+    def _take(self, status: RobotiqStatus, asked: float) -> None:
+        """Pass on a status that was asked for at ``asked``."""
+        period = asked - self._last_poll if self._last_poll else None
+        self._counters.note_poll(asked, status.timestamp, period)
         self._last_poll = self._asked = asked
         self._controller.see(status, asked)
         self._channels.publish_changes()

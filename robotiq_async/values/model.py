@@ -7,7 +7,7 @@ Nothing of this has run on real hardware yet.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from . import registers as reg
@@ -243,7 +243,9 @@ def _with_jaw(
         object_status=(reg.gOBJ,),
         faults=_ADAPTIVE_FAULTS,
         tcp=_GATEWAY,
-        rtu=_GATEWAY,
+        # Manual of the 2F-85 and 2F-140 (4.7.5): function 23, which the vendor's software uses as well. What
+        # gateways make of it is unknown.
+        rtu=replace(_GATEWAY, write_function=23),
         # A 2F-85 reads 3 and 227 to 230 (PickNik's driver); no other source gives the readings of the others.
         stroke=Stroke(mm, open_reading=3, closed_reading=228),
         open_reading_max=6,

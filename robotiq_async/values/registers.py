@@ -102,6 +102,7 @@ class RegisterMap:
         read_function: Modbus function that reads the status block, 3 or 4.
         device_id: the unit id the gripper is shipped with.
         count: registers of either block that are read and written, 1..8; the others are 0.
+        write_function: Modbus function that writes the request block: 16, or 23, which also reads the status.
     """
 
     request: int
@@ -109,6 +110,7 @@ class RegisterMap:
     read_function: int
     device_id: int
     count: int = REGISTER_COUNT
+    write_function: int = 16
 
 
 TCP_REGISTERS: Final = RegisterMap(request=0x0000, status=0x0000, read_function=4, device_id=2)

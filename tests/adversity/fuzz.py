@@ -111,10 +111,12 @@ def payload(reply: bytes, serial: bool, model: Model) -> bytes | None:
     end = begin + 2 * where.count
     size = end + (2 if serial else 0)
     reply = reply[:size]
-    asked = struct.pack(">BBHH", where.device_id, where.read_function, where.status, where.count)
-    request = asked if serial else reply[:4] + bytes((0, len(asked))) + asked
-    right = len(reply) == size and answers(request, reply, serial)
-    return reply[begin:end] if right else None
+    for function in (where.read_function, where.write_function):
+        asked = struct.pack(">BBHH", where.device_id, function, where.status, where.count)
+        request = asked if serial else reply[:4] + bytes((0, len(asked))) + asked
+        if function != WRITE and len(reply) == size and answers(request, reply, serial):
+            return reply[begin:end]
+    return None
 
 
 def decoder(count: int, seed: int = 1) -> dict[str, int]:

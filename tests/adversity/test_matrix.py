@@ -21,6 +21,15 @@ LETS_GO = ("power-cut", "foreign", "fault", "release", "e-stop")
 """What ends a grip if no other axis can move. Else a stop writes nothing that could fail."""
 CONNECTION_LOST = [("tcp", "silence once"), ("tcp", "reset"), ("tcp", "close")]
 """What does so too, as it would with a 3-Finger: what came of the grip cannot be seen in time."""
+WITH_FUNCTION_23 = {
+    # The status that is read after the damage shows that the write was carried out.
+    ("command pending", trouble): "done → RUNNING_IDLE"
+    for trouble in (
+        *("drop once", "half once", "wrong-checksum once", "wrong-function once", "wrong-length once"),
+        *("wrong-count once", "wrong-unit once"),
+    )
+}
+"""What comes of a cell on a serial line to a jaw, which is written with function 23."""
 FORGETTING = {
     # The other client's write comes too soon after ours, and is the one that is forgotten.
     ("tcp", "moving", "foreign 128"): "done → RUNNING_IDLE",
@@ -39,6 +48,8 @@ def expected(cell: Cell, model: Model) -> str:
         # A lag that grows shows the closing once more: an axis that moves is held where it is.
         lets_go = lets_go or kind_of(cell) == "status-lag" in {habit.kind for habit in HABITS}
         return f"done, {'let go' if lets_go else 'kept'} → SHUTDOWN"
+    if len(model.axes) == 1 and cell.link == "rtu" and (cell.phase.name, cell.trouble) in WITH_FUNCTION_23:
+        return WITH_FUNCTION_23[cell.phase.name, cell.trouble]
     forgets = any(habit.kind == "write-spacing" for habit in HABITS)
     other = FORGETTING.get((cell.link, cell.phase.name, cell.trouble)) if forgets else None
     return other or cell.outcome

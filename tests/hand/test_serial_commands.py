@@ -5,11 +5,13 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Iterable
 from contextlib import asynccontextmanager
+from dataclasses import replace
+from typing import Any
 
 import pytest
 
-from robotiq_async import Finger, RobotiqHand
-from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
+from robotiq_async import ConnectionLostError, Finger, RobotiqHand
+from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, parse_troubles
 from robotiq_async.values.model import model_of
 from tests.grippers import activate_beforehand
 from tests.virtual import VirtualLoop
@@ -17,7 +19,8 @@ from tests.virtual_line import VirtualLine
 
 pytestmark = pytest.mark.virtual_time
 
-READ, WRITE = 3, 16
+READ, WRITE, BOTH = 3, 16, 23
+WRITES = (WRITE, BOTH)
 A = Finger.A
 
 
@@ -25,6 +28,7 @@ class Replies:
     """The function of each reply, in order, and when it left."""
 
     def __init__(self, server: SerialSimulatorServer) -> None:
+        self.server = server
         self.seen: list[tuple[float, int]] = []
         self._loop = asyncio.get_running_loop()
         server.policy = self._note
@@ -45,14 +49,18 @@ def model(request: pytest.FixtureRequest) -> str:
 
 @asynccontextmanager
 async def at_a_line(
-    monkeypatch: pytest.MonkeyPatch, model: str, poll_interval: float = 0.005
+    monkeypatch: pytest.MonkeyPatch,
+    model: str,
+    *,
+    poll_interval: float = 0.005,
+    write_function: int | None = None,
 ) -> AsyncIterator[tuple[RobotiqHand, Replies]]:
     cable = VirtualLine(monkeypatch)
     gripper = SimulatedGripper(asyncio.get_running_loop().time, model=model_of(model))
     async with SerialSimulatorServer(cable.FAR, gripper) as server:
         await activate_beforehand(gripper)
         address = f"rtu://{cable.NEAR}?model={model}"
-        async with RobotiqHand(address, poll_interval=poll_interval) as hand:
+        async with RobotiqHand(address, poll_interval=poll_interval, write_function=write_function) as hand:
             replies = Replies(server)
             await asyncio.sleep(0.1)
             yield hand, replies
@@ -78,8 +86,8 @@ async def test_a_command_is_written_before_the_next_read_which_shows_it(
             async for status in hand.statuses(buffer=1):
                 if status.requested_position(A) == position:
                     break
-            assert replies.since(asked)[:2] == [WRITE, READ]
-            written = next(at for at, function in replies.seen if at >= asked and function == WRITE)
+            assert replies.since(asked)[:2] == ([WRITE, READ] if model == "3f" else [BOTH])
+            written = next(at for at, function in replies.seen if at >= asked and function in WRITES)
             assert written - asked < 0.005, "the gripper has it: a read would take as long again"
             await asyncio.sleep(0.05)
 
@@ -92,7 +100,7 @@ async def test_an_old_status_is_read_anew_before_a_command(
         await asyncio.sleep(0.05)
         asked = asyncio.get_running_loop().time()
         await hand.set_position(100)
-        assert replies.since(asked) == [READ, WRITE]
+        assert replies.since(asked) == [READ, WRITE if model == "3f" else BOTH]
         assert asyncio.get_running_loop().time() - asked < 0.01, "at once, and not with the next poll"
         assert hand.statistics.status_age_p99 < 0.006
 
@@ -129,7 +137,7 @@ async def test_commands_made_together_are_one_write(monkeypatch: pytest.MonkeyPa
         hand.command(A, position=77)
         hand.command(A, speed=9)
         await asyncio.sleep(0.03)
-        assert replies.since(asked).count(WRITE) == 1
+        assert sum(function in WRITES for function in replies.since(asked)) == 1
 
 
 async def test_over_tcp_a_command_is_decided_on_the_next_read() -> None:
@@ -146,3 +154,72 @@ async def test_over_tcp_a_command_is_decided_on_the_next_read() -> None:
         server.policy = note
         await hand.set_position(100)
         assert seen[-2:] == [4, WRITE]
+
+
+# -- function 23, which jaws are written with ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("words", ["wrong-checksum once", "half once", "drop once"])
+async def test_a_damaged_reply_costs_no_command_and_no_link(
+    monkeypatch: pytest.MonkeyPatch, words: str
+) -> None:
+    """The status that is read after it shows that the write was carried out."""
+    async with at_a_line(monkeypatch, "2f85") as (hand, replies):
+        await hand.set_position(50)
+        (trouble,) = parse_troubles(words)
+        gripper = replies.server.gripper
+        before = len(gripper.writes)
+        await between_polls(hand)
+        async with replies.server.fault_injector.making(replace(trouble, on="write")):
+            await hand.set_position(200)
+            assert len(gripper.writes) == before + 1
+        await asyncio.sleep(2.0)
+        assert gripper.position(A) == pytest.approx(200, abs=3)
+        assert hand.statistics.reconnects == 0
+
+
+async def test_a_write_that_was_not_heard_is_lost_and_not_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with at_a_line(monkeypatch, "2f85") as (hand, replies):
+        await hand.move(50)
+        gripper = replies.server.gripper
+        before = len(gripper.writes)
+        await between_polls(hand)
+        async with replies.server.fault_injector.making(parse_troubles("silence once")[0]):
+            with pytest.raises(ConnectionLostError):
+                await hand.set_position(200)
+        await asyncio.sleep(1.0)
+        assert len(gripper.writes) == before
+        assert gripper.position(A) < 60
+
+
+async def test_a_write_of_speed_alone_stays_in_doubt_after_a_damaged_reply(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """No status shows speeds and forces, so none can tell whether they were taken."""
+    async with at_a_line(monkeypatch, "2f85") as (hand, replies):
+        await hand.set_position(50)
+        await between_polls(hand)
+        (trouble,) = parse_troubles("wrong-checksum once")
+        async with replies.server.fault_injector.making(replace(trouble, on="write")):
+            with pytest.raises(ConnectionLostError):
+                await hand.set_speed(17)
+
+
+async def test_function_16_can_be_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with at_a_line(monkeypatch, "2f85", write_function=16) as (hand, replies):
+        asked = await between_polls(hand)
+        await hand.set_position(50)
+        assert replies.since(asked)[0] == WRITE
+
+
+async def test_function_23_can_be_chosen_for_a_3_finger(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with at_a_line(monkeypatch, "3f", write_function=23) as (hand, replies):
+        asked = await between_polls(hand)
+        await hand.set_position(50)
+        assert replies.since(asked)[0] == BOTH
+
+
+@pytest.mark.parametrize("wrong", [3, 17, 22, 0, "16", 16.5, True])
+def test_only_two_functions_write(wrong: Any) -> None:
+    with pytest.raises((TypeError, ValueError), match="write_function must be"):
+        RobotiqHand("sim://", write_function=wrong)

@@ -8,6 +8,7 @@ import pytest
 import serial
 
 from robotiq_async.link.modbus import ModbusTransport
+from robotiq_async.values.model import TWO_FINGER_85
 from tests.link.scripted_device import Device, unopened
 from tests.virtual_line import VirtualLine
 
@@ -26,5 +27,13 @@ async def transport(device: Device) -> AsyncIterator[ModbusTransport]:
     """At the near end, open."""
     transport = unopened(VirtualLine.NEAR)
     await transport.open()
+    yield transport
+    await transport.close()
+
+
+@pytest.fixture
+async def jaw(device: Device) -> AsyncIterator[ModbusTransport]:
+    """A transport to a 2F-85 at the near end, not open."""
+    transport = unopened(VirtualLine.NEAR, TWO_FINGER_85.rtu)
     yield transport
     await transport.close()

@@ -33,6 +33,10 @@ class Device:
         """Requests that come sooner than this after a reply are not heard."""
         self.most = 8
         """A read of more registers than this gets no answer."""
+        self.has_23 = True
+        """Whether function 23 is served."""
+        self.refuses = False
+        """Whether a function that is not served gets an exception; else it gets no answer."""
         self.echoes = False
         """Whether the line brings back what is sent."""
         self._answered_at = 0.0
@@ -52,7 +56,7 @@ class Device:
     def _ready(self) -> None:
         self._inbox += self._port.read(4096)
         while len(self._inbox) >= 8:
-            size = 8 if self._inbox[1] == 3 else 9 + self._inbox[6]
+            size = self._size()
             if len(self._inbox) < size:
                 return
             request, self._inbox = self._inbox[:size], self._inbox[size:]
@@ -63,6 +67,10 @@ class Device:
                 self.send(request)
             if self.loses:
                 self.loses -= 1
+                continue
+            if request[1] == 23 and not self.has_23:
+                if self.refuses:
+                    self.send(with_crc(bytes((9, 0x80 | 23, 1))))
                 continue
             if pause < self.least_pause or (request[1] == 3 and request[5] > self.most):
                 continue
@@ -79,11 +87,18 @@ class Device:
                 self.send(b"".join(kept) + reply)
                 self._answered_at = self._loop.time()
 
+    def _size(self) -> int:
+        """Bytes of the first request."""
+        inbox, counts_at = self._inbox, {16: 6, 23: 10}.get(self._inbox[1])
+        if counts_at is None:
+            return 8
+        return counts_at + 3 + inbox[counts_at] if len(inbox) > counts_at else counts_at + 3
+
     def _reply(self, request: bytes) -> bytes:
         if request[1] == 16:
             return with_crc(request[:6])
         count = int.from_bytes(request[4:6], "big")
-        return with_crc(bytes((9, 3, 2 * count)) + len(self.requests).to_bytes(2, "big") * count)
+        return with_crc(bytes((9, request[1], 2 * count)) + len(self.requests).to_bytes(2, "big") * count)
 
 
 def unopened(device: str, registers: RegisterMap = RTU_REGISTERS) -> ModbusTransport:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Callable
+from collections.abc import Callable
 
 import pytest
 
 from robotiq_async import ProtocolError, ResponseTimeoutError, RobotiqConnectionError
 from robotiq_async.link.modbus import ModbusTransport
 from robotiq_async.link.silence import LONG_S, SHORT_S
-from robotiq_async.values.model import TWO_FINGER_85
 from tests.link.scripted_device import Device, unopened, wrong_checksum
 from tests.serial_line import with_crc
 from tests.virtual_line import VirtualLine
@@ -19,14 +18,6 @@ from tests.virtual_line import VirtualLine
 pytestmark = pytest.mark.virtual_time
 
 IMAGE = (0x0900, 0x00FF, 0x4060, 0, 0, 0, 0, 0)
-
-
-@pytest.fixture
-async def jaw(device: Device) -> AsyncIterator[ModbusTransport]:
-    """A transport to a 2F-85, not open."""
-    transport = unopened(VirtualLine.NEAR, TWO_FINGER_85.rtu)
-    yield transport
-    await transport.close()
 
 
 def counts(device: Device) -> list[int]:

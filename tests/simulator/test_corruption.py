@@ -48,7 +48,7 @@ def at_once(frame: bytes) -> list[tuple[float, bytes]]:
     ("pdu", "is_to_a_write"),
     [
         *((READ, False), ("03 02 1234", False), ("83 02", False), ("84 02", False)),
-        (READ_WRITE, False),
+        (READ_WRITE, True),
         *((WRITE, True), (WRITE_ONE, True), ("86 02", True), ("90 02", True)),
     ],
 )

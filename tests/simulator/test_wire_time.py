@@ -124,7 +124,7 @@ async def test_a_line_keeps_no_more_than_it_carries_for_a_while(monkeypatch: pyt
         ("3f", {}, True, 131.6, 131.6),
         ("3f", {"poll_interval": 0.01}, False, 100, 0),
         ("2f85", {}, False, 200, 0),
-        ("2f85", {}, True, 171, 171),
+        ("2f85", {}, True, 269.4, 269.4),
     ],
 )
 async def test_how_often_a_hand_polls(

@@ -47,8 +47,13 @@ class Reply:
 
     @property
     def is_to_a_write(self) -> bool:
-        """Whether it answers a write; FC23 counts as a read, because its reply carries the status."""
-        return self.pdu[0] & 0x7F in (WRITE_SINGLE, WRITE_MULTIPLE)
+        """Whether it answers a write; FC23 is one, though its reply carries the status."""
+        return self.pdu[0] & 0x7F in (WRITE_SINGLE, WRITE_MULTIPLE, READ_WRITE)
+
+    @property
+    def has_registers(self) -> bool:
+        """Whether it carries registers, as the replies to reads and to FC23 do."""
+        return self.pdu[0] & 0x7F not in (WRITE_SINGLE, WRITE_MULTIPLE)
 
     @property
     def is_exception(self) -> bool:
@@ -112,13 +117,13 @@ def wrong_function(reply: Reply, value: float) -> Parts:
 def wrong_length(reply: Reply, value: float) -> Parts:
     """The reply has one register less and says so, as if less had been asked; one to a write lacks a byte."""
     pdu = reply.pdu
-    return reply.changed(pdu=pdu[:-1] if reply.is_to_a_write else bytes((pdu[0], pdu[1] - 2)) + pdu[2:-2])
+    return reply.changed(pdu=bytes((pdu[0], pdu[1] - 2)) + pdu[2:-2] if reply.has_registers else pdu[:-1])
 
 
 def wrong_count(reply: Reply, value: float) -> Parts:
     """The reply announces two bytes more than it has; one to a write, another number of registers."""
     pdu = reply.pdu
-    if reply.is_to_a_write:
+    if not reply.has_registers:
         return reply.changed(pdu=pdu[:-1] + bytes((pdu[-1] ^ 1,)))
     return reply.changed(pdu=bytes((pdu[0], pdu[1] + 2)) + pdu[2:])
 
@@ -140,8 +145,10 @@ def wrong_protocol(reply: Reply, value: float) -> Parts:
 
 
 def wrong_echo(reply: Reply, value: float) -> Parts:
-    """The reply to a write names the register next to the one that was written."""
+    """The reply to a write names the register next to the one that was written; one to FC23 names none."""
     pdu = reply.pdu
+    if reply.has_registers:
+        return reply.changed()
     return reply.changed(pdu=pdu[:2] + bytes((pdu[2] ^ 1,)) + pdu[3:])
 
 
