@@ -68,7 +68,8 @@ class RobotiqHand(Hand):
     Args:
         address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``rtu+tcp://HOST:PORT``
             (a serial line behind a socket), ``sim://`` (or ``sim://?speedup=10&object=150``), or a
-            transport object.
+            transport object. A serial port sends at 115200 baud, 8N1, unless the address ends in
+            ``?baud=500000``, ``&parity=E`` or ``&stopbits=2``.
         name: what to call this hand, in 1..64 printable characters: errors and the log begin with it, and
             metrics and recordings carry it. None calls it by its address.
         device_id: Modbus unit id, 0..255 over TCP and 1..247 over RTU; by default 2 over TCP and 9 over

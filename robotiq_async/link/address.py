@@ -8,6 +8,7 @@ import re
 import socket
 import stat
 from dataclasses import dataclass
+from difflib import get_close_matches
 from ipaddress import IPv4Address, IPv6Address
 from typing import Final, Literal
 
@@ -22,10 +23,15 @@ FORMS: Final = (
     "rtu:///dev/ttyUSB0 (a serial port; rtu://COM3 on Windows), "
     "rtu+tcp://HOST:PORT (a serial line behind a TCP socket), sim:// (or sim://?speedup=10&object=150), "
     "zenoh://SITE/HOST/GRIPPER (on another host: for robotiq_async.fleet.RemoteHand and for commands); "
-    "?model=2f85, 2f140 or hand-e at the end for a sibling of the 3-Finger"
+    "?model=2f85, 2f140 or hand-e at the end for a sibling of the 3-Finger, ?baud=500000 for a serial port "
+    "with another rate than 115200"
 )
 
-LINE: Final = "the line runs at 115200 baud, 8N1, as a gripper does out of the box (manual)"
+BAUD: Final = 115200  # the rate of a serial line, 8N1, as a gripper comes out of the box (manual)
+SLOWEST_BAUD: Final = 9600
+FASTEST_BAUD: Final = 1_000_000
+"""No manual lists the rates that the vendor's tool can set; users have named 125000, 250000 and 500000."""
+LINE_OPTIONS: Final = ("baud", "parity", "stopbits")
 
 SLOWEST: Final = 0.01
 FASTEST: Final = 1000.0
@@ -57,6 +63,35 @@ NOTHING_SPECIAL: Final = Simulation()
 
 
 @dataclass(frozen=True, slots=True)
+class Line:
+    """The settings of a serial port. It sends 8 data bits, as Modbus RTU wants them.
+
+    Attributes:
+        baud: bits a second, 9600..1000000.
+        parity: "N" for none, "E" for even, "O" for odd.
+        stopbits: 1 or 2.
+    """
+
+    baud: int = BAUD
+    parity: str = "N"
+    stopbits: int = 1
+
+    @property
+    def character_s(self) -> float:
+        """Seconds that a character takes."""
+        return (9 + (self.parity != "N") + self.stopbits) / self.baud
+
+    def __str__(self) -> str:
+        usual = Line()
+        given = [name for name in LINE_OPTIONS if getattr(self, name) != getattr(usual, name)]
+        return "?" + "&".join(f"{name}={getattr(self, name)}" for name in given) if given else ""
+
+
+USUAL_LINE: Final = Line()
+USUAL: Final = "without them 115200 baud, 8N1, as a gripper comes"
+
+
+@dataclass(frozen=True, slots=True)
 class Address:
     """A checked address.
 
@@ -65,6 +100,7 @@ class Address:
         host: host name or IP address (tcp, rtu+tcp), device of the serial port (rtu), empty (sim).
         port: TCP port; 0 for the others.
         simulation: what the gripper is like (sim); nothing special for the others.
+        line: how the serial port sends (rtu); the usual for the others.
         model: of the gripper; None if the address does not name it.
     """
 
@@ -72,6 +108,7 @@ class Address:
     host: str = ""
     port: int = 0
     simulation: Simulation = NOTHING_SPECIAL
+    line: Line = USUAL_LINE
     model: Model | None = None
 
     @property
@@ -85,7 +122,7 @@ class Address:
         return self.kind in ("tcp", "rtu+tcp")
 
     def __str__(self) -> str:
-        query = str(self.simulation)
+        query = str(self.simulation) + str(self.line)
         if self.model is not None:
             query += f"{'&' if query else '?'}model={self.model.name}"
         if self.is_socket:
@@ -119,11 +156,15 @@ def parse_address(address: object) -> Address:
         if "://" in rest:  # pyserial would open it, and block the event loop for seconds
             what = f"{rest} is no serial port; for one behind a TCP socket use rtu+tcp://HOST:PORT"
             raise ValueError(f"malformed address {address!r}: {what}; accepted: {FORMS}")
-        if "=" in rest.partition("?")[2]:
-            what = f"a serial port has no option but model, got {rest.partition('?')[2]!r}; {LINE}"
-            raise ValueError(f"malformed address {address!r}: {what}; accepted: {FORMS}")
-        return Address("rtu", rest, model=model)
+        try:
+            device, line = _device_and_line(rest)
+        except ValueError as error:
+            raise ValueError(f"malformed address {address!r}: {error}; accepted: {FORMS}") from None
+        return Address("rtu", device, line=line, model=model)
     if scheme in ("tcp", "rtu+tcp"):
+        if any(option.partition("=")[0] in LINE_OPTIONS for option in rest.partition("?")[2].split("&")):
+            what = "baud, parity and stopbits are options of a serial port; a serial server has its own"
+            raise ValueError(f"malformed address {address!r}: {what}; accepted: {FORMS}")
         # Serial servers have no usual port, so one must be given.
         host, port = _host_and_port(rest, TCP_PORT if scheme == "tcp" else None)
         if ":" not in host and _ends_in_a_number(host) and not _is_ipv4(host):
@@ -166,6 +207,48 @@ def _without_model(text: str) -> tuple[str, Model | None]:
         raise ValueError("model must be given once, as model=NAME")
     others = "&".join(option for option in options if not option.startswith("model="))
     return place + (f"?{others}" if others else ""), model_of(names[0])
+
+
+def _device_and_line(text: str) -> tuple[str, Line]:
+    """Split DEVICE?baud=...&parity=...&stopbits=...; a device may have a question mark in its name."""
+    device, _, query = text.partition("?")
+    if "=" not in query:
+        if rate := re.search(r":([0-9]+)$", text):
+            raise ValueError(f"the rate of a serial port is ?baud={rate[1]}")
+        return text, USUAL_LINE
+    given: dict[str, str] = {}
+    for part in query.split("&"):
+        name, _, value = part.partition("=")
+        if name not in LINE_OPTIONS:
+            meant = next((each for each in ("model", *LINE_OPTIONS) if _is_like(name, each)), "")
+            hint = f"; did you mean {meant}?" if meant else ""
+            known = f"known are: model, {', '.join(LINE_OPTIONS)}"
+            raise ValueError(f"no option {name!r} of a serial port{hint}; {known} ({USUAL})")
+        if name in given:
+            raise ValueError(f"{name} must be given once, as {name}=VALUE")
+        given[name] = value
+    return device, Line(
+        baud=_baud(given["baud"]) if "baud" in given else BAUD,
+        parity=_one_of("parity", given.get("parity", "N").upper(), "N", "E", "O"),
+        stopbits=int(_one_of("stopbits", given.get("stopbits", "1"), "1", "2")),
+    )
+
+
+def _is_like(name: str, known: str) -> bool:
+    """Whether a name is a misspelling of a known one."""
+    return bool(get_close_matches(name.lower(), [known], 1, 0.6)) or name.lower().startswith(known)
+
+
+def _baud(text: str) -> int:
+    if not re.fullmatch(r"[0-9]{1,7}", text) or not SLOWEST_BAUD <= int(text) <= FASTEST_BAUD:
+        raise ValueError(f"baud must be an integer in {SLOWEST_BAUD}..{FASTEST_BAUD}, got {text!r}")
+    return int(text)
+
+
+def _one_of(name: str, given: str, *known: str) -> str:
+    if given not in known:
+        raise ValueError(f"{name} must be {', '.join(known[:-1])} or {known[-1]}, got {given!r}")
+    return given
 
 
 def _host_and_port(text: str, usual: int | None) -> tuple[str, int | None]:

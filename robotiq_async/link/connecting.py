@@ -16,7 +16,6 @@ from ..values.errors import ConnectFailedError
 from .address import Address
 from .host_names import addresses_of, why_no_socket, why_unreachable
 from .serial_ports import hasten, why_no_port
-from .silence import BAUD
 
 Client = AsyncModbusTcpClient | AsyncModbusSerialClient
 
@@ -114,7 +113,13 @@ def _make(address: Address, host: str, options: dict[str, Any]) -> Client:
             raise ConnectFailedError(
                 str(address), f"serial ports need pyserial: {install('serial')}"
             ) from None
-        form: dict[str, Any] = {"baudrate": BAUD, "bytesize": 8, "parity": "N", "stopbits": 1}
+        line = address.line
+        form: dict[str, Any] = {
+            "baudrate": line.baud,
+            "bytesize": 8,
+            "parity": line.parity,
+            "stopbits": line.stopbits,
+        }
         client = AsyncModbusSerialClient(host, framer=FramerType.RTU, **form, **options)
     return client
 

@@ -167,7 +167,7 @@ class ModbusTransport:
         self._loop = loop = asyncio.get_running_loop()
         self._clock = clock_of(loop)
         self._watchdog = Watchdog(loop, self._response_timeout, lambda: self._is_waiting, self._on_timeout)
-        self._silence = Silence(self._clock)
+        self._silence = Silence(self._clock, self._address.line.character_s)
         self._silence.is_long = self._needs_long_silence
         self._failure, self._is_echoed = None, None if self._rtu else False
         try:
@@ -418,7 +418,8 @@ class ModbusTransport:
         except NOISE as error:
             self._needs_long_silence = self._silence.is_long = True
             self._log.warning(
-                "%s does not answer after a silence of 0.3 ms, so it gets 1.75 ms: %s", self._address, error
+                "%s does not answer after a silence of %.1f ms, so it gets 1.75 ms: %s",
+                *(self._address, 1000 * self._silence.short_s, error),
             )
             await self._bring_in_step(math.inf)
 

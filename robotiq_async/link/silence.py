@@ -14,8 +14,7 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-BAUD: Final = 115200  # of the gripper's serial line; 8 data bits, no parity, 1 stop bit (manual)
-SHORT_S: Final = 3.5 * 10 / BAUD
+SHORT_CHARACTERS: Final = 3.5
 LONG_S: Final = 0.00175
 TIMER_S: Final = 0.001
 """The timers of a loop are no finer: epoll rounds up to whole milliseconds. The rest of a silence is spent
@@ -27,22 +26,25 @@ class Silence:
 
     Attributes:
         heard: when the last bytes arrived, by the clock.
+        short_s: seconds of the short silence.
         is_long: whether this line needs the longer silence.
     """
 
-    def __init__(self, clock: Callable[[], float]) -> None:
+    def __init__(self, clock: Callable[[], float], character_s: float) -> None:
         """Begin with the short silence.
 
         Args:
             clock: that of the event loop (``clock_of``). uvloop's own ``time()`` counts whole milliseconds.
+            character_s: seconds that a character takes on the line.
         """
         self._clock = clock
+        self.short_s: Final = SHORT_CHARACTERS * character_s
         self.heard = -math.inf
         self.is_long = False
 
     async def keep(self) -> None:
         """Wait until the line has been silent for long enough; returns at once if it has."""
-        until = self.heard + (LONG_S if self.is_long else SHORT_S)
+        until = self.heard + (max(LONG_S, self.short_s) if self.is_long else self.short_s)
         if (left := until - self._clock()) <= 0:
             return
         if self._clock is not time.monotonic:

@@ -47,7 +47,7 @@ class Transport(Protocol):
 
 
 class Answer(NamedTuple):
-    """What came of a write that also reads.
+    """The outcome of a write that also reads.
 
     Attributes:
         registers: the status registers, read after the write.

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.link.address import FORMS, Address, Simulation, parse_address
+from robotiq_async.link.address import FORMS, Address, Line, Simulation, parse_address
 
 NAMES = st.from_regex(r"[a-z0-9_][a-z0-9_-]{0,62}", fullmatch=True).filter(
     lambda name: not re.fullmatch("[0-9]+|0x[0-9a-f]*", name)
@@ -167,6 +167,27 @@ PORTS_THAT_ARE_NONE = ["", "0", "65536", "-1", "+502", " 502", "502 ", "5_02", "
 
 
 @pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("rtu:///dev/ttyUSB0", Line(115200, "N", 1)),
+        ("rtu:///dev/ttyUSB0?baud=500000", Line(500000, "N", 1)),
+        ("rtu://COM3?baud=9600&parity=E&stopbits=2", Line(9600, "E", 2)),
+        ("rtu://COM3?model=2f85&parity=o", Line(115200, "O", 1)),
+    ],
+)
+def test_how_a_serial_port_sends(text: str, line: Line) -> None:
+    parsed = parse_address(text)
+    assert parsed.line == line
+    assert parse_address(str(parsed)) == parsed
+    assert parsed.host in ("/dev/ttyUSB0", "COM3")
+
+
+def test_a_character_has_ten_to_twelve_bits() -> None:
+    assert Line().character_s == pytest.approx(86.8e-6, abs=1e-7)
+    assert Line(9600, "E", 2).character_s == pytest.approx(12 / 9600)
+
+
+@pytest.mark.parametrize(
     ("what", "meant"),
     [
         ("COM3", "rtu://COM3"),
@@ -175,8 +196,20 @@ PORTS_THAT_ARE_NONE = ["", "0", "65536", "-1", "+502", " 502", "502 ", "5_02", "
         ("2f85", "tcp://192.168.1.11?model=2f85"),
         ("2F-140", "?model=2f140"),
         ("HandE", "?model=hand-e"),
-        ("rtu:///dev/ttyUSB0?baudrate=9600", "115200 baud"),
-        ("rtu://COM3?baudrate=9600&model=2f85", "got 'baudrate=9600'"),
+        ("rtu:///dev/ttyUSB0?baudrate=9600", "no option 'baudrate' of a serial port; did you mean baud?"),
+        ("rtu://COM3?baudrate=9600&model=2f85", "did you mean baud?"),
+        ("rtu:///dev/ttyUSB0?modle=2f85", "did you mean model?"),
+        (
+            "rtu:///dev/ttyUSB0?x=1",
+            "known are: model, baud, parity, stopbits",
+        ),
+        ("rtu:///dev/ttyUSB0:115200", "the rate of a serial port is ?baud=115200"),
+        ("rtu:///dev/ttyUSB0?baud=300", "baud must be an integer in 9600..1000000, got '300'"),
+        ("rtu:///dev/ttyUSB0?baud=1e6", "baud must be an integer"),
+        ("rtu:///dev/ttyUSB0?parity=M", "parity must be N, E or O, got 'M'"),
+        ("rtu:///dev/ttyUSB0?stopbits=3", "stopbits must be 1 or 2, got '3'"),
+        ("rtu:///dev/ttyUSB0?baud=9600&baud=9600", "baud must be given once"),
+        ("rtu+tcp://192.168.1.20:54321?baud=9600", "a serial server has its own"),
     ],
 )
 def test_what_somebody_may_have_meant_is_told(what: str, meant: str) -> None:

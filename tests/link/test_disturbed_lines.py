@@ -10,13 +10,14 @@ import pytest
 
 from robotiq_async import ProtocolError, ResponseTimeoutError, RobotiqConnectionError
 from robotiq_async.link.modbus import ModbusTransport
-from robotiq_async.link.silence import LONG_S, SHORT_S
+from robotiq_async.link.silence import LONG_S
 from tests.link.scripted_device import Device, unopened, wrong_checksum
 from tests.serial_line import with_crc
 from tests.virtual_line import VirtualLine
 
 pytestmark = pytest.mark.virtual_time
 
+SHORT_S = 3.5 * 10 / 115200
 IMAGE = (0x0900, 0x00FF, 0x4060, 0, 0, 0, 0, 0)
 
 

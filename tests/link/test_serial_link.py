@@ -236,3 +236,17 @@ async def test_a_port_that_is_forbidden_and_anything_else(
     monkeypatch.setattr(serial, "serial_for_url", refuse)
     with pytest.raises(ConnectFailedError, match=why if why != FORBIDDEN else "not allowed to open it"):
         await unopened("/dev/ttyUSB7").open()
+
+
+async def test_a_port_is_opened_as_its_address_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[dict[str, object]] = []
+
+    def refuse(*_: object, **how: object) -> None:
+        opened.append(how)
+        raise serial.SerialException(errno.ENOENT, "no such port")
+
+    monkeypatch.setattr(serial, "serial_for_url", refuse)
+    with pytest.raises(ConnectFailedError):
+        await unopened("/dev/ttyUSB7?baud=500000&parity=E&stopbits=2").open()
+    (how,) = opened
+    assert {"baudrate": 500000, "parity": "E", "stopbits": 2, "bytesize": 8}.items() <= how.items()

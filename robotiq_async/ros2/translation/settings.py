@@ -100,7 +100,7 @@ def check_settings(values: Mapping[str, object]) -> Settings:
 
 
 def _option_value(name: str, value: Value) -> object:
-    # The default of the option, which may be None: on a serial line the default poll_interval differs.
+    # The default of the option, which may be None: that of write_spacing stands for another of a jaw.
     return OF_HAND[name].default if value == PARAMETERS[name].default else value
 
 

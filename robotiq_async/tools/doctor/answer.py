@@ -243,6 +243,8 @@ def _report_place(usual: RegisterMap, found: RegisterMap, report: Report) -> Non
         unit = Finding(Level.DOUBT, "unit id", f"{found.device_id}, not {usual.device_id}", advice)
     report(unit)
     at = f"status at {found.status}, requests at {found.request}, function {found.read_function}"
+    if found.write_function == 23:
+        at += "; a hand writes with function 23 (not tried: doctor writes nothing)"
     options = {
         "request_address": (found.request, usual.request),
         "status_address": (found.status, usual.status),
