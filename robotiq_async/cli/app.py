@@ -18,6 +18,7 @@ from .commands.measure import speed
 from .commands.measure_force import force
 from .commands.monitor import monitor, status
 from .commands.move import move
+from .commands.ports import ports
 from .commands.recordings import export, plot, record, recover, replay
 from .commands.simulate import simulate
 from .commands.verify import verify
@@ -25,7 +26,7 @@ from .commands.view import view
 from .commands.web import web
 
 COMMANDS: Final = (
-    *(demo, simulate, status, move, monitor, web, view, doctor, verify),
+    *(demo, simulate, status, move, monitor, web, view, ports, doctor, verify),
     *(record, replay, export, plot, recover, agent),
 )
 """A new sub-command is a module with a function of its name, and an entry here."""
@@ -52,7 +53,7 @@ What the extras beside cli are for:
     record    record (not of a table, .csv), replay, export, plot, recover, verify
     plot      plot, the pictures of measure
     fleet     agent, fleet, doctor and all others with zenoh:// addresses
-    serial    rtu:// addresses
+    serial    ports, rtu:// addresses
 
 Nothing here has run on real hardware yet.
 """

@@ -1,4 +1,4 @@
-"""Serial ports: why one cannot be opened, and the latency timer of USB adapters."""
+"""Serial ports: why one cannot be opened, and the names and the latency timer of USB adapters."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ TAKEN: Final = "another program has opened it"
 NO_PORT: Final = "it is not a serial port"
 
 USB_SERIAL: Final = Path("/sys/bus/usb-serial/devices")  # where Linux has a folder for each USB adapter
+BY_ID: Final = Path("/dev/serial/by-id")  # where Linux has a link to each USB adapter, by its name
 
 _WHY: Final = {
     **dict.fromkeys((errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR), MISSING),
@@ -24,16 +25,25 @@ _WHY: Final = {
 }
 
 
-def why_no_port(error: OSError | None) -> str:
+def why_no_port(error: OSError | None, folder: Path = BY_ID) -> str:
     """Why a serial port cannot be opened, for a person. ``error`` is pyserial's, or None."""
     if error is None:
         return "cannot open the serial port"
     # For a port that it cannot configure, pyserial gives no number; its context, the error of termios, does.
     numbers = (error.errno, *getattr(error.__context__, "args", ()))
-    return next(
+    why = next(
         (_WHY[each] for each in numbers if isinstance(each, int) and each in _WHY),
         f"cannot open the serial port: {error}",
     )
+    adapters = names_of_adapters(folder) if why is MISSING else {}
+    return f"{why} These are: {', '.join(sorted(adapters))}" if adapters else why
+
+
+def names_of_adapters(folder: Path = BY_ID) -> dict[str, str]:
+    """The USB adapters that are plugged in: by device, the path that names the adapter (Linux)."""
+    with contextlib.suppress(OSError):
+        return {os.path.realpath(path): str(path) for path in sorted(folder.iterdir())}
+    return {}
 
 
 def hasten(port: object) -> None:

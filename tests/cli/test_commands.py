@@ -14,6 +14,7 @@ from contextlib import asynccontextmanager, contextmanager, redirect_stdout
 from typing import TYPE_CHECKING
 
 import pytest
+from serial.tools.list_ports_common import ListPortInfo
 
 from robotiq_async import Fault, Finger, RobotiqStatus
 from robotiq_async.cli.commands.demo import _program
@@ -242,6 +243,34 @@ async def test_a_closed_standard_stream_does_no_harm(
     command = [sys.executable, "-m", "robotiq_async", "status", server.address]
     code = f"import os; os.close({closed}); os.execv({sys.executable!r}, {command!r})"
     (await shell.finish(await shell.python("-c", code))).assert_succeeded()
+
+
+# -- ports -------------------------------------------------------------------------------------------------
+
+
+def listed(*ports: tuple[str, str]) -> list[ListPortInfo]:
+    found = []
+    for device, description in ports:
+        port = ListPortInfo(device)
+        port.description = description
+        found.append(port)
+    return found
+
+
+def test_ports_are_listed_as_addresses(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    ports = listed(("/dev/ttyUSB1", "FT232R USB UART"), ("/dev/ttyS0", "n/a"))
+    # pyserial is below what is tested.
+    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: ports)
+    outcome = call("ports")
+    assert outcome.code == 0
+    assert outcome.out.splitlines() == ["rtu:///dev/ttyS0", "rtu:///dev/ttyUSB1  FT232R USB UART"]
+
+
+def test_a_machine_without_ports(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("serial.tools.list_ports.comports", list)
+    outcome = call("ports")
+    assert outcome.code == 1
+    assert "no serial port: is the adapter plugged in?" in outcome.err
 
 
 # -- doctor ------------------------------------------------------------------------------------------------

@@ -15,7 +15,14 @@ import serial
 
 from robotiq_async import ConnectFailedError, ProtocolError, ResponseTimeoutError, RobotiqConnectionError
 from robotiq_async.link.modbus import ModbusTransport
-from robotiq_async.link.serial_ports import FORBIDDEN, MISSING, NO_PORT, TAKEN
+from robotiq_async.link.serial_ports import (
+    FORBIDDEN,
+    MISSING,
+    NO_PORT,
+    TAKEN,
+    names_of_adapters,
+    why_no_port,
+)
 from tests.link.scripted_device import SPOILT, Device, reopened, unopened, wrong_checksum
 from tests.serial_line import SerialLine, with_crc
 
@@ -206,6 +213,18 @@ async def test_a_path_that_is_no_port_and_one_that_does_not_exist_differ(device:
     with pytest.raises(ConnectFailedError) as caught:
         await unopened(device).open()
     assert str(caught.value) == f"cannot connect to rtu://{device}: {why}"
+
+
+def test_a_port_that_is_missing_is_told_with_those_that_are_there(tmp_path: Path) -> None:
+    error = serial.SerialException(errno.ENOENT, "no")
+    assert why_no_port(error, tmp_path / "none") == MISSING
+    for device, name in (("ttyUSB1", "usb-FTDI_FT232R-if00"), ("ttyACM0", "usb-Other-if00")):
+        (tmp_path / device).touch()
+        (tmp_path / "by-id").mkdir(exist_ok=True)
+        (tmp_path / "by-id" / name).symlink_to(tmp_path / device)
+    folder = tmp_path / "by-id"
+    assert why_no_port(error, folder) == f"{MISSING} These are: {tmp_path}/ttyACM0, {tmp_path}/ttyUSB1"
+    assert names_of_adapters(folder)[f"{tmp_path}/ttyUSB1"] == str(folder / "usb-FTDI_FT232R-if00")
 
 
 async def test_a_port_of_another_program_is_reported(tmp_path: Path) -> None:
