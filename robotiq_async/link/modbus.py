@@ -154,6 +154,11 @@ class ModbusTransport:
     def is_open(self) -> bool:
         return self._client is not None
 
+    @property
+    def echoes(self) -> bool:
+        """Whether the line was seen to echo what is sent; the echo is dropped."""
+        return bool(self._is_echoed)
+
     async def open(self) -> None:
         """Connect, and make sure that no answer to an earlier request is taken for one to come.
 
@@ -312,7 +317,8 @@ class ModbusTransport:
             raise
         finally:
             self._exchange = None
-        self._is_echoed = bool(exchange.is_echoed)
+            self._is_echoed = self._is_echoed or exchange.is_echoed
+        self._is_echoed = bool(self._is_echoed)
         return answer
 
     def _can_repeat(self, error: Exception | None) -> bool:

@@ -28,7 +28,7 @@ from robotiq_async.tools.doctor import Finding, Level, examine
 from robotiq_async.tools.doctor.answer import _advice_for_opening
 from robotiq_async.tools.doctor.gripper import report_adapter
 from robotiq_async.values.request import AxisRequest, Request
-from tests.serial_line import SerialLine
+from tests.serial_line import SerialLine, with_crc
 from tests.virtual import run
 
 pytestmark = pytest.mark.virtual_time  # names and serial lines run loops of their own, in real time
@@ -284,6 +284,43 @@ async def test_one_lost_reply_does_not_make_it_another_unit(words: str) -> None:
         found = await findings(server.address)
     assert found["unit id"] == Finding(Level.GOOD, "unit id", "2")
     assert found["Modbus"].found == "answers when asked 2 times"
+
+
+def echoing(answer: Callable[[bytes], bytes]) -> Callable[[bytes], bytes]:
+    return lambda request: request + answer(request)
+
+
+def status_of(request: bytes) -> bytes:
+    """A reply of a gripper at rest to a read on a serial line."""
+    size = 2 * request[5]
+    block = bytes((0, 0, 0, *(0, 6, 0) * 3, 0, 137, 0, 0))
+    return with_crc(bytes((request[0], request[1], size)) + block[:size])
+
+
+ON_A_LINE: dict[str, tuple[Callable[[bytes], bytes], str]] = {
+    "silence": (lambda _: b"", "Nothing answers: check the gripper's power, A and B"),
+    "echo alone": (echoing(lambda _: b""), "The line echoes what is sent, and nothing else answers"),
+    "damage": (lambda request: status_of(request)[:-1] + b"\0", "Replies come damaged"),
+    "another rate": (lambda _: bytes.fromhex("f8 00 e0 fe"), "another rate or parity"),
+    "7 bits": (lambda request: bytes(each & 0x7F for each in status_of(request)[1:]), "7 data bits"),
+}
+
+
+@pytest.mark.parametrize("fault", ON_A_LINE)
+async def test_a_line_without_an_answer_gets_advice_for_lines(fault: str) -> None:
+    answer, advice = ON_A_LINE[fault]
+    async with answering(answer) as address:
+        found = await findings(f"rtu+tcp://{address}", seconds=120)
+    assert found["Modbus"].level is Level.BAD
+    assert advice in found["Modbus"].advice
+    assert "not this gripper" not in found["Modbus"].advice
+
+
+async def test_an_echo_on_the_line_is_told() -> None:
+    async with answering(echoing(status_of)) as address:
+        found = await findings(f"rtu+tcp://{address}", seconds=60)
+    assert found["echo"].level is Level.GOOD
+    assert found["Modbus"].found == "answers"
 
 
 @pytest.mark.parametrize("lost", range(1, 9))

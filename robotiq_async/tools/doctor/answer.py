@@ -50,6 +50,7 @@ async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> 
     It opens no extra connection to test the port, which would occupy a gateway that serves one client.
     """
     failure: RobotiqConnectionError | None = None
+    echoes = False
     stranger: RobotiqStatus | None = None
     for number, (registers, patience) in enumerate(_attempts(address, usual)):
         link = _link(address, registers, patience)
@@ -62,6 +63,7 @@ async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> 
             if number == 0:
                 _report_port(address, report)
             failure = failure or error
+            echoes = echoes or _echoes(link)
             await asyncio.sleep(LET_GO_S if number < TRIES else 0)
             continue
         if number == 0:
@@ -74,6 +76,8 @@ async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> 
         if registers != usual and (again := await _ask_again(address, usual, link)) is not None:
             # The line had lost the first requests, whatever they were: nothing about this gripper is unusual.
             (link, status, seconds), registers, tries = again, usual, tries + 1
+        if _echoes(link):
+            report(Finding(Level.GOOD, "echo", "the line echoes what is sent, and the echo is dropped"))
         report(_answers(failure if registers == usual else None, tries, seconds))
         _report_place(usual, registers, report)
         _report_silence(status, report)
@@ -82,7 +86,7 @@ async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> 
         _report_stranger(stranger, report)
         raise GiveUpError
     assert failure is not None
-    advice = await _other_frames(address) or _advice_for_silence(failure)
+    advice = await _other_frames(address) or _advice_for_silence(address, failure, echoes)
     report(Finding(Level.BAD, "Modbus", str(failure), advice))
     raise GiveUpError
 
@@ -222,7 +226,13 @@ def _answers(failure: RobotiqConnectionError | None, tries: int, seconds: float)
     return Finding(Level.DOUBT, "Modbus", f"answers when asked {tries} times", advice)
 
 
-def _advice_for_silence(error: RobotiqConnectionError) -> str:
+def _echoes(link: Link) -> bool:
+    return isinstance(link, ModbusTransport) and link.echoes
+
+
+def _advice_for_silence(address: Address, error: RobotiqConnectionError, echoes: bool) -> str:
+    if address.is_rtu and isinstance(error, ResponseTimeoutError | ProtocolError):
+        return _advice_for_a_line(error, echoes)
     if isinstance(error, ResponseTimeoutError):
         return (
             "Connected, but no unit answers: another device, the gripper's fieldbus is not Modbus, or it "
@@ -231,6 +241,25 @@ def _advice_for_silence(error: RobotiqConnectionError) -> str:
     if isinstance(error, ProtocolError):
         return "What answers is not this gripper: its registers are elsewhere, or it does not speak Modbus."
     return f"It closes the connection when asked. {ALONE}, or not speak Modbus."
+
+
+def _advice_for_a_line(error: RobotiqConnectionError, echoes: bool) -> str:
+    """What to look at when no gripper answers on a serial line. A line tells no more than its bytes."""
+    if isinstance(error, ResponseTimeoutError):
+        heard = "The line echoes what is sent, and nothing else answers" if echoes else "Nothing answers"
+        return (
+            f"{heard}: check the gripper's power, A and B (swapped?), its rate (?baud=), and whether another "
+            "program has the line. At a UR the tool I/O must belong to the user, and Robotiq's URCap be off."
+        )
+    if "checksum" in str(error):
+        return (
+            "Replies come damaged: check shield, ground, termination and length of the cable, then parity and "
+            "stop bits (?parity=, ?stopbits=)."
+        )
+    return (
+        "Bytes come that are no reply: the line has another rate or parity (?baud=, ?parity=) or 7 data bits, "
+        "a second master talks on it, or another device answers."
+    )
 
 
 # -- the device that answers -------------------------------------------------------------------------------
