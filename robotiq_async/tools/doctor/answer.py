@@ -253,8 +253,8 @@ def _advice_for_a_line(error: RobotiqConnectionError, echoes: bool) -> str:
         )
     if "checksum" in str(error):
         return (
-            "Replies come damaged: check shield, ground, termination and length of the cable, then parity and "
-            "stop bits (?parity=, ?stopbits=)."
+            "Replies come damaged: check shield, ground, termination and length of the cable, then parity "
+            "and stop bits (?parity=, ?stopbits=)."
         )
     return (
         "Bytes come that are no reply: the line has another rate or parity (?baud=, ?parity=) or 7 data bits, "
