@@ -252,9 +252,11 @@ class ModbusTransport:
         return Answer(self._status_in(reply), None)
 
     async def _prepare_write(self) -> None:
+        await self._pause()
         if self._failure is not None and self._can_repeat(self._failure):
             await self._bring_in_step(math.inf)  # a write must not meet what is left of a disturbance
-        await self._pause()
+            await self._pause()
+        self._check_connected()
 
     async def write(self, registers: Sequence[int]) -> None:
         """Write the request registers with one FC16, exactly once; a jaw has three of the eight.
@@ -288,12 +290,12 @@ class ModbusTransport:
             bears: tells errors after which the connection stays open. They are raised as they are: the caller
                 brings the line back in step.
         """
+        await self._pause()
         failure = self._failure
         if failure is not None and bears(failure):
             self._failure = None
             raise failure
         self._check_connected()
-        await self._pause()
         frame = serial_frame(request) if self._rtu else tcp_frame(self._next_number(), request)
         exchange = Exchange(frame, self._loop, serial=self._rtu, is_echoed=self._is_echoed)
         self._exchange = exchange
@@ -421,12 +423,15 @@ class ModbusTransport:
         try:
             for _ in range(SHORT_READS):
                 await self._resynchronise(bears=self._can_repeat)
-        except NOISE as error:
-            self._needs_long_silence = self._silence.is_long = True
-            self._log.warning(
-                "%s does not answer after a silence of %.1f ms, so it gets 1.75 ms: %s",
-                *(self._address, 1000 * self._silence.short_s, error),
-            )
+        except RobotiqConnectionError as error:
+            if not self._can_repeat(error):
+                raise
+            if isinstance(error, NOISE):
+                self._needs_long_silence = self._silence.is_long = True
+                self._log.warning(
+                    "%s does not answer after a silence of %.1f ms, so it gets 1.75 ms: %s",
+                    *(self._address, 1000 * self._silence.short_s, error),
+                )
             await self._bring_in_step(math.inf)
 
     async def _resynchronise(self, by: float = math.inf, *, bears: Bears = _nothing) -> None:
@@ -508,15 +513,13 @@ class ModbusTransport:
 
     async def _pause(self) -> None:
         """Keep the silence between frames: what follows sooner may be taken for part of the last frame."""
-        if not self._keeps_silence:
+        if not self._keeps_silence or self._client is None:
             return
-        self._check_connected()
         try:
             await self._silence.keep()
         except BaseException:
             self._drop()
             raise
-        self._check_connected()
 
 
 def _plain(error: RobotiqConnectionError) -> RobotiqConnectionError:

@@ -192,6 +192,34 @@ async def test_a_write_does_not_meet_the_rest_of_a_disturbance(
     await newest(transport, device)
 
 
+@pytest.mark.parametrize("first", ["read", "write"])
+async def test_a_byte_in_the_silence_before_a_request_costs_a_read(
+    transport: ModbusTransport, device: Device, first: str
+) -> None:
+    """A floating line makes it up as the device stops sending, while the next request waits for silence."""
+    await transport.read()
+    asyncio.get_running_loop().call_later(0.0001, device.send, b"\xff")
+    if first == "write":
+        assert await transport.send(lambda: IMAGE)
+    await newest(transport, device)
+    assert transport.is_open
+
+
+async def test_a_device_that_is_busy_at_the_opening_is_asked_again(device: Device) -> None:
+    transport = unopened(VirtualLine.NEAR)
+    replies = 0
+
+    def busy_once(reply: bytes) -> bytes:
+        nonlocal replies
+        replies += 1
+        return exception(6)(reply) if replies == 2 else reply
+
+    device.spoil, device.spoils_all = busy_once, True
+    await transport.open()
+    await newest(transport, device)
+    await transport.close()
+
+
 async def test_an_acknowledgement_with_a_wrong_checksum_acknowledges_nothing(
     transport: ModbusTransport, device: Device
 ) -> None:

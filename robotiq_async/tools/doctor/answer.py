@@ -257,8 +257,8 @@ def _advice_for_a_line(error: RobotiqConnectionError, echoes: bool) -> str:
             "and stop bits (?parity=, ?stopbits=)."
         )
     return (
-        "Bytes come that are no reply: the line has another rate or parity (?baud=, ?parity=) or 7 data bits, "
-        "a second master talks on it, or another device answers."
+        "Bytes come that are no reply: the line has another rate or parity (?baud=, ?parity=) or 7 data "
+        "bits, a second master talks on it, or another device answers."
     )
 
 
