@@ -444,8 +444,8 @@ class ModbusTransport:
 
         The first one of all asks a jaw for eight registers, which show a wrong model.
         """
-        count, all_asked = self._map.count, not self._probe
-        if all_asked and count < REGISTER_COUNT:
+        count = self._map.count
+        if not self._probe and count < REGISTER_COUNT:
             self._probe = REGISTER_COUNT
             answer = await self._ask(read_request(self._map, REGISTER_COUNT), by=by, bears=bears)
             rest = registers_in(answer, serial=self._rtu)[count:]
