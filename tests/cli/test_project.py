@@ -78,7 +78,7 @@ def test_a_missing_module_names_the_extra_that_brings_it() -> None:
     package = {module: names[0] for module, names in packages_distributions().items()}
     sources = [file.read_text() for file in sorted((ROOT / "robotiq_async").rglob("*.py"))]
     needs = {found for source in sources for found in NEED.findall(source)}
-    assert {extra for _, extra in needs} == {"fleet", "monitor", "plot", "record", "view", "web"}
+    assert {extra for _, extra in needs} == {"fleet", "monitor", "plot", "record", "serial", "view", "web"}
     for module, extra in needs:
         assert package[module] in packages_of(extra), f"{extra} does not bring {module}"
     advised = {found for source in sources for found in ADVICE.findall(source)}
