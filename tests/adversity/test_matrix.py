@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import pytest
 
 from robotiq_async import Finger
@@ -60,11 +62,12 @@ def tried(cell: Cell, model: Model, patch: pytest.MonkeyPatch) -> str:
         async with world(cell.link, monkeypatch=patch, model=model) as here:
             return await outcome(here, cell.phase, cell.trouble)
 
-    try:
-        return run(main)
-    except HeldLoopError:
-        # Virtual time takes the same course again: what the code does to the loop it does twice.
-        return run(main)
+    # Virtual time takes the same course again: what the code does to the loop it does each time. The machine,
+    # which is slow at any moment, was seen to do so twice in a row.
+    for _ in range(3):
+        with contextlib.suppress(HeldLoopError):
+            return run(main)
+    return run(main)
 
 
 @pytest.mark.parametrize(
