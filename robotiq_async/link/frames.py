@@ -35,6 +35,8 @@ _PASSING: Final = (5, 6, 11)
 
 _CHECKSUM: Final = 2
 """Bytes of the checksum at the end of a frame on a serial line."""
+_READS: Final = (3, 4)
+"""Function codes of reads of registers."""
 _WRITE: Final = 16
 """Function code of a write of several registers."""
 _WRITE_AND_READ: Final = 23
@@ -172,7 +174,7 @@ class Expected(NamedTuple):
         said = f"the {who} refuses function {function}: exception {code} ({_EXCEPTIONS.get(code, 'unknown')})"
         if function == _WRITE and code in (1, 2, 3):
             return said + _whole(self._count)
-        if function != _WRITE and code == 1:
+        if function in _READS and code == _ILLEGAL_FUNCTION:
             return f"{said}: read_function={7 - function} asks with the other one"
         return said
 

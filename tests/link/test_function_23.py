@@ -99,6 +99,7 @@ async def test_a_device_that_refuses_the_function_is_written_with_16(
     assert not jaw.reads_with_writes
     (said,) = [each.getMessage() for each in caplog.records]
     assert "is written with function 16: the gripper refuses function 23" in said
+    assert "read_function" not in said, "that would ask with another function"
 
 
 async def test_a_device_that_does_not_answer_the_function_is_written_with_16_from_then_on(
