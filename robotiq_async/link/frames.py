@@ -108,12 +108,20 @@ class RefusedError(ProtocolError):
     """A whole reply that refuses the request.
 
     Attributes:
-        is_passing: whether the same request may be answered the next time.
-        is_unknown_function: whether the device does not serve the function.
+        code: the exception code.
     """
 
-    is_passing = False
-    is_unknown_function = False
+    code = 0
+
+    @property
+    def is_passing(self) -> bool:
+        """Whether the same request may be answered the next time."""
+        return self.code in _PASSING
+
+    @property
+    def is_unknown_function(self) -> bool:
+        """Whether the device does not serve the function."""
+        return self.code == _ILLEGAL_FUNCTION
 
 
 class MisfitError(ProtocolError):
@@ -154,8 +162,7 @@ class Expected(NamedTuple):
             return False
         code = frame[len(self.refusal)]
         refused = RefusedError(self._refused(code))
-        refused.is_passing = code in _PASSING
-        refused.is_unknown_function = code == _ILLEGAL_FUNCTION
+        refused.code = code
         raise refused
 
     @property

@@ -87,6 +87,14 @@ NOISE: Final = (MisfitError, ResponseTimeoutError)
 Bears = Callable[[RobotiqConnectionError], bool]
 
 
+class _StillOpenError(Exception):
+    """An error that left the connection open, in ``error``: the caller brings the line back in step."""
+
+    def __init__(self, error: RobotiqConnectionError) -> None:
+        super().__init__(str(error))
+        self.error = error
+
+
 def _nothing(_: RobotiqConnectionError) -> bool:
     return False
 
@@ -127,7 +135,7 @@ class ModbusTransport:
         self._exchange: Exchange | None = None
         """The exchange in flight."""
         self._failure: RobotiqConnectionError | None = None
-        """What happened to the link between two exchanges; the next exchange raises it."""
+        """An error of the link between two exchanges; the next exchange raises it."""
         self._number = secrets.randbelow(LAST_NUMBER)
         """Transaction id of the last request; starts at random to differ from those of other programs."""
         self._poll = read_request(registers, registers.count)
@@ -141,8 +149,7 @@ class ModbusTransport:
         self._loop: asyncio.AbstractEventLoop
         self._clock: Callable[[], float]
         self._watchdog: Watchdog
-        self._silence: Silence
-        self._needs_long_silence = False
+        self._silence = Silence(address.line.character_s)
         self._is_echoed: bool | None = False
         """Whether the line echoes what is sent; None until the first exchange of a connection tells."""
         self._is_hushing = False
@@ -172,8 +179,6 @@ class ModbusTransport:
         self._loop = loop = asyncio.get_running_loop()
         self._clock = clock_of(loop)
         self._watchdog = Watchdog(loop, self._response_timeout, lambda: self._is_waiting, self._on_timeout)
-        self._silence = Silence(self._clock, self._address.line.character_s)
-        self._silence.is_long = self._needs_long_silence
         self._failure, self._is_echoed = None, None if self._rtu else False
         try:
             with anyio.fail_after(self._connect_timeout):
@@ -189,16 +194,14 @@ class ModbusTransport:
             await self._settle(SETTLE_S)
         self._silence.heard = self._clock()  # whatever the line carried for the last connection
         await self._greet()
-        if self._keeps_silence and not self._needs_long_silence:
+        if self._keeps_silence and not self._silence.is_long:
             await self._try_short_silence()
 
     async def read(self) -> Registers:
         try:
             answer = await self._ask(self._poll, bears=self._can_repeat)
-        except RobotiqConnectionError as error:
-            if not self._can_repeat(error):
-                raise
-            answer = await self._read_again(_plain(error))
+        except _StillOpenError as borne:
+            answer = await self._read_again(_plain(borne.error))
         return self._status_in(answer)
 
     def _status_in(self, answer: bytes) -> Registers:
@@ -238,9 +241,8 @@ class ModbusTransport:
             return None
         try:
             reply = await self._ask(write_and_read_request(self._map, registers), bears=self._leaves_doubt)
-        except RobotiqConnectionError as error:
-            if not self._leaves_doubt(error):
-                raise
+        except _StillOpenError as borne:
+            error = borne.error
             if not self._has_23 and not isinstance(error, MisfitError):
                 self._writes_with_23 = False
                 self._log.warning("%s is written with function 16: %s", self._address, _plain(error))
@@ -287,14 +289,13 @@ class ModbusTransport:
         Args:
             request: unit and PDU.
             by: when it must be over, in the loop's time, even if the response timeout is longer.
-            bears: tells errors after which the connection stays open. They are raised as they are: the caller
-                brings the line back in step.
+            bears: tells the errors after which the connection stays open, and _StillOpenError is raised.
         """
         await self._pause()
         failure = self._failure
         if failure is not None and bears(failure):
             self._failure = None
-            raise failure
+            raise _StillOpenError(failure)
         self._check_connected()
         frame = serial_frame(request) if self._rtu else tcp_frame(self._next_number(), request)
         exchange = Exchange(frame, self._loop, serial=self._rtu, is_echoed=self._is_echoed)
@@ -305,7 +306,7 @@ class ModbusTransport:
             answer = await exchange.answer
         except RobotiqConnectionError as error:
             if bears(error):
-                raise
+                raise _StillOpenError(error) from None
             self._drop()
             raise _plain(error) from None
         except OSError as error:
@@ -323,19 +324,21 @@ class ModbusTransport:
         self._is_echoed = bool(self._is_echoed)
         return answer
 
-    def _can_repeat(self, error: Exception | None) -> bool:
-        """Whether a read can be asked again after this error."""
-        if isinstance(error, RefusedError):
-            return error.is_passing
+    def _is_noise(self, error: RobotiqConnectionError) -> bool:
+        """Whether a lost or damaged byte of a serial line can be the cause."""
         return self._rtu and isinstance(error, NOISE)
+
+    def _can_repeat(self, error: RobotiqConnectionError) -> bool:
+        """Whether a read can be asked again after this error."""
+        return error.is_passing if isinstance(error, RefusedError) else self._is_noise(error)
 
     def _leaves_doubt(self, error: RobotiqConnectionError) -> bool:
         """Whether the connection can go on after this end of a write with function 23."""
-        return isinstance(error, RefusedError) or (self._rtu and isinstance(error, NOISE))
+        return isinstance(error, RefusedError) or self._is_noise(error)
 
     def _can_do_without(self, error: RobotiqConnectionError) -> bool:
         """Whether the error may only mean that a jaw does not serve eight registers."""
-        return self._can_repeat(error) or isinstance(error, RefusedError | ResponseTimeoutError)
+        return isinstance(error, RefusedError | ResponseTimeoutError) or self._is_noise(error)
 
     def _next_number(self) -> int:
         """A transaction id. Never 0, which some devices answer to anything."""
@@ -408,29 +411,26 @@ class ModbusTransport:
         bears = self._can_do_without if asks_for_rest else self._can_repeat
         try:
             await self._resynchronise(bears=bears)
-        except RobotiqConnectionError as error:
-            if not bears(error):
-                raise
+        except _StillOpenError as borne:
+            why = _plain(borne.error)
             try:
                 await self._bring_in_step(self._repeat_by())
             except RobotiqConnectionError as again:
-                raise _plain(error) from again
+                raise why from again
             if asks_for_rest:
-                self._log.info("%s did not answer a read of all registers: %s", self._address, _plain(error))
+                self._log.info("%s did not answer a read of all registers: %s", self._address, why)
 
     async def _try_short_silence(self) -> None:
         """Read a few times after 3.5 characters of silence; take the longer one if an answer is missing."""
         try:
             for _ in range(SHORT_READS):
                 await self._resynchronise(bears=self._can_repeat)
-        except RobotiqConnectionError as error:
-            if not self._can_repeat(error):
-                raise
-            if isinstance(error, NOISE):
-                self._needs_long_silence = self._silence.is_long = True
+        except _StillOpenError as borne:
+            if self._is_noise(borne.error):
+                self._silence.is_long = True
                 self._log.warning(
                     "%s does not answer after a silence of %.1f ms, so it gets 1.75 ms: %s",
-                    *(self._address, 1000 * self._silence.short_s, error),
+                    *(self._address, 1000 * self._silence.short_s, borne.error),
                 )
             await self._bring_in_step(math.inf)
 
@@ -516,7 +516,7 @@ class ModbusTransport:
         if not self._keeps_silence or self._client is None:
             return
         try:
-            await self._silence.keep()
+            await self._silence.keep(self._clock)
         except BaseException:
             self._drop()
             raise

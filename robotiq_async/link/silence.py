@@ -22,35 +22,32 @@ waiting without giving up the turn."""
 
 
 class Silence:
-    """Keeps the silence before the next frame.
+    """Keeps the silence before the next frame of a line, over all its connections.
 
     Attributes:
-        heard: when the last bytes arrived, by the clock.
+        heard: when the last bytes arrived, by the clock of the event loop.
         short_s: seconds of the short silence.
         is_long: whether this line needs the longer silence.
     """
 
-    def __init__(self, clock: Callable[[], float], character_s: float) -> None:
-        """Begin with the short silence.
-
-        Args:
-            clock: that of the event loop (``clock_of``). uvloop's own ``time()`` counts whole milliseconds.
-            character_s: seconds that a character takes on the line.
-        """
-        self._clock = clock
+    def __init__(self, character_s: float) -> None:
+        """Begin with the short silence; ``character_s`` is what a character takes on the line, in seconds."""
         self.short_s: Final = SHORT_CHARACTERS * character_s
         self.heard = -math.inf
         self.is_long = False
 
-    async def keep(self) -> None:
-        """Wait until the line has been silent for long enough; returns at once if it has."""
+    async def keep(self, clock: Callable[[], float]) -> None:
+        """Wait until the line has been silent for long enough; returns at once if it has.
+
+        ``clock`` is that of the event loop (``clock_of``). uvloop's own ``time()`` counts whole milliseconds.
+        """
         until = self.heard + (max(LONG_S, self.short_s) if self.is_long else self.short_s)
-        if (left := until - self._clock()) <= 0:
+        if (left := until - clock()) <= 0:
             return
-        if self._clock is not time.monotonic:
+        if clock is not time.monotonic:
             await asyncio.sleep(left)  # virtual time passes only in the loop, and its timers are exact
             return
         if left > TIMER_S:
             await asyncio.sleep(left - TIMER_S)
-        while self._clock() < until:
+        while clock() < until:
             pass
