@@ -3,10 +3,11 @@
 Every cycle reads the status, decides and writes at once, like the scan of a PLC, so each decision is made on
 what the gripper has just shown. What stops the gripper does not wait for the read. Nor does a command on a
 serial line while the newest status is fresh: a read takes as long there as the status is old, and the read
-after the write shows the command's echo. No other task touches
-the transport: callers leave their requests with the controller and wait. So no exchange is cancelled in
-flight, except when a stop has waited for it long enough; then the link is closed with it. start() and stop()
-may be called from different tasks.
+after the write shows the command's echo.
+
+No other task touches the transport: callers leave their requests with the controller and wait. So no exchange
+is cancelled in flight, except when a stop has waited for it long enough; then the link is closed with it.
+start() and stop() may be called from different tasks.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from typing import Final
 
 import anyio
 
-from ..control.controller import Controller
+from ..control.controller import Controller, Due
 from ..control.waiters import fail, resolve
 from ..link.transport import CyclicLink, Link
 from ..link.watchdog import HELD_S
@@ -155,7 +156,7 @@ class Poller:
 
     def hurry(self) -> None:
         """Begin the next cycle at once, and not with the tick, if it may begin with a write."""
-        due = self._controller.due(self._tick.time())
+        due = self._due()
         if due is not None and (due.is_urgent or (self._options.link.is_rtu and due.wait <= SOON_S)):
             self._tick.hurry()
 
@@ -259,41 +260,37 @@ class Poller:
 
     async def _cycle(self) -> None:
         """Read, decide, write. Write a stop before reading, too: a gripper may obey and not answer."""
-        controller = self._controller
-        if controller.has_request and not self._is_held_up():
-            if await self._is_urgent():
+        due = self._due()
+        if due is not None and not self._is_held_up():
+            if due.is_urgent and await self._is_soon(due, LONGEST_SPACING_S):
                 await self._write()
-            elif await self._is_fresh():
+            elif self._is_fresh_for(due) and await self._is_soon(due, SOON_S):
                 # What is read shows the echo. A command that came meanwhile begins the next cycle.
                 if not await self._write_and_read():
                     await self._poll_once()
                 return
         for _ in range(READS):
             await self._poll_once()
-            if not (controller.has_request and await self._is_due(SOON_S)):
+            due = self._due()
+            if due is None or not await self._is_soon(due, SOON_S):
                 return  # most cycles end here
             if not self._is_held_up():
                 await self._write_and_read()
                 return
         await self._write()
 
-    async def _is_urgent(self) -> bool:
-        """Whether there is a stop to write; waits for write_spacing."""
-        due = self._controller.due(self._tick.time())
-        return due is not None and due.is_urgent and await self._is_due(LONGEST_SPACING_S)
+    def _due(self) -> Due | None:
+        return self._controller.due(self._tick.time())
 
-    async def _is_fresh(self) -> bool:
-        """Whether there is a command to write, and a status of a serial line that is new enough for it."""
-        now = self._tick.time()
-        due = self._controller.due(now)
-        if due is None or not due.is_command or not self._options.link.is_rtu:
-            return False
-        return now + due.wait - self._asked <= FRESH_S and await self._is_due(SOON_S)
+    def _is_fresh_for(self, due: Due) -> bool:
+        """Whether it is a command for a serial line, and the newest status is new enough to decide on."""
+        is_fresh = self._tick.time() + due.wait - self._asked <= FRESH_S
+        return is_fresh and due.is_command and self._options.link.is_rtu
 
-    async def _is_due(self, soon: float) -> bool:
-        """Whether there is something to write in this cycle; waits for write_spacing for ``soon`` seconds."""
-        due = self._controller.due(self._tick.time())
-        if due is None or due.wait > soon:
+    @staticmethod
+    async def _is_soon(due: Due, soon: float) -> bool:
+        """Whether the write may leave within ``soon`` seconds; waits until then."""
+        if due.wait > soon:
             return False
         if due.wait:
             await asyncio.sleep(due.wait)
@@ -301,7 +298,7 @@ class Poller:
 
     async def _write_and_read(self) -> bool:
         """Write, and read in the same exchange if link and request allow that; whether a status was read."""
-        link, due = self._cyclic, self._controller.due(self._tick.time())
+        link, due = self._cyclic, self._due()
         if link is None or not link.reads_with_writes or due is None or not due.is_command:
             await self._write()
             return False
