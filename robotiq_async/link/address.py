@@ -7,6 +7,7 @@ import os
 import re
 import socket
 import stat
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from ipaddress import IPv4Address, IPv6Address
@@ -216,22 +217,18 @@ def _device_and_line(text: str) -> tuple[str, Line]:
         if rate := re.search(r":([0-9]+)$", text):
             raise ValueError(f"the rate of a serial port is ?baud={rate[1]}")
         return text, USUAL_LINE
-    given: dict[str, str] = {}
-    for part in query.split("&"):
-        name, _, value = part.partition("=")
-        if name not in LINE_OPTIONS:
-            meant = next((each for each in ("model", *LINE_OPTIONS) if _is_like(name, each)), "")
-            hint = f"; did you mean {meant}?" if meant else ""
-            known = f"known are: model, {', '.join(LINE_OPTIONS)}"
-            raise ValueError(f"no option {name!r} of a serial port{hint}; {known} ({USUAL})")
-        if name in given:
-            raise ValueError(f"{name} must be given once, as {name}=VALUE")
-        given[name] = value
+    given = _options(query, LINE_OPTIONS, _no_option_of_a_line)
     return device, Line(
         baud=_baud(given["baud"]) if "baud" in given else BAUD,
         parity=_one_of("parity", given.get("parity", "N").upper(), "N", "E", "O"),
         stopbits=int(_one_of("stopbits", given.get("stopbits", "1"), "1", "2")),
     )
+
+
+def _no_option_of_a_line(name: str) -> str:
+    meant = next((each for each in ("model", *LINE_OPTIONS) if _is_like(name, each)), "")
+    hint = f"; did you mean {meant}?" if meant else ""
+    return f"no option {name!r} of a serial port{hint}; known are: model, {', '.join(LINE_OPTIONS)} ({USUAL})"
 
 
 def _is_like(name: str, known: str) -> bool:
@@ -301,18 +298,29 @@ def _ends_in_a_number(host: str) -> bool:
 
 def parse_simulation(query: str) -> Simulation:
     """Parse the part after ``sim://``: nothing, or ``?OPTION=VALUE&...``."""
-    given: dict[str, str] = {}
-    for part in query.removeprefix("?").split("&") if query else ():
-        name, separator, value = part.partition("=")
-        if name not in SIMULATION_OPTIONS:
-            raise ValueError(f"no option {name!r}; known are: {', '.join(SIMULATION_OPTIONS)}")
-        if not separator or name in given:
-            raise ValueError(f"{name} must be given once, as {name}=VALUE")
-        given[name] = value
+    known = ", ".join(SIMULATION_OPTIONS)
+    given = _options(
+        query.removeprefix("?") if query else None,
+        SIMULATION_OPTIONS,
+        lambda name: f"no option {name!r}; known are: {known}",
+    )
     return Simulation(
         speedup=_speedup(given["speedup"]) if "speedup" in given else 1.0,
         object=_object(given["object"]) if "object" in given else None,
     )
+
+
+def _options(query: str | None, known: Sequence[str], unknown: Callable[[str], str]) -> dict[str, str]:
+    """Split NAME=VALUE&...; ``unknown`` makes the message for a name that is not known."""
+    given: dict[str, str] = {}
+    for part in () if query is None else query.split("&"):
+        name, separator, value = part.partition("=")
+        if name not in known:
+            raise ValueError(unknown(name))
+        if not separator or name in given:
+            raise ValueError(f"{name} must be given once, as {name}=VALUE")
+        given[name] = value
+    return given
 
 
 def _speedup(text: str) -> float:

@@ -32,6 +32,14 @@ async def newest(transport: ModbusTransport, device: Device) -> None:
     assert registers[0] == len(device.requests)
 
 
+async def reads_and_writes(transport: ModbusTransport, device: Device) -> None:
+    """Reads and writes succeed in turns, none of them at the second attempt."""
+    for _ in range(5):
+        await newest(transport, device)
+        await transport.write(IMAGE)
+    assert transport.repeats == 0
+
+
 # -- three registers ---------------------------------------------------------------------------------------
 
 
@@ -102,10 +110,7 @@ async def test_a_device_that_needs_the_longer_silence_gets_it(
     device.least_pause = LONG_S - 1e-6
     transport = unopened(VirtualLine.NEAR)
     await transport.open()
-    for _ in range(5):
-        await newest(transport, device)
-        await transport.write(IMAGE)
-    assert transport.repeats == 0
+    await reads_and_writes(transport, device)
     (said,) = [each.getMessage() for each in caplog.records]
     assert "does not answer after a silence of 0.3 ms, so it gets 1.75 ms: " in said
     asked = len(device.requests)
@@ -236,10 +241,7 @@ async def test_an_echo_is_recognised_and_dropped(device: Device) -> None:
     device.echoes = True
     transport = unopened(VirtualLine.NEAR)
     await transport.open()
-    for _ in range(3):
-        await newest(transport, device)
-        await transport.write(IMAGE)
-    assert transport.repeats == 0
+    await reads_and_writes(transport, device)
     await transport.close()
 
 
