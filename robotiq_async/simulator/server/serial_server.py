@@ -51,10 +51,12 @@ class _RtuEndpoint(SimulatorEndpoint):
     """What is the same for RTU frames, whatever carries them.
 
     Attributes:
+        paced: whether bytes take their time, of connections to come.
         reply_silence: seconds from a request to the first byte of its reply, of connections to come.
     """
 
     functions = RTU_FUNCTIONS
+    paced: bool
     reply_silence = REPLY_SILENCE_S
 
     def take(self, inbox: bytearray) -> Frame | None:
@@ -68,6 +70,9 @@ class _RtuEndpoint(SimulatorEndpoint):
 
     def _reply(self, frame: Frame, pdu: bytes) -> bytes:
         return rtu_reply(frame, pdu)
+
+    def _connection(self) -> SerialConnection:
+        return SerialConnection(self, self.reply_silence if self.paced else None)
 
 
 class SerialSimulatorServer(_RtuEndpoint):
@@ -109,7 +114,7 @@ class SerialSimulatorServer(_RtuEndpoint):
         super().__init__(gripper)
         self._device_id = check_int("device_id", device_id, 1, 247)
         self._port = port
-        self._paced = check_flag("paced", paced)
+        self.paced = check_flag("paced", paced)
 
     @property
     def port(self) -> str:
@@ -135,11 +140,6 @@ class SerialSimulatorServer(_RtuEndpoint):
             raise ImportError(f"a serial line needs pyserial: {install('serial')}")
         await super().start()
 
-    @property
-    def paced(self) -> bool:
-        """Whether bytes take their time."""
-        return self._paced
-
     def _is_meant(self, unit: int) -> bool:
         return unit in (_BROADCAST, self._device_id)
 
@@ -153,9 +153,6 @@ class SerialSimulatorServer(_RtuEndpoint):
         # one after that; closing it earlier would fail.
         await asyncio.sleep(0)
         await asyncio.sleep(0)
-
-    def _connection(self) -> SerialConnection:
-        return SerialConnection(self, self.reply_silence if self._paced else None)
 
 
 class RtuOverTcpSimulatorServer(_RtuEndpoint, SimulatorServer):
@@ -199,9 +196,6 @@ class RtuOverTcpSimulatorServer(_RtuEndpoint, SimulatorServer):
 
     def _is_meant(self, unit: int) -> bool:
         return unit == _BROADCAST or super()._is_meant(unit)
-
-    def _connection(self) -> SerialConnection:
-        return SerialConnection(self, self.reply_silence if self.paced else None)
 
 
 class WireTime:
