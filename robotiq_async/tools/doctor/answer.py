@@ -244,7 +244,7 @@ def _advice_for_silence(address: Address, error: RobotiqConnectionError, echoes:
 
 
 def _advice_for_a_line(error: RobotiqConnectionError, echoes: bool) -> str:
-    """What to look at when no gripper answers on a serial line. A line tells no more than its bytes."""
+    """Advice for a serial line on which no gripper answers. A line tells no more than its bytes."""
     if isinstance(error, ResponseTimeoutError):
         heard = "The line echoes what is sent, and nothing else answers" if echoes else "Nothing answers"
         return (

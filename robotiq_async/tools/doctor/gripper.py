@@ -47,7 +47,7 @@ async def examine(address: Address, report: Report, *, device_id: int | None = N
         try:
             if address.kind == "rtu":
                 report_adapter(address, report)
-            await _timing(link, POLL_INTERVAL_S, report)
+            await _timing(link, report)
             _check_model(model, await link.read(), report)
             report_state(RobotiqStatus.from_registers(await link.read(), model=model), report)
             await _others(link, report)
@@ -87,7 +87,7 @@ async def _resolve(address: Address, report: Report) -> None:
     report(Finding(Level.GOOD, "name", f"{address.host} is {', '.join(found)}"))
 
 
-async def _timing(link: Link, interval: float, report: Report) -> None:
+async def _timing(link: Link, report: Report) -> None:
     loop = asyncio.get_running_loop()
     times, began = [], loop.time()
     for _ in range(PROBES):
@@ -100,22 +100,22 @@ async def _timing(link: Link, interval: float, report: Report) -> None:
     times.sort()
     p50, p99 = percentile(times, 0.5), percentile(times, 0.99)
     found = f"{1000 * p50:.1f} ms, 99th percentile {1000 * p99:.1f} ms"
-    if p99 < interval:
+    if p99 < POLL_INTERVAL_S:
         report(Finding(Level.GOOD, "round trip", found))
     else:
-        hertz = f"{1 / interval:.0f} Hz"
+        hertz = f"{1 / POLL_INTERVAL_S:.0f} Hz"
         advice = f"Too slow for {hertz} at times: use a wired network, or a larger poll_interval."
         if p99 > RESPONSE_TIMEOUT_S / 2:
             advice = f"Pass response_timeout={long_enough(p99):g}; a write, and a stop, take as long."
         report(Finding(Level.DOUBT, "round trip", found, advice))
     report_damage(link, len(times), report)
-    report(_rate(rate, interval))
+    report(_rate(rate))
 
 
-def _rate(rate: float, interval: float) -> Finding:
+def _rate(rate: float) -> Finding:
     found = f"up to {rate:.0f} reads a second" if rate >= 10 else f"up to {rate:.1f} reads a second"
     period = max(0.01, math.ceil(100 / rate) / 100)
-    if rate >= 1 / interval:
+    if rate >= 1 / POLL_INTERVAL_S:
         return Finding(Level.GOOD, "rate", found)
     if period <= LONGEST_PERIOD_S:
         return Finding(Level.DOUBT, "rate", found, f"Pass poll_interval={period:g}.")

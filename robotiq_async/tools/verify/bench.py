@@ -61,11 +61,6 @@ class Bench:
         """The name, for messages, of what moves in stages that move one finger."""
         return "finger A" if len(self.fingers) > 1 else "the jaw"
 
-    @property
-    def interval(self) -> float:
-        """The usual seconds between two reads on such a link."""
-        return POLL_INTERVAL_S
-
     def another_link(
         self, registers: RegisterMap, keep: Callable[[Frame], None] | None = None
     ) -> RecordedLink:
@@ -76,7 +71,7 @@ class Bench:
         return RecordedLink(transport, keep or self.keep, self.model)
 
     def watch(self, seconds: float) -> Watch:
-        interval = self.lengths.interval or self.interval
+        interval = self.lengths.interval or POLL_INTERVAL_S
         return Watch(self.link, self.person, seconds=seconds, interval=interval, spacing=self.spacing)
 
     # -- results ---------------------------------------------------------------------------------------------

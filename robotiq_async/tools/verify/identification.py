@@ -6,6 +6,7 @@ import asyncio
 from typing import Final
 
 from ...session.gripper_link import registers_of
+from ...session.options import POLL_INTERVAL_S
 from ...values.enums import Fault
 from ...values.model import THREE_FINGER, names_that_fit
 from ...values.registers import STATUS_RESERVED
@@ -69,7 +70,7 @@ async def check_before_writing(bench: Bench) -> RobotiqStatus:
     loop, first = asyncio.get_running_loop(), await bench.link.read()
     until, not_ready, last = loop.time() + WATCH_S, 0, first
     while loop.time() < until:
-        await asyncio.sleep(2 * bench.interval)
+        await asyncio.sleep(2 * POLL_INTERVAL_S)
         last = await bench.link.read()
         if why := why_no_gripper(last):
             raise EndError("refused", f"what answers may be another device: {why}")

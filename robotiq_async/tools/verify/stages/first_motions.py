@@ -6,7 +6,7 @@ import asyncio
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from ....session.options import ACTIVATION_TIMEOUT_S
+from ....session.options import ACTIVATION_TIMEOUT_S, POLL_INTERVAL_S
 from ....values.enums import Finger, ObjectStatus
 from ....values.request import Request
 from ....values.status import RobotiqStatus
@@ -166,7 +166,7 @@ def _judge(bench: Bench, found: _Found) -> None:
         follows = "No option is needed: a hand ignores the object status for 250 ms."
         if worst > LAG_S:
             follows = "That is longer than a hand waits: a move may end before it begins. Please report this."
-        bench.judge("axis.lag", worst <= max(0.01, bench.interval), words, follows, worst_ms=1000 * worst)
+        bench.judge("axis.lag", worst <= max(0.01, POLL_INTERVAL_S), words, follows, worst_ms=1000 * worst)
         if worst > LAG_S:
             raise EndError("deviation", f"axis.lag: {words}, longer than a hand waits")
     else:

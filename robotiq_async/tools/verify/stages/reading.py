@@ -11,6 +11,7 @@ from typing import Final
 from ....link.serial_ports import latency_file, latency_timer
 from ....runtime.sockets import is_loopback
 from ....session.gripper_link import registers_of
+from ....session.options import POLL_INTERVAL_S
 from ....values.enums import Fault
 from ....values.errors import RobotiqConnectionError
 from ....values.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap, Registers
@@ -180,7 +181,7 @@ async def _counts(bench: Bench) -> None:
 
 async def _round_trip(bench: Bench) -> None:
     worst, figures = 0.0, dict[str, Figure]()
-    for period in (*PERIODS_S, bench.interval):
+    for period in (*PERIODS_S, POLL_INTERVAL_S):
         times = sorted(await _trips(bench.link, bench.lengths.reads, period))
         p50, p99 = percentile(times, 0.5), percentile(times, 0.99)
         name = f"at_{1000 * period:g}_ms"
@@ -189,7 +190,7 @@ async def _round_trip(bench: Bench) -> None:
         worst = max(worst, p99)
     found = f"99 of 100 reads take at most {1000 * worst:.1f} ms"
     timer = bench.checks.get("host.timer")
-    if worst >= bench.interval and timer is not None and timer.verdict is Verdict.DIFFERS:
+    if worst >= POLL_INTERVAL_S and timer is not None and timer.verdict is Verdict.DIFFERS:
         why = f"{found}, but timers of this computer are late: it may be the slow one"
         bench.inconclusive("read.round_trip", why, **figures)
         return
@@ -199,7 +200,7 @@ async def _round_trip(bench: Bench) -> None:
         follows += "; a wired network is quicker"
     follows += "."
     options = {"poll_interval": interval}
-    bench.judge("read.round_trip", worst < bench.interval, found, follows, options, **figures)
+    bench.judge("read.round_trip", worst < POLL_INTERVAL_S, found, follows, options, **figures)
 
 
 def _histogram(seconds: list[float]) -> list[Figure]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Final
 
 from ....link.modbus import ModbusTransport
+from ....session.options import POLL_INTERVAL_S
 from ....values.enums import Finger
 from ....values.errors import RobotiqConnectionError
 from ....values.request import Request
@@ -48,7 +49,7 @@ async def _read(bench: Bench) -> None:
             failures.append(str(error))
             if len(failures) > MOST_FAILURES:
                 raise
-        await asyncio.sleep(max(0.0, began + bench.interval - loop.time()))
+        await asyncio.sleep(max(0.0, began + POLL_INTERVAL_S - loop.time()))
     times.sort()
     failed = len(failures) + _repeats(bench) - repeated
     figures: dict[str, Figure] = {
