@@ -17,7 +17,7 @@ def ports() -> None:
     For example:
 
         robotiq-async ports
-        robotiq-async doctor rtu:///dev/ttyUSB0?model=2f85
+        robotiq-async doctor "rtu:///dev/ttyUSB0?model=2f85"
     """
     need("serial", "serial")
     from serial.tools import list_ports
