@@ -5,12 +5,15 @@ from __future__ import annotations
 import asyncio
 import concurrent.futures
 from collections.abc import Coroutine
-from typing import Any, TypeVar
+from contextlib import suppress
+from typing import Any, Final, TypeVar
 
 from rclpy.executors import Executor
 from rclpy.task import Future
 
 T = TypeVar("T")
+PASSES: Final = 4
+"""Passes of an executor until an answer is sent: a callback ends, its result is set, it is sent; one more."""
 
 
 class ClosedError(Exception):
@@ -34,11 +37,20 @@ class Bridge:
         self._is_closed = True
 
     async def drained(self, timeout: float) -> None:
-        """Wait, in the loop, until all work is done, or for ``timeout`` seconds."""
-        under_way = [asyncio.wrap_future(each) for each in self._under_way]
-        if under_way:
-            await asyncio.wait(under_way, timeout=timeout)
-            await asyncio.gather(*(each for each in under_way if each.done()), return_exceptions=True)
+        """Wait, in the loop, until work is done and the executor has answered, or for ``timeout`` seconds."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(timeout):
+                under_way = [asyncio.wrap_future(each) for each in self._under_way]
+                await asyncio.gather(*under_way, return_exceptions=True)
+                for _ in range(PASSES):
+                    await self._executor_pass()
+
+    async def _executor_pass(self) -> None:
+        # A pass runs each task once, in an order that differs between distributions, and tasks that begin
+        # during a pass run in the next one. When a task has run, the pass before it is therefore complete.
+        passed = asyncio.Event()
+        self._executor.create_task(self._loop.call_soon_threadsafe, passed.set)
+        await passed.wait()
 
     async def ask(self, work: Coroutine[Any, Any, T]) -> T:
         """Run work in the loop, from a callback of ROS; other callbacks run meanwhile."""

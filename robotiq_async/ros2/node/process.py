@@ -24,7 +24,7 @@ from ...runtime.log import log
 from .bridge import Bridge
 from .gripper_node import GripperNode
 
-ANSWERS_S: Final = 0.5  # seconds to answer the requests that the end has aborted; this takes milliseconds
+ANSWERS_S: Final = 2.0  # seconds to answer what the end has aborted: milliseconds, unless the executor hangs
 LINGER_S: Final = 0.1  # seconds for sent messages to leave: ROS does not report when they have
 JOIN_S: Final = 2.0  # seconds for the executor to shut down, and for its thread to end
 MOST_FAILURES: Final = 20  # failing callbacks per second: with more, the executor itself is broken

@@ -11,6 +11,7 @@ import pytest
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.task import Future as Answer
 
 from robotiq_async.ros2.node.bridge import Bridge, ClosedError
 from tests.ros2.live.processes import PATIENCE_S
@@ -59,6 +60,44 @@ async def test_calls_are_answered_and_none_crosses_after_the_end() -> None:
     thread = threading.Thread(target=executor.spin, daemon=True)
     thread.start()
     assert await asyncio.wait_for(asyncio.wrap_future(answers), PATIENCE_S) == ["well"]
+    await asyncio.to_thread(executor.shutdown, PATIENCE_S)
+    await asyncio.to_thread(thread.join, PATIENCE_S)
+    rclpy.shutdown(context=context)
+
+
+async def test_the_end_waits_for_an_executor_that_is_held_up() -> None:
+    """On a busy machine, a goal had ended in the loop and its result was never sent."""
+    context = Context()
+    rclpy.init(context=context)
+    executor = SingleThreadedExecutor(context=context)
+    bridge = Bridge(asyncio.get_running_loop(), executor)
+    is_held, goes_on = Future[None](), threading.Event()
+    sent, answers = Answer(executor=executor), []
+    sent.add_done_callback(lambda done: answers.append(done.result()))
+
+    def hold() -> None:
+        is_held.set_result(None)
+        assert goes_on.wait(PATIENCE_S)
+
+    async def ends_when_held() -> str:
+        await asyncio.wrap_future(is_held)
+        return "aborted"
+
+    async def ask() -> None:
+        executor.create_task(hold)
+        sent.set_result(await bridge.ask(ends_when_held()))
+
+    executor.create_task(ask)
+    thread = threading.Thread(target=executor.spin, daemon=True)
+    thread.start()
+    await asyncio.wrap_future(is_held)
+    ends = asyncio.create_task(bridge.drained(PATIENCE_S))
+    for _ in range(100):
+        await asyncio.sleep(0)
+    assert not ends.done()
+    goes_on.set()
+    await ends
+    assert answers == ["aborted"]
     await asyncio.to_thread(executor.shutdown, PATIENCE_S)
     await asyncio.to_thread(thread.join, PATIENCE_S)
     rclpy.shutdown(context=context)
