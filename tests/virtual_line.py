@@ -11,13 +11,16 @@ import serial
 
 
 class VirtualLine:
-    """Two serial ports and the cable between them, which can be pulled and put back."""
+    """Serial ports and the cable between them, which can be pulled and put back.
+
+    One port is at the near end, and any number at the far end, as several devices hang on RS-485.
+    """
 
     NEAR, FAR = "/dev/ttyNEAR", "/dev/ttyFAR"
 
     def __init__(self, patch: pytest.MonkeyPatch) -> None:
         self._loop = asyncio.get_running_loop()
-        self._ports: dict[str, _Port] = {}
+        self._ports: list[_Port] = []
         self._is_plugged = True
         # pyserial is below what is tested; pymodbus asks it for a port and gets one of ours.
         patch.setattr(serial, "serial_for_url", self._open)
@@ -25,8 +28,8 @@ class VirtualLine:
     def pull(self) -> None:
         """Pull the near port out, as one pulls a USB adapter."""
         self._is_plugged = False
-        if self.NEAR in self._ports:
-            self._ports[self.NEAR].lose()
+        for port in self._at(self.NEAR):
+            port.lose()
 
     def plug(self) -> None:
         """Put it back."""
@@ -35,18 +38,22 @@ class VirtualLine:
     def _open(self, url: str, **_: Any) -> _Port:
         if url == self.NEAR and not self._is_plugged:
             raise serial.SerialException(2, f"could not open port {url}")
-        self._ports[url] = port = _Port(self, url, self._loop)
+        port = _Port(self, url, self._loop)
+        self._ports.append(port)
         return port
 
     def carry(self, sender: str, data: bytes) -> None:
-        """Bring bytes to the other port, if it is open."""
-        other = self._ports.get(self.FAR if sender == self.NEAR else self.NEAR)
-        if other is not None and self._is_plugged:
-            other.arrive(data)
+        """Bring bytes to the other end, where it is open."""
+        if self._is_plugged:
+            for port in self._at(self.FAR if sender == self.NEAR else self.NEAR):
+                port.arrive(data)
 
     def closed(self, port: _Port) -> None:
-        if self._ports.get(port.url) is port:
-            del self._ports[port.url]
+        if port in self._ports:
+            self._ports.remove(port)
+
+    def _at(self, url: str) -> list[_Port]:
+        return [port for port in self._ports if port.url == url]
 
 
 class _Port:

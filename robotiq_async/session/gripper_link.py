@@ -23,7 +23,7 @@ LAST_BLOCK: Final = 0x10000 - REGISTER_COUNT
 """The highest first register of a block: registers are numbered to 0xFFFF."""
 _WRITE_FUNCTIONS: Final = (16, 23)
 _GATEWAY: Final = " (two grippers behind one gateway: give each of the hands its device_id)"
-_LINE: Final = " (a serial port has one owner, whatever the device_id: two would read each other's replies)"
+_LINE: Final = " (two grippers on one serial line: give each of the hands its device_id, in one event loop)"
 
 T = TypeVar("T")
 
@@ -36,11 +36,13 @@ class Gripper:
         place: the same for all spellings of its address.
         unit: the unit id that was given; None if none was, or if only one hand can own the place.
         hint: for the error message, in case two grippers were meant.
+        is_on_line: whether the place is a serial line, whose connection one event loop must own.
     """
 
     place: str
     unit: int | None = None
     hint: str = field(default="", compare=False)
+    is_on_line: bool = False
 
     def may_be(self, other: Gripper) -> bool:
         """Whether both may be the same gripper.
@@ -149,14 +151,15 @@ def _over_modbus(address: Address, registers: RegisterMap, names_unit: bool, nam
         shown = f"{address}#{id(simulated):x}"  # every sim:// is a gripper of its own
         make = partial(SimulatedTransport, simulated, registers)
         return GripperLink(shown, partial(Gripper, shown), make, model=model)
-    # A gateway takes several connections. On a serial line replies carry no number, so every program that has
-    # it open gets part of what arrives: there the unit id tells no two grippers apart.
-    unit = registers.device_id if names_unit and not address.is_rtu else None
+    # On a gateway each hand has a connection of its own. On a serial line, where replies carry no number, the
+    # hands of an event loop share one.
+    unit = registers.device_id if names_unit else None
     hint = _LINE if address.is_rtu else _GATEWAY  # for users who meant two grippers
+    shares_line = address.is_rtu and names_unit
     return GripperLink(
         str(address),
-        lambda: Gripper(canonical_address(address), unit, hint),
-        partial(ModbusTransport, address, registers, log=Log(name or str(address))),
+        lambda: Gripper(canonical_address(address), unit, hint, shares_line),
+        partial(ModbusTransport, address, registers, shares_line=shares_line, log=Log(name or str(address))),
         address.is_rtu,
         model,
     )
@@ -190,7 +193,7 @@ class Claims(Generic[T]):
             for each in list(self._claims.values()):
                 if each.loop.is_closed() or (each.loop is here and is_over(each.owner)):
                     self.release(each.owner)
-                elif each.gripper().may_be(wanted):
+                elif _conflict(each.gripper(), wanted, is_here=each.loop is here):
                     return each.owner
             self._claims[owner] = _Claim(gripper, owner, here)
         return None
@@ -198,3 +201,11 @@ class Claims(Generic[T]):
     def release(self, owner: T) -> None:
         """Give up a claim. Takes no lock: any thread may call it."""
         self._claims.pop(owner, None)
+
+
+def _conflict(owned: Gripper, wanted: Gripper, *, is_here: bool) -> bool:
+    """Whether the hand of a gripper keeps another from a hand; ``is_here``: both are in one event loop."""
+    is_line = owned.place == wanted.place and (owned.is_on_line or wanted.is_on_line)
+    # A socket carries Modbus TCP or the frames of a serial line, not both.
+    can_share = is_here and owned.is_on_line and wanted.is_on_line
+    return owned.may_be(wanted) or (is_line and not can_share)

@@ -97,6 +97,16 @@ def test_two_grippers_behind_one_gateway_and_any_number_of_simulated_ones(tmp_pa
     assert len(read(tmp_path, f"{GOOD}device_id = 3\n{right}{simulated}").grippers) == 5
 
 
+def test_two_grippers_on_one_serial_line(tmp_path: Path) -> None:
+    left, right = (
+        f'[grippers.{name}]\naddress = "rtu:///dev/ttyUSB0?model=2f85"\n' for name in ("left", "right")
+    )
+    site = 'site = "lab"\n'
+    assert len(read(tmp_path, f"{site}{left}device_id = 9\n{right}device_id = 12\n").grippers) == 2
+    with pytest.raises(AgentFileError, match="give each of the grippers its device_id"):
+        read(tmp_path, f"{site}{left}device_id = 9\n{right}")
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

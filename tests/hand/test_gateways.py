@@ -105,5 +105,5 @@ async def test_the_socket_is_kept_alive(gateway: SimulatorServer) -> None:
         await asyncio.sleep(0)
         session = hand._session
         assert session is not None
-        line: socket.socket = session._poller._transport._client.ctx.transport.get_extra_info("socket")  # type: ignore[attr-defined]
+        line: socket.socket = session._poller._transport._connection._transport.get_extra_info("socket")  # type: ignore[attr-defined]
         assert line.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)

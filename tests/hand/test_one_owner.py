@@ -46,16 +46,17 @@ async def test_two_grippers_behind_one_gateway_have_two_hands(server: SimulatorS
         assert four.state is State.RUNNING_IDLE
 
 
-async def test_a_serial_port_has_one_hand_for_all_unit_ids(tmp_path: Path) -> None:
+async def test_a_serial_port_has_one_hand_unless_both_name_their_units(tmp_path: Path) -> None:
     with SerialLine(tmp_path) as line:
         async with (
             SerialSimulatorServer(line.far, SimulatedGripper(speedup=20)),
             RobotiqHand(f"rtu://{line.near}", device_id=9) as hand,
         ):
             for port in (line.near, line.near.resolve()):
-                other = RobotiqHand(f"rtu://{port}", device_id=10)
-                with pytest.raises(InvalidStateError, match="a serial port has one owner"):
-                    await other.start()
+                for unit in (None, 9):
+                    other = RobotiqHand(f"rtu://{port}", device_id=unit)
+                    with pytest.raises(InvalidStateError, match="give each of the hands its device_id"):
+                        await other.start()
             assert hand.statistics.reconnects == 0
 
 

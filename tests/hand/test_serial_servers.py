@@ -38,14 +38,24 @@ async def test_it_comes_back(words: str) -> None:
             await hand.move(100, A)
 
 
-@pytest.mark.parametrize("units", [(None, None), (9, 12)])
-async def test_a_serial_server_has_one_owner(units: tuple[int | None, int | None]) -> None:
+@pytest.mark.parametrize("units", [(None, None), (9, None), (None, 12)])
+async def test_a_serial_server_has_one_owner_unless_both_name_their_units(
+    units: tuple[int | None, int | None],
+) -> None:
     gripper = SimulatedGripper(asyncio.get_running_loop().time)
     async with RtuOverTcpSimulatorServer(gripper) as server:
         one = RobotiqHand(server.address, device_id=units[0])
         await one.start(activate=False)
-        with pytest.raises(InvalidStateError, match="would read each other's replies"):
+        with pytest.raises(InvalidStateError, match="give each of the hands its device_id"):
             await RobotiqHand(server.address, device_id=units[1]).start(activate=False)
+        await one.stop()
+
+
+async def test_a_socket_carries_one_protocol() -> None:
+    gripper = SimulatedGripper(asyncio.get_running_loop().time)
+    async with RtuOverTcpSimulatorServer(gripper) as server:
+        one = RobotiqHand(server.address, device_id=9)
+        await one.start(activate=False)
         with pytest.raises(InvalidStateError):
-            await RobotiqHand(server.address.removeprefix("rtu+")).start(activate=False)
+            await RobotiqHand(server.address.removeprefix("rtu+"), device_id=12).start(activate=False)
         await one.stop()

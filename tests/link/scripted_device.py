@@ -29,6 +29,8 @@ class Device:
         """What becomes of the next reply; of every one, if :attr:`spoils_all`."""
         self.loses = 0
         """Requests that are lost from here on."""
+        self.late: dict[int, float] = {}
+        """By unit id, how many seconds late the answers to its requests are; beyond all time-outs: silent."""
         self.least_pause = 0.0
         """Requests that come sooner than this after a reply are not heard."""
         self.most = 8
@@ -68,6 +70,9 @@ class Device:
             if self.loses:
                 self.loses -= 1
                 continue
+            if (late := self.late.get(request[0])) is not None:
+                self._loop.call_later(late, self.send, self._reply(request))
+                continue
             if request[1] == 23 and not self.has_23:
                 if self.refuses:
                     self.send(with_crc(bytes((9, 0x80 | 23, 1))))
@@ -98,12 +103,18 @@ class Device:
         if request[1] == 16:
             return with_crc(request[:6])
         count = int.from_bytes(request[4:6], "big")
-        return with_crc(bytes((9, request[1], 2 * count)) + len(self.requests).to_bytes(2, "big") * count)
+        return with_crc(
+            bytes((request[0], request[1], 2 * count)) + len(self.requests).to_bytes(2, "big") * count
+        )
 
 
-def unopened(device: str, registers: RegisterMap = RTU_REGISTERS) -> ModbusTransport:
+def unopened(
+    device: str, registers: RegisterMap = RTU_REGISTERS, *, shares_line: bool = False
+) -> ModbusTransport:
     address = parse_address(f"rtu://{device}")
-    return ModbusTransport(address, registers, connect_timeout=1.0, response_timeout=0.05)
+    return ModbusTransport(
+        address, registers, connect_timeout=1.0, response_timeout=0.05, shares_line=shares_line
+    )
 
 
 async def reopened(transport: ModbusTransport) -> int:

@@ -100,3 +100,16 @@ async def test_of_many_threads_one_gets_it(claims: Claims[str]) -> None:
     for _ in range(3):
         got = await asyncio.gather(*(asyncio.to_thread(in_its_loop, number) for number in range(4)))
         assert sum(got) == 1
+
+
+async def test_a_serial_line_is_shared_in_one_event_loop(claims: Claims[str]) -> None:
+    """Its connection belongs to one."""
+    left, right = Gripper("x", 9, is_on_line=True), Gripper("x", 12, is_on_line=True)
+
+    async def claim() -> str | None:
+        return claims.claim(lambda: right, "elsewhere", never)
+
+    assert claims.claim(lambda: left, "first", never) is None
+    assert await asyncio.to_thread(asyncio.run, claim()) == "first"
+    assert claims.claim(lambda: right, "second", never) is None
+    assert claims.claim(lambda: Gripper("x", 14), "Modbus TCP to the same socket", never) == "first"

@@ -1,0 +1,292 @@
+"""Several grippers on one serial line, each with a hand of its own, in virtual time."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import AsyncExitStack, asynccontextmanager
+from typing import Any
+
+import pytest
+
+from robotiq_async import (
+    ConnectFailedError,
+    Finger,
+    InvalidStateError,
+    NotStartedError,
+    ReconnectPolicy,
+    RobotiqHand,
+    State,
+)
+from robotiq_async.simulator import (
+    RtuOverTcpSimulatorServer,
+    SerialSimulatorServer,
+    SimulatedGripper,
+    Trouble,
+)
+from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
+from tests.grippers import activate_beforehand
+from tests.virtual import until
+from tests.virtual_line import VirtualLine
+
+pytestmark = pytest.mark.virtual_time
+
+A = Finger.A
+LEFT, RIGHT = 9, 12
+RESPONSE_S = 0.25
+
+
+class Bus:
+    """A line with two grippers."""
+
+    def __init__(self, address: str, servers: dict[int, Any], pull: Callable[[], None]) -> None:
+        self.address = address
+        self.servers = servers
+        self.pull = pull
+
+    def gripper(self, unit: int) -> SimulatedGripper:
+        gripper: SimulatedGripper = self.servers[unit].gripper
+        return gripper
+
+    def hand(self, unit: int | None, address: str = "", **options: Any) -> RobotiqHand:
+        """A hand for a unit of the line; a lost one is looked for every half second at least."""
+        usual: dict[str, Any] = {"model": TWO_FINGER_85, "response_timeout": RESPONSE_S, "device_id": unit}
+        policy = ReconnectPolicy(first_delay=0.1, max_delay=0.5)
+        return RobotiqHand(address or self.address, reconnect=policy, **usual | options)
+
+
+@asynccontextmanager
+async def serial_bus(patch: pytest.MonkeyPatch, models: dict[int, Model]) -> AsyncIterator[Bus]:
+    """An adapter with two devices at the far end of its cable."""
+    clock, line = asyncio.get_running_loop().time, VirtualLine(patch)
+
+    def pull() -> None:
+        line.pull()
+        asyncio.get_running_loop().call_later(0.5, line.plug)
+
+    async with AsyncExitStack() as stack:
+        servers = {}
+        for unit, model in models.items():
+            gripper = SimulatedGripper(clock, model=model)
+            await activate_beforehand(gripper)
+            server = SerialSimulatorServer(VirtualLine.FAR, gripper, device_id=unit)
+            servers[unit] = await stack.enter_async_context(server)
+        yield Bus(f"rtu://{VirtualLine.NEAR}", servers, pull)
+
+
+class Tee(asyncio.Protocol):
+    """The client's end of a serial server with two devices behind it."""
+
+    def __init__(self, ports: list[int]) -> None:
+        self._ports = ports
+        self._behind: list[Any] = []
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self.transport: Any = transport
+        loop: Any = asyncio.get_running_loop()
+        self._behind = [loop.connect(lambda: Branch(self), port) for port in self._ports]
+
+    def data_received(self, data: bytes) -> None:
+        for each in self._behind:
+            each.write(data)
+
+    def connection_lost(self, _: Exception | None) -> None:
+        for each in self._behind:
+            each.close()
+
+
+class Branch(asyncio.Protocol):
+    """What comes from one of the devices."""
+
+    def __init__(self, tee: Tee) -> None:
+        self._tee = tee
+
+    def data_received(self, data: bytes) -> None:
+        self._tee.transport.write(data)
+
+
+@asynccontextmanager
+async def socket_bus(_: pytest.MonkeyPatch, models: dict[int, Model]) -> AsyncIterator[Bus]:
+    """A serial server with two devices on its line."""
+    loop = asyncio.get_running_loop()
+    tees: list[Tee] = []
+
+    def tee() -> Tee:
+        tees.append(Tee([server.port for server in servers.values()]))
+        return tees[-1]
+
+    async with AsyncExitStack() as stack:
+        servers = {}
+        for unit, model in models.items():
+            gripper = SimulatedGripper(loop.time, model=model)
+            await activate_beforehand(gripper)
+            server = RtuOverTcpSimulatorServer(gripper, device_id=unit)
+            servers[unit] = await stack.enter_async_context(server)
+        listener = await loop.create_server(tee, "127.0.0.1", 0)
+        port = listener.sockets[0].getsockname()[1]
+        yield Bus(f"rtu+tcp://127.0.0.1:{port}", servers, lambda: tees[-1].transport.abort())
+        listener.close()
+
+
+@pytest.fixture(params=[serial_bus, socket_bus], ids=["rtu", "rtu+tcp"])
+async def bus(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Bus]:
+    async with request.param(monkeypatch, {LEFT: TWO_FINGER_85, RIGHT: TWO_FINGER_85}) as bus:
+        yield bus
+
+
+async def longest_gap(hand: RobotiqHand, seconds: float) -> float:
+    """The longest time between two statuses."""
+    now = asyncio.get_running_loop().time
+    last, until_then, longest = now(), now() + seconds, 0.0
+    async for _ in hand.statuses():
+        longest, last = max(longest, now() - last), now()
+        if last >= until_then:
+            break
+    return longest
+
+
+async def positions(hand: RobotiqHand, ended: asyncio.Event) -> set[int]:
+    """The positions that statuses show until something has ended."""
+    seen = set()
+    async for status in hand.statuses():
+        seen.add(status.position(A))
+        if ended.is_set():
+            break
+    return seen
+
+
+async def test_each_moves_its_own_gripper(bus: Bus) -> None:
+    async with bus.hand(LEFT) as left, bus.hand(RIGHT) as right:
+        ends = await asyncio.gather(left.move(200), right.move(50))
+        assert [end.positions[A] for end in ends] == pytest.approx([200, 50], abs=3)
+        assert [bus.gripper(unit).target(A) for unit in (LEFT, RIGHT)] == [200, 50]
+        assert left.statistics.reconnects == right.statistics.reconnects == 0
+
+
+async def test_turns_are_fair(bus: Bus) -> None:
+    async with bus.hand(LEFT) as left, bus.hand(RIGHT) as right:
+        before = left.statistics.polls, right.statistics.polls
+        await asyncio.sleep(5)
+        polls = left.statistics.polls - before[0], right.statistics.polls - before[1]
+        assert min(polls) > 0.95 * max(polls)
+        assert min(polls) > 5 * 140
+        # A stream of one takes turns from the other, and not all.
+        for step in range(100):
+            left.command(position=step)
+            await asyncio.sleep(0.01)
+        assert await longest_gap(right, 1.0) < 0.02
+
+
+async def test_a_silent_gripper_costs_the_other_a_response_timeout_now_and_then(bus: Bus) -> None:
+    async with bus.hand(LEFT) as left, bus.hand(RIGHT) as right:
+        before = right.statistics.polls
+        async with bus.servers[LEFT].fault_injector.making(Trouble("silence")):
+            gap = await longest_gap(right, 10.0)
+            assert left.state is State.DISCONNECTED
+        assert gap < RESPONSE_S + 0.05
+        assert right.statistics.reconnects == 0
+        # In each second the silent one has at most two tries of 0.4 s, and the other the rest.
+        assert right.statistics.polls - before > 10 * 0.2 * 150
+        await left.wait_for_state(State.RUNNING_IDLE, timeout=2)
+        await left.move(70)
+
+
+async def test_statuses_of_a_silent_gripper_that_come_late_reach_nobody(bus: Bus) -> None:
+    """Replies 0.3 s late, after the response timeout, in the turns of the other gripper."""
+    async with bus.hand(LEFT) as left, bus.hand(RIGHT) as right:
+        await asyncio.gather(left.move(220), right.move(30))
+        ended = asyncio.Event()
+        watching = [asyncio.create_task(positions(hand, ended)) for hand in (left, right)]
+        async with bus.servers[LEFT].fault_injector.making(Trouble("delay", 0.3)):
+            await asyncio.sleep(10)
+        await left.wait_for_state(State.RUNNING_IDLE, timeout=3)
+        ended.set()
+        for seen, there in zip(await asyncio.gather(*watching), (220, 30), strict=True):
+            assert seen
+            assert all(abs(position - there) <= 3 for position in seen)
+
+
+async def test_a_stop_arrives_although_the_other_is_silent(bus: Bus) -> None:
+    loop = asyncio.get_running_loop()
+    async with bus.hand(LEFT), bus.hand(RIGHT) as right:
+        right.command(position=255)
+        await until(lambda: right.status.position(A) > 20)
+        async with bus.servers[LEFT].fault_injector.making(Trouble("silence")):
+            await asyncio.sleep(0.3)
+            began = loop.time()
+            await right.stop()
+            assert loop.time() - began < 2.0
+        assert not bus.gripper(RIGHT).is_moving
+        assert bus.gripper(RIGHT).position(A) < 200
+
+
+async def test_the_one_that_stays_keeps_the_line_and_the_last_one_closes_it(bus: Bus) -> None:
+    async with bus.hand(RIGHT) as right:
+        async with bus.hand(LEFT) as left:
+            await left.move(90)
+        assert await longest_gap(right, 0.5) < 0.02
+        await right.move(80)
+        async with bus.hand(LEFT) as again:
+            await again.move(40)
+        assert right.statistics.reconnects == 0
+    async with bus.hand(None, device_id=LEFT) as alone:
+        await alone.move(10)
+
+
+async def test_an_end_of_the_connection_is_the_end_for_both(bus: Bus) -> None:
+    async with bus.hand(LEFT) as left, bus.hand(RIGHT) as right:
+        bus.pull()
+        for hand in (left, right):
+            await hand.wait_for_state(State.DISCONNECTED, timeout=1)
+        for hand in (left, right):
+            await hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
+            assert hand.statistics.reconnects == 1
+        await asyncio.gather(left.move(100), right.move(100))
+
+
+async def test_a_cancelled_start_leaves_the_other_alone(bus: Bus) -> None:
+    async with bus.hand(RIGHT) as right:
+        nobody = bus.hand(33)
+        starting = asyncio.create_task(nobody.start(wait=5))
+        await asyncio.sleep(0.1)
+        starting.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await starting
+        assert await longest_gap(right, 1.0) < 0.05
+        assert right.statistics.reconnects == 0
+        with pytest.raises(NotStartedError):
+            nobody.status  # noqa: B018
+
+
+async def test_a_unit_that_is_not_there(bus: Bus) -> None:
+    async with bus.hand(RIGHT) as right:
+        with pytest.raises(ConnectFailedError, match="no device answers"):
+            await bus.hand(33).start()
+        assert right.statistics.reconnects == 0
+
+
+async def test_the_units_of_a_line_are_claimed(bus: Bus) -> None:
+    async with bus.hand(LEFT):
+        for unit in (LEFT, None):
+            with pytest.raises(InvalidStateError, match="give each of the hands its device_id"):
+                await bus.hand(unit).start()
+
+
+@pytest.mark.parametrize("line", [serial_bus, socket_bus])
+async def test_different_models_on_a_line(line: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    async with (
+        line(monkeypatch, {LEFT: THREE_FINGER, RIGHT: TWO_FINGER_85}) as bus,
+        bus.hand(LEFT, model=THREE_FINGER) as left,
+        bus.hand(RIGHT) as right,
+    ):
+        ends = await asyncio.gather(left.move(120), right.move(50))
+        assert [end.positions[A] for end in ends] == pytest.approx([120, 50], abs=3)
+
+
+async def test_a_line_has_one_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with (
+        serial_bus(monkeypatch, {LEFT: TWO_FINGER_85, RIGHT: TWO_FINGER_85}) as bus,
+        bus.hand(LEFT),
+    ):
+        with pytest.raises(ConnectFailedError, match="the port is in use as rtu:///dev/ttyNEAR"):
+            await bus.hand(RIGHT, f"{bus.address}?baud=57600").start()
