@@ -24,6 +24,7 @@ import asyncio
 import logging
 import math
 import secrets
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Final
 
@@ -58,6 +59,9 @@ USUAL_RESPONSE_S: Final = 0.4
 """A longer response timeout means a slow line: a repeated read then gets that timeout instead of REPEAT_S."""
 SHORT_READS: Final = 3
 """Reads after the short silence, at opening, before a line is trusted with it."""
+MOST_UNANSWERED: Final = 3
+UNANSWERED_S: Final = 60.0
+"""With so many unanswered reads in so many seconds, a line gets the longer silence."""
 REPEAT_WARNING_S: Final = 60.0
 """At most one warning about repeated reads in this time."""
 
@@ -108,6 +112,8 @@ class ModbusTransport:
         """Number of registers that the last read for :meth:`_resynchronise` asked for."""
         self._rest: Registers = ()
         """The registers after those that a poll reads, as they were at opening, if any was not 0."""
+        self._unanswered: deque[float] = deque(maxlen=MOST_UNANSWERED)
+        """When the last reads were repeated because there was no answer."""
         self._warned = -math.inf
         """When the last warning about a repeated read was logged."""
 
@@ -278,20 +284,31 @@ class ModbusTransport:
 
     async def _try_short_silence(self) -> None:
         """Read a few times after 3.5 characters of silence; take the longer one if an answer is missing."""
-        silence = self._connection.silence
         try:
             async with self._connection.turn(self):
                 for _ in range(SHORT_READS):
                     await self._resynchronise(bears=self._can_repeat)
         except StillOpenError as borne:
             if self._connection.is_noise(borne.error):
-                silence.is_long = True
-                self._log.warning(
-                    "%s does not answer after a silence of %.1f ms, so it gets 1.75 ms: %s",
-                    *(self._address, 1000 * silence.short_s, borne.error),
-                )
+                self._keep_long_silence(borne.error)
             async with self._connection.turn(self):
                 await self._bring_in_step(math.inf)
+
+    def _note_unanswered(self, why: RobotiqConnectionError) -> None:
+        """Take the longer silence if reads stay unanswered that are answered when they are repeated."""
+        silence, now = self._connection.silence, self._connection.clock()
+        self._unanswered.append(now)
+        is_often = len(self._unanswered) == MOST_UNANSWERED and now - self._unanswered[0] < UNANSWERED_S
+        if is_often and self._connection.keeps_silence and not silence.is_long:
+            self._keep_long_silence(why)
+
+    def _keep_long_silence(self, why: RobotiqConnectionError) -> None:
+        silence = self._connection.silence
+        silence.is_long = True
+        self._log.warning(
+            "%s does not answer after a silence of %.1f ms, so it gets 1.75 ms: %s",
+            *(self._address, 1000 * silence.short_s, why),
+        )
 
     async def _resynchronise(self, by: float = math.inf, *, bears: Bears = _nothing) -> None:
         """Make sure that no answer to an earlier request is still on its way.
@@ -330,11 +347,14 @@ class ModbusTransport:
         try:
             async with self._connection.turn(self):
                 by = self._repeat_by()
-                await self._bring_in_step(by)
-                answer = await self._ask(self._poll, by=by)
+                with self._connection.silence.long():  # the shorter one may be why there was no answer
+                    await self._bring_in_step(by)
+                    answer = await self._ask(self._poll, by=by)
         except RobotiqConnectionError as error:
             raise why from error
         self.repeats += 1
+        if isinstance(why, ResponseTimeoutError):
+            self._note_unanswered(why)
         if (now := self._connection.clock()) - self._warned >= REPEAT_WARNING_S:
             self._warned = now
             self._log.warning("a read was repeated: %s (%d times so far)", why, self.repeats)

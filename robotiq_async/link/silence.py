@@ -11,7 +11,8 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Final
 
 SHORT_CHARACTERS: Final = 3.5
@@ -35,6 +36,15 @@ class Silence:
         self.short_s: Final = SHORT_CHARACTERS * character_s
         self.heard = -math.inf
         self.is_long = False
+
+    @contextmanager
+    def long(self) -> Iterator[None]:
+        """Keep the longer silence during a block."""
+        before, self.is_long = self.is_long, True
+        try:
+            yield
+        finally:
+            self.is_long = before
 
     async def keep(self, clock: Callable[[], float]) -> None:
         """Wait until the line has been silent for long enough; returns at once if it has.

@@ -9,6 +9,7 @@ import pytest
 from robotiq_async import Finger
 from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values.model import TWO_FINGER_85, Model
+from robotiq_async.values.registers import REGISTER_COUNT
 from tests.adversity.cell import Cell, cells, outcome
 from tests.adversity.world import HABITS, MODEL, HeldLoopError, world
 from tests.virtual import run
@@ -21,15 +22,16 @@ OF_A_JAW = [
 """What a sibling is tried with here. ``MODEL=2f85`` in the environment tries the whole table."""
 LETS_GO = ("power-cut", "foreign", "fault", "release", "e-stop")
 """What ends a grip if no other axis can move. Else a stop writes nothing that could fail."""
-CONNECTION_LOST = [("tcp", "silence once"), ("tcp", "reset"), ("tcp", "close")]
+CONNECTION_LOST = [("tcp", "silence once"), ("tcp", "reset"), ("tcp", "close"), ("rtu", "echo for 60")]
 """What does so too, as it would with a 3-Finger: what came of the grip cannot be seen in time."""
 WITH_FUNCTION_23 = {
     # The status that is read after the damage shows that the write was carried out.
-    ("command pending", trouble): "done → RUNNING_IDLE"
+    ("command pending", f"{trouble} {lasts}"): "done → RUNNING_IDLE"
     for trouble in (
-        *("drop once", "half once", "wrong-checksum once", "wrong-function once", "wrong-length once"),
-        *("wrong-count once", "wrong-unit once"),
+        *("drop", "half", "wrong-checksum", "wrong-function", "wrong-length", "wrong-count", "wrong-unit"),
+        *("wrong-echo", "byte-before", "garbled", "seven-bits"),
     )
+    for lasts in ("once", "for 60")
 }
 """What comes of a cell on a serial line to a jaw, which is written with function 23."""
 FORGETTING = {
@@ -76,6 +78,8 @@ def tried(cell: Cell, model: Model, patch: pytest.MonkeyPatch) -> str:
 def test_cell(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
     if kind_of(cell) == "interference" and Finger.SCISSOR not in MODEL.all_axes:
         pytest.skip("there is no scissor")
+    if kind_of(cell) == "registers" and MODEL.rtu.count < REGISTER_COUNT:
+        pytest.skip("it has no more")
     reads_with_3 = any(habit.kind == "function-3-only" for habit in HABITS) or MODEL.tcp.read_function == 3
     if kind_of(cell) == "function-3-only" and reads_with_3:
         pytest.skip("the hand reads with function 3 anyway")

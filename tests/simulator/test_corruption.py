@@ -128,6 +128,22 @@ def test_only_the_checksum_is_wrong(pdu: str) -> None:
     assert (int.from_bytes(wrong[-2:], "big") ^ int.from_bytes(frame[-2:], "big")).bit_count() == 1
 
 
+@pytest.mark.parametrize("pdu", [READ, WRITE])
+def test_a_byte_too_many(pdu: str) -> None:
+    frame = rtu(pdu)
+    assert list(corrupted("byte-before", frame, serial=True)) == at_once(b"\0" + frame)
+    assert list(corrupted("byte-after", frame, serial=True, value=255)) == at_once(frame + b"\xff")
+
+
+def test_another_setting_of_the_port() -> None:
+    frame = rtu("03 02 82ff")
+    ((_, seven),) = corrupted("seven-bits", frame, serial=True)
+    assert [byte & 0x7F for byte in frame] == list(seven) != list(frame)
+    ((_, garbled),) = corrupted("garbled", frame, serial=True)
+    assert len(garbled) < len(frame)
+    assert not set(garbled) & set(frame)
+
+
 # The frame is in order, but not how it comes.
 
 FRAMES = [(tcp(READ), False), (tcp(WRITE), False), (rtu(READ), True), (rtu(WRITE), True)]

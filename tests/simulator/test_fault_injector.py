@@ -37,12 +37,14 @@ READ = bytes.fromhex("04 0000 0001")
 AXES_ASKED = tuple(AxisRequest(10 * n, 100 + n, 200 + n) for n in range(1, 5))
 ACTIVE = Request(activate=True, axes=AXES_ASKED, individual_fingers=False, individual_scissor=False)
 MISFITS = {
-    "tcp": {"wrong-checksum"},
+    "tcp": {
+        *("wrong-checksum", "byte-before", "byte-after", "seven-bits", "garbled", "echo", "strict-silence"),
+    },
     "rtu": {
         *("wrong-transaction", "wrong-protocol", "exception", "reset", "close", "accept-silence", "refuse"),
         *("multiplexer", "wake-needed", "one-connection-only"),
     },
-    "rtu+tcp": {"wrong-transaction", "wrong-protocol", "exception"},
+    "rtu+tcp": {"wrong-transaction", "wrong-protocol", "exception", "strict-silence"},
 }
 """What cannot happen on a kind of link."""
 

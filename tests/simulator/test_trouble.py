@@ -19,13 +19,14 @@ CONDITIONS = [
     *("accept-silence", "refuse", "multiplexer", "power-cut", "slow-device", "interference", "fault"),
     *("idle-reset", "e-stop"),
     *("status-lag", "silence-fault", "slow-activation", "echoed-limits", "write-spacing"),
-    *("wake-needed", "function-3-only", "one-connection-only"),
+    *("wake-needed", "function-3-only", "one-connection-only", "echo", "strict-silence", "registers"),
 ]
 """Kinds that cannot be for a single reply or moment."""
 REPLIES = [
     *("delay", "late", "drop", "half", "pieces", "twice", "exception"),
     *("wrong-function", "wrong-length", "wrong-count", "wrong-transaction"),
     *("wrong-unit", "wrong-protocol", "wrong-checksum"),
+    *("byte-before", "byte-after", "seven-bits", "garbled"),
 ]
 """Kinds that can be about replies to reads and to writes."""
 
@@ -69,7 +70,7 @@ def test_the_kinds_that_are_about_replies() -> None:
     assert corrupting == {*REPLIES, "wrong-echo"}
     assert {name for name, kind in KINDS.items() if kind.lasts == INF} == {
         *CONDITIONS,
-        *("delay", "pieces", "silence"),
+        *("delay", "pieces", "silence", "seven-bits", "garbled"),
     }
 
 
@@ -205,9 +206,13 @@ VALUES = {
     "silence-fault": (1, 0, 3600),
     "slow-activation": (25, 0, 600),
     "write-spacing": (0.01, 0, 1),
+    "byte-before": (0, 0, 255),
+    "byte-after": (0, 0, 255),
+    "strict-silence": (0.00175, 0, 1),
+    "registers": (3, 1, 8),
 }
 """The usual value of each kind that has one, the least and the greatest."""
-WHOLE = {"exception", "foreign", "fault", "e-stop"}
+WHOLE = {"exception", "foreign", "fault", "e-stop", "byte-before", "byte-after", "registers"}
 """Kinds whose value is a whole number; others have seconds, or none."""
 
 

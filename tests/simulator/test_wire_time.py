@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
 from typing import Any
 
@@ -10,7 +11,13 @@ import pytest
 import serial
 
 from robotiq_async import Finger, RobotiqHand
-from robotiq_async.simulator import RtuOverTcpSimulatorServer, SerialSimulatorServer, SimulatedGripper
+from robotiq_async.simulator import (
+    RtuOverTcpSimulatorServer,
+    SerialSimulatorServer,
+    SimulatedGripper,
+    Trouble,
+    parse_troubles,
+)
 from robotiq_async.simulator.server.connection import MOST_UNREAD
 from robotiq_async.simulator.server.serial_server import MOST_UNSENT, WireTime
 from robotiq_async.values.model import model_of
@@ -159,6 +166,67 @@ async def test_how_often_a_hand_polls(
             if streaming:
                 assert after.link_use > 0.9
                 assert 0.002 < after.status_age_p50 <= after.status_age_p99 <= 0.006
+
+
+@virtual
+@pytest.mark.parametrize(
+    ("words", "what_is_logged"),
+    [
+        ("echo", ""),
+        ("strict-silence", "does not answer after a silence of 0.3 ms, so it gets 1.75 ms"),
+        ("registers", "did not answer a read of all registers"),
+        ("byte-before on read every 0.2", "a read was repeated"),
+        ("byte-after every 0.2", "a read was repeated"),
+    ],
+)
+@pytest.mark.parametrize("model", ["3f", "2f85"])
+async def test_a_hand_works_on_lines_as_they_are(
+    words: str,
+    what_is_logged: str,
+    model: str,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """It moves, loses no link, and polls as often as the line bears."""
+    if words == "registers" and model == "3f":
+        pytest.skip("a 3-Finger has eight registers")
+    caplog.set_level(logging.INFO)
+    loop, cable = asyncio.get_running_loop(), VirtualLine(monkeypatch)
+    gripper = SimulatedGripper(loop.time, model=model_of(model))
+    async with SerialSimulatorServer(cable.FAR, gripper) as server:
+        await activate_beforehand(gripper)
+        plan = asyncio.create_task(server.fault_injector.run(parse_troubles(words)))
+        await asyncio.sleep(0)
+        async with RobotiqHand(f"rtu://{cable.NEAR}?model={model}") as hand:
+            for position in (200, 40, 120):
+                result = await hand.move(position, Finger.A)
+                assert result.positions[Finger.A] == pytest.approx(position, abs=3)
+            assert hand.statistics.reconnects == 0
+            assert hand.statistics.period_p50 <= 0.0055
+        plan.cancel()
+        await asyncio.wait([plan])
+    assert what_is_logged in caplog.text
+    if not what_is_logged:
+        assert "WARNING" not in caplog.text
+
+
+@virtual
+async def test_a_device_that_needs_the_longer_silence_now_and_then(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The reads at opening do not show it; the third read without an answer does."""
+    loop, cable = asyncio.get_running_loop(), VirtualLine(monkeypatch)
+    async with (
+        SerialSimulatorServer(cable.FAR, SimulatedGripper(loop.time)) as server,
+        RobotiqHand(f"rtu://{cable.NEAR}") as hand,
+        server.fault_injector.making(Trouble("strict-silence")),
+    ):
+        await asyncio.sleep(3)
+        assert "so it gets 1.75 ms" in caplog.text
+        polls = hand.statistics.polls
+        await asyncio.sleep(1)
+        assert hand.statistics.polls - polls > 150
+        assert hand.statistics.reconnects == 0
 
 
 @virtual

@@ -23,10 +23,12 @@ from robotiq_async.simulator import (
     SimulatedGripper,
     SimulatorServer,
     Trouble,
+    parse_troubles,
 )
 from robotiq_async.tools.doctor import Finding, Level, examine
 from robotiq_async.tools.doctor.answer import _advice_for_opening
 from robotiq_async.tools.doctor.gripper import report_adapter
+from robotiq_async.values.model import TWO_FINGER_85
 from robotiq_async.values.request import AxisRequest, Request
 from tests.serial_line import SerialLine, with_crc
 from tests.virtual import run
@@ -314,6 +316,35 @@ async def test_a_line_without_an_answer_gets_advice_for_lines(fault: str) -> Non
     assert found["Modbus"].level is Level.BAD
     assert advice in found["Modbus"].advice
     assert "not this gripper" not in found["Modbus"].advice
+
+
+@pytest.mark.parametrize(
+    ("words", "level", "advice"),
+    [
+        ("silence", Level.BAD, "check the gripper's power, A and B (swapped?), its rate (?baud=)"),
+        ("wrong-checksum for ever", Level.BAD, "check shield, ground, termination and length of the cable"),
+        ("byte-before for ever", Level.BAD, "Bytes come that are no reply"),
+        ("byte-after for ever", Level.BAD, "Bytes come that are no reply"),
+        ("garbled", Level.BAD, "another rate or parity (?baud=, ?parity=) or 7 data bits"),
+        ("seven-bits", Level.BAD, "7 data bits"),
+        ("echo", Level.GOOD, ""),
+        ("registers", Level.GOOD, ""),
+        ("registers 2", Level.BAD, "Nothing answers"),
+    ],
+)
+async def test_what_a_serial_line_does_is_no_other_device(words: str, level: Level, advice: str) -> None:
+    (trouble,) = parse_troubles(words)
+    gripper = SimulatedGripper(model=TWO_FINGER_85)
+    async with (
+        RtuOverTcpSimulatorServer(gripper, paced=False) as server,
+        server.fault_injector.making(trouble),
+    ):
+        found = await findings(server.address, seconds=120)
+    assert found["Modbus"].level is level
+    assert advice in found["Modbus"].advice
+    assert ("echo" in found) == (words == "echo")
+    assert "not this gripper" not in found["Modbus"].advice
+    assert "Pass" not in "".join(each.advice for each in found.values())
 
 
 async def test_an_echo_on_the_line_is_told() -> None:

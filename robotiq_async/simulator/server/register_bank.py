@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from typing import TYPE_CHECKING, Final
 
-from robotiq_async.values.registers import REGISTER_COUNT, RTU_REGISTERS, Registers
+from robotiq_async.values.registers import RTU_REGISTERS, Registers
 
 from ..functions import READ_HOLDING, READ_INPUT, READ_WRITE, WRITE_MULTIPLE, WRITE_SINGLE
 
@@ -72,7 +72,7 @@ class RegisterBank:
         _check(len(data) >= 4)
         address, count = struct.unpack_from(">HH", data)
         _check(1 <= count <= _MOST_READ)
-        block = _block_of(address, count, _READABLE)
+        block = self._block_of(address, count, _READABLE)
         if function == READ_WRITE:
             self._write(data[4:6], _content(data[6:], _MOST_WRITTEN_AND_READ))
             if self._gripper.habits.answers_with_echo:
@@ -85,8 +85,15 @@ class RegisterBank:
 
     def _write(self, at: bytes, content: bytes) -> None:
         address, count = int.from_bytes(at, "big"), len(content) // 2
-        block = _block_of(address, count, _WRITABLE)
+        block = self._block_of(address, count, _WRITABLE)
         self._gripper.write(address - block, struct.unpack(f">{count}H", content))
+
+    def _block_of(self, address: int, count: int, blocks: tuple[int, ...]) -> int:
+        """Where the block begins that has all of the registers."""
+        for block in blocks:
+            if block <= address and address + count <= block + self._troubles.served_registers:
+                return block
+        raise _RefusedError(_ILLEGAL_ADDRESS)
 
     def _registers(self, function: int, block: int) -> Registers:
         function_of_the_status = READ_HOLDING if self._troubles.reads_only_with_function_3 else READ_INPUT
@@ -106,11 +113,3 @@ def _content(data: bytes, most: int) -> bytes:
     count, content = int.from_bytes(data[:2], "big"), data[3:]
     _check(1 <= count <= most and data[2] == 2 * count == len(content))
     return content
-
-
-def _block_of(address: int, count: int, blocks: tuple[int, ...]) -> int:
-    """Where the block begins that has all of the registers."""
-    for block in blocks:
-        if block <= address and address + count <= block + REGISTER_COUNT:
-            return block
-    raise _RefusedError(_ILLEGAL_ADDRESS)

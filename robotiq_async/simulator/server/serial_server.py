@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import importlib.util
+import math
 from typing import TYPE_CHECKING, Final
 
 from pymodbus.transport.serialtransport import create_serial_connection
@@ -244,12 +245,19 @@ class SerialConnection(Connection):
         super().__init__(endpoint)
         self._wire = None if reply_silence is None else WireTime(reply_silence)
         self._heard_at = 0.0
+        self._sent_at = -math.inf
+        """When the last bytes of a reply were put on the line."""
         self._unsent = 0
         """Bytes sent since the line had taken all of them."""
 
     def data_received(self, data: bytes) -> None:
         """Take bytes from the line, once they have come; more than it can carry for long is lost."""
         now = self._loop.time()
+        line = self._endpoint.fault_injector
+        if line.echoes:
+            self._put(data)
+        if not self._inbox and now - self._sent_at < line.strict_silence:
+            return
         if self._wire is None:
             pause, self._heard_at = now - self._heard_at, now
             self._hear(data, pause)
@@ -284,6 +292,7 @@ class SerialConnection(Connection):
             self._unsent = 0
         if self._unsent + len(part) <= MOST_UNSENT:
             self._unsent += len(part)
+            self._sent_at = self._loop.time()
             super().pass_on(part)
 
     def _regulate(self) -> None:

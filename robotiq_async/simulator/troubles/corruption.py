@@ -157,6 +157,26 @@ def wrong_checksum(reply: Reply, value: float) -> Parts:
     return ((0.0, reply.frame[:-1] + bytes((reply.frame[-1] ^ 1,))),)
 
 
+def byte_before(reply: Reply, value: float) -> Parts:
+    """A byte comes first."""
+    return ((0.0, bytes((int(value),)) + reply.frame),)
+
+
+def byte_after(reply: Reply, value: float) -> Parts:
+    """A byte comes last, as from a line that nobody drives when the device stops sending."""
+    return ((0.0, reply.frame + bytes((int(value),))),)
+
+
+def seven_bits(reply: Reply, value: float) -> Parts:
+    """The client's port is set to seven data bits."""
+    return ((0.0, bytes(byte & 0x7F for byte in reply.frame)),)
+
+
+def garbled(reply: Reply, value: float) -> Parts:
+    """The rates differ: half as many bytes come, and none of them is right."""
+    return ((0.0, bytes(byte ^ 0x0F | 0xE0 for byte in reply.frame[::2])),)
+
+
 def refusal(reply: Reply, value: float) -> Parts:
     """An exception reply with this code comes instead."""
     return reply.changed(pdu=bytes((reply.pdu[0] | 0x80, int(value))))

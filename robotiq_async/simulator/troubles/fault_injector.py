@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from robotiq_async.values.enums import Finger
+from robotiq_async.values.registers import REGISTER_COUNT
 from robotiq_async.values.request import AxisRequest, Request
 
 from .corruption import Reply
@@ -157,6 +158,21 @@ class FaultInjector:
     def reads_only_with_function_3(self) -> bool:
         """Whether function 4 is refused and 3 reads the status."""
         return bool(self._lasting("function-3-only"))
+
+    @property
+    def echoes(self) -> bool:
+        """Whether the line brings back what is sent."""
+        return bool(self._lasting("echo"))
+
+    @property
+    def strict_silence(self) -> float:
+        """Seconds after a reply in which no request is heard."""
+        return max((trouble.amount for trouble in self._lasting("strict-silence")), default=0.0)
+
+    @property
+    def served_registers(self) -> int:
+        """How many registers of each block are served."""
+        return min((int(trouble.amount) for trouble in self._lasting("registers")), default=REGISTER_COUNT)
 
     def lets_in(self, present: int) -> bool:
         """Whether a new connection is let in, beside those that there are."""

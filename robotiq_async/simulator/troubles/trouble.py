@@ -55,9 +55,13 @@ class Kind(NamedTuple):
     habit: str | None = None
 
     def fits(self, link: Link) -> bool:
-        """Whether it can happen on a kind of link: a serial server has frames of a line, and connections."""
+        """Whether it can happen on a kind of link.
+
+        A serial server has the frames of a line, and connections. It keeps the silence between frames itself.
+        """
         if link == "rtu+tcp":
-            return self.link in (None, "rtu") or self.corruption is None
+            is_about_frames = self.corruption is not None
+            return self is not KINDS["strict-silence"] and (self.link != "tcp" or not is_about_frames)
         return self.link in (None, link)
 
     @property
@@ -93,11 +97,32 @@ KINDS: Final[dict[str, Kind]] = {
         "a reply to a write names another register", corruption=corruption.wrong_echo, on="write"
     ),
     "wrong-checksum": Kind("a reply has a wrong checksum", corruption=corruption.wrong_checksum, link="rtu"),
+    "byte-before": Kind(
+        "a byte VALUE comes before a reply", _EVENT, 0, 0, 255, corruption.byte_before, link="rtu"
+    ),
+    "byte-after": Kind(
+        "a byte VALUE comes after a reply", _EVENT, 0, 0, 255, corruption.byte_after, link="rtu"
+    ),
+    "seven-bits": Kind(
+        "replies lose the highest bit of each byte", _CONDITION, corruption=corruption.seven_bits, link="rtu"
+    ),
+    "garbled": Kind(
+        "replies are bytes that mean nothing, as at another rate",
+        _CONDITION,
+        corruption=corruption.garbled,
+        link="rtu",
+    ),
     "exception": Kind(
         "a request is answered by exception VALUE", _EVENT, 4, 1, 255, corruption.refusal, link="tcp"
     ),
     # Requests and connections.
     "silence": Kind("requests are not heard; connections stay open", _CONDITION),
+    "echo": Kind("the line brings back what is sent", _CONDITION, link="rtu"),
+    "strict-silence": Kind(
+        "a request that comes within VALUE seconds after a reply is not heard",
+        *(_CONDITION, 0.00175, 0, 1),
+        link="rtu",
+    ),
     "reset": Kind("all connections are reset", link="tcp"),
     "close": Kind("all connections are closed in order", link="tcp"),
     "accept-silence": Kind(
@@ -149,6 +174,9 @@ KINDS: Final[dict[str, Kind]] = {
         "on a new connection the first image with rACT only wakes the gripper: its motion is forgotten",
         _CONDITION,
         link="tcp",
+    ),
+    "registers": Kind(
+        "more than VALUE registers of a block are refused: no answer on a serial line", _CONDITION, 3, 1, 8
     ),
     "function-3-only": Kind("function 4 is refused, and function 3 reads the status", _CONDITION),
     "one-connection-only": Kind("while there is a connection, a new one is reset", _CONDITION, link="tcp"),

@@ -254,7 +254,7 @@ def _advice_for_a_line(error: RobotiqConnectionError, echoes: bool) -> str:
     if "checksum" in str(error):
         return (
             "Replies come damaged: check shield, ground, termination and length of the cable, then parity "
-            "and stop bits (?parity=, ?stopbits=)."
+            "and stop bits (?parity=, ?stopbits=); a serial server may be set to 7 data bits."
         )
     return (
         "Bytes come that are no reply: the line has another rate or parity (?baud=, ?parity=) or 7 data "
