@@ -173,6 +173,10 @@ class ModbusTransport:
     def reads_with_writes(self) -> bool:
         return self._writes_with_23
 
+    @property
+    def has_read_with_write(self) -> bool:
+        return self._has_23
+
     async def send_and_read(self, decide: Callable[[], Sequence[int] | None]) -> Answer | None:
         """Write what ``decide`` returns, if anything, and read the status, with function 23.
 

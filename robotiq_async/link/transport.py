@@ -93,6 +93,10 @@ class CyclicLink(Link, Protocol):
     def reads_with_writes(self) -> bool:
         """Whether the gripper can, too, as far as is known."""
 
+    @property
+    def has_read_with_write(self) -> bool:
+        """Whether it has, once."""
+
     async def send_and_read(self, decide: Callable[[], Sequence[int] | None]) -> Answer | None:
         """As :meth:`send`, and read the status in the same exchange; None if there was nothing to write.
 

@@ -39,6 +39,7 @@ ACTIVE = Request(activate=True, axes=AXES_ASKED, individual_fingers=False, indiv
 MISFITS = {
     "tcp": {
         *("wrong-checksum", "byte-before", "byte-after", "seven-bits", "garbled", "echo", "strict-silence"),
+        "no-function-23",
     },
     "rtu": {
         *("wrong-transaction", "wrong-protocol", "exception", "reset", "close", "accept-silence", "refuse"),

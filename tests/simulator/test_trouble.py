@@ -20,6 +20,7 @@ CONDITIONS = [
     *("idle-reset", "e-stop"),
     *("status-lag", "silence-fault", "slow-activation", "echoed-limits", "write-spacing"),
     *("wake-needed", "function-3-only", "one-connection-only", "echo", "strict-silence", "registers"),
+    "no-function-23",
 ]
 """Kinds that cannot be for a single reply or moment."""
 REPLIES = [

@@ -170,5 +170,7 @@ def assert_as_assumed(report: Report) -> None:
     assert report.why == "done", report.words
     wrong = {name: check for name, check in report.checks.items() if check.verdict is not Verdict.AS_ASSUMED}
     assert not wrong
-    expected = {name for name, each in checks_of(report.model).items() if each.stage in report.stages}
+    expected = {
+        name for name, each in checks_of(report.model, report.link).items() if each.stage in report.stages
+    }
     assert report.checks.keys() == expected

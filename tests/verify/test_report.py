@@ -361,7 +361,8 @@ def test_the_page_names_every_key_ending_and_check() -> None:
     assert first_cells("### report.json") == list(report_with().as_dict())
     assert first_cells("### How a run ends") == list(ENDINGS)
     assert first_cells("## What is checked") == list(CATALOGUE)
-    named = set(re.findall(r"`([a-z]+\.[a-z_]+)`", HARDWARE)) - {"report.json", "report.md", "recording.mcap"}
+    files = {"report.json", "report.md", "recording.mcap"}
+    named = set(re.findall(r"`([a-z]+\.[a-z_0-9]+)`", HARDWARE)) - files
     assert named == {*CATALOGUE}
 
 

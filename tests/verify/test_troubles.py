@@ -13,9 +13,9 @@ from robotiq_async.link.address import parse_address
 from robotiq_async.simulator import SimulatorServer, Trouble
 from robotiq_async.simulator.troubles.like_hardware import like_hardware, own_habits
 from robotiq_async.tools.verify import Plan, Report, Runner, Verdict
-from robotiq_async.tools.verify.catalogue import CATALOGUE, HARMLESS
+from robotiq_async.tools.verify.catalogue import HARMLESS, checks_of
 from robotiq_async.tools.verify.motions import REACHED, UNREACHED
-from robotiq_async.values.model import THREE_FINGER
+from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
 from robotiq_async.values.registers import rGTO
 from tests.verify.matrix import EVENTS, HABITS, options
 from tests.verify.people import SHORT, Helper, Roll, assert_as_assumed, differing, served, verified
@@ -35,8 +35,20 @@ async def test_a_habit_is_found_and_nothing_else(trouble: str, check: str, optio
     assert report.options == options(option)
     if ending == "done":
         assert not report.inconclusive
-        assert report.checks.keys() == CATALOGUE.keys()
+        assert report.checks.keys() == checks_of(THREE_FINGER, "tcp").keys()
     assert not helper.alarms
+
+
+@pytest.mark.parametrize(
+    ("model", "options"), [(THREE_FINGER, {}), (TWO_FINGER_85, {"write_function": 16})], ids=str
+)
+async def test_a_line_without_function_23(model: Model, options: dict[str, int]) -> None:
+    """A jaw is written with it unless told otherwise."""
+    async with served("no-function-23", serial=True, model=model) as server:
+        report = await verified(server, last=2)
+    assert report.why == "done", report.words
+    assert differing(report) == {"write.function_23": options}
+    assert not report.inconclusive
 
 
 async def test_a_gripper_like_hardware_has_its_three_habits() -> None:

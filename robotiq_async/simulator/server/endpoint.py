@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, ClassVar, Final, Self
 
 from robotiq_async.values.model import THREE_FINGER
 
-from ..functions import READ_INPUT
 from ..physics.gripper import SimulatedGripper
 from ..troubles.corruption import ReplyPolicy, unchanged
 from ..troubles.fault_injector import FaultInjector
@@ -160,9 +159,7 @@ class SimulatorEndpoint(ABC):
 
     def answer(self, frame: Frame) -> bytes:
         """Carry out a request; the frame of the reply."""
-        served: Collection[int] = self.functions
-        if self.fault_injector.reads_only_with_function_3:
-            served = set(served) - {READ_INPUT}
+        served = set(self.functions) - self.fault_injector.refused_functions
         return self._reply(frame, self._bank.answer(frame.pdu, served))
 
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:

@@ -13,6 +13,7 @@ from robotiq_async.values.enums import Finger
 from robotiq_async.values.registers import REGISTER_COUNT
 from robotiq_async.values.request import AxisRequest, Request
 
+from ..functions import READ_INPUT, READ_WRITE
 from .corruption import Reply
 from .trouble import KINDS, Trouble
 
@@ -153,6 +154,12 @@ class FaultInjector:
     def is_multiplexed(self) -> bool:
         """Whether clients share a connection to the gripper that outlives theirs."""
         return bool(self._lasting("multiplexer"))
+
+    @property
+    def refused_functions(self) -> frozenset[int]:
+        """Modbus functions that are refused although the link serves them."""
+        refusing = {"function-3-only": READ_INPUT, "no-function-23": READ_WRITE}
+        return frozenset(refusing[trouble.kind] for trouble in self._lasting(*refusing))
 
     @property
     def reads_only_with_function_3(self) -> bool:

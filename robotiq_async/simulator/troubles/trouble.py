@@ -179,6 +179,7 @@ KINDS: Final[dict[str, Kind]] = {
         "more than VALUE registers of a block are refused: no answer on a serial line", _CONDITION, 3, 1, 8
     ),
     "function-3-only": Kind("function 4 is refused, and function 3 reads the status", _CONDITION),
+    "no-function-23": Kind("function 23 is refused: no answer on a serial line", _CONDITION, link="rtu"),
     "one-connection-only": Kind("while there is a connection, a new one is reset", _CONDITION, link="tcp"),
 }
 """Every kind of trouble, by its name."""

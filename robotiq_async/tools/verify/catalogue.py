@@ -18,6 +18,7 @@ class Assumption(NamedTuple):
     assumed: str  # what is assumed, in a sentence
     is_safety: bool = False  # whether the run ends when it does not hold
     of_several: bool = False  # whether it is about several axes, and so not about a jaw
+    of_lines: bool = False  # whether it is about serial lines alone
 
 
 CATALOGUE: Final[dict[str, Assumption]] = {
@@ -34,6 +35,7 @@ CATALOGUE: Final[dict[str, Assumption]] = {
     "write.motion": Assumption(2, "With rGTO = 0 no position request moves anything.", True),
     "write.echo": Assumption(2, "A write is echoed within 20 ms of its acknowledgement."),
     "write.spacing": Assumption(2, "The second of two writes acts, however soon it follows."),
+    "write.function_23": Assumption(2, "Function 23 writes and reads in one exchange.", of_lines=True),
     "activation.time": Assumption(3, "An activation takes at most 20 s."),
     "activation.registers": Assumption(3, "After an activation gGTO is 0, and every gDT is 0."),
     "axis.finger": Assumption(
@@ -70,10 +72,14 @@ CATALOGUE: Final[dict[str, Assumption]] = {
 """By name, in the order in which they are checked."""
 
 
-def checks_of(model: Model) -> dict[str, Assumption]:
-    """The assumptions about a model, by name."""
-    several = len(model.axes) > 1
-    return {name: each for name, each in CATALOGUE.items() if several or not each.of_several}
+def checks_of(model: Model, link: str) -> dict[str, Assumption]:
+    """The assumptions about a model on a kind of link ("tcp", "rtu" or "rtu+tcp"), by name."""
+    several, is_line = len(model.axes) > 1, link != "tcp"
+    return {
+        name: each
+        for name, each in CATALOGUE.items()
+        if (several or not each.of_several) and (is_line or not each.of_lines)
+    }
 
 
 LAST: Final = 9  # the last stage

@@ -9,7 +9,7 @@ from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from typing import Any, Final, TypeVar
 
-from ...link.transport import Link
+from ...link.transport import CyclicLink, Link
 from ...runtime.concurrency import wait_shielded
 from ...values.errors import RobotiqConnectionError
 from ...values.model import Model
@@ -91,6 +91,24 @@ class RecordedLink:
         ended = loop.time()
         self._keep(Frame(began, ended, "command", request.registers))
         return ended
+
+    async def write_and_read(self, request: Request) -> bool:
+        """Write an image with function 23, or 16 where 23 is refused; whether 23 was answered."""
+        loop = asyncio.get_running_loop()
+        began = loop.time()
+        self.written = request
+        self.wrote = began
+        self._echoes.append((began, request.echo))
+        assert isinstance(self.link, CyclicLink), "only serial lines are asked"
+        try:
+            answer = await self._whole(self.link.send_and_read(lambda: request.registers))
+        except RobotiqConnectionError as error:
+            self._keep(Frame(began, loop.time(), "failure", request.registers, str(error)))
+            raise
+        assert answer is not None, "there was an image to write"
+        self._keep(Frame(began, loop.time(), "command", request.registers))
+        self._keep(Frame(began, loop.time(), "status", answer.registers))
+        return answer.doubt is None and self.link.has_read_with_write
 
     def expect(self, echo: Echo) -> None:
         """Take what the gripper shows for what is in force."""

@@ -40,7 +40,7 @@ class Report:
 
     def complete(self) -> None:
         """Note as inconclusive the checks that a stage has not reached."""
-        for name, assumption in checks_of(self.model).items():
+        for name, assumption in checks_of(self.model, self.link).items():
             if assumption.stage in self.entered and name not in self.checks:
                 self.checks[name] = Check(name, Verdict.INCONCLUSIVE, "not reached")
 

@@ -109,6 +109,12 @@ class Watch:
             await self.pause(left)
         return await self._link.write(request)
 
+    async def write_and_read(self, request: Request) -> bool:
+        """Write an image with function 23, if the device takes it; whether that was answered."""
+        self.check_stop()
+        await self.pause(max(0.0, self._link.wrote + self._spacing - self._loop.time()))
+        return await self._link.write_and_read(request)
+
     async def until(
         self, is_so: Callable[[RobotiqStatus], bool], seconds: float, interval: float | None = None
     ) -> RobotiqStatus | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import Final
 
+from ....session.gripper_link import registers_of
 from ....session.options import LONGEST_SPACING_S, usual_write_spacing
 from ....values.enums import Finger
 from ....values.request import Request
@@ -26,6 +27,7 @@ GAPS_S: Final = (0.002, 0.005, 0.011, 0.021)
 PAIRS: Final = 5
 MOST_PAIRS: Final = 25  # tried at one distance until PAIRS of them count
 LATE: Final = 1.5
+READ_WRITE: Final = 23
 LATE_S: Final = 0.0005  # a first image was late if it took LATE times the usual, and this much more
 
 
@@ -46,6 +48,8 @@ async def writing(bench: Bench) -> None:
         why = "the gripper echoes no positions while it is inactive; repeat this stage after stage 3"
         bench.inconclusive("write.echo", why)
         bench.inconclusive("write.spacing", why)
+    if bench.address.is_rtu:
+        await _function_23(bench, watch, image)
     await watch.write(image)
     await _echoed(watch, image)
 
@@ -166,6 +170,26 @@ async def _pair(bench: Bench, watch: Watch, image: Request, gap: float, number: 
     await watch.write(second, spaced=False)
     shown = await watch.until(lambda status: status.echo == second.echo, 0.3)
     return acknowledged - began, shown is not None
+
+
+async def _function_23(bench: Bench, watch: Watch, image: Request) -> None:
+    """Write marked images with function 23; one that is refused is written with function 16."""
+    loop, times = asyncio.get_running_loop(), list[float]()
+    for number in range(PROBES):
+        if not await watch.write_and_read(_marked(image, number)):
+            follows = "No option is needed: a 3-Finger is written with function 16."
+            options: Options = NO_OPTIONS
+            if registers_of(bench.address).write_function == READ_WRITE:
+                follows, options = "Without it the first command may be lost.", {"write_function": 16}
+            found = f"function 23 is not answered ({len(times)} of {number + 1} were)"
+            bench.differs("write.function_23", found, follows, options)
+            return
+        times.append(loop.time() - bench.link.wrote)
+        await watch.look()
+    times.sort()
+    p50, worst = 1000 * percentile(times, 0.5), 1000 * times[-1]
+    found = f"answered in {p50:.1f} ms, at most {worst:.1f} ms"
+    bench.as_assumed("write.function_23", found, p50_ms=p50, worst_ms=worst)
 
 
 def _judge_spacing(bench: Bench, kept: list[Figure], enough: list[float]) -> None:
