@@ -55,7 +55,7 @@ docs: $(SITE)/.complete  ## Make the documentation site in site/, strictly: no d
 dist: $(RELEASE)/.complete  ## Build sdist and wheel in dist/, and try each in a bare environment (needs the package index)
 	@$(RELEASE)/bin/python -m tests.release.dist
 
-pythons: $(RELEASE)/.complete  ## Test the library on other Pythons (PYTHONS="3.12 3.13 3.14"); one that cannot be had is named
+pythons: $(RELEASE)/.complete  ## Test the core on other Pythons (PYTHONS="3.12 3.13 3.14"); one that cannot be had is named
 	@$(RELEASE)/bin/python -m tests.release.pythons $(PYTHONS)
 
 canary: $(RELEASE)/.complete  ## Test with the newest of all dependencies, in an environment that is thrown away
@@ -129,5 +129,5 @@ $(SITE)/.complete: docs/site/requirements.txt constraints.txt
 
 $(RELEASE)/.complete: Makefile
 	@$(PYTHON) -m venv --clear $(RELEASE)
-	@$(RELEASE)/bin/python -m pip install --quiet --disable-pip-version-check uv
+	@$(RELEASE)/bin/python -m pip install --quiet --disable-pip-version-check twine uv
 	@touch $@

@@ -5,11 +5,16 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import pty
-import tty
+import sys
 from pathlib import Path
 from types import TracebackType
 from typing import Self
+
+import pytest
+
+if sys.platform != "win32":
+    import pty
+    import tty
 
 
 def with_crc(frame: bytes) -> bytes:
@@ -29,6 +34,8 @@ class SerialLine:
     """
 
     def __init__(self, folder: Path) -> None:
+        if sys.platform == "win32":
+            pytest.skip("Windows has no pseudo terminals")
         self.near = folder / "ttyNEAR"
         self.held: list[bytes] | None = None
         """Bytes on their way to the near end, while they are held back."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import resource
 from collections.abc import Iterator
 
 import pytest
@@ -21,6 +20,7 @@ from robotiq_async import (
 @pytest.fixture(params=[0, 1])
 def few_files(request: pytest.FixtureRequest) -> Iterator[None]:
     """This process can open no more files, or one more."""
+    resource = pytest.importorskip("resource")
     limits = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (256, limits[1]))
     opened = []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pty
 import socket
 from itertools import combinations
 from pathlib import Path
@@ -85,7 +84,7 @@ def test_a_link_is_followed_to_where_it_leads_now(tmp_path: Path) -> None:
 
 
 def test_a_device_is_known_by_its_number(tmp_path: Path) -> None:
-    master, slave = pty.openpty()
+    master, slave = pytest.importorskip("pty").openpty()
     name = os.ttyname(slave)
     (tmp_path / "by-id").symlink_to(name)
     assert place(f"rtu://{tmp_path}/by-id") == place(f"rtu://{name}")

@@ -4,11 +4,13 @@
     dist/robotiq_async-VERSION-py3-none-any.whl
 
 Each goes into two new environments, outside the clone: the base install runs the demo as a module and says
-what the command line needs; with the extra ``cli`` the command runs it.
+what the command line needs; with the extra ``cli`` the command runs it. twine looks at what the package index
+would show, strictly.
 """
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
 import tarfile
@@ -24,7 +26,14 @@ from tests.release.environments import CONSTRAINTS, ROOT, FailedError, exit_code
 DIST: Final = ROOT / "dist"
 IN_THE_SDIST: Final = (
     *("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "SECURITY.md"),
-    *("constraints.txt", "mkdocs.yml", "demo/demo.py", "docs/tutorial.md", "ros2/package.xml"),
+    *(
+        "constraints.txt",
+        "mkdocs.yml",
+        "demo/demo.py",
+        "docs/tutorial.md",
+        "hatch_build.py",
+        "ros2/package.xml",
+    ),
     *("robotiq_async/__init__.py", "tests/conftest.py"),
 )
 IN_THE_WHEEL: Final = (
@@ -56,7 +65,17 @@ def build() -> list[Path]:
     ]
     if strange:
         raise FailedError(f"{wheel.name} installs {strange}")
+    with zipfile.ZipFile(wheel) as archive:
+        described = archive.read(f"{name}.dist-info/METADATA").decode()
+    if dead := relative(described):
+        raise FailedError(f"the description has links that lead nowhere on the package index: {dead}")
+    run(sys.executable, "-m", "twine", "check", "--strict", str(sdist), str(wheel))
     return [sdist, wheel]
+
+
+def relative(text: str) -> list[str]:
+    """The links of a page that are right only beside its files."""
+    return [link for link in re.findall(r"\]\(([^)\s]+)\)", text) if not re.match(r"[a-z]+://", link)]
 
 
 def _need(archive: Path, files: set[str], wanted: tuple[str, ...]) -> None:

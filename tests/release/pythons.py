@@ -1,4 +1,4 @@
-"""``make pythons``: the tests of the library on other Pythons.
+"""``make pythons``: the tests of the core on other Pythons.
 
 One that is not here is asked of uv, which downloads it; one that cannot be had is named and left out: nothing
 fails then, and nothing is claimed.
@@ -12,15 +12,8 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import Final
 
-from tests.release.environments import CONSTRAINTS, ROOT, FailedError, make, run_suite, uv
-
-TOOLS: Final = (
-    *("hypothesis", "minimalmodbus", "numpy", "pyModbusTCP", "pyrobotiqgripper", "pyserial", "uvloop"),
-    *("pytest", "pytest-asyncio", "pytest-xdist"),
-)
-"""What the tests of the library need beside it."""
+from tests.release.environments import CONSTRAINTS, NEEDS, ROOT, FailedError, make, run_suite, uv
 
 
 def interpreter(version: str) -> str | None:
@@ -53,7 +46,7 @@ def tried(version: str) -> str:
     if python is None:
         return "left out: it is not here, and uv cannot get it"
     with tempfile.TemporaryDirectory(prefix="robotiq_async_python") as folder:
-        return run_suite(make(Path(folder) / "venv", *CONSTRAINTS, *TOOLS, "-e", str(ROOT), python=python))
+        return run_suite(make(Path(folder) / "venv", *CONSTRAINTS, *NEEDS, "-e", str(ROOT), python=python))
 
 
 def main() -> int:

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import re
+import runpy
 import sys
+import tomllib
+from types import ModuleType
 
 import pytest
 
+from docs.site.versions import version
 from tests.release.canary import news, pinned
-from tests.release.environments import FailedError, run
+from tests.release.dist import relative
+from tests.release.environments import ROOT, FailedError, run
+from tests.release.tag import check, notes, repositories
 
 
 def test_a_failed_program_is_reported_with_its_output() -> None:
@@ -33,3 +40,103 @@ def test_a_package_that_is_pinned_twice_may_be_either() -> None:
     versions = pinned()["numpy"]
     assert len(versions) == 2
     assert news(f"numpy=={each}" for each in versions) == []
+
+
+# -- a tag ---------------------------------------------------------------------------------------------------
+
+
+def test_every_file_names_the_same_repository() -> None:
+    (repository,) = set(repositories().values())
+    parts = re.fullmatch(r"https://github\.com/([\w-]+)/([\w-]+)", repository)
+    assert parts is not None
+    urls = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["urls"]
+    pages = "https://{}.github.io/{}/".format(*parts.groups())
+    assert all(url.startswith(repository) or url == pages for url in urls.values())
+
+
+def test_no_address_is_an_example() -> None:
+    for name in ("pyproject.toml", "CITATION.cff", "ros2/package.xml", "README.md", "SECURITY.md"):
+        assert not re.search(r"example\.(org|com)", (ROOT / name).read_text(encoding="utf-8")), name
+
+
+def test_a_tag_of_another_version_or_another_repository_is_no_release() -> None:
+    repository = repositories()["pyproject.toml"]
+    with pytest.raises(FailedError, match=f"the tag is v99.0, and .*version.py has {version()}"):
+        check("v99.0", repository)
+    with pytest.raises(
+        FailedError, match=r"this repository is https://github\.com/other/name, and not as in"
+    ):
+        check(f"v{version()}", "https://github.com/other/name")
+
+
+def test_the_notes_of_a_release_are_what_the_changelog_says_of_it() -> None:
+    changelog = (
+        "# Changelog\n\n## [0.2.0] - 2026-12-01\n\n### Added\n\n- More.\n\n## [0.1.0] - unreleased\n\nOld.\n"
+    )
+    assert notes(changelog, "0.2.0") == "### Added\n\n- More."
+    for missing in ("0.1.0", "0.3.0"):
+        with pytest.raises(FailedError, match=f"has no heading ## .{missing}. - YYYY-MM-DD"):
+            notes(changelog, missing)
+
+
+# -- the description on the package index --------------------------------------------------------------------
+
+
+def test_links_of_the_description_lead_to_the_tag(monkeypatch: pytest.MonkeyPatch) -> None:
+    interface = ModuleType("hatchling.metadata.plugin.interface")
+    interface.MetadataHookInterface = object  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, interface.__name__, interface)
+    absolute = runpy.run_path(str(ROOT / "hatch_build.py"))["absolute"]
+    page = "![a\nb](docs/a.webp) [c [d]](docs/c.md#e) [f](https://f.org) [g](#g)"
+    assert absolute(page, "https://github.com/me/it", "1.2.3") == (
+        "![a\nb](https://github.com/me/it/raw/v1.2.3/docs/a.webp)"
+        " [c [d]](https://github.com/me/it/blob/v1.2.3/docs/c.md#e) [f](https://f.org) [g](#g)"
+    )
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(relative(readme)) > 40
+    assert relative(absolute(readme, "https://github.com/me/it", "1.2.3")) == []
+
+
+# -- the workflows -------------------------------------------------------------------------------------------
+
+WORKFLOWS = {
+    path.name: path.read_text(encoding="utf-8") for path in (ROOT / ".github" / "workflows").glob("*.yml")
+}
+
+
+def test_the_workflow_has_the_steps_of_ci() -> None:
+    ours = re.findall(r"^make (\S+)$", (ROOT / ".ci" / "run").read_text(encoding="utf-8"), re.MULTILINE)
+    (steps,) = re.findall(r"^ +step: \[(.*)\]$", WORKFLOWS["ci.yml"], re.MULTILINE)
+    # Other Pythons have jobs of their own there.
+    assert steps.split(", ") == [step for step in ours if step != "pythons"]
+
+
+def test_the_workflow_has_the_pythons_of_the_classifiers() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    known = re.findall(r"Python :: (3\.\d+)", "\n".join(project["classifiers"]))
+    (pythons,) = re.findall(r"python: \[(.*)\]\n +step:", WORKFLOWS["ci.yml"])
+    assert pythons.replace('"', "").split(", ") == known
+
+
+@pytest.mark.parametrize("name", WORKFLOWS)
+def test_a_workflow_may_read_and_its_jobs_take_what_they_need(name: str) -> None:
+    assert "\npermissions:\n  contents: read\n\njobs:\n" in WORKFLOWS[name]
+    writes = re.findall(r"^ +(\S+): write$", WORKFLOWS[name], re.MULTILINE)
+    assert (
+        sorted(writes)
+        == {
+            "ci.yml": [],
+            "release.yml": ["contents", "id-token", "id-token", "pages"],
+            "site.yml": ["id-token", "pages"],
+        }[name]
+    )
+    assert "secrets" not in WORKFLOWS[name]
+
+
+@pytest.mark.parametrize("name", WORKFLOWS)
+def test_actions_are_pinned(name: str) -> None:
+    for action in re.findall(r"uses: (\S+)$", WORKFLOWS[name], re.MULTILINE):
+        if action.startswith("./"):
+            assert (ROOT / action).is_file()
+        else:
+            assert re.fullmatch(r"[\w-]+/[\w-]+@(v\d+|release/v\d+|[0-9a-f]{40})", action)

@@ -12,6 +12,8 @@ from typing import Any
 
 import pytest
 
+pytest.importorskip("pty")
+
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.simulator.server.connection import MOST_UNREAD, MOST_WAITING
 from robotiq_async.simulator.server.serial_server import MOST_UNSENT

@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 import serial
 
+pytest.importorskip("pty")
+
 from robotiq_async import Finger, RobotiqHand
 from robotiq_async.simulator import (
     RtuOverTcpSimulatorServer,
