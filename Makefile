@@ -25,7 +25,7 @@ unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH PYTHONSTARTUP PIP_USER P
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo show test test-web test-ros2 pages docs dist pythons canary soak habits fuzz explore bench lint check format constraints clean
+.PHONY: help demo show smoke test-core test test-web test-ros2 pages docs dist pythons canary soak habits fuzz explore bench lint check format constraints clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -36,6 +36,12 @@ demo: $(STAMP)  ## Run the demo on a simulated gripper (ADDRESS=... for a real o
 
 show: $(STAMP)  ## Run the demo with the hand in three dimensions on a page in your browser
 	@$(BIN)/python -m robotiq_async demo --show $(ADDRESS)
+
+smoke: $(STAMP)  ## Try a bit of everything; the first thing to run after a change (20 s)
+	@$(BIN)/python -m pytest --numprocesses auto --dist worksteal @tests/smoke.txt
+
+test-core: $(STAMP)  ## Run the tests of the core: values, control, link, session, hand, simulator, sync (1 minute)
+	@$(BIN)/python -m pytest -rs --numprocesses auto --dist worksteal @tests/core.txt
 
 test: $(STAMP)  ## Run the tests; those that need a browser, ROS or other environments are test-web, test-ros2 and pages
 	@$(BIN)/python -m pytest -rs --numprocesses auto --dist worksteal

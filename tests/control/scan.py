@@ -21,6 +21,8 @@ from robotiq_async.values.request import Request
 from tests.register_words import with_object_status
 
 POLL_S = 0.005
+ACTIVATING_S = 0.05
+"""Between two polls of an activation that is only a beginning: it takes many seconds."""
 
 
 class Outcome:
@@ -120,9 +122,9 @@ class Scan:
             self.controller.see(self.status())
         self.controller.activates = False
 
-    def step(self, *, answer: bool = True) -> None:
+    def step(self, *, answer: bool = True, poll: float = POLL_S) -> None:
         """One cycle; without an answer the write arrives and the link goes down before it is known."""
-        self.now += POLL_S
+        self.now += poll
         self.controller.see(self.status())
         self._write(answer=answer)
 
@@ -149,12 +151,12 @@ class Scan:
         for _ in range(round(seconds / POLL_S)):
             self.step()
 
-    def until(self, condition: Callable[[], bool], seconds: float = 30.0) -> float:
+    def until(self, condition: Callable[[], bool], seconds: float = 30.0, poll: float = POLL_S) -> float:
         """Step until something is true; returns how long it took."""
         began = self.now
         while not condition():
             assert self.now - began < seconds, f"not within {seconds} s: {self.controller.status!r}"
-            self.step()
+            self.step(poll=poll)
         return self.now - began
 
     def blink(self, away: float = 0.05) -> None:
@@ -171,7 +173,7 @@ class Scan:
 
     def start(self) -> None:
         self.connect()
-        self.until(lambda: self.state is State.RUNNING_IDLE)
+        self.until(lambda: self.state is State.RUNNING_IDLE, poll=ACTIVATING_S)
 
     @property
     def state(self) -> State:
