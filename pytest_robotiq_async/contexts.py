@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from robotiq_async.hand.robotiq_hand import RobotiqHand
+from robotiq_async import RobotiqHand
 from robotiq_async.runtime.concurrency import running_loop
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 

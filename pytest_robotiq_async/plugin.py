@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from robotiq_async.hand.robotiq_hand import RobotiqHand
+    from robotiq_async import RobotiqHand
     from robotiq_async.simulator import FaultInjector, SimulatedGripper, SimulatorServer
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest_asyncio
 
 if TYPE_CHECKING:
-    from robotiq_async.hand.robotiq_hand import RobotiqHand
+    from robotiq_async import RobotiqHand
     from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 

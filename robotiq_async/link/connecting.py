@@ -12,9 +12,9 @@ import anyio
 from pymodbus import FramerType
 from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
 
+from ..runtime.host_names import addresses_of, why_no_socket, why_unreachable
 from ..values.errors import ConnectFailedError
 from .address import Address
-from .host_names import addresses_of, why_no_socket, why_unreachable
 from .serial_ports import hasten, why_no_port
 
 Client = AsyncModbusTcpClient | AsyncModbusSerialClient

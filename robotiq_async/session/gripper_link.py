@@ -12,16 +12,14 @@ from typing import Final, Generic, TypeVar
 from ..link.address import Address, canonical_address, parse_address
 from ..link.guard import GuardedTransport
 from ..link.modbus import ModbusTransport
+from ..link.registers import registers_of
 from ..link.sim_transport import SimulatedTransport, new_gripper
 from ..link.transport import Link, Transport
 from ..runtime.log import Log
-from ..values.checks import check_int, repr_of
+from ..values.checks import repr_of
 from ..values.model import THREE_FINGER, Model, model_of
-from ..values.registers import REGISTER_COUNT, RegisterMap
+from ..values.registers import RegisterMap
 
-LAST_BLOCK: Final = 0x10000 - REGISTER_COUNT
-"""The highest first register of a block: registers are numbered to 0xFFFF."""
-_WRITE_FUNCTIONS: Final = (16, 23)
 _GATEWAY: Final = " (two grippers behind one gateway: give each of the hands its device_id)"
 _LINE: Final = " (two grippers on one serial line: give each of the hands its device_id, in one event loop)"
 
@@ -103,45 +101,6 @@ def with_model(address: Address, model: object) -> Address:
     if address.model not in (None, found):
         raise ValueError(f"model {found.name} contradicts the address {address}")
     return address if found is THREE_FINGER else replace(address, model=found)
-
-
-def registers_of(
-    address: Address,
-    *,
-    device_id: object = None,
-    read_function: object = None,
-    write_function: object = None,
-    request_address: object = None,
-    status_address: object = None,
-) -> RegisterMap:
-    """How the registers of a gripper are read and written; None stands for the usual value of the link."""
-    model = model_of(address.model)
-    usual = model.rtu if address.is_rtu else model.tcp
-    # On a serial line 0 is a broadcast, which no device answers, and ids above 247 are reserved. Over TCP
-    # grippers in the field answer to any id, and drivers have used 0 and 255.
-    units = (1, 247) if address.is_rtu else (0, 255)
-    return RegisterMap(
-        request=_int_or("request_address", request_address, 0, LAST_BLOCK, usual.request),
-        status=_int_or("status_address", status_address, 0, LAST_BLOCK, usual.status),
-        read_function=_int_or("read_function", read_function, 3, 4, usual.read_function),
-        device_id=_int_or("device_id", device_id, *units, usual.device_id),
-        count=usual.count,
-        write_function=check_write_function(
-            usual.write_function if write_function is None else write_function
-        ),
-    )
-
-
-def check_write_function(value: object) -> int:
-    """A Modbus function that writes the request registers."""
-    function = check_int("write_function", value, *_WRITE_FUNCTIONS)
-    if function not in _WRITE_FUNCTIONS:
-        raise ValueError(f"write_function must be 16 or 23, got {function}")
-    return function
-
-
-def _int_or(name: str, value: object, low: int, high: int, usual: int) -> int:
-    return usual if value is None else check_int(name, value, low, high)
 
 
 def _over_modbus(address: Address, registers: RegisterMap, names_unit: bool, name: str) -> GripperLink:

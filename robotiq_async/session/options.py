@@ -14,6 +14,7 @@ from enum import Flag, auto
 from functools import partial
 from typing import Annotated, Final, get_type_hints
 
+from ..link.registers import LAST_BLOCK, check_write_function
 from ..link.transport import Link, Transport
 from ..runtime.log import Log
 from ..values.calibration import ForceCalibration, SpeedCalibration, Units
@@ -21,7 +22,7 @@ from ..values.checks import check_byte, check_flag, check_int, check_seconds, re
 from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..values.model import MODELS, THREE_FINGER, Model, model_of
 from ..values.registers import RTU_REGISTERS, TCP_REGISTERS
-from .gripper_link import LAST_BLOCK, GripperLink, check_write_function, gripper_link
+from .gripper_link import GripperLink, gripper_link
 
 
 class Usual(float):

@@ -8,7 +8,8 @@ room            what it holds
 ``server``      :class:`SimulatorServer` (Modbus TCP), :class:`SerialSimulatorServer` (Modbus RTU),
                 :class:`RtuOverTcpSimulatorServer` (Modbus RTU behind a serial server)
 ``troubles``    what can go wrong, as data and as words: :class:`Trouble`, :func:`parse_troubles`;
-                :class:`FaultInjector`, ``server.fault_injector``, makes it happen
+                :class:`FaultInjector`, ``server.fault_injector``, makes it happen;
+                :func:`own_habits` and :func:`like_hardware`: what real grippers do
 ``functions``   the Modbus functions that are served
 ==============  ===========================================================================
 
@@ -17,18 +18,24 @@ The physics imports neither pymodbus nor asyncio.
 
 from .physics.gripper import SimulatedGripper
 from .physics.habits import Habits
+from .physics.scale import SimulatedScale
 from .server.serial_server import RtuOverTcpSimulatorServer, SerialSimulatorServer
 from .server.tcp_server import SimulatorServer
 from .troubles.fault_injector import FaultInjector
-from .troubles.trouble import Trouble, parse_troubles
+from .troubles.like_hardware import like_hardware, own_habits
+from .troubles.trouble import KINDS, Trouble, parse_troubles
 
 __all__ = [
+    "KINDS",
     "FaultInjector",
     "Habits",
     "RtuOverTcpSimulatorServer",
     "SerialSimulatorServer",
     "SimulatedGripper",
+    "SimulatedScale",
     "SimulatorServer",
     "Trouble",
+    "like_hardware",
+    "own_habits",
     "parse_troubles",
 ]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ...link.address import is_remote, parse_address
+from ...link.registers import registers_of
 from ...runtime.log import printable
-from ...session.gripper_link import registers_of
 from ..addresses import full_address, gripper_words
 from ..arguments import Address, Unit, need
 from ..failures import CommandError, UsageError, usage

@@ -163,7 +163,7 @@ def _scale(
         return from_table
     if not is_simulated(address):
         return _typed
-    from ...simulator.physics.scale import SimulatedScale
+    from ...simulator import SimulatedScale
 
     simulated = SimulatedScale(surface)
 

@@ -96,10 +96,10 @@ async def simulate(
         SerialSimulatorServer,
         SimulatedGripper,
         SimulatorServer,
+        own_habits,
         parse_troubles,
     )
-    from ...simulator.troubles.like_hardware import like_hardware as habits_like_hardware
-    from ...simulator.troubles.like_hardware import own_habits
+    from ...simulator import like_hardware as habits_like_hardware
 
     if troubles:
         _list_troubles()
@@ -174,7 +174,7 @@ def _place(gripper: SimulatedGripper, position: int | None, *, fixed: bool) -> N
 
 
 def _list_troubles() -> None:
-    from ...simulator.troubles.trouble import KINDS
+    from ...simulator import KINDS
 
     for name, kind in KINDS.items():
         usual = "" if kind.value is None else f" (VALUE: {kind.value:g} unless given)"

@@ -10,7 +10,6 @@ from inspect import signature
 from typing import Final
 
 from ...control.state_machine import RUNNING
-from ...control.stops import KEEP_S
 from ...hand.robotiq_hand import RobotiqHand
 from ...runtime.clock import now
 from ...runtime.log import Log
@@ -32,6 +31,9 @@ from .records import Records
 from .requests import Request, Requests, Work, axes_of, label_of
 
 RETRY_S: Final = 1.0  # seconds between two attempts to reach the gripper
+REST_S: Final = (
+    0.5  # for a hand that keeps its grip to come to rest, as long as a stop that keeps one gives it
+)
 SEQUENCES: Final = frozenset({"activate", "reset", "atr", "recover"})
 """Commands with a speed and a force of their own."""
 COMMANDS: Final = frozenset({"set_position", "set_speed", "set_force", "move", "hold"}) | SEQUENCES
@@ -232,7 +234,7 @@ class ServedHand:
         self._settings.merge({})
         await self._hand.hold(Finger.ALL)
         with suppress(TimeoutError):
-            async with asyncio.timeout(KEEP_S):
+            async with asyncio.timeout(REST_S):
                 async for _ in self._hand.statuses():
                     if not self._hand.is_moving:
                         return

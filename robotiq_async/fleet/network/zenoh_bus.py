@@ -13,7 +13,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
-from ...link.host_names import addresses_of
+from ...runtime.host_names import addresses_of
 from .endpoints import parse_endpoint
 
 try:

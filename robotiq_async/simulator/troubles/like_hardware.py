@@ -27,12 +27,18 @@ from .trouble import Trouble
 
 
 def own_habits(model: Model) -> Habits:
-    """The habits of the gripper itself: faster in a simulation that is."""
+    """The habits of a real gripper of this model, to pass to :class:`SimulatedGripper` as ``habits``.
+
+    They go by the time of the gripper: faster in a simulation that is.
+    """
     return Habits(activation_time=REAL_ACTIVATION if model is THREE_FINGER else QUICK_ACTIVATION)
 
 
 def like_hardware(model: Model) -> tuple[Trouble, ...]:
-    """The habits that go by real time, as the clients do that meet them."""
+    """What a real gripper of this model does on its link, as troubles for :class:`FaultInjector`.
+
+    They go by real time, as the clients do that meet them.
+    """
     if model is THREE_FINGER:
         return Trouble("status-lag"), Trouble("silence-fault"), Trouble("write-spacing")
     return (Trouble("silence-fault"),)

@@ -10,9 +10,9 @@ from typing import Final, NamedTuple
 
 from ...link.address import Address
 from ...link.modbus import ModbusTransport
+from ...link.registers import registers_of
 from ...link.sim_transport import SimulatedTransport, new_gripper
 from ...link.transport import Link
-from ...session.gripper_link import registers_of
 from ...session.options import LONGEST_RESPONSE_S
 from ...values.errors import (
     ConnectFailedError,

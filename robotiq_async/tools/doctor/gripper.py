@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Final
 
 from ...link.address import Address
-from ...link.host_names import addresses_of
 from ...link.modbus import ModbusTransport
+from ...link.registers import registers_of
 from ...link.serial_ports import USB_SERIAL, latency_file, latency_timer
 from ...link.transport import Link
-from ...session.gripper_link import registers_of
+from ...runtime.host_names import addresses_of
 from ...session.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S
 from ...values.enums import Severity
 from ...values.errors import ConnectionLostError, RobotiqConnectionError

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import Final
 
-from ...session.gripper_link import registers_of
+from ...link.registers import registers_of
 from ...session.options import POLL_INTERVAL_S
 from ...values.enums import Fault
 from ...values.model import THREE_FINGER, names_that_fit

@@ -8,9 +8,9 @@ from collections import Counter
 from dataclasses import replace
 from typing import Final
 
+from ....link.registers import registers_of
 from ....link.serial_ports import latency_file, latency_timer
 from ....runtime.sockets import is_loopback
-from ....session.gripper_link import registers_of
 from ....session.options import POLL_INTERVAL_S
 from ....values.enums import Fault
 from ....values.errors import RobotiqConnectionError

@@ -12,7 +12,7 @@ import os
 import socket
 from ipaddress import ip_address
 
-from ..runtime.concurrency import in_a_thread
+from .concurrency import in_a_thread
 
 
 async def addresses_of(host: str, port: int) -> list[str]:
