@@ -14,10 +14,12 @@ from ..link.transport import Transport
 from ..session.options import (
     ACTIVATION_TIMEOUT_S,
     CONNECT_TIMEOUT_S,
+    NO_ADDRESS,
     POLL_INTERVAL_S,
     RESPONSE_TIMEOUT_S,
     WRITE_SPACING_S,
     HandOptions,
+    NoAddress,
     ReconnectPolicy,
 )
 from ..session.session import Session
@@ -68,7 +70,8 @@ class RobotiqHand(Hand):
     Args:
         address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``rtu+tcp://HOST:PORT``
             (a serial line behind a socket), ``sim://`` (or ``sim://?speedup=10&object=150``), or a
-            transport object. A serial port sends at 115200 baud, 8N1, unless the address ends in
+            transport object. Without one the gripper is simulated, and the first start logs a warning
+            that says so. A serial port sends at 115200 baud, 8N1, unless the address ends in
             ``?baud=500000``, ``&parity=E`` or ``&stopbits=2``.
         name: what to call this hand, in 1..64 printable characters: errors and the log begin with it, and
             metrics and recordings carry it. None calls it by its address.
@@ -116,7 +119,7 @@ class RobotiqHand(Hand):
 
     def __init__(
         self,
-        address: str | Transport = "sim://",
+        address: str | Transport = NO_ADDRESS,
         *,
         name: str | None = None,
         device_id: int | None = None,
@@ -172,6 +175,8 @@ class RobotiqHand(Hand):
     async def _start(self, activate: bool, wait: float) -> None:
         if self._session is not None and not self._session.is_over:
             self._session.check_loop("hand.start()")
+        if self._session is None and isinstance(self._options.address, NoAddress):
+            self._options.log.warning("no address was given: the gripper is simulated, nothing real moves")
         self._session = session = Session(
             self._options, self._machine, self._channels, activate=activate, wait=wait
         )

@@ -34,6 +34,14 @@ class Usual(float):
     __slots__ = ()
 
 
+class NoAddress(str):
+    """The address of a hand that was given none. The same text given on purpose is a plain str."""
+
+    __slots__ = ()
+
+
+NO_ADDRESS: Final = NoAddress("sim://")
+"""A program runs without hardware: its first start warns that nothing real moves."""
 POLL_INTERVAL_S: Final = 0.005
 """200 Hz, as the thesis polled; the manual names 200 Hz for RTU and 100 Hz for TCP. On a serial line, where a
 read and a write take longer, the next cycle begins later, and that is no miss."""

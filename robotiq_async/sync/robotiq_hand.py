@@ -12,6 +12,7 @@ from ..link.transport import Transport
 from ..session.options import (
     ACTIVATION_TIMEOUT_S,
     CONNECT_TIMEOUT_S,
+    NO_ADDRESS,
     POLL_INTERVAL_S,
     RESPONSE_TIMEOUT_S,
     WRITE_SPACING_S,
@@ -110,7 +111,7 @@ class RobotiqHand:
 
     def __init__(
         self,
-        address: str | Transport = "sim://",
+        address: str | Transport = NO_ADDRESS,
         *,
         name: str | None = None,
         device_id: int | None = None,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import os
 from collections.abc import Iterator
 
@@ -46,6 +47,21 @@ async def test_sim_address_runs_over_real_modbus_tcp() -> None:
     other = RobotiqHand("sim://")
     await asyncio.gather(hand.start(activate=False), other.start(activate=False))
     await asyncio.gather(hand.stop(), other.stop())
+
+
+@pytest.mark.virtual_time
+async def test_without_an_address_a_warning_says_once_that_the_gripper_is_simulated(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level(logging.WARNING)
+    for hand, warnings in ((RobotiqHand(), 1), (RobotiqHand("sim://"), 0)):
+        caplog.clear()
+        for _ in range(2):
+            await hand.start(activate=False)
+            await hand.stop()
+        said = [each.getMessage() for each in caplog.records if each.levelno == logging.WARNING]
+        assert len(said) == warnings
+        assert all("no address was given: the gripper is simulated" in text for text in said)
 
 
 async def test_an_address_may_say_how_fast_its_gripper_is_and_what_is_in_its_way() -> None:
