@@ -144,7 +144,7 @@ class Controller:
             RobotiqError: the gripper cannot be reached.
         """
         if self.machine.ask(Trigger.ASK_HOLD, self.status):
-            self._requests.hold(axes, "hold() took over", waiter)
+            self._requests.hold(axes, "a hold took over", waiter)
             self._show(Trigger.ASK_HOLD)
         else:
             waiter.set_result(None)
@@ -159,8 +159,8 @@ class Controller:
             waiter.set_result(None)
             return
         if self.is_busy or self._evidence.condition is Trigger.SEEN_BUSY:
-            self._begin_reset(Trigger.ASK_HALT, MoveSupersededError("halt() took over"))
-        self._requests.supersede(Finger.ALL, MoveSupersededError("halt() stopped the fingers"))
+            self._begin_reset(Trigger.ASK_HALT, MoveSupersededError("a halt took over"))
+        self._requests.supersede(Finger.ALL, MoveSupersededError("a halt stopped the fingers"))
         if self._stop is None or self._stop.is_delivered:  # a new halt is sent anew
             self._stop = Stop(StopLevel.HALT, [] if self._stop is None else self._stop.waiters)
         self._stop.waiters.append(waiter)
@@ -185,7 +185,7 @@ class Controller:
             RobotiqError: not possible now.
         """
         if self.machine.ask(trigger, self.status):
-            self._begin_reset(trigger, MoveSupersededError(f"{trigger.value} took over"))
+            self._begin_reset(trigger, MoveSupersededError(f"a {trigger.value.removesuffix('()')} took over"))
 
     def release(self) -> None:
         """Begin an automatic release.
@@ -196,7 +196,7 @@ class Controller:
         if self.machine.state is State.FAULT and self.status is not None and not self.status.activation_echo:
             raise NotActivatedError("the gripper is reset: there is nothing to release")
         self.machine.ask(Trigger.ASK_RELEASE, self.status)
-        self._fail_all(MoveSupersededError("atr() took over"))
+        self._fail_all(MoveSupersededError("a release took over"))
         self._begin(Trigger.ASK_RELEASE)
 
     def drop_requests(self, error: RobotiqError) -> None:

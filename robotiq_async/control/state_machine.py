@@ -198,7 +198,7 @@ def refusal(
         case Verdict.NOT_STARTED:
             return NotStartedError("the hand is not started")
         case Verdict.NOT_ACTIVATED:
-            return NotActivatedError("the gripper is not activated: call activate() or recover()")
+            return NotActivatedError("the gripper is not activated", advice="call activate() or recover()")
         case Verdict.IN_FAULT:
             return GripperFaultError(Fault.NONE if status is None else status.fault)
     allowed = states_allowing(trigger)

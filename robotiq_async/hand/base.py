@@ -569,7 +569,7 @@ class Hand(ABC):
 
     def _check_running(self) -> None:
         if self._session is None:
-            raise NotStartedError("the hand is not started: use 'async with' or start()")
+            raise NotStartedError("the hand is not started", advice="use 'async with' or start()")
         self._session.check_running()
 
     def _check_may_listen(self) -> None:

@@ -267,7 +267,7 @@ class RobotiqHand(Hand):
             ask=session.controller.release,
             failing={
                 **dict.fromkeys(ended, lambda: NotActivatedError("the gripper was reset during the release")),
-                State.DO_RESET: lambda: InvalidStateError("reset() or halt() took over", State.DO_RESET),
+                State.DO_RESET: lambda: InvalidStateError("a reset or a halt took over", State.DO_RESET),
             },
             what="the automatic release was not finished",
         )
@@ -284,22 +284,23 @@ class RobotiqHand(Hand):
                     self._check_worth_a_reset(resets)
                     resets = await self._reset_until_shown(resets)
             return
-        raise StateTimeoutError(f"the gripper is not active after {limit:g} s: {self._what_keeps_it()}")
+        raise self._not_active(limit)
 
-    def _what_keeps_it(self) -> str:
-        if self.state is not State.FAULT:
-            return self.state.name
-        fault = self.status.fault
-        why = f"{fault.description} (gFLT 0x{int(fault):02X})"
-        return why if fault.is_known else f"{why}. reset() may clear it, and DROPS the part"
+    def _not_active(self, seconds: float) -> StateTimeoutError:
+        why, advice = self.state.name, ""
+        if self.state is State.FAULT:
+            fault = self.status.fault
+            why = f"{fault.description} (gFLT 0x{int(fault):02X})"
+            advice = "" if fault.is_known else "reset() may clear it, and DROPS the part"
+        return StateTimeoutError(f"the gripper is not active after {seconds:g} s: {why}", advice=advice)
 
     def _check_worth_a_reset(self, resets: int) -> None:
         fault = self.status.fault
         what = f"the gripper makes no progress: {fault.description} (gFLT 0x{int(fault):02X})"
         if resets == RESETS:
             raise StateTimeoutError(
-                f"{what}, also after {resets} resets. Is its emergency stop released, and is it powered? "
-                "Switch its power off and on, look at its LED, then call recover() again"
+                f"{what}, also after {resets} resets. Is its emergency stop released, and is it powered?",
+                advice="switch its power off and on, look at its LED, then call recover() again",
             )
         self._options.log.warning("%s for %g s; it is reset and activated", what, STALLED_S)
 

@@ -188,9 +188,9 @@ class Session:
         if self.is_over:
             if self._poller.failure is not None:
                 raise self.link_lost()
-            raise NotStartedError("the hand is not started: use 'async with' or start()")
+            raise NotStartedError("the hand is not started", advice="use 'async with' or start()")
         if self._loop.is_closed():
-            raise NotStartedError("the event loop that the hand ran in was closed: start() it again")
+            raise NotStartedError("the event loop that the hand ran in was closed", advice="start() it again")
 
     def check_takes_requests(self) -> None:
         """Raise NotStartedError once stop() was called."""
@@ -297,7 +297,7 @@ class Session:
             State.FAULT: self._fault,
             State.ATR_DONE: self._fault,
             State.RESET: lambda: NotActivatedError("the gripper was reset during the activation"),
-            State.DO_RESET: lambda: NotActivatedError("reset() or halt() took over"),
+            State.DO_RESET: lambda: NotActivatedError("a reset or a halt took over"),
         }
         try:
             watch = StallWatch(self._channels.listeners, self.machine)
@@ -311,8 +311,10 @@ class Session:
                 )
         except StateTimeoutError as error:
             fault = Fault.NONE if self.controller.status is None else self.controller.status.fault
-            why = f": {fault.description} (gFLT 0x{int(fault):02X}); recover() resets it" if fault else ""
-            raise ActivationTimeoutError(f"{error}{why}") from None
+            if not fault:
+                raise ActivationTimeoutError(str(error)) from None
+            why = f"{fault.description} (gFLT 0x{int(fault):02X})"
+            raise ActivationTimeoutError(f"{error}: {why}", advice="recover() resets it") from None
         if stall.cancelled_caught:
             raise self._stalled()
 
@@ -342,8 +344,8 @@ class Session:
         fault = self.controller.status.fault
         return ActivationTimeoutError(
             f"the activation makes no progress: for {STALLED_S:g} s nothing but {fault.description} (gFLT "
-            f"0x{int(fault):02X}). Is the emergency stop released, and the gripper powered? Release it; then "
-            "start(activate=False) and recover(), which resets the gripper"
+            f"0x{int(fault):02X}). Is the emergency stop released, and the gripper powered?",
+            advice="release it; then start(activate=False) and recover(), which resets the gripper",
         )
 
     def _fault(self) -> GripperFaultError:

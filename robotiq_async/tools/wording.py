@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import Final
 
-from ..values.enums import ObjectStatus, State
+from ..values.enums import ObjectStatus, State, Trigger
 from ..values.errors import GripperFaultError, InvalidStateError, NotActivatedError, RobotiqError
 from ..values.status import NO_REQUEST
 
@@ -37,29 +36,25 @@ AXIS_WORDS: Final = {
 }
 """A description of each ``axis_state()``."""
 
-_METHOD: Final = re.compile(r"\b([a-z_]+)\(\)")
-_ADVICE: Final = re.compile(r": [^:]*(?:\b[a-z_]+\(\)|'async with').*")
-_ACTIONS: Final = {"atr": "release", "start": "the start", "stop": "the end"}
+TRIGGER_WORDS: Final = {each: each.value.removesuffix("()") for each in Trigger} | {
+    Trigger.ASK_RELEASE: "release",
+    Trigger.ASK_START: "the start",
+    Trigger.ASK_STOP: "the end",
+}
+"""A description of what changes a state."""
 
 
 def refusal_words(error: RobotiqError, hints: Mapping[State, str]) -> str:
-    """Why a command was refused, and which key or button helps: of the hints, that of the state."""
+    """Why a command was refused, and which key or button helps: of the hints, that of the state.
+
+    What the error advises is for programs, and left out.
+    """
     if isinstance(error, NotActivatedError):
-        return f"{_message(error)}; {hints[State.RESET]}"
+        return f"{error.message}; {hints[State.RESET]}"
     if isinstance(error, GripperFaultError):
         return f"{error.message}; {hints[State.FAULT]}"
     if isinstance(error, InvalidStateError) and error.allowed:
         now = STATE_WORDS[error.state]
         allowed = sorted({STATE_WORDS[state] for state in error.allowed if state is not State.RUNNING_CC})
         return f"not now, as it is {now!r}; only when {' or '.join(map(repr, allowed))}"
-    return _message(error)
-
-
-def _message(error: RobotiqError) -> str:
-    # Advice for programs is cut off.
-    return without_methods(_ADVICE.sub("", error.message))
-
-
-def without_methods(words: str) -> str:
-    """Replace methods by the names of their actions, without parentheses."""
-    return _METHOD.sub(lambda found: _ACTIONS.get(found[1], found[1]), words)
+    return error.message

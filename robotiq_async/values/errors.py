@@ -48,20 +48,27 @@ class RobotiqError(Exception):
 
     Attributes:
         hand: the ``name`` given to the hand's constructor, or an empty string. ``str(error)`` begins with it.
+        advice: which calls of the library help, or an empty string. ``str(error)`` ends with it.
     """
 
     hand: str = ""
+    advice: str = ""
+
+    def __init__(self, *args: object, advice: str = "") -> None:
+        super().__init__(*args)
+        if advice:
+            self.advice = advice
 
     @property
     def message(self) -> str:
-        """The text without the name of the hand."""
+        """The text without the name of the hand and without the advice."""
         return super().__str__()
 
     def __str__(self) -> str:
-        return f"{self.hand}: {self.message}" if self.hand else self.message
+        return ": ".join(filter(None, (self.hand, self.message, self.advice)))
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({str(self)!r})" if self.hand else super().__repr__()
+        return f"{type(self).__name__}({str(self)!r})" if self.hand or self.advice else super().__repr__()
 
     def __reduce__(self) -> tuple[Callable[..., RobotiqError], tuple[object, ...], dict[str, object]]:
         return _restore, (type(self), *self.args), vars(self)

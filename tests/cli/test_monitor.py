@@ -346,8 +346,8 @@ async def test_it_speaks_of_keys_and_not_of_methods_and_states(active: Operator)
 @pytest.mark.parametrize(
     ("error", "words"),
     [
-        (MoveSupersededError("atr() took over"), "release took over"),
-        (MoveSupersededError("halt() stopped the fingers"), "halt stopped the fingers"),
+        (MoveSupersededError("a release took over"), "a release took over"),
+        (MoveSupersededError("it moved", advice="call move() again"), "it moved"),
         (GripperFaultError(Fault.SCISSOR_BLOCKED, "major fault"), "major fault; v does what it needs"),
         (refusal(Trigger.ASK_COMMAND, State.RESET), "the gripper is not activated; a activates it"),
         (

@@ -33,6 +33,7 @@ from robotiq_async.values.errors import (
     GripperFaultError,
     InvalidStateError,
     MoveTimeoutError,
+    NotActivatedError,
     ProtocolError,
     RobotiqError,
 )
@@ -244,6 +245,15 @@ def test_errors(kind: type[Exception]) -> None:
     assert type(read) is kind
     assert str(read) == str(error)
     assert vars(read) == vars(error) | ({"status": LATER} if issubclass(kind, MoveTimeoutError) else {})
+
+
+def test_the_advice_of_an_error_is_carried() -> None:
+    error = NotActivatedError("not activated", advice="call activate()")
+    again = values.read_error(carried(values.error_fields(error)), five_later)
+    assert isinstance(again, NotActivatedError)
+    assert (again.message, again.advice) == ("not activated", "call activate()")
+    garbage = values.error_fields(error) | {"advice": 7}
+    assert isinstance(values.read_error(carried(garbage), five_later), ProtocolError)
 
 
 def test_the_name_of_the_agents_hand_stays_with_the_agent() -> None:

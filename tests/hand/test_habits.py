@@ -438,6 +438,6 @@ async def test_one_whose_currents_change_is_waited_for_until_the_limit() -> None
 
     humming = await pressed(Humming())
     began = now()
-    with pytest.raises(ActivationTimeoutError, match=r"0x05\); recover\(\) resets it"):
+    with pytest.raises(ActivationTimeoutError, match=r"0x05\): recover\(\) resets it"):
         await RobotiqHand(humming).start()
     assert now() - began >= ACTIVATION_TIMEOUT_S

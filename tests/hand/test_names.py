@@ -113,7 +113,8 @@ async def error_of(hand: RobotiqHand, name: str) -> RobotiqError:
 def assert_tells(error: BaseException | None, name: str = NAME) -> None:
     assert isinstance(error, RobotiqError)
     assert error.hand == name
-    assert str(error) == f"{name}: {error.message}"
+    advice = f": {error.advice}" if error.advice else ""
+    assert str(error) == f"{name}: {error.message}{advice}"
     assert name not in error.message
     assert repr(str(error)) in repr(error)
 
@@ -123,7 +124,8 @@ async def test_a_refusal_tells_the_name_when_there_is_one(name: str) -> None:
     assert_tells(await error_of(RobotiqHand(name=NAME), name))
     error = await error_of(RobotiqHand(), name)
     assert error.hand == ""
-    assert str(error) == error.message == error.args[0]
+    assert str(error).startswith(error.message)
+    assert error.message == error.args[0]
 
 
 async def test_a_start_that_fails_tells_the_name(server: SimulatorServer, named: RobotiqHand) -> None:

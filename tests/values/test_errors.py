@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+
+import pytest
+
 from robotiq_async.values import errors
 from robotiq_async.values.enums import Fault, State
 
@@ -42,6 +47,22 @@ def test_the_tree_is_that_of_the_contract() -> None:
     assert {kind.__name__: " ".join(base.__name__ for base in kind.__bases__) for kind in found} == TREE
     assert errors.__doc__ is not None
     assert [name for name in TREE if name not in errors.__doc__] == [], "it draws the tree"
+
+
+def test_advice_is_told_and_kept_apart_from_the_message() -> None:
+    error = errors.NotActivatedError("not activated", advice="call activate()")
+    error.hand = "left"
+    for each in (error, copy.copy(error), pickle.loads(pickle.dumps(error))):
+        assert (each.message, each.advice) == ("not activated", "call activate()")
+        assert str(each) == "left: not activated: call activate()"
+        assert repr(each) == "NotActivatedError('left: not activated: call activate()')"
+    assert errors.NotActivatedError("not activated").advice == ""
+
+
+@pytest.mark.parametrize("kind", [errors.StateTimeoutError, errors.ResponseTimeoutError])
+def test_an_error_of_python_with_two_bases_has_advice_too(kind: type[errors.RobotiqError]) -> None:
+    error = pickle.loads(pickle.dumps(kind("late", advice="call stop()")))
+    assert (type(error), error.message, str(error)) == (kind, "late", "late: call stop()")
 
 
 def test_a_refusal_tells_the_state_and_the_states_that_would_do() -> None:

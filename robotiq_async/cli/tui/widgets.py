@@ -11,7 +11,7 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from ...tools.recording.payloads import Fields
-from ...tools.wording import AXIS_WORDS, STATE_WORDS, without_methods
+from ...tools.wording import AXIS_WORDS, STATE_WORDS, TRIGGER_WORDS
 from ...values.enums import Fault, Finger, ObjectStatus, Severity, State, Trigger
 from ...values.model import Model
 from ...values.statistics import Statistics
@@ -199,4 +199,4 @@ def transition_words(event: Fields) -> str | None:
     That drops the transitions between sending a request and its acknowledgement.
     """
     before, after = (STATE_WORDS[State[event[end]]] for end in ("source", "target"))
-    return None if before == after else f"{after} ({without_methods(Trigger[event['trigger']].value)})"
+    return None if before == after else f"{after} ({TRIGGER_WORDS[Trigger[event['trigger']]]})"

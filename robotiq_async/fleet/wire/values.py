@@ -101,6 +101,8 @@ def error_fields(error: Exception) -> Fields:
     for name in _WORDS:
         if hasattr(error, name):
             fields[name] = getattr(error, name)
+    if isinstance(error, RobotiqError) and error.advice:
+        fields["advice"] = error.advice
     return fields
 
 
@@ -132,6 +134,8 @@ def _error(fields: Fields, clock: Clock) -> Exception:
         known["address"] = words(fields["address"])
     if issubclass(kind, ControlLostError):
         known["reason"] = words(fields["reason"])
+    if issubclass(kind, RobotiqError) and "advice" in fields:
+        known["advice"] = words(fields["advice"])
     vars(error).update(known)
     return error
 
