@@ -27,14 +27,14 @@ unexport PYTHONDONTWRITEBYTECODE
 .DEFAULT_GOAL := help
 .PHONY: help demo show smoke test-core test test-web test-ros2 pages docs dist pythons canary soak habits fuzz explore bench lint check format constraints clean
 
-help:  ## Show this list
+help:  ## Show this list; times are those of two idle cores, without setting up the environment (once, a minute)
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-demo: $(STAMP)  ## Run the demo on a simulated gripper (ADDRESS=... for a real one: it asks, and moves)
+demo: $(STAMP)  ## Run the demo on a simulated gripper (30 s; ADDRESS=... for a real one: it asks, and moves)
 	@$(BIN)/python -m robotiq_async demo $(ADDRESS)
 	@echo; echo "To see the hand itself, moving in your browser: make show"
 
-show: $(STAMP)  ## Run the demo with the hand in three dimensions on a page in your browser
+show: $(STAMP)  ## Run the demo with the hand in three dimensions on a page in your browser (30 s)
 	@$(BIN)/python -m robotiq_async demo --show $(ADDRESS)
 
 smoke: $(STAMP)  ## Try a bit of everything; the first thing to run after a change (20 s)
@@ -43,7 +43,7 @@ smoke: $(STAMP)  ## Try a bit of everything; the first thing to run after a chan
 test-core: $(STAMP)  ## Run the tests of the core: values, control, link, session, hand, simulator, sync (1 minute)
 	@$(BIN)/python -m pytest -rs --numprocesses auto --dist worksteal @tests/core.txt
 
-test: $(STAMP)  ## Run the tests; those that need a browser, ROS or other environments are test-web, test-ros2 and pages
+test: $(STAMP)  ## Run the tests (5 minutes); those that need a browser, ROS or other environments are test-web, test-ros2 and pages
 	@$(BIN)/python -m pytest -rs --numprocesses auto --dist worksteal
 
 test-web: $(STAMP)  ## Test the page in a real browser (Debian: chromium, chromium-driver); skipped where there is none
@@ -55,10 +55,10 @@ test-ros2:  ## Test the ROS 2 node with real clients, each ROS in an environment
 pages: $(STAMP)  ## Run the code of every page in the environment that the page names (needs the package index)
 	@$(BIN)/python -m pytest --numprocesses auto tests/docs/environments.py
 
-docs: $(SITE)/.complete  ## Make the documentation site in site/, strictly: no dead links, nothing from other hosts
+docs: $(SITE)/.complete  ## Make the documentation site in site/, strictly: no dead links, nothing from other hosts (10 s)
 	@$(SITE)/bin/python -m docs.site
 
-dist: $(RELEASE)/.complete  ## Build sdist and wheel in dist/, and try each in a bare environment (needs the package index)
+dist: $(RELEASE)/.complete  ## Build sdist and wheel in dist/, and try each in a bare environment (30 s; needs the package index)
 	@$(RELEASE)/bin/python -m tests.release.dist
 
 pythons: $(RELEASE)/.complete  ## Test the core on other Pythons (PYTHONS="3.12 3.13 3.14"); one that cannot be had is named
@@ -83,7 +83,7 @@ explore: $(STAMP)  ## Try random examples that the tests do not, for some minute
 bench: $(STAMP)  ## Measure steadiness and cost beside bare pymodbus and a C thread (12 minutes; needs gcc)
 	@$(BIN)/python -m tests.benchmarks --json benchmarks.json
 
-lint: $(STAMP)  ## Check style, types and the directions of the imports
+lint: $(STAMP)  ## Check style, types and the directions of the imports (30 s)
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
