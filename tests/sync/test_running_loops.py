@@ -8,18 +8,19 @@ from types import SimpleNamespace
 
 import pytest
 
+from robotiq_async.session.options import LATE_POLLS
 from robotiq_async.sync import RobotiqHand
 
 WORDS = "an event loop runs in this thread"
 
 
 def warnings(caplog: pytest.LogCaptureFixture) -> list[str]:
-    """What a hand that is used warns of."""
+    """What a hand that is used warns of; that it polled late is a matter of the machine."""
     with caplog.at_level(logging.WARNING), RobotiqHand("sim://?speedup=50", name="left") as hand:
         hand.move(40)
-    logged = [record.getMessage() for record in caplog.records]
+    messages = [record.getMessage() for record in caplog.records]
     caplog.clear()
-    return logged
+    return [each for each in messages if LATE_POLLS not in each]
 
 
 async def test_it_is_logged_once_per_hand(caplog: pytest.LogCaptureFixture) -> None:
