@@ -6,12 +6,15 @@ import ast
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import robotiq_async
 from docs import make_tables
 
 PACKAGE = Path(robotiq_async.__file__).parent
+ROOT = Path(__file__).parents[1]
+AROUND = re.compile(r"robotiq_async\.(cli|fleet|ros2|tools)\b|pytest_robotiq_async\b")
 OUTSIDE = {"__init__", "__main__", "__pycache__", "_demo", "data", "py", "version"}
 """What no contract needs to speak of."""
 
@@ -72,3 +75,29 @@ def test_importing_the_library_imports_neither_simulator_nor_extras() -> None:
         "mcap",
     ):
         assert name not in modules
+
+
+def test_the_tests_of_the_core_run_without_what_stands_around_it() -> None:
+    """``make test-core``: nobody who changes the core waits for a page, or for another host."""
+    folders = (ROOT / "tests" / "core.txt").read_text(encoding="utf-8").split()
+    left = [file for folder in folders for file in (ROOT / folder).rglob("*.py")]
+    known = set(left)
+    assert len(left) > 100
+    while left:
+        file = left.pop()
+        for name in imported(file):
+            assert not AROUND.match(name), f"{file.relative_to(ROOT)} imports {name}"
+            other = (ROOT / name.replace(".", "/")).with_suffix(".py")
+            if name.startswith("tests.") and other.is_file() and other not in known:
+                known.add(other)
+                left.append(other)
+
+
+def imported(file: Path) -> Iterator[str]:
+    """The modules that a test imports, and the names that it takes from them as if they were modules."""
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
+            yield from (f"{node.module}.{each.name}" for each in node.names)
+        elif isinstance(node, ast.Import):
+            yield from (each.name for each in node.names)

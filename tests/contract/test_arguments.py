@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from robotiq_async import Finger
+from robotiq_async.fleet import RemoteHand
 from robotiq_async.hand import Hand
-from tests.contract.bench import CALLS, Bench, at_rest, called, contract
+from tests.calls import CALLS, called
+from tests.contract.bench import Bench, at_rest, contract
 
 Bad = list[tuple[type[Exception], list[Any]]]
 NO_INTEGERS = [1.0, "3", True, b"3", [3], np.bool_(True), np.float64(3)]
@@ -122,3 +124,9 @@ async def test_integers_of_numpy_are_integers(here: Bench, hand: Hand) -> None:
     assert hand.status.current(abc & 1) == hand.status.current(Finger.A)
     hand.statuses(value)
     hand.requests(value)
+
+
+def test_with_names_async_with_for_a_hand_on_another_host() -> None:
+    hand: Any = RemoteHand("zenoh://lab/cell/left")
+    with pytest.raises(TypeError, match="'async with'"), hand:
+        pass

@@ -13,7 +13,8 @@ import pytest
 
 from robotiq_async import NotStartedError, RobotiqStatus, State, Stream
 from robotiq_async.hand import Hand
-from tests.contract.bench import CALLS, LOCAL, REMOTE, A, Bench, bench, called, contract
+from tests.calls import CALLS, called
+from tests.contract.bench import LOCAL, REMOTE, A, Bench, bench, contract
 from tests.virtual import VirtualLoop
 
 

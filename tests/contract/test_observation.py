@@ -10,7 +10,8 @@ import pytest
 
 from robotiq_async import ConnectionLostError, NotStartedError, RobotiqStatus, State
 from robotiq_async.hand import Hand
-from tests.contract.bench import COMMANDS, A, Bench, at_rest, called, contract, ended, statuses
+from tests.calls import COMMANDS, called
+from tests.contract.bench import A, Bench, at_rest, contract, ended, statuses
 
 PROPERTIES = ("is_moving", "is_activated", "is_reset")
 

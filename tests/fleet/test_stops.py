@@ -19,7 +19,7 @@ from robotiq_async.fleet.wire.envelope import Call, unpack_answer
 from robotiq_async.runtime.log import Log
 from robotiq_async.values.errors import ControlLostError
 from robotiq_async.values.request import Request
-from tests.contract.bench import COMMANDS, called
+from tests.calls import COMMANDS, called
 from tests.fleet.lab import LEFT, Lab, lab
 from tests.virtual import inside, until, virtual
 

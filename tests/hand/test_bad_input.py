@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from robotiq_async import ReconnectPolicy, RobotiqHand, State
-from robotiq_async.fleet import RemoteHand
 
 pytestmark = pytest.mark.virtual_time
 
@@ -117,12 +116,6 @@ def test_addresses(address: Any) -> None:
 def test_with_names_async_with_and_the_hand_that_blocks() -> None:
     hand: Any = RobotiqHand()
     with pytest.raises(TypeError, match=r"'async with'.*robotiq_async\.sync"), hand:
-        pass
-
-
-def test_with_names_async_with_for_a_hand_on_another_host() -> None:
-    hand: Any = RemoteHand("zenoh://lab/cell/left")
-    with pytest.raises(TypeError, match="'async with'"), hand:
         pass
 
 

@@ -15,7 +15,7 @@ import pytest
 
 from robotiq_async import Finger, NotStartedError, RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.contract.bench import COMMANDS, called
+from tests.calls import COMMANDS, called
 
 ROOT = Path(__file__).parents[2]
 

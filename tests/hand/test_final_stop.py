@@ -15,7 +15,7 @@ from robotiq_async import Fault, Finger, NotActivatedError, NotStartedError, Rob
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import AxisRequest, Request
-from tests.contract.bench import COMMANDS, called
+from tests.calls import COMMANDS, called
 from tests.fake_transport import Wire
 from tests.grippers import activate_beforehand
 from tests.virtual import until

@@ -19,7 +19,7 @@ from robotiq_async import (
 )
 from robotiq_async.simulator import Trouble
 from tests.adversity.world import world
-from tests.contract.bench import COMMANDS, called
+from tests.calls import COMMANDS, called
 
 pytestmark = pytest.mark.virtual_time
 

@@ -30,10 +30,9 @@ from robotiq_async import (
 )
 from robotiq_async.session.options import LONGEST_NAME
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
-from robotiq_async.tools.recording.payloads import reading_fields, state_fields, title
 from robotiq_async.values.request import AxisRequest, Request
+from tests.calls import COMMANDS, called
 from tests.conftest import Clock, started
-from tests.contract.bench import COMMANDS, called
 
 pytestmark = pytest.mark.virtual_time
 
@@ -67,12 +66,11 @@ def test_a_name_is_kept_and_shown(name: str) -> None:
     hand = RobotiqHand("tcp://192.168.1.11", name=name)
     assert (hand.name, hand.address) == (name, "tcp://192.168.1.11:502")
     assert repr(hand) == f"<RobotiqHand {name} tcp://192.168.1.11:502 DISCONNECTED>"
-    assert title(hand) == f"{name} (tcp://192.168.1.11:502)"
 
 
 def test_without_a_name_it_is_called_by_its_address() -> None:
     hand = RobotiqHand("192.168.1.11")
-    assert hand.name == hand.address == title(hand) == "tcp://192.168.1.11:502"
+    assert hand.name == hand.address == "tcp://192.168.1.11:502"
     assert repr(hand) == "<RobotiqHand tcp://192.168.1.11:502 DISCONNECTED>"
 
 
@@ -91,11 +89,6 @@ def test_a_malformed_name_is_a_value_error(name: str) -> None:
 def test_a_name_that_is_not_text_is_a_type_error(name: Any) -> None:
     with pytest.raises(TypeError, match="name must be None or a text"):
         RobotiqHand(name=name)
-
-
-async def test_published_fields_carry_the_name(named: RobotiqHand) -> None:
-    for fields in (reading_fields(named), state_fields(named, 0.0)):
-        assert (fields["name"], fields["address"]) == (NAME, named.address)
 
 
 # -- errors ------------------------------------------------------------------------------------------------

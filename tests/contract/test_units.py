@@ -1,0 +1,46 @@
+"""The units of a hand, here or on another host: they are by the calibrations that it is made with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from robotiq_async import RobotiqHand, Units
+from robotiq_async.fleet import RemoteHand
+from robotiq_async.hand import Hand
+from robotiq_async.values.calibration import ForceCalibration, SpeedCalibration
+from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, write_table
+
+THESIS = Units()
+HANDS: list[Callable[..., Hand]] = [RobotiqHand, partial(RemoteHand, "zenoh://lab/cell/left")]
+
+
+def test_a_hand_has_them_before_it_is_started() -> None:
+    assert [make().units for make in HANDS] == [THESIS, THESIS]
+
+
+def test_they_are_by_the_owners_calibrations(tmp_path: Path) -> None:
+    write_table(tmp_path / "speed.csv", SPEED, {0: (20_000,), 255: (5_000,)})
+    write_table(tmp_path / "force.csv", FORCE, {50: (1000,), 100: (3000,)})
+    speeds = SpeedCalibration.from_csv(tmp_path / "speed.csv")
+    forces = ForceCalibration.from_csv(tmp_path / "force.csv")
+    for make in HANDS:
+        hand = make(calibration=speeds, force_calibration=forces)
+        assert hand.units == Units(speeds, forces)
+        assert hand.units.closing_s(255) == 5
+        assert hand.units.force(label_n=19.62) == 75
+        with pytest.raises(ValueError, match=r"newton of a label \(no measured force\) in 9\.81\.\.29\.43"):
+            hand.units.force(label_n=30)
+        with pytest.raises(ValueError, match=r"force 10 lies outside what was measured: 50\.\.100"):
+            hand.units.label_n(10)
+
+
+def test_objects_that_are_no_calibration_are_refused() -> None:
+    for make in HANDS:
+        with pytest.raises(TypeError, match="force_calibration must be None or a ForceCalibration"):
+            make(force_calibration=30)
+        with pytest.raises(TypeError, match="calibration must be None or a SpeedCalibration"):
+            make(calibration="mine.csv")
