@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import Final
 
-from ....session.gripper_link import registers_of
+from ....link.registers import registers_of
 from ....session.options import LONGEST_SPACING_S, usual_write_spacing
 from ....values.enums import Finger
 from ....values.request import Request
