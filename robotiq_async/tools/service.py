@@ -1,0 +1,252 @@
+"""What a program around hands needs to run as a service: signals, health, systemd's watchdog.
+
+::
+
+    hand = RobotiqHand("tcp://192.168.1.11")
+
+    async def main():
+        async with stops_on_signals(hand), watched_by_systemd(hand):
+            await hand.start(wait=86400)  # FINGERS MOVE
+            await work()
+
+A signal stops the hands first, and only then ends the program. Else the fingers would move on while a
+framework waits for its clients, or a task takes its time.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import socket
+import threading
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass
+from types import FrameType
+from typing import Any, Final
+
+import anyio
+
+from ..control.state_machine import RUNNING
+from ..hand import Hand
+from ..runtime.clock import now
+from ..runtime.log import log
+from ..values.enums import Fault, Finger, ObjectStatus, State
+from ..values.errors import NotStartedError
+from ..values.status import RobotiqStatus
+
+FRESH_S: Final = 1.0
+"""A status that is older says nothing about the gripper: two hundred polls have brought none."""
+INSIST_S: Final = 3.0
+"""Seconds after a signal in which further ones are ignored. A stop takes 2 s at most."""
+_ENDING: Final = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """One hand at one moment.
+
+    Attributes:
+        name: of the hand, or its address.
+        state: of the hand.
+        status_age: seconds since the newest status was read; None if there is none.
+        fault: the gripper's fault in the newest status.
+        holds: the axes that report a contact while closing, in the newest status.
+        problem: why the hand takes no motion commands now, in a sentence; empty if it does.
+    """
+
+    name: str
+    state: State
+    status_age: float | None
+    fault: Fault
+    holds: Finger
+    problem: str
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether the hand takes motion commands."""
+        return not self.problem
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON."""
+        return {
+            "name": self.name,
+            "ready": self.is_ready,
+            "problem": self.problem,
+            "state": self.state.name,
+            "status_age": self.status_age,
+            "fault": int(self.fault),
+            "fault_description": self.fault.description,
+            "holds": str(self.holds),
+        }
+
+
+def health(hand: Hand) -> Health:
+    """The health of a hand, at once and whatever its state: nothing is asked of the gripper."""
+    try:
+        status = hand.status
+    except NotStartedError:
+        status = None
+    age = None if status is None else max(0.0, now() - status.timestamp)
+    return Health(
+        hand.name or hand.address,
+        hand.state,
+        age,
+        Fault.NONE if status is None else status.fault,
+        Finger(0) if status is None else _holds(status),
+        _problem(hand.state, age, status),
+    )
+
+
+def _holds(status: RobotiqStatus) -> Finger:
+    held = Finger(0)
+    for axis in status.model.axes:
+        if status.finger_status(axis) is ObjectStatus.CONTACT_CLOSING:
+            held |= axis
+    return held
+
+
+def _problem(state: State, age: float | None, status: RobotiqStatus | None) -> str:
+    if state is State.SHUTDOWN:
+        return "the hand is not started"
+    if status is None or age is None:
+        return "no status has been read yet"
+    if state is State.DISCONNECTED or age > FRESH_S:
+        return f"the link is down: no status for {age:.1f} s"
+    if status.fault.is_serious:
+        return f"fault 0x{int(status.fault):02X}: {status.fault.description}"
+    return "" if state in RUNNING else f"the hand is in {state.name}"
+
+
+class Signals:
+    """What has come.
+
+    Attributes:
+        received: the number of the first signal; 0 if there was none.
+    """
+
+    def __init__(self) -> None:
+        self.received = 0
+
+
+@asynccontextmanager
+async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator[Signals]:
+    """Stop hands on SIGINT, SIGTERM and SIGHUP, and leave the block after that.
+
+    All stops begin at once, in the next turn of the event loop. When they have ended, what is inside the
+    block is cancelled, and the program continues after it. The NotStartedError of a call that a stop has
+    ended does not leave the block. Further signals are ignored for 3 s; later ones do what they did before
+    the block. An ignored signal stays ignored. SIGKILL stops nothing.
+
+    Args:
+        hands: what is stopped; one that does not run is left alone.
+        forward: for servers that end themselves in order: pass the signal on to the handler that was there
+            before the block, in place of cancelling.
+
+    Raises:
+        RuntimeError: not in the main thread.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        raise RuntimeError("signals reach the main thread alone: enter stops_on_signals() there")
+    loop, signals, stopping = asyncio.get_running_loop(), Signals(), list[asyncio.Task[None]]()
+    received_at = 0.0
+    scope = anyio.CancelScope()
+
+    async def stop(number: int) -> None:
+        for stopped in await asyncio.gather(*(each.stop() for each in hands), return_exceptions=True):
+            if isinstance(stopped, BaseException):
+                log.error("a hand could not be stopped: %r", stopped)
+        if forward and callable(previous[number]):
+            previous[number](number, None)
+        else:
+            scope.cancel()
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        nonlocal received_at
+        if not signals.received:
+            signals.received, received_at = number, time.monotonic()
+            # A signal interrupts the loop anywhere: a stop has to begin in a turn of its own.
+            with suppress(RuntimeError):  # the loop was closed
+                loop.call_soon_threadsafe(lambda: stopping.append(loop.create_task(stop(number))))
+        elif time.monotonic() - received_at > INSIST_S:
+            _pass_on(previous[number], number, frame)
+
+    previous: dict[int, Any] = {
+        number: signal.signal(number, handle)
+        for number in _ENDING
+        if signal.getsignal(number) is not signal.SIG_IGN
+    }
+    try:
+        with scope:
+            yield signals
+    except NotStartedError:
+        if not signals.received:
+            raise
+    finally:
+        if stopping:
+            with anyio.CancelScope(shield=True):
+                await asyncio.wait(stopping)
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+
+
+def _pass_on(handler: object, number: int, frame: FrameType | None) -> None:
+    if callable(handler):
+        handler(number, frame)
+    else:
+        signal.signal(number, signal.SIG_DFL)
+        signal.raise_signal(number)
+
+
+@asynccontextmanager
+async def watched_by_systemd(*hands: Hand) -> AsyncIterator[None]:
+    """Tell systemd that the service is ready, that it lives, and how it is; without systemd, do nothing.
+
+    For a unit with ``Type=notify``. With ``WatchdogSec=`` the event loop tells it twice in that time that the
+    program lives. When the loop hangs, or a hand has ended by itself, it is told no more, and restarts the
+    service. A gripper that is off or in fault is no reason to: ``systemctl status`` shows it.
+    """
+    tell = _Systemd()
+    if not tell.is_there:
+        yield
+        return
+    started: set[Hand] = set()
+
+    def lives() -> bool:
+        started.update(each for each in hands if each.state is not State.SHUTDOWN)
+        return not any(each.state is State.SHUTDOWN for each in started)
+
+    async def report() -> None:
+        while True:
+            words = ", ".join(
+                f"{each.name}: {each.problem or each.state.name}" for each in map(health, hands)
+            )
+            tell(f"STATUS={words}", *(["WATCHDOG=1"] if lives() else []))
+            await asyncio.sleep(tell.interval)
+
+    tell("READY=1")
+    reporting = asyncio.create_task(report(), name="robotiq_async systemd")
+    try:
+        yield
+    finally:
+        tell("STOPPING=1")
+        reporting.cancel()
+        await asyncio.wait([reporting])
+
+
+class _Systemd:
+    """The notification socket of the service manager (sd_notify(3)): datagrams of lines, and no answer."""
+
+    def __init__(self) -> None:
+        path = os.environ.get("NOTIFY_SOCKET", "")
+        self._address = "\0" + path[1:] if path.startswith("@") else path
+        microseconds = os.environ.get("WATCHDOG_USEC", "")
+        self.interval = int(microseconds) / 2e6 if microseconds.isdecimal() and int(microseconds) else 5.0
+        self.is_there = bool(path) and hasattr(socket, "AF_UNIX")
+
+    def __call__(self, *lines: str) -> None:
+        with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+            sender.setblocking(False)
+            sender.sendto("\n".join(lines).encode(), self._address)
