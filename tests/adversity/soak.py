@@ -50,6 +50,10 @@ ON_TCP = [Trouble(kind) for kind in ("reset", "close", "refuse", "accept-silence
     *(Trouble(kind) for kind in ("wrong-transaction", "wrong-protocol")),
     *(Trouble("multiplexer", seconds) for seconds in (0.02, 0.3, 0.7)),
 ]
+ON_A_LINE = [Trouble(kind) for kind in ("wrong-checksum", "byte-before", "byte-after")] + [
+    *(Trouble(kind, lasts=0.0) for kind in ("garbled", "seven-bits")),
+    *(Trouble(kind) for kind in ("echo", "strict-silence")),
+]
 MOVES_EVERYTHING = ("foreign", "release")
 OF_A_SCISSOR = "interference"
 
@@ -170,7 +174,7 @@ class Soak:
 
     async def fault_injector(self, ends: float) -> None:
         """One trouble after the other."""
-        kinds = ON_ANY_LINK + (ON_TCP if self.line is None else [])
+        kinds = ON_ANY_LINK + (ON_TCP if self.line is None else ON_A_LINE)
         if Finger.SCISSOR not in self.hand.model.all_axes:
             kinds = [kind for kind in kinds if kind.kind != OF_A_SCISSOR]
         while time.monotonic() < ends:
