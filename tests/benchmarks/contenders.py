@@ -29,6 +29,8 @@ from tests.benchmarks.program import Figures
 INTERVAL_S = 0.005
 SETTLE_S = 0.3
 
+WRITE = 16  # the function that writes registers
+
 
 def resident() -> int:
     """Bytes of memory that this process has."""
@@ -113,19 +115,22 @@ async def latency(seconds: float, ports: list[int]) -> Figures:
     link: Any = it._options.make_transport()
     it._options = replace(it._options, link=replace(it._options.link, make=lambda **_: link))
     arrived = written = 0.0
-    hear, write = link._on_data, link.write
+    connection = link._connection
+    hear, ask = connection._on_data, link._ask
 
     def note_arrival(data: bytes) -> None:
         nonlocal arrived
         arrived = time.monotonic()
         hear(data)
 
-    async def note_write(registers: Any) -> None:
+    async def note_write(request: bytes, **limits: Any) -> bytes:
         nonlocal written
-        written = time.monotonic()
-        await write(registers)
+        if request[1] == WRITE:
+            written = time.monotonic()
+        answer: bytes = await ask(request, **limits)
+        return answer
 
-    link._on_data, link.write = note_arrival, note_write
+    connection._on_data, link._ask = note_arrival, note_write
     to_wire, to_reader, to_return = [], [], []
     async with it:
 

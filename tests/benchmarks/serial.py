@@ -1,9 +1,12 @@
 """A hand on a serial line at its real speed: how often it polls and writes, and how long a command takes.
 
-    python -m tests.benchmarks.serial [idle stream] --seconds 20
+    python -m tests.benchmarks.serial [idle stream beside] --seconds 20
 
 The simulated gripper runs in a process of its own, on one end of a pair of pseudo terminals, and takes the
-time that the bytes take at 115200 baud. Beside the interval of serial lines stand others, 5 ms too.
+time that the bytes take at 115200 baud. Beside the usual interval stand others.
+
+``beside`` compares a hand at a 2F-85 with a bare client, on a line that is not ours (line.c, needs gcc): the
+bytes, 0.3 ms of silence and 0.5 ms for the reply.
 """
 
 from __future__ import annotations
@@ -16,22 +19,26 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
-from robotiq_async import Finger, RobotiqHand
+from robotiq_async import JAW, Finger, RobotiqHand, RobotiqStatus
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
 from robotiq_async.values.statistics import percentile
 from tests.benchmarks import program
 from tests.benchmarks.program import ROOT, Row, figures_of, median_of
 from tests.serial_line import SerialLine
 
-PARTS = ("idle", "stream")
+PARTS = ("idle", "stream", "beside")
 INTERVALS = (0.005, 0.01, 0.02)
 STREAM_S = 0.002
 """From one command of a stream to the next: more than any line can carry."""
+TARGET_S = 0.01
+"""From one target to the next of the control loop that is compared with others."""
+LINE_MS = ("0.3", "0.5")
+"""Silence and turnaround of the line that is not ours."""
 
 
 # -- the gripper, in a process of its own ------------------------------------------------------------------
@@ -111,6 +118,72 @@ async def asked(hand: RobotiqHand, seconds: float) -> list[float]:
     return took
 
 
+# -- beside others -----------------------------------------------------------------------------------------
+
+
+@contextmanager
+def independent(program: Path) -> Iterator[str]:
+    """The port of a 2F-85 in C."""
+    with tempfile.TemporaryDirectory() as folder:
+        port = f"{folder}/tty"
+        command = [str(program), "gripper", port, *LINE_MS]
+        with subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT
+        ) as process:
+            assert process.stdout is not None
+            assert process.stdin is not None
+            process.stdout.readline()
+            try:
+                yield port
+            finally:
+                process.stdin.close()
+
+
+async def compared(port: str, seconds: float, options: dict[str, int]) -> dict[str, float]:
+    """A hand that polls, and then follows a target that changes 100 times a second."""
+    async with RobotiqHand(f"rtu://{port}?model=2f85", **options) as hand:  # type: ignore[arg-type]
+        await asyncio.sleep(0.3)
+        polls, used, began = hand.statistics.polls, time.process_time(), time.monotonic()
+        await asyncio.sleep(seconds / 2)
+        idle = hand.statistics.polls - polls
+        cpu = (time.process_time() - used) / idle
+        idle_rate = idle / (time.monotonic() - began)
+        before, began = hand.statistics, time.monotonic()
+        took = await followed(hand, seconds / 2)
+        wall, after = time.monotonic() - began, hand.statistics
+        took.sort()
+        return {
+            "idle": idle_rate,
+            "statuses": (after.polls - before.polls) / wall,
+            "writes": (after.writes - before.writes) / wall,
+            "p50": percentile(took, 0.5),
+            "p99": percentile(took, 0.99),
+            "cpu": cpu,
+        }
+
+
+async def followed(hand: RobotiqHand, seconds: float) -> list[float]:
+    """Seconds from each target until a status shows it, or a later one."""
+    pending: dict[int, float] = {}
+    took: list[float] = []
+
+    def see(item: object) -> None:
+        if isinstance(item, RobotiqStatus) and (asked := pending.get(item.requested_position(JAW))):
+            for target, when in list(pending.items()):
+                if when <= asked:
+                    took.append(item.timestamp - when)
+                    del pending[target]
+
+    remove, ends, target = hand.add_listener(see), time.monotonic() + seconds, 0
+    while time.monotonic() < ends:
+        target = (target + 1) % 200
+        pending[target] = time.monotonic()
+        hand.command(position=target)
+        await asyncio.sleep(TARGET_S)
+    remove()
+    return took
+
+
 # -- the tables --------------------------------------------------------------------------------------------
 
 
@@ -139,6 +212,39 @@ class Benchmarks(program.Benchmarks):
                 "CPU a poll, us": f"{1e6 * it['cpu']:.0f}",
             }
 
+    def beside(self) -> Iterator[Row]:
+        """A hand at a 2F-85 beside a bare client, on the same line."""
+        line = program.build("line", self.folder, "util")
+
+        def bare(hz: int) -> dict[str, float]:
+            with independent(line) as port:
+                command = [str(line), "bare", port, str(hz), str(self.seconds / 2)]
+                done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
+                found: dict[str, float] = json.loads(done.stdout)
+            return {"idle": found["statuses"], "cpu": 0.0, **found}
+
+        def hand(**options: int) -> dict[str, float]:
+            with independent(line) as port:
+                return figures_of("serial", "--beside", port, self.seconds, json.dumps(options))
+
+        turns: dict[str, Callable[[], dict[str, float]]] = {
+            "bare, 100 Hz": partial(bare, 100),
+            "bare, free run": partial(bare, 0),
+            "hand": hand,
+            "hand, write_function=16": partial(hand, write_function=16),
+        }
+        for name, figures in self.in_turns("beside", turns).items():
+            it = median_of(figures)
+            yield {
+                "client": name,
+                "statuses a second, idle": f"{it['idle']:.0f}",
+                "streaming 100 Hz": f"{it['statuses']:.0f}",
+                "writes a second": f"{it['writes']:.0f}",
+                "echo p50, ms": f"{1000 * it['p50']:.2f}",
+                "p99, ms": f"{1000 * it['p99']:.1f}",
+                "CPU a status, ms": f"{1000 * it['cpu']:.2f}" if it["cpu"] else "",
+            }
+
     def _one(self, interval: float, what: str) -> dict[str, float]:
         with served() as port:
             return figures_of("serial", "--hand", port, interval, self.seconds, what)
@@ -155,6 +261,8 @@ if __name__ == "__main__":
         case ["--gripper", folder]:
             with asyncio.Runner(loop_factory=precise_loop) as runner:
                 runner.run(gripper(folder))
+        case ["--beside", port, seconds, options]:
+            print(json.dumps(asyncio.run(compared(port, float(seconds), json.loads(options)))))  # noqa: T201
         case ["--hand", port, interval, seconds, what]:
             figures = asyncio.run(measured(port, float(interval), float(seconds), streams=what == "stream"))
             print(json.dumps(figures))  # noqa: T201
