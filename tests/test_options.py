@@ -23,6 +23,9 @@ NUMBERS = {name: option for name, option in OPTIONS.items() if option.high}
 DEFAULTS = {name: option.default for name, option in OPTIONS.items()}
 
 
+LISTS = str.maketrans("()", "[]")
+
+
 def beyond(option: Option) -> float:
     """A number just above the range."""
     return option.high + (1 if isinstance(option.default, int | None) else 0.001)
@@ -68,8 +71,10 @@ def test_the_keys_of_a_gripper_in_the_agent_file(tmp_path: Path) -> None:
             continue
         value = option.low if option.default is None else str(option.default).lower()
         value = f'"{option.choices[1]}"' if option.choices else value
+        value = "((3, 85.0), (228, 0.0))" if option.is_file else value
         path.write_text(
-            f'site = "lab"\n[grippers.left]\naddress = "127.0.0.1"\n{name} = {value}\n', encoding="utf-8"
+            f'site = "lab"\n[grippers.left]\naddress = "127.0.0.1"\n{name} = {str(value).translate(LISTS)}\n',
+            encoding="utf-8",
         )
         if Place.FILE in option.places:
             given = getattr(read_agent_file(path).grippers["left"], name)

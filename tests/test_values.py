@@ -297,7 +297,10 @@ def test_values_of_one_axis_are_listed_below_its_name() -> None:
         "requested_position": status.requested_position(B),
         "current_ma": status.current_ma(B),
         "axis_state": status.axis_state(B),
+        "opening_mm": status.opening_mm(B),
+        "open_fraction": status.open_fraction(B),
     }
+    assert not {"opening_mm", "open_fraction"} & status.as_dict()["SCISSOR"].keys()
     assert result().as_dict()["A"] == {
         "outcome": "CONTACT_CLOSING",
         "position": 150,

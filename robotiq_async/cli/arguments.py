@@ -77,6 +77,8 @@ def _argument(option: Option) -> object:
             Literal[option.choices] | None,
             Parameter(help=f"{option.help} (default: that of the address, or {option.choices[0]})."),
         ]
+    if option.is_file:
+        return Annotated[str | None, Parameter(metavar="FILE.csv", help=f"{option.help}.")]
     if option.default is not None:
         return Annotated[float, Parameter(metavar="SECONDS", help=f"{option.help}, {low:g}..{high:g}.")]
     convert = _integer("the value", int(low), int(high))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
 from typing import Final, Literal
 
 import anyio
@@ -103,6 +104,10 @@ class RobotiqHand(Hand):
         calibration: how fast this gripper is: default timeouts of moves come from it, and the speeds of
             :attr:`units`. None for the thesis's gripper.
         force_calibration: what :attr:`units` labels force values with. None for the manual's figures.
+        stroke: points that were measured on this gripper, from open to closed: two or more pairs of a
+            position in counts and an opening in millimetres, or the path of a file that
+            ``robotiq-async measure stroke`` wrote. Millimetres and fractions of this hand, and of its
+            statuses and results, follow them. None for the nominal openings of the model.
         keep_grip: what :meth:`stop` does by default, and leaving the block does always: False stops the
             fingers for certain (rGTO = 0), True holds axes that move and keeps a grip in force. A gripper
             that is not polled afterwards may lose its activation, and with it the grip.
@@ -137,6 +142,7 @@ class RobotiqHand(Hand):
         status_address: int | None = None,
         calibration: SpeedCalibration | None = None,
         force_calibration: ForceCalibration | None = None,
+        stroke: str | Path | Sequence[tuple[int, float]] | None = None,
         keep_grip: bool = False,
         model: Model | str | None = None,
     ) -> None:
@@ -158,6 +164,7 @@ class RobotiqHand(Hand):
             status_address=status_address,
             calibration=calibration,
             force_calibration=force_calibration,
+            stroke=stroke,  # type: ignore[arg-type]  # a file becomes its points there
             keep_grip=keep_grip,
             model=model,  # type: ignore[arg-type]  # a name becomes its model there
         )

@@ -12,16 +12,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from enum import Flag, auto
 from functools import partial
+from pathlib import Path
 from typing import Annotated, Final, get_type_hints
 
 from ..link.registers import LAST_BLOCK, check_write_function
 from ..link.transport import Link, Transport
 from ..runtime.log import Log
 from ..values.calibration import ForceCalibration, SpeedCalibration, Units
+from ..values.calibration.csv_tables import read_stroke
 from ..values.checks import check_byte, check_flag, check_int, check_seconds, repr_of
 from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..values.model import MODELS, THREE_FINGER, Model, model_of
 from ..values.registers import RTU_REGISTERS, TCP_REGISTERS
+from ..values.stroke import Points, check_points
 from .gripper_link import GripperLink, gripper_link
 
 
@@ -98,6 +101,7 @@ class Option:
         rtu: what None stands for on a serial line.
         default: what counts unless another value is given; None where it depends on the link.
         choices: the names that it can be, for one that is a name.
+        is_file: whether it can be the path of a file.
     """
 
     help: str
@@ -109,6 +113,7 @@ class Option:
     rtu: int | None = None
     default: object = None
     choices: tuple[str, ...] = ()
+    is_file: bool = False
 
 
 def _seconds(help: str, low: float, high: float, places: Place = Place.FILE) -> Option:
@@ -170,6 +175,13 @@ def _check_forces(_: str, forces: object) -> ForceCalibration | None:
     if not isinstance(forces, ForceCalibration | None):
         raise TypeError(f"force_calibration must be None or a ForceCalibration, got {repr_of(forces)}")
     return forces
+
+
+def check_stroke(name: str, stroke: object) -> Points | None:
+    """Points that were measured on a gripper, or those of a file; None for nominal openings."""
+    if stroke is None:
+        return None
+    return read_stroke(stroke) if isinstance(stroke, str | Path) else check_points(name, stroke)
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,6 +290,15 @@ class HandOptions:
     force_calibration: Annotated[
         ForceCalibration | None, Option("Labels of the force values", _check_forces)
     ] = None
+    stroke: Annotated[
+        Points | None,
+        Option(
+            "Measured openings of this gripper: a file of measure stroke",
+            check_stroke,
+            Place.FILE | Place.COMMAND_LINE | Place.ROS,
+            is_file=True,
+        ),
+    ] = None
     keep_grip: Annotated[bool, Option("Whether a stop keeps a grip in force", check_flag, Place.FILE)] = False
     model: Annotated[
         Model,
@@ -305,7 +326,7 @@ class HandOptions:
             self._keep("write_spacing", usual_write_spacing(self.model))
         for name, option in OPTIONS.items():
             self._keep(name, option.check(name, getattr(self, name)))
-        self._keep("units", units_of(self.calibration, self.force_calibration, self.model))
+        self._keep("units", units_of(self.calibration, self.force_calibration, self.model, self.stroke))
         self._keep("log", Log(self.given_name or self.link.address))
 
     def _keep(self, name: str, value: object) -> None:
@@ -345,8 +366,16 @@ def offered(place: Place) -> dict[str, Option]:
     return {name: option for name, option in OPTIONS.items() if place in option.places}
 
 
-def units_of(calibration: object, force_calibration: object, model: Model = THREE_FINGER) -> Units:
-    """What the values of a hand mean; None for the usual speeds of its model, and for the manual's forces."""
+def units_of(
+    calibration: object, force_calibration: object, model: Model = THREE_FINGER, stroke: object = None
+) -> Units:
+    """What the values of a hand mean; None for the usual speeds of its model and the manual's figures."""
     speeds = _check_speeds("calibration", calibration)
     forces = _check_forces("force_calibration", force_calibration)
-    return Units(speeds or SpeedCalibration.usual(model), forces or ForceCalibration.nominal(model))
+    points = check_stroke("stroke", stroke)
+    return Units(
+        # A table of closing times knows no model.
+        replace(speeds, stroke=model.stroke) if speeds else SpeedCalibration.usual(model),
+        forces or ForceCalibration.nominal(model),
+        model.stroke.measured(points) if points else model.stroke,
+    )

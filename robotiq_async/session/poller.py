@@ -100,6 +100,7 @@ class Poller:
         self._channels = channels
         self._options = options
         self._model = options.model
+        self._stroke = options.units.stroke
         self._log = options.log
         self._loop = asyncio.get_running_loop()
         self.connected: asyncio.Future[None] = self._loop.create_future()
@@ -372,7 +373,7 @@ class Poller:
         self._take(self._status(registers, answered), asked)
 
     def _status(self, registers: Registers, answered: float) -> RobotiqStatus:
-        return RobotiqStatus(registers, answered, next(self._channels.numbers), self._model)
+        return RobotiqStatus(registers, answered, next(self._channels.numbers), self._model, self._stroke)
 
     def _take(self, status: RobotiqStatus, asked: float) -> None:
         """Pass on a status that was asked for at ``asked``."""

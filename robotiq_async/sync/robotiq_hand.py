@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Generic, Self, TypeVar
 
 from ..hand.grip_watch import SLIP_COUNTS
@@ -129,6 +130,7 @@ class RobotiqHand:
         status_address: int | None = None,
         calibration: SpeedCalibration | None = None,
         force_calibration: ForceCalibration | None = None,
+        stroke: str | Path | Sequence[tuple[int, float]] | None = None,
         keep_grip: bool = False,
         model: Model | str | None = None,
     ) -> None:
@@ -150,6 +152,7 @@ class RobotiqHand:
             status_address=status_address,
             calibration=calibration,
             force_calibration=force_calibration,
+            stroke=stroke,
             keep_grip=keep_grip,
             model=model,
         )

@@ -45,6 +45,14 @@ class GraspResult:
         return self.holds.bit_count() >= self.at_least
 
     @property
+    def width_mm(self) -> float | None:
+        """The width of the part between a jaw's fingertips; None if none is held, and for a 3-Finger.
+
+        In millimetres: nominal, unless the hand has measured points.
+        """
+        return self.move.opening_mm if self.is_held else None
+
+    @property
     def positions(self) -> Mapping[Finger, int]:
         """The final position of each addressed axis, in counts; ``hand.units.mm()`` converts."""
         return self.move.positions
@@ -55,10 +63,14 @@ class GraspResult:
         return self.move.status
 
     def as_dict(self) -> dict[str, Any]:
-        """The result in types that JSON and pandas accept; the key ``move`` holds that of the closing."""
+        """The result in types that JSON and pandas accept; the key ``move`` holds that of the closing.
+
+        What is None is left out.
+        """
         return {
             "is_held": self.is_held,
             "holds": names_of(self.holds),
+            **({} if self.width_mm is None else {"width_mm": self.width_mm}),
             "at_least": self.at_least,
             "move": self.move.as_dict(),
         }

@@ -11,53 +11,13 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from . import registers as reg
-from .checks import check_axis, check_byte, check_int, check_mask, check_number, repr_of
+from .checks import check_axis, check_int, check_mask, repr_of
 from .enums import Fault, Finger, ObjectStatus, names_of
 from .registers import Field, RegisterMap, Registers
+from .stroke import Stroke
 
 TOLERANCE: Final = 2
 """Counts between a request and the position reached (manual: within 1-2)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Stroke:
-    """From open to closed. Openings are nominal: linear in counts, although a real finger may rotate.
-
-    Attributes:
-        mm: the opening of an open gripper, in millimetres.
-        open_reading: position, in counts, that an open finger reads.
-        closed_reading: position, in counts, that a closed finger reads.
-    """
-
-    mm: float
-    open_reading: int
-    closed_reading: int
-
-    @property
-    def counts(self) -> int:
-        """Counts of a full closing."""
-        return self.closed_reading - self.open_reading
-
-    def opening_mm(self, position: int) -> float:
-        """The opening at a position: all of it up to the open reading, 0 from the closed reading on.
-
-        Raises:
-            TypeError: position is not an int.
-            ValueError: position is outside 0..255.
-        """
-        # Requests beyond the end stops are legal; the finger ends at the stop.
-        reached = min(max(check_byte("position", position), self.open_reading), self.closed_reading)
-        return self.mm * (self.closed_reading - reached) / self.counts
-
-    def position_of(self, millimetres: float) -> int:
-        """The position, in counts, closest to an opening.
-
-        Raises:
-            TypeError: not a number.
-            ValueError: outside 0 (closed) .. ``mm`` (open).
-        """
-        opening = check_number("millimetres", millimetres, 0.0, self.mm)
-        return round(self.closed_reading - opening / self.mm * self.counts)
 
 
 def _masks(
@@ -98,6 +58,7 @@ class Model:
         object_shift: of the byte with the object status, in register 0.
         moving: for each value of that byte, the axes that move.
         contacts: the same for the axes that a contact stopped.
+        holding: the same for the fingers that a contact stopped while closing.
         names: of the axes.
         contact_names: of the axes in ``contacts``.
     """
@@ -119,6 +80,7 @@ class Model:
     all_axes: Finger = field(init=False)
     moving: tuple[Finger, ...] = field(init=False)
     contacts: tuple[Finger, ...] = field(init=False)
+    holding: tuple[Finger, ...] = field(init=False)
     names: tuple[str, ...] = field(init=False)
     contact_names: tuple[tuple[str, ...], ...] = field(init=False)
     _index: dict[Finger, int] = field(init=False)
@@ -130,6 +92,8 @@ class Model:
         keep(self, "all_axes", Finger(sum(self.axes)))
         keep(self, "moving", _masks(self.object_status, self.axes, {ObjectStatus.IN_MOTION}))
         keep(self, "contacts", _masks(self.object_status, self.axes, contact))
+        closing = _masks(self.object_status, self.axes, {ObjectStatus.CONTACT_CLOSING})
+        keep(self, "holding", tuple(axes & Finger.ABC for axes in closing))
         keep(self, "names", tuple(names_of(self.all_axes)))
         keep(self, "contact_names", tuple(tuple(names_of(axes)) for axes in self.contacts))
         keep(self, "_index", {axis: index for index, axis in enumerate(self.axes)})
@@ -234,7 +198,12 @@ _GATEWAY: Final = RegisterMap(request=0x03E8, status=0x07D0, read_function=3, de
 
 
 def _with_jaw(
-    name: str, title: str, mm: float, speeds_mm_s: tuple[float, float], forces_n: tuple[float, float]
+    name: str,
+    title: str,
+    mm: float,
+    speeds_mm_s: tuple[float, float],
+    forces_n: tuple[float, float],
+    arc: tuple[float, float] | None = None,
 ) -> Model:
     return Model(
         name=name,
@@ -247,7 +216,7 @@ def _with_jaw(
         # gateways make of it is unknown.
         rtu=replace(_GATEWAY, write_function=23),
         # A 2F-85 reads 3 and 227 to 230 (PickNik's driver); no other source gives the readings of the others.
-        stroke=Stroke(mm, open_reading=3, closed_reading=228),
+        stroke=Stroke(mm, open_reading=3, closed_reading=228, arc=arc),
         open_reading_max=6,
         closed_reading_min=226,
         speeds_mm_s=speeds_mm_s,
@@ -255,10 +224,15 @@ def _with_jaw(
     )
 
 
+# Arc of a 2F-85: fits the pads of the public model in MuJoCo Menagerie within 0.1 mm; they meet at its end.
+# Arc of a 2F-140: the link from knuckle to inner finger in ros-industrial's description; the joint's limit.
+_ARC_85: Final = (0.869, 0.775)
+_ARC_140: Final = (0.868, 0.70)
+
 # Manual of the 2F-85 and 2F-140, specifications; manual of the Hand-E, the 130 N are those of its example.
-TWO_FINGER_85: Final = _with_jaw("2f85", "2F-85", 85.0, (20.0, 150.0), (20.0, 235.0))
+TWO_FINGER_85: Final = _with_jaw("2f85", "2F-85", 85.0, (20.0, 150.0), (20.0, 235.0), _ARC_85)
 """The 2F-85."""
-TWO_FINGER_140: Final = _with_jaw("2f140", "2F-140", 140.0, (30.0, 250.0), (10.0, 125.0))
+TWO_FINGER_140: Final = _with_jaw("2f140", "2F-140", 140.0, (30.0, 250.0), (10.0, 125.0), _ARC_140)
 """The 2F-140."""
 HAND_E: Final = _with_jaw("hand-e", "Hand-E", 50.0, (20.0, 150.0), (20.0, 130.0))
 """The Hand-E."""

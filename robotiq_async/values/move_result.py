@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from .enums import Finger, ObjectStatus, names_of
+from .enums import JAW, Finger, ObjectStatus, names_of
 from .frozen_mapping import FrozenMapping
 from .status import RobotiqStatus
 
@@ -41,6 +41,16 @@ class MoveResult:
             object.__setattr__(self, name, FrozenMapping(getattr(self, name)))
 
     @property
+    def opening_mm(self) -> float | None:
+        """The final opening of a jaw, in millimetres: nominal, unless the hand has measured points.
+
+        None for a 3-Finger: ``result.status.opening_mm(finger)`` has that of each finger.
+        """
+        if len(self.status.model.axes) > 1:
+            return None
+        return self.status.stroke.opening_mm(self.positions[JAW])
+
+    @property
     def object_detected(self) -> bool:
         """Whether a contact stopped at least one addressed axis."""
         return bool(self.contacts)
@@ -48,10 +58,12 @@ class MoveResult:
     def as_dict(self) -> dict[str, Any]:
         """The result in types that JSON and pandas accept; enumerations and masks as in a status.
 
-        The key of each axis holds its ``outcome``, ``position``, ``reached`` and ``peak_current_ma``.
+        The key of each axis holds its ``outcome``, ``position``, ``reached`` and ``peak_current_ma``. What is
+        None is left out.
         """
         return {
             "duration": self.duration,
+            **({} if self.opening_mm is None else {"opening_mm": self.opening_mm}),
             "object_detected": self.object_detected,
             "contacts": names_of(self.contacts),
             **{

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 from . import registers as reg
 from .checks import check_int, check_seconds
 from .enums import Fault, Finger, Initialization, Mode, ObjectStatus
 from .model import THREE_FINGER, Model
+from .stroke import Stroke
 
 NO_REQUEST: Final = "NO_REQUEST"
 """What :meth:`RobotiqStatus.axis_state` says of an axis whose gDT of 0 does not mean motion."""
@@ -20,27 +22,48 @@ _STATES = tuple(what.name for what in _OBJECT_STATUSES)
 _STATES_WITHOUT_REQUEST = (NO_REQUEST, *_STATES[1:])
 
 
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part that fingers hold, as the gripper reports it. Immutable; can be compared, hashed and pickled.
+
+    Attributes:
+        holds: the fingers that hold it.
+        width_mm: the opening of a jaw around it, in millimetres: nominal, unless the hand has measured
+            points. None for a 3-Finger, whose fingers have no single width between them.
+    """
+
+    holds: Finger
+    width_mm: float | None
+
+
 class RobotiqStatus:
     """What the gripper said at one moment. Immutable and hashable; decoded when asked.
 
-    Two statuses are equal when their registers, timestamp and sequence are.
+    Two statuses are equal when their registers, timestamp, sequence and model are.
 
     Attributes:
         registers: the eight registers as they came.
         timestamp: monotonic seconds at which the reply arrived.
         sequence: counts every poll of a hand, from 0.
         model: of the gripper.
+        stroke: what its positions mean as openings; by default the model's.
     """
 
-    __slots__ = ("_model", "_registers", "_sequence", "_timestamp")
+    __slots__ = ("_model", "_registers", "_sequence", "_stroke", "_timestamp")
     _registers: reg.Registers
     _timestamp: float
     _sequence: int
     _model: Model
+    _stroke: Stroke
 
     # The hand makes one of these 200 times a second: it keeps the registers and nothing else.
     def __init__(
-        self, registers: reg.Registers, timestamp: float = 0.0, sequence: int = 0, model: Model = THREE_FINGER
+        self,
+        registers: reg.Registers,
+        timestamp: float = 0.0,
+        sequence: int = 0,
+        model: Model = THREE_FINGER,
+        stroke: Stroke | None = None,
     ) -> None:
         if hasattr(self, "_sequence"):
             raise AttributeError("RobotiqStatus is immutable: it is made once")
@@ -48,6 +71,7 @@ class RobotiqStatus:
         _set(self, "_timestamp", timestamp)
         _set(self, "_sequence", sequence)
         _set(self, "_model", model)
+        _set(self, "_stroke", model.stroke if stroke is None else stroke)
 
     @classmethod
     def from_registers(
@@ -89,6 +113,11 @@ class RobotiqStatus:
         """The model of the gripper."""
         return self._model
 
+    @property
+    def stroke(self) -> Stroke:
+        """What positions of the gripper mean as openings: of its model, or from points measured on it."""
+        return self._stroke
+
     # One axis. Each takes one Finger member; several, or one that the model lacks, is a ValueError.
 
     def finger_status(self, finger: Finger | int) -> ObjectStatus:
@@ -118,6 +147,33 @@ class RobotiqStatus:
     def position(self, finger: Finger | int) -> int:
         """Position in counts, 0..255 (gPO). Open reads 6-7 on a 3-Finger, closed 240 or more."""
         return reg.gPO[self._model.index(finger)].read(self._registers)
+
+    def opening_mm(self, finger: Finger | int) -> float:
+        """The opening at a finger, in millimetres: nominal, unless the hand was made with measured points.
+
+        Of a jaw this is the width between its fingertips. See :class:`Units` for what it means on a 3-Finger.
+
+        Raises:
+            TypeError: not a Finger or an int.
+            ValueError: not exactly one finger. The scissor has no opening.
+        """
+        return self._stroke.openings[self._finger_position(finger)]
+
+    def open_fraction(self, finger: Finger | int) -> float:
+        """How far a finger is open, as the share of its travel in counts: 1 (open) .. 0 (closed).
+
+        Raises:
+            TypeError, ValueError: as :meth:`opening_mm`.
+        """
+        return self._stroke.fractions[self._finger_position(finger)]
+
+    def _finger_position(self, finger: Finger | int) -> int:
+        position = self.position(finger)
+        if finger == Finger.SCISSOR:
+            raise ValueError(
+                f"finger must be A, B or C, for the scissor has no opening, got {Finger.SCISSOR}"
+            )
+        return position
 
     def requested_position(self, finger: Finger | int) -> int:
         """Echo of the position request, 0..255 (gPR)."""
@@ -227,6 +283,20 @@ class RobotiqStatus:
         model = self._model
         return model.contacts[self._registers[0] >> model.object_shift & 0xFF]
 
+    @property
+    def part(self) -> Part | None:
+        """The part that is held, and how wide it is; None if the gripper reports none.
+
+        A finger holds a part if it reports a contact while closing, under a request in force, and without a
+        serious fault. It may never report one for a thin part. A contact latches: it stays when the part has
+        been taken out, until the finger is asked to move.
+        """
+        holding = self._model.holding[self._registers[0] >> self._model.object_shift & 0xFF]
+        if not holding or not self._is_under_request or self.fault.is_serious:
+            return None
+        jaw = len(self._model.axes) == 1
+        return Part(holding, self.opening_mm(holding) if jaw else None)
+
     def as_dict(self) -> dict[str, Any]:
         """The status in types for JSON and pandas, by attribute name.
 
@@ -236,6 +306,19 @@ class RobotiqStatus:
         """
         # A recorder calls this at every poll: read registers and not the many properties.
         words, fault, states, model = self._registers, self.fault, self._states, self._model
+        axes: dict[str, dict[str, Any]] = {
+            name: {
+                "position": reg.gPO[n].read(words),
+                "requested_position": reg.gPR[n].read(words),
+                "current_ma": reg.gCU[n].read(words) * reg.MILLIAMPERE_PER_COUNT,
+                "axis_state": states[model.object_status[n].read(words)],
+            }
+            for n, name in enumerate(model.names)
+        }
+        for name in model.names[:3]:  # without the scissor
+            position = axes[name]["position"]
+            axes[name]["opening_mm"] = self._stroke.openings[position]
+            axes[name]["open_fraction"] = self._stroke.fractions[position]
         return {
             "registers": list(words),
             "timestamp": self._timestamp,
@@ -250,15 +333,7 @@ class RobotiqStatus:
             "activation_echo": self.activation_echo,
             "go_echo": self.go_echo,
             "contacts": list(model.contact_names[words[0] >> model.object_shift & 0xFF]),
-            **{
-                name: {
-                    "position": reg.gPO[n].read(words),
-                    "requested_position": reg.gPR[n].read(words),
-                    "current_ma": reg.gCU[n].read(words) * reg.MILLIAMPERE_PER_COUNT,
-                    "axis_state": states[model.object_status[n].read(words)],
-                }
-                for n, name in enumerate(model.names)
-            },
+            **axes,
         }
 
     def __eq__(self, other: object) -> bool:
@@ -269,8 +344,9 @@ class RobotiqStatus:
     def __hash__(self) -> int:
         return hash(self._key())
 
-    def __reduce__(self) -> tuple[type[RobotiqStatus], tuple[reg.Registers, float, int, Model]]:
-        return RobotiqStatus, self._key()
+    def __reduce__(self) -> tuple[object, ...]:
+        own = None if self._stroke == self._model.stroke else self._stroke
+        return RobotiqStatus, (*self._key(), own)
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"RobotiqStatus is immutable: cannot set {name!r}")

@@ -24,7 +24,7 @@ def test_the_defaults_will_do() -> None:
     assert {name: value for name, value in given.items() if value is not None} == {
         name: value
         for name, value in USUAL.items()
-        if value != -1 and name != "model"  # "" is the address's
+        if value != -1 and name not in ("model", "stroke")  # "" is the address's, or nominal
     }
     rate = check_settings(USUAL | {"publish_rate": 100}).publish_rate
     assert (rate, type(rate)) == (100.0, float), "an integer will do"
@@ -47,6 +47,7 @@ def test_the_defaults_will_do() -> None:
         ("read_function", 5, "read_function must be in -1..4, got 5"),
         ("force", 64.0, "force must be an int in 0..255, got 64.0"),
         ("allow_stalling", 1, "allow_stalling must be true or false, got 1"),
+        ("stroke", "none.csv", "none.csv: cannot be read: No such file or directory"),
         ("model", "2f99", "model must be one of 3f, 2f85, 2f140, hand-e, got '2f99'"),
         ("joint_prefix", "left <&", "joint_prefix may have letters, digits, _ . / and -, got 'left <&'"),
     ],

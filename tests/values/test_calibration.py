@@ -23,7 +23,7 @@ def test_opening() -> None:
     stroke = THREE_FINGER.stroke
     assert stroke.opening_mm(124) == pytest.approx(77.2, abs=0.1)
     for outside in (-0.1, 155.1, float("nan")):
-        with pytest.raises(ValueError, match=r"millimetres must be a number in 0\.0\.\.155\.0"):
+        with pytest.raises(ValueError, match=r"mm must be millimetres in 0\.0\.\.155\.0"):
             stroke.position_of(outside)
 
 

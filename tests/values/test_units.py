@@ -33,7 +33,7 @@ def test_speeds_and_force_labels_go_both_ways(value: int) -> None:
 
 @given(st.floats(0, 155), st.floats(15.46, 73.16), st.floats(15, 60))
 def test_the_value_is_the_closest_one(mm: float, mm_per_s: float, label_n: float) -> None:
-    assert THESIS.mm(THESIS.position(mm=mm)) == pytest.approx(mm, abs=155 / 235 / 2 + 1e-9)
+    assert THESIS.mm(THESIS.position(mm=mm)) == pytest.approx(mm, abs=155 / 235 / 2 + 0.01)
     speed, force = THESIS.speed(mm_per_s=mm_per_s), THESIS.force(label_n=label_n)
     assert all(
         abs(THESIS.mm_per_s(speed) - mm_per_s) <= abs(THESIS.mm_per_s(other) - mm_per_s)

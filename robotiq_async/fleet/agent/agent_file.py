@@ -144,6 +144,8 @@ class _Reader:
             if not isinstance(table, dict):
                 raise TypeError(f"{name} must be a table with an address: [grippers.{name}], got {table!r}")
         self._check_keys_of(table, path, _OF_GRIPPER, needed=("address",))
+        if isinstance(table.get("stroke"), str):
+            table = {**table, "stroke": self._path.parent / table["stroke"]}
         address = table["address"]
         with self._blaming(*path, "address"):
             if not isinstance(address, str):

@@ -167,7 +167,7 @@ def _jaw_targets(names: Sequence[str], values: Sequence[float], prefix: str, mod
         unit = "m" if model is HAND_E else "rad"
         raise GoalError(f"{joint.name!r} must be in {low}..{high} {unit}, got {value:.4f}")
     opening = (reached - joint.closed) / (joint.open - joint.closed)
-    return Targets(((model.stroke.position_of(opening * model.stroke.mm), JAW),))
+    return Targets(((round(model.stroke.closed_reading - opening * model.stroke.counts), JAW),))
 
 
 def _pairs(

@@ -10,6 +10,7 @@ from typing import Any, Final
 from ...fleet.network.route import parse_remote_address
 from ...link.address import is_remote, parse_address
 from ...session.options import Option, Place, offered
+from ...values.calibration.csv_tables import read_stroke
 from ...values.checks import check_int, check_number
 from ...values.model import model_of
 
@@ -33,6 +34,8 @@ def _of_hand(name: str, option: Option) -> Parameter:
     text, low, default = option.help, option.low, option.default
     if option.choices:
         return Parameter("", f"{text}; empty for that of the address.")
+    if option.is_file:
+        return Parameter("", f"{text}; empty for nominal ones.")
     if default is None:  # it depends on the link
         text += f"; {USUAL} stands for {option.tcp} over TCP, {option.rtu} on a serial line"
         low = default = USUAL
@@ -148,5 +151,16 @@ def _check_model(text: str) -> str:
     return model_of(text).name if text else ""
 
 
-_CHECKS: Final = {"address": _check_address, "model": _check_model, "joint_prefix": _check_prefix}
+def _check_file(path: str) -> str:
+    if path:
+        read_stroke(path)
+    return path
+
+
+_CHECKS: Final = {
+    "address": _check_address,
+    "model": _check_model,
+    "stroke": _check_file,
+    "joint_prefix": _check_prefix,
+}
 """Checks of strings, by parameter."""

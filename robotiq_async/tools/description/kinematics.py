@@ -25,8 +25,9 @@ from typing import Final, NamedTuple
 
 from ...values.checks import check_byte
 from ...values.enums import JAW, Finger
-from ...values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model, Stroke
+from ...values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
 from ...values.status import RobotiqStatus
+from ...values.stroke import Stroke
 
 Points = tuple[tuple[int, float], ...]
 """Position in counts, rising, and angle in degrees; straight in between, level beyond the ends."""
@@ -78,7 +79,7 @@ class JawJoint(NamedTuple):
 
     def at(self, stroke: Stroke, position: int) -> float:
         """Radians or metres at a position in counts; linear in between, as PickNik's driver has it."""
-        return self.closed + (self.open - self.closed) * stroke.opening_mm(position) / stroke.mm
+        return self.closed + (self.open - self.closed) * stroke.open_fraction(position)
 
 
 JAW_JOINTS: Final = MappingProxyType(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, Final
 
 from ...hand import Hand
@@ -32,8 +33,13 @@ def object_schema(**properties: object) -> dict[str, object]:
     return {"type": "object", "properties": properties}
 
 
-def _for_each_axis(**properties: object) -> dict[str, object]:
-    return {str(axis.name): object_schema(**properties) for axis in Finger.ALL}
+def _for_each_axis(
+    of_fingers: Mapping[str, object] = MappingProxyType({}), **properties: object
+) -> dict[str, object]:
+    return {
+        str(axis.name): object_schema(**properties, **(of_fingers if axis is not Finger.SCISSOR else {}))
+        for axis in Finger.ALL
+    }
 
 
 _FAULT: Final = {"fault": STRING, "fault_code": INTEGER, "severity": STRING, "description": STRING}
@@ -52,7 +58,13 @@ SCHEMAS: Final = {
         activation_echo=_BOOLEAN,
         go_echo=_BOOLEAN,
         contacts={"type": "array", "items": STRING},
-        **_for_each_axis(position=INTEGER, requested_position=INTEGER, current_ma=INTEGER, axis_state=STRING),
+        **_for_each_axis(
+            position=INTEGER,
+            requested_position=INTEGER,
+            current_ma=INTEGER,
+            axis_state=STRING,
+            of_fingers={"opening_mm": NUMBER, "open_fraction": NUMBER},
+        ),
     ),
     "command": object_schema(
         timestamp=NUMBER,

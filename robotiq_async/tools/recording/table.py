@@ -28,6 +28,8 @@ _FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
 """A spreadsheet takes a text that begins with one of these for a formula."""
 _MAY_LACK: Final = ("B", "C", "SCISSOR")
 """The axes that a sibling of the 3-Finger does not have."""
+_NEW: Final = ("opening_mm", "open_fraction")
+"""What recordings of earlier versions do not have."""
 STATE: Final = "state"
 """The column with the state of the hand as of the last event; the JSON of a status does not have it."""
 LABEL: Final = "label"
@@ -88,6 +90,8 @@ def _value(fields: Fields, name: str, kind: str) -> Any:  # noqa: ANN401  # as J
         return fields.get(name)
     if axis not in fields and axis in _MAY_LACK:
         return None
+    if key in _NEW:
+        return fields[axis].get(key)
     return fields[axis][key] if axis else fields[name]
 
 

@@ -22,6 +22,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TextIO
 
+from ..stroke import Points, check_points
+
 Table = dict[int, tuple[int, ...]]  # for each value, its runs
 
 
@@ -100,6 +102,42 @@ def write_table(path: Path | str, layout: Layout, table: Mapping[int, Sequence[i
     """
     runs = len(next(iter(table.values()), ()))
     write_rows(path, [layout.header(runs), *([value, *table[value]] for value in sorted(table))])
+
+
+STROKE: Final = ["position_counts", "opening_mm"]
+"""The columns of a stroke: measured points of one gripper, from open to closed."""
+
+
+def read_stroke(path: Path | str) -> Points:
+    """Read the measured points of a gripper, as ``robotiq-async measure stroke`` writes them.
+
+    Raises:
+        TableError: the file cannot be read, or its points do not make a stroke.
+    """
+    rows = iter(read_rows(path))
+    line, header = next(rows, (None, []))
+    if header != STROKE:
+        raise TableError(
+            path, line, f"expected the columns {','.join(STROKE)}, got {','.join(header) or 'none'}"
+        )
+    points: list[tuple[int, float]] = []
+    for line, cells in rows:
+        if len(cells) != 2 or not re.fullmatch(r"[0-9]{1,4}(\.[0-9]{1,6})?", cells[1]):
+            raise TableError(path, line, f"expected counts and millimetres, got {','.join(cells)!r:.100}")
+        points.append((integer(path, line, STROKE[0], cells[0], 255), float(cells[1])))
+    try:
+        return check_points("stroke", points)
+    except ValueError as error:
+        raise TableError(path, None, str(error)) from error
+
+
+def write_stroke(path: Path | str, points: Points) -> None:
+    """Write measured points, replacing the file in one step.
+
+    Raises:
+        OSError: the file cannot be written; it stays as it was.
+    """
+    write_rows(path, [STROKE, *([position, f"{mm:g}"] for position, mm in points)])
 
 
 def thesis_table(name: str, layout: Layout) -> Table:

@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Final
 
 from ..checks import check_byte, check_number
-from ..model import THREE_FINGER, Model, Stroke
+from ..model import THREE_FINGER, Model
+from ..stroke import Stroke
 from .csv_tables import FORCE, SPEED, Layout, Table, TableError, read_table, thesis_table
 
 GRAVITY: Final = 9.81  # m/s2, the thesis's value

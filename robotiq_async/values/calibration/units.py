@@ -9,16 +9,21 @@ from math import ceil, floor
 from typing import overload
 
 from ..checks import check_number
+from ..model import THREE_FINGER
+from ..stroke import Stroke
 from .scales import ForceCalibration, SpeedCalibration, covered, nearest
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Units:
-    """Converts both ways: ``await hand.move(hand.units.position(mm=80))``.
+    """Converts both ways, as the calls of a hand do: ``hand.units.position(mm=80)``, ``hand.units.mm(120)``.
 
-    **Openings are nominal**: the manual's stroke, treated as linear in counts although a real finger rotates.
-    They apply to the fingers, not to the scissor. Where the fingertips meet early, as at about 113 counts in
-    pinch mode, the real opening is 0 while these conversions give 84 mm.
+    **Openings are nominal**, unless the hand was made with measured points: the manual's stroke, on the arc
+    of its linkage for a 2F, and linear in counts for a Hand-E and for a finger of a 3-Finger, although that
+    rotates. They apply to the fingers, not to the scissor. Where the fingertips of a 3-Finger meet early, as
+    at about 113 counts in pinch mode, the real opening is 0 while these conversions give 84 mm.
+
+    **Fractions** are the share of the travel that is open, 1 (open) .. 0 (closed), linear in counts.
 
     **Forces are labels**: a straight line between the manual's two figures, which the manual calls not
     linear, or the readings of one scale. They order the force values; they do not tell the force on a part.
@@ -26,10 +31,12 @@ class Units:
     Attributes:
         speeds: what speed values mean; by default the thesis's closing times.
         forces: labels of the force values; by default the manual's figures.
+        stroke: what positions mean as openings; by default a 3-Finger's.
     """
 
     speeds: SpeedCalibration = field(default_factory=SpeedCalibration.thesis)
     forces: ForceCalibration = field(default_factory=ForceCalibration.nominal)
+    stroke: Stroke = THREE_FINGER.stroke
 
     def __post_init__(self) -> None:
         """Check the tables.
@@ -37,24 +44,42 @@ class Units:
         Raises:
             TypeError: a table has the wrong type.
         """
-        for name, kind in (("speeds", SpeedCalibration), ("forces", ForceCalibration)):
+        for name, kind in (
+            ("speeds", SpeedCalibration),
+            ("forces", ForceCalibration),
+            ("stroke", Stroke),
+        ):
             if not isinstance(getattr(self, name), kind):
                 raise TypeError(f"{name} must be a {kind.__name__}, got {getattr(self, name)!r}")
 
     # -- to counts -------------------------------------------------------------------------------------
 
-    def position(self, *, mm: float) -> int:
+    @overload
+    def position(self, *, mm: float) -> int: ...
+
+    @overload
+    def position(self, *, open_fraction: float) -> int: ...
+
+    def position(self, *, mm: float | None = None, open_fraction: float | None = None) -> int:
         """The position, in counts, that comes closest to an opening.
 
+        A count is about 0.4 mm on a 2F-85, 0.6 mm on a 2F-140 and 0.2 mm on a Hand-E.
+
         Args:
-            mm: nominal millimetres between the fingertips, 0 (closed) .. 155 (open).
+            mm: millimetres between the fingertips, 0 (closed) .. the stroke (open); of a gripper with
+                measured points from their least to their most.
+            open_fraction: instead of it, the share of the travel that is open: 1 (open) .. 0 (closed). The
+                ends are 0 and 255 counts, those of ``open()`` and ``close()``.
 
         Raises:
-            TypeError: not a number.
-            ValueError: outside 0..155 mm.
+            TypeError: not a number, or not exactly one of the two arguments.
+            ValueError: outside the range, which the message gives in the same unit.
         """
-        stroke = self.speeds.stroke
-        return stroke.position_of(check_number("mm", mm, 0.0, stroke.mm, "millimetres"))
+        if (mm is None) == (open_fraction is None):
+            raise TypeError("position() takes one of mm and open_fraction")
+        if mm is None:
+            return self.stroke.position_at(open_fraction)  # type: ignore[arg-type]  # one of the two is given
+        return self.stroke.position_of(mm)
 
     @overload
     def speed(self, *, mm_per_s: float) -> int: ...
@@ -94,7 +119,7 @@ class Units:
     # -- from counts -----------------------------------------------------------------------------------
 
     def mm(self, position: int) -> float:
-        """The nominal opening at a position, in millimetres: 155 at 6 and below, 0 from 241 on.
+        """The opening at a position, in millimetres; of a 3-Finger 155 at 6 and below, 0 from 241 on.
 
         Args:
             position: counts, 0..255.
@@ -103,7 +128,19 @@ class Units:
             TypeError: not an int.
             ValueError: outside 0..255.
         """
-        return self.speeds.stroke.opening_mm(position)
+        return self.stroke.opening_mm(position)
+
+    def open_fraction(self, position: int) -> float:
+        """The share of the travel that is open at a position: 1 (open) .. 0 (closed), linear in counts.
+
+        Args:
+            position: counts, 0..255.
+
+        Raises:
+            TypeError: not an int.
+            ValueError: outside 0..255.
+        """
+        return self.stroke.open_fraction(position)
 
     def mm_per_s(self, speed: int) -> float:
         """Millimetres of opening a second, at a speed value.
@@ -134,7 +171,7 @@ class Units:
 
     def __repr__(self) -> str:
         return (
-            f"<Units 0..{self.speeds.stroke.mm:g} mm (nominal), "
+            f"<Units {self.stroke.closed_mm:g}..{self.stroke.mm:g} mm ({self.stroke.source}), "
             f"{_words(_mm_per_s(self.speeds))} mm/s ({self.speeds.source}), "
             f"labels {_words(_labels(self.forces))} N ({self.forces.source})>"
         )
