@@ -117,7 +117,6 @@ def test_every_error_that_a_docstring_names_is_exported() -> None:
 
 def test_the_parameters_of_the_calls_are_those_of_the_contract() -> None:
     hand = robotiq_async.RobotiqHand
-    empty = inspect.Parameter.empty
 
     def parameters(name: str) -> list[tuple[str, object, bool]]:
         """Name, default and whether it is keyword-only."""
@@ -131,13 +130,16 @@ def test_the_parameters_of_the_calls_are_those_of_the_contract() -> None:
     assert {"device_id": None, "poll_interval": 0.005, "speed": 128, "force": 64}.items() <= options.items()
     assert {"response_timeout", "activation_timeout", "reconnect"} <= options.keys()
     assert parameters("start") == [("activate", True, False), ("wait", 0.0, True)]
-    assert parameters("set_position") == [("value", empty, False), ("fingers", abc, False)]
-    assert parameters("set_speed") == [("value", empty, False), ("fingers", every, False)]
-    assert parameters("set_force") == [("value", empty, False), ("fingers", every, False)]
+    value, position = ("value", None, False), ("position", None, False)
+    openings = [(name, None, True) for name in ("mm", "open_fraction")]
+    assert parameters("set_position") == [value, ("fingers", abc, False), *openings]
+    assert parameters("set_speed") == [value, ("fingers", every, False), ("mm_per_s", None, True)]
+    assert parameters("set_force") == [value, ("fingers", every, False), ("label_n", None, True)]
     changes = [(name, None, True) for name in ("position", "speed", "force")]
-    assert parameters("command") == [("fingers", abc, False), *changes]
-    motion = [(name, None, True) for name in ("speed", "force", "timeout")]
-    assert parameters("move") == [("position", empty, False), ("fingers", abc, False), *motion]
+    units = [*openings, ("mm_per_s", None, True), ("label_n", None, True)]
+    assert parameters("command") == [("fingers", abc, False), *changes, *units]
+    motion = [(name, None, True) for name in ("speed", "mm_per_s", "force", "label_n", "timeout")]
+    assert parameters("move") == [position, ("fingers", abc, False), *openings, *motion]
     assert parameters("open") == parameters("close") == [("fingers", abc, False), *motion]
     assert parameters("statuses") == [("buffer", 1, False), ("lost_after", None, True)]
     assert parameters("transitions") == parameters("halt") == parameters("atr") == parameters("reset") == []

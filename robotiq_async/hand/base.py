@@ -2,33 +2,31 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection
+from abc import abstractmethod
 from types import TracebackType
-from typing import TYPE_CHECKING, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Self
 
 from ..runtime.concurrency import running_loop
-from ..runtime.log import Log
 from ..session.options import LONGEST_WAIT_S
-from ..session.streams import Channel, Channels, Stream, check_buffer, check_limit
+from ..session.streams import Stream, check_buffer, check_limit
 from ..session.waiting import check_states
 from ..values.calibration import Units
-from ..values.checks import check_byte, check_flag, check_optional_byte, check_seconds, check_timeout
+from ..values.checks import check_flag, check_optional_byte, check_seconds, check_timeout
 from ..values.enums import CLOSED, OPEN, Finger, State
 from ..values.errors import ConnectionLostError, NotStartedError
 from ..values.events import SentRequest, Transition
 from ..values.grip import GraspResult, GripEvent, check_at_least
-from ..values.model import THREE_FINGER, Model
+from ..values.model import Model
 from ..values.move_result import MoveResult
 from ..values.statistics import Statistics
-from ..values.status import RobotiqStatus
+from ..values.status import Part, RobotiqStatus
+from .amounts import force_of, needed, position_of, speed_of
 from .grip_watch import SLIP_COUNTS, GripWatch
-from .run import NamesErrors, Run, refuse_copy, refuse_with
+from .kind import Kind
+from .run import refuse_with
 
-T = TypeVar("T")
 
-
-class Hand(ABC):
+class Hand(Kind):
     """A gripper, as a program sees it.
 
     Use a hand with ``async with``, or call :meth:`start` and :meth:`stop`. A hand belongs to the event loop
@@ -41,10 +39,16 @@ class Hand(ABC):
     * ``fingers``: the axes, a :class:`Finger` mask or the same integer; the others stay as they are.
       ``Finger.ABC`` are the fingers of the model, ``Finger.ALL`` its axes; others that it lacks are refused.
     * ``position``: the target in counts, 0 (open) .. 255 (closed). Any object with ``__index__`` is an
-      integer, except a bool.
-    * ``speed``: 0 (the slowest) .. 255; None leaves the speed of these axes. :attr:`units` has mm/s.
-    * ``force``: 0 (the least, not none) .. 255, not linear; None leaves the force of these axes.
+      integer, except a bool. In its place ``mm``, the opening in millimetres, or ``open_fraction``, the share
+      of the travel that is open, 1 (open) .. 0 (closed). Neither is for the scissor.
+    * ``speed``: 0 (the slowest) .. 255; None leaves the speed of these axes. In its place ``mm_per_s``,
+      millimetres of opening a second.
+    * ``force``: 0 (the least, not none) .. 255, not linear; None leaves the force of these axes. In its place
+      ``label_n``, newtons of a label: no measured force.
     * ``timeout``: seconds above 0; None for twice the expected time plus 2 s.
+
+    What is not in counts becomes the closest count by :attr:`units`, which says how far to trust it, and is
+    refused outside their range. One amount is given once: counts and millimetres together are a TypeError.
 
     Timestamps are monotonic seconds of this process, wherever the gripper is. No motion is ever sent twice.
 
@@ -58,32 +62,6 @@ class Hand(ABC):
         keep_grip: whether :meth:`stop` keeps a grip by default.
         model: of the gripper.
     """
-
-    _session: Run | None = None
-    """The present run, or the last one; None before the first start."""
-
-    def __init__(
-        self,
-        address: str,
-        *,
-        units: Callable[[Model], Units],
-        name: str = "",
-        keep_grip: bool = False,
-        model: Model = THREE_FINGER,
-    ) -> None:
-        self._address = address
-        self._given_name = name
-        self._units = units
-        self._keep_grip = keep_grip
-        self._model = model
-        self._channels = Channels(Log(name or address))
-        self._naming = NamesErrors(name)
-
-    def __repr__(self) -> str:
-        name = f"{self._given_name} " if self._given_name else ""
-        return f"<{type(self).__name__} {name}{self._address} {self.state.name}>"
-
-    __reduce__ = refuse_copy
 
     # -- lifetime --------------------------------------------------------------------------------------
 
@@ -165,7 +143,14 @@ class Hand(ABC):
 
     # -- commands --------------------------------------------------------------------------------------
 
-    async def set_position(self, value: int, fingers: Finger | int = Finger.ABC) -> None:
+    async def set_position(
+        self,
+        value: int | None = None,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        mm: float | None = None,
+        open_fraction: float | None = None,
+    ) -> None:
         """Send axes somewhere; returns when the gripper has acknowledged it, not when they are there.
 
         When cancelled, the request may still be sent: :meth:`halt` stops it.
@@ -175,20 +160,35 @@ class Hand(ABC):
                 The request is not sent again, and may have been carried out.
         """
         axes = self.model.mask(fingers)
+        target = position_of(self.units, axes, value, mm, open_fraction, "value")
         with self._naming:
-            await self._set("position", check_byte("value", value), axes)
+            await self._set("position", needed("set_position", target, "value", "mm", "open_fraction"), axes)
 
-    async def set_speed(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
+    async def set_speed(
+        self,
+        value: int | None = None,
+        fingers: Finger | int = Finger.ALL,
+        *,
+        mm_per_s: float | None = None,
+    ) -> None:
         """Set the speed of axes, as :meth:`set_position`, also of a motion under way; never starts one."""
         axes = self.model.mask(fingers)
+        speed = speed_of(self.units, value, mm_per_s, "value")
         with self._naming:
-            await self._set("speed", check_byte("value", value), axes)
+            await self._set("speed", needed("set_speed", speed, "value", "mm_per_s"), axes)
 
-    async def set_force(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
+    async def set_force(
+        self,
+        value: int | None = None,
+        fingers: Finger | int = Finger.ALL,
+        *,
+        label_n: float | None = None,
+    ) -> None:
         """Set the force of axes, as :meth:`set_position`; never starts a motion. More tightens a grip."""
         axes = self.model.mask(fingers)
+        force = force_of(self.units, value, label_n, "value")
         with self._naming:
-            await self._set("force", check_byte("value", value), axes)
+            await self._set("force", needed("set_force", force, "value", "label_n"), axes)
 
     def command(
         self,
@@ -197,6 +197,10 @@ class Hand(ABC):
         position: int | None = None,
         speed: int | None = None,
         force: int | None = None,
+        mm: float | None = None,
+        open_fraction: float | None = None,
+        mm_per_s: float | None = None,
+        label_n: float | None = None,
     ) -> None:
         """Ask something of axes and return at once, for control loops. The last value wins; nothing queues.
 
@@ -204,24 +208,36 @@ class Hand(ABC):
         :attr:`is_moving` is true until the axes rest; statuses show the old request until it is echoed.
 
         Raises:
-            ValueError: also if position, speed and force are all None.
+            ValueError: also if position, speed and force are all None, in any unit.
             RobotiqError: the hand takes no commands now.
         """
         axes = self.model.mask(fingers)
-        if position is None and speed is None and force is None:
-            raise ValueError("command() needs at least one of position, speed and force in 0..255, got none")
-        position = check_optional_byte("position", position)
-        speed, force = check_optional_byte("speed", speed), check_optional_byte("force", force)
+        if mm is open_fraction is mm_per_s is label_n is None:  # counts alone: loops call this in every cycle
+            if position is None and speed is None and force is None:
+                raise ValueError(
+                    "command() needs at least one of position, speed and force in 0..255, or in mm, "
+                    "open_fraction, mm_per_s or label_n, got none"
+                )
+            position = check_optional_byte("position", position)
+            speed, force = check_optional_byte("speed", speed), check_optional_byte("force", force)
+        else:
+            units = self.units
+            position = position_of(units, axes, position, mm, open_fraction)
+            speed, force = speed_of(units, speed, mm_per_s), force_of(units, force, label_n)
         with self._naming:
             self._command(axes, position, speed, force)
 
     async def move(
         self,
-        position: int,
+        position: int | None = None,
         fingers: Finger | int = Finger.ABC,
         *,
+        mm: float | None = None,
+        open_fraction: float | None = None,
         speed: int | None = None,
+        mm_per_s: float | None = None,
         force: int | None = None,
+        label_n: float | None = None,
         timeout: float | None = None,
     ) -> MoveResult:
         """Move axes; when all have stopped, return how each ended: at the target, or against something.
@@ -240,8 +256,10 @@ class Hand(ABC):
             RobotiqStateError: the hand takes no commands now, or was stopped.
         """
         axes = self.model.mask(fingers)
-        target = check_byte("position", position)
-        speed, force = check_optional_byte("speed", speed), check_optional_byte("force", force)
+        units = self.units
+        target = position_of(units, axes, position, mm, open_fraction)
+        target = needed("move", target, "position", "mm", "open_fraction")
+        speed, force = speed_of(units, speed, mm_per_s), force_of(units, force, label_n)
         limit = check_timeout("timeout", timeout)
         with self._naming:
             return await self._move(axes, target, speed, force, limit)
@@ -251,22 +269,30 @@ class Hand(ABC):
         fingers: Finger | int = Finger.ABC,
         *,
         speed: int | None = None,
+        mm_per_s: float | None = None,
         force: int | None = None,
+        label_n: float | None = None,
         timeout: float | None = None,
     ) -> MoveResult:
         """Open fingers: :meth:`move` to 0. Returns and raises what it does."""
-        return await self.move(OPEN, fingers, speed=speed, force=force, timeout=timeout)
+        axes, units = self.model.mask(fingers), self.units
+        speed, force = speed_of(units, speed, mm_per_s), force_of(units, force, label_n)
+        return await self.move(OPEN, axes, speed=speed, force=force, timeout=timeout)
 
     async def close(
         self,
         fingers: Finger | int = Finger.ABC,
         *,
         speed: int | None = None,
+        mm_per_s: float | None = None,
         force: int | None = None,
+        label_n: float | None = None,
         timeout: float | None = None,
     ) -> MoveResult:
         """Close the fingers, not the connection (that is :meth:`stop`): :meth:`move` to 255."""
-        return await self.move(CLOSED, fingers, speed=speed, force=force, timeout=timeout)
+        axes, units = self.model.mask(fingers), self.units
+        speed, force = speed_of(units, speed, mm_per_s), force_of(units, force, label_n)
+        return await self.move(CLOSED, axes, speed=speed, force=force, timeout=timeout)
 
     async def grasp(
         self,
@@ -274,7 +300,9 @@ class Hand(ABC):
         *,
         at_least: int | None = None,
         speed: int | None = None,
+        mm_per_s: float | None = None,
         force: int | None = None,
+        label_n: float | None = None,
         timeout: float | None = None,
     ) -> GraspResult:
         """Close fingers until each has met something or is closed, and say which of them hold it.
@@ -288,8 +316,10 @@ class Hand(ABC):
         the part has been taken out meanwhile. Open first, or ask for more force.
         """
         axes = self.model.mask(fingers)
-        needed = check_at_least(at_least, axes)
-        return GraspResult(await self.close(axes, speed=speed, force=force, timeout=timeout), needed)
+        contacts = check_at_least(at_least, axes)
+        units = self.units
+        speed, force = speed_of(units, speed, mm_per_s), force_of(units, force, label_n)
+        return GraspResult(await self.close(axes, speed=speed, force=force, timeout=timeout), contacts)
 
     async def hold(self, fingers: Finger | int = Finger.ALL) -> None:
         """Hold axes that move where they are; returns when the gripper has acknowledged it.
@@ -413,17 +443,20 @@ class Hand(ABC):
         return self._units(self.model)
 
     @property
-    @abstractmethod
-    def state(self) -> State:
-        """The state of the hand."""
-
-    @property
     def status(self) -> RobotiqStatus:
         """The newest status, however old its timestamp says it is; NotStartedError before the first."""
         if (status := self._newest_status) is not None:
             return status
         with self._naming:
             raise NotStartedError("no status has been read yet: start the hand first")
+
+    @property
+    def part(self) -> Part | None:
+        """The part that is held, and how wide it is; None if the gripper reports none: ``status.part``.
+
+        Raises as :attr:`is_moving`, so that an old answer is never taken for a new one.
+        """
+        return self._current_status().part
 
     @property
     def is_activated(self) -> bool:
@@ -513,71 +546,6 @@ class Hand(ABC):
             self._check_running()
             return await self._wait_for_state(states, limit)
 
-    # -- for subclasses: what each kind of hand supplies, with checked arguments -------------------------
-
-    @property
-    @abstractmethod
-    def _newest_status(self) -> RobotiqStatus | None:
-        """The newest status; None before the first."""
-
-    @abstractmethod
-    def _is_moving(self) -> bool:
-        """Whether an axis moves or will move; only asked while that is known."""
-
-    @abstractmethod
-    async def _start(self, activate: bool, wait: float) -> None: ...
-
-    @abstractmethod
-    async def _stop(self, halt: bool, keep_grip: bool) -> None: ...
-
-    @abstractmethod
-    async def _set(self, what: Literal["position", "speed", "force"], value: int, axes: Finger) -> None: ...
-
-    @abstractmethod
-    def _command(self, axes: Finger, position: int | None, speed: int | None, force: int | None) -> None: ...
-
-    @abstractmethod
-    async def _move(
-        self, axes: Finger, target: int, speed: int | None, force: int | None, timeout: float | None
-    ) -> MoveResult: ...
-
-    @abstractmethod
-    async def _hold(self, axes: Finger) -> None: ...
-
-    @abstractmethod
-    async def _halt(self) -> None: ...
-
-    @abstractmethod
-    async def _activate(self) -> None: ...
-
-    @abstractmethod
-    async def _reset(self) -> None: ...
-
-    @abstractmethod
-    async def _atr(self) -> None: ...
-
-    @abstractmethod
-    async def _recover(self, timeout: float | None) -> None: ...
-
-    @abstractmethod
-    async def _wait_for_state(self, states: Collection[State], timeout: float | None) -> State: ...
-
-    # -- what the calls above share ----------------------------------------------------------------------
-
-    def _keeps_grip(self, keep_grip: bool | None) -> bool:
-        return self._keep_grip if keep_grip is None else check_flag("keep_grip", keep_grip)
-
-    def _check_running(self) -> None:
-        if self._session is None:
-            raise NotStartedError("the hand is not started", advice="use 'async with' or start()")
-        self._session.check_running()
-
-    def _check_may_listen(self) -> None:
-        """Refuse another thread or loop while the hand runs: neither streams nor listeners are locked."""
-        session = self._session
-        if session is not None and not session.is_over and not session.lost_its_loop:
-            session.check_loop("a stream or a listener of the hand")
-
     def _current_status(self) -> RobotiqStatus:
         with self._naming:
             self._check_running()
@@ -585,16 +553,3 @@ class Hand(ABC):
             if self.state is State.DISCONNECTED:
                 raise ConnectionLostError("the link to the gripper is down: what it does is not known")
             return status
-
-    def _opened(self, channel: Channel[T], buffer: int | None, limit: float | None = None) -> Stream[T]:
-        self._check_may_listen()
-        return channel.open(buffer, limit, self._no_status_for)
-
-    def _no_status_for(self, seconds: float) -> ConnectionLostError:
-        error = ConnectionLostError(f"no status for {seconds:g} s (the hand is in {self.state.name})")
-        error.hand = self._given_name
-        return error
-
-    def _abandon_if_loop_closed(self) -> None:
-        if self._session is not None and self._session.lost_its_loop:
-            self._session.abandon()

@@ -27,7 +27,7 @@ from ..values.grip import GraspResult, GripEvent
 from ..values.model import Model
 from ..values.move_result import MoveResult
 from ..values.statistics import Statistics
-from ..values.status import RobotiqStatus
+from ..values.status import Part, RobotiqStatus
 from .caller import Caller
 
 T = TypeVar("T")
@@ -191,14 +191,35 @@ class RobotiqHand:
 
     # -- commands --------------------------------------------------------------------------------------
 
-    def set_position(self, value: int, fingers: Finger | int = Finger.ABC) -> None:
-        self._caller.wait(lambda: self._inner.set_position(value, fingers))
+    def set_position(
+        self,
+        value: int | None = None,
+        fingers: Finger | int = Finger.ABC,
+        *,
+        mm: float | None = None,
+        open_fraction: float | None = None,
+    ) -> None:
+        self._caller.wait(
+            lambda: self._inner.set_position(value, fingers, mm=mm, open_fraction=open_fraction)
+        )
 
-    def set_speed(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
-        self._caller.wait(lambda: self._inner.set_speed(value, fingers))
+    def set_speed(
+        self,
+        value: int | None = None,
+        fingers: Finger | int = Finger.ALL,
+        *,
+        mm_per_s: float | None = None,
+    ) -> None:
+        self._caller.wait(lambda: self._inner.set_speed(value, fingers, mm_per_s=mm_per_s))
 
-    def set_force(self, value: int, fingers: Finger | int = Finger.ALL) -> None:
-        self._caller.wait(lambda: self._inner.set_force(value, fingers))
+    def set_force(
+        self,
+        value: int | None = None,
+        fingers: Finger | int = Finger.ALL,
+        *,
+        label_n: float | None = None,
+    ) -> None:
+        self._caller.wait(lambda: self._inner.set_force(value, fingers, label_n=label_n))
 
     def command(
         self,
@@ -207,20 +228,49 @@ class RobotiqHand:
         position: int | None = None,
         speed: int | None = None,
         force: int | None = None,
+        mm: float | None = None,
+        open_fraction: float | None = None,
+        mm_per_s: float | None = None,
+        label_n: float | None = None,
     ) -> None:
-        self._caller.tell(lambda: self._inner.command(fingers, position=position, speed=speed, force=force))
+        self._caller.tell(
+            lambda: self._inner.command(
+                fingers,
+                position=position,
+                speed=speed,
+                force=force,
+                mm=mm,
+                open_fraction=open_fraction,
+                mm_per_s=mm_per_s,
+                label_n=label_n,
+            )
+        )
 
     def move(
         self,
-        position: int,
+        position: int | None = None,
         fingers: Finger | int = Finger.ABC,
         *,
+        mm: float | None = None,
+        open_fraction: float | None = None,
         speed: int | None = None,
+        mm_per_s: float | None = None,
         force: int | None = None,
+        label_n: float | None = None,
         timeout: float | None = None,
     ) -> MoveResult:
         return self._caller.wait(
-            lambda: self._inner.move(position, fingers, speed=speed, force=force, timeout=timeout)
+            lambda: self._inner.move(
+                position,
+                fingers,
+                mm=mm,
+                open_fraction=open_fraction,
+                speed=speed,
+                mm_per_s=mm_per_s,
+                force=force,
+                label_n=label_n,
+                timeout=timeout,
+            )
         )
 
     def open(
@@ -228,21 +278,41 @@ class RobotiqHand:
         fingers: Finger | int = Finger.ABC,
         *,
         speed: int | None = None,
+        mm_per_s: float | None = None,
         force: int | None = None,
+        label_n: float | None = None,
         timeout: float | None = None,
     ) -> MoveResult:
-        return self._caller.wait(lambda: self._inner.open(fingers, speed=speed, force=force, timeout=timeout))
+        return self._caller.wait(
+            lambda: self._inner.open(
+                fingers,
+                speed=speed,
+                mm_per_s=mm_per_s,
+                force=force,
+                label_n=label_n,
+                timeout=timeout,
+            )
+        )
 
     def close(
         self,
         fingers: Finger | int = Finger.ABC,
         *,
         speed: int | None = None,
+        mm_per_s: float | None = None,
         force: int | None = None,
+        label_n: float | None = None,
         timeout: float | None = None,
     ) -> MoveResult:
         return self._caller.wait(
-            lambda: self._inner.close(fingers, speed=speed, force=force, timeout=timeout)
+            lambda: self._inner.close(
+                fingers,
+                speed=speed,
+                mm_per_s=mm_per_s,
+                force=force,
+                label_n=label_n,
+                timeout=timeout,
+            )
         )
 
     def grasp(
@@ -251,11 +321,21 @@ class RobotiqHand:
         *,
         at_least: int | None = None,
         speed: int | None = None,
+        mm_per_s: float | None = None,
         force: int | None = None,
+        label_n: float | None = None,
         timeout: float | None = None,
     ) -> GraspResult:
         return self._caller.wait(
-            lambda: self._inner.grasp(fingers, at_least=at_least, speed=speed, force=force, timeout=timeout)
+            lambda: self._inner.grasp(
+                fingers,
+                at_least=at_least,
+                speed=speed,
+                mm_per_s=mm_per_s,
+                force=force,
+                label_n=label_n,
+                timeout=timeout,
+            )
         )
 
     def hold(self, fingers: Finger | int = Finger.ALL) -> None:
@@ -303,6 +383,10 @@ class RobotiqHand:
     @property
     def status(self) -> RobotiqStatus:
         return self._inner.status
+
+    @property
+    def part(self) -> Part | None:
+        return self._inner.part
 
     @property
     def is_activated(self) -> bool:

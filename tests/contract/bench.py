@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from contextlib import asynccontextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import wraps
 from typing import Any, TypeVar
 
 import pytest
@@ -118,6 +119,23 @@ def contract(
         return both
 
     return of_both if test is None else of_both(test)
+
+
+def on_model(model: Model) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Let a test of the contract run on another gripper than a 3-Finger."""
+
+    def of(test: Callable[..., None]) -> Callable[..., None]:
+        @wraps(test)
+        def on_it(*args: Any, **arguments: Any) -> None:
+            token = MODEL.set(model)
+            try:
+                test(*args, **arguments)
+            finally:
+                MODEL.reset(token)
+
+        return on_it
+
+    return of
 
 
 async def at_rest(hand: Hand) -> None:

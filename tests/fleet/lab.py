@@ -18,6 +18,7 @@ from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.fleet.wire.values import error_fields
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.model import THREE_FINGER, Model
+from robotiq_async.values.stroke import Points
 from tests.fleet.network import MemoryBus, Network
 from tests.grippers import activate_beforehand
 from tests.virtual import until
@@ -110,6 +111,7 @@ async def lab(
     kind: type[SimulatedGripper] = SimulatedGripper,
     keep_grip: bool = False,
     model: Model = THREE_FINGER,
+    stroke: Points | None = None,
 ) -> AsyncIterator[Lab]:
     """An agent that serves zenoh://lab/cell/left, under a name in a network, by default one of its own."""
     network = network or Network()
@@ -118,7 +120,7 @@ async def lab(
     async with SimulatorServer(gripper) as server:
         if active:
             await activate_beforehand(gripper)
-        hand = RobotiqHand(server.address, keep_grip=keep_grip, model=model)
+        hand = RobotiqHand(server.address, keep_grip=keep_grip, model=model, stroke=stroke)
         agent = Agent("lab", "cell", {"left": hand}, network.bus(name), window=window)
         async with serving(agent) as task:
             yield Lab(network, gripper, server, hand, agent, task)

@@ -107,6 +107,7 @@ class HandPublisher:
             "age": None if status is None else stamp - status.timestamp,
             "address": self._hand.address,
             "model": self._hand.model.name,
+            "stroke": self._hand.units.stroke.points,
             "state": self._hand.state.name,
             "fault": None if status is None else int(status.fault),
             "is_moving": self._is_moving(),

@@ -38,6 +38,8 @@ SEQUENCES: Final = frozenset({"activate", "reset", "atr", "recover"})
 """Commands with a speed and a force of their own."""
 COMMANDS: Final = frozenset({"set_position", "set_speed", "set_force", "move", "hold"}) | SEQUENCES
 """Commands of a holder: the methods of a hand by that name. In addition there are command and cancel."""
+UNITS: Final = frozenset({"mm", "open_fraction", "mm_per_s", "label_n"})
+"""Arguments of a hand that are no counts. Clients convert them: the agent restores the counts that it saw."""
 
 
 class ServedHand:
@@ -337,6 +339,8 @@ class ServedHand:
             self._to_hold &= ~axes_of(request.name, request.call.arguments)
 
     def _work(self, name: str, arguments: Fields) -> Work:
+        if own := sorted(UNITS & arguments.keys()):
+            raise TypeError(f"requests are in counts, got {', '.join(own)}")
         if name == "command":
             return self._set(**arguments)
         # Checked here: a coroutine raises for wrong arguments only when it is awaited.
@@ -354,6 +358,8 @@ class ServedHand:
         asked = {check_mask(int(mask)): changes for mask, changes in axes.items()}
         for changes in asked.values():  # all of them before the first takes effect
             for name, value in changes.items():
+                if name in UNITS:
+                    raise TypeError(f"requests are in counts, got {name}")
                 check_byte(name, value)
         self._settings.merge(settings_of("command", {"axes": axes}))
         for mask, changes in asked.items():

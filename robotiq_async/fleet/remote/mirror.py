@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 from ...runtime.log import Log, log
 from ...session.streams import Channels
 from ...values.enums import State, Trigger
 from ...values.events import Transition
+from ...values.model import Model
 from ...values.status import RobotiqStatus
+from ...values.stroke import Points, Stroke, check_points
 from ..control.lease import WINDOW_S
 from ..wire.status_message import StatusMessage
 from ..wire.values import Fields, read_request, read_transition, reading
@@ -72,6 +74,7 @@ class Mirror:
         events: number of the newest event that readers got.
         misrouted: messages about another gripper, which were dropped.
         received_at: arrival of the last current message.
+        points: of the agent's stroke, measured on the gripper; empty for nominal openings.
     """
 
     def __init__(
@@ -92,6 +95,8 @@ class Mirror:
         self.events = 0
         self.misrouted = 0
         self.received_at = 0.0
+        self.points: Points = ()
+        self._strokes: dict[Model, Stroke] = {}  # made of the points
         self._mark = mark
         self._channels = channels
         self._entered = entered
@@ -199,7 +204,20 @@ class Mirror:
 
     def renumbered(self, status: RobotiqStatus) -> RobotiqStatus:
         """The status of an answer, with a sequence of ours."""
-        return RobotiqStatus(status.registers, status.timestamp, self._base + status.sequence, status.model)
+        model, sequence = status.model, self._base + status.sequence
+        return RobotiqStatus(status.registers, status.timestamp, sequence, model, self._stroke(model))
+
+    def receive_points(self, summary: Mapping[str, Any]) -> None:
+        """Take over the points that were measured on the gripper; an older agent tells none."""
+        points = check_points("stroke", summary["stroke"]) if summary.get("stroke") else ()
+        if points != self.points:
+            self.points = points
+            self._strokes.clear()
+
+    def _stroke(self, model: Model) -> Stroke | None:
+        if self.points and model not in self._strokes:
+            self._strokes[model] = model.stroke.measured(self.points)
+        return self._strokes.get(model)
 
     def begin(self, at: float) -> None:
         self._report(State.DISCONNECTED, Trigger.ASK_START, at)
@@ -251,7 +269,7 @@ class Mirror:
         for other in (self._pushed, newest):
             if other is not None:
                 at = max(at, other.timestamp) if other.sequence < sequence else min(at, other.timestamp)
-        return RobotiqStatus(message.registers, at, sequence, message.model)
+        return RobotiqStatus(message.registers, at, sequence, message.model, self._stroke(message.model))
 
     def _hand_on(self, event: Fields) -> None:
         with reading("an event"):

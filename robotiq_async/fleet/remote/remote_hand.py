@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Collection
 from contextlib import nullcontext
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import Final, Literal
 
 from ...control.state_machine import RUNNING, refusal
@@ -26,6 +26,7 @@ from ...values.model import THREE_FINGER
 from ...values.move_result import MoveResult
 from ...values.statistics import Counters, Statistics
 from ...values.status import RobotiqStatus
+from ...values.stroke import Points
 from ..network.bus import Bus, Urgency
 from ..network.route import parse_remote_address
 from ..wire.values import Fields, read_result, reading
@@ -57,6 +58,7 @@ class RemoteHand(Hand):
       after :meth:`command` has returned, the refusal is logged.
     * :meth:`halt` needs no lease and is repeated until it is answered. If another client commands the
       gripper, it loses the lease. ConnectionLostError means no answer within 2 s: the fingers MAY STILL MOVE.
+    * Millimetres and fractions follow the ``stroke`` of the agent's hand. What is sent are counts.
     * :attr:`state` is DISCONNECTED also while the agent is silent; that is a transition, too. Some statuses
       may be missing, and :meth:`grip_events` follows those that arrived.
 
@@ -99,9 +101,13 @@ class RemoteHand(Hand):
         self._gripper, self._route = parse_remote_address(address)
         self._connect_timeout = check_seconds("connect_timeout", connect_timeout, 0.1, 60.0)
         self._control = control
-        units = partial(units_of, calibration, force_calibration)
+        units = cache(partial(units_of, calibration, force_calibration))  # loops ask in every cycle
         units(THREE_FINGER)  # checks the calibrations
-        super().__init__(str(self._gripper), units=units, keep_grip=check_flag("keep_grip", keep_grip))
+        super().__init__(
+            str(self._gripper),
+            units=lambda model: units(model, self._points),
+            keep_grip=check_flag("keep_grip", keep_grip),
+        )
         if bus is None:
             self._route.configuration()  # a malformed or unprotected route fails here, not at the start
         self._shared_bus = bus
@@ -299,6 +305,11 @@ class RemoteHand(Hand):
     def statistics(self) -> Statistics:
         """Figures of the agent's polling, at most 1 s old."""
         return Counters().snapshot(0) if self._session is None else self._session.statistics
+
+    @property
+    def _points(self) -> Points | None:
+        """The measured points of the agent's hand, which has the option ``stroke``."""
+        return None if self._session is None else self._session.mirror.points or None
 
     @property
     def _newest_status(self) -> RobotiqStatus | None:

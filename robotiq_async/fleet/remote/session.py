@@ -135,6 +135,7 @@ class RemoteSession:
         with reading("its figures"):
             self.window = check_seconds("window", info["window"], WINDOW_MIN_S, WINDOW_MAX_S)
             self.statistics = read_statistics(info["statistics"])
+            self.mirror.receive_points(info)
         return True
 
     async def _give_up(self) -> None:
@@ -268,6 +269,7 @@ class RemoteSession:
             return
         if "statistics" in fields:
             self.statistics = read_statistics(fields["statistics"])
+            self.mirror.receive_points(fields)
             return
         if self._receive_status(bytes.fromhex(fields["status"]), in_turn=True):
             self.mirror.receive_events(fields["events"])

@@ -1,0 +1,133 @@
+"""Kind: what each kind of hand supplies, and what the calls of all of them share."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection
+from typing import Literal, TypeVar
+
+from ..runtime.log import Log
+from ..session.streams import Channel, Channels, Stream
+from ..values.calibration import Units
+from ..values.checks import check_flag
+from ..values.enums import Finger, State
+from ..values.errors import ConnectionLostError, NotStartedError
+from ..values.model import THREE_FINGER, Model
+from ..values.move_result import MoveResult
+from ..values.status import RobotiqStatus
+from .run import NamesErrors, Run, refuse_copy
+
+T = TypeVar("T")
+
+
+class Kind(ABC):
+    """The inside of a hand; :class:`~robotiq_async.hand.Hand` has its calls, and says how to add a kind."""
+
+    _session: Run | None = None
+    """The present run, or the last one; None before the first start."""
+
+    def __init__(
+        self,
+        address: str,
+        *,
+        units: Callable[[Model], Units],
+        name: str = "",
+        keep_grip: bool = False,
+        model: Model = THREE_FINGER,
+    ) -> None:
+        self._address = address
+        self._given_name = name
+        self._units = units
+        self._keep_grip = keep_grip
+        self._model = model
+        self._channels = Channels(Log(name or address))
+        self._naming = NamesErrors(name)
+
+    def __repr__(self) -> str:
+        name = f"{self._given_name} " if self._given_name else ""
+        return f"<{type(self).__name__} {name}{self._address} {self.state.name}>"
+
+    __reduce__ = refuse_copy
+
+    # -- what each kind of hand supplies, with checked arguments -----------------------------------------
+
+    @property
+    @abstractmethod
+    def state(self) -> State:
+        """The state of the hand."""
+
+    @property
+    @abstractmethod
+    def _newest_status(self) -> RobotiqStatus | None:
+        """The newest status; None before the first."""
+
+    @abstractmethod
+    def _is_moving(self) -> bool:
+        """Whether an axis moves or will move; only asked while that is known."""
+
+    @abstractmethod
+    async def _start(self, activate: bool, wait: float) -> None: ...
+
+    @abstractmethod
+    async def _stop(self, halt: bool, keep_grip: bool) -> None: ...
+
+    @abstractmethod
+    async def _set(self, what: Literal["position", "speed", "force"], value: int, axes: Finger) -> None: ...
+
+    @abstractmethod
+    def _command(self, axes: Finger, position: int | None, speed: int | None, force: int | None) -> None: ...
+
+    @abstractmethod
+    async def _move(
+        self, axes: Finger, target: int, speed: int | None, force: int | None, timeout: float | None
+    ) -> MoveResult: ...
+
+    @abstractmethod
+    async def _hold(self, axes: Finger) -> None: ...
+
+    @abstractmethod
+    async def _halt(self) -> None: ...
+
+    @abstractmethod
+    async def _activate(self) -> None: ...
+
+    @abstractmethod
+    async def _reset(self) -> None: ...
+
+    @abstractmethod
+    async def _atr(self) -> None: ...
+
+    @abstractmethod
+    async def _recover(self, timeout: float | None) -> None: ...
+
+    @abstractmethod
+    async def _wait_for_state(self, states: Collection[State], timeout: float | None) -> State: ...
+
+    # -- what the calls above share ----------------------------------------------------------------------
+
+    def _keeps_grip(self, keep_grip: bool | None) -> bool:
+        return self._keep_grip if keep_grip is None else check_flag("keep_grip", keep_grip)
+
+    def _check_running(self) -> None:
+        if self._session is None:
+            raise NotStartedError("the hand is not started", advice="use 'async with' or start()")
+        self._session.check_running()
+
+    def _check_may_listen(self) -> None:
+        """Refuse another thread or loop while the hand runs: neither streams nor listeners are locked."""
+        session = self._session
+        if session is not None and not session.is_over and not session.lost_its_loop:
+            session.check_loop("a stream or a listener of the hand")
+
+    def _opened(self, channel: Channel[T], buffer: int | None, limit: float | None = None) -> Stream[T]:
+        self._check_may_listen()
+        return channel.open(buffer, limit, self._no_status_for)
+
+    def _no_status_for(self, seconds: float) -> ConnectionLostError:
+        error = ConnectionLostError(f"no status for {seconds:g} s (the hand is in {self.state.name})")
+        error.hand = self._given_name
+        return error
+
+    def _abandon_if_loop_closed(self) -> None:
+        if self._session is not None and self._session.lost_its_loop:
+            self._session.abandon()
