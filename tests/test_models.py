@@ -38,6 +38,7 @@ from robotiq_async.tools.recording.recorder import Recorder
 from robotiq_async.tools.recording.recordings import read_recording
 from robotiq_async.tools.recording.table import COLUMNS, Table
 from robotiq_async.tools.web.page.mirror import HandMirror
+from robotiq_async.tools.web.page.widgets.words import axis_title, opening_words
 from robotiq_async.values.checks import parse_fingers
 from robotiq_async.values.errors import MeasuringError, RobotiqStateError
 from robotiq_async.values.model import MODELS, model_of
@@ -425,7 +426,10 @@ async def test_a_recording_has_the_one_axis_and_can_be_read(tmp_path: Path) -> N
     named = dict(zip(COLUMNS["status"], row, strict=True))
     assert named["A.position"] >= TWO_FINGER_85.closed_reading_min  # type: ignore[operator]
     assert named["B.position"] is None
-    assert status_line(last.fields).count("=") == 1
+    assert re.fullmatch(r"status   jaw=\d+ \(\d+\.\d mm\) AT_POSITION", status_line(last.fields))
+    assert named["A.opening_mm"] == TWO_FINGER_85.stroke.opening_mm(int(str(named["A.position"])))
+    assert 0 <= named["A.open_fraction"] < 0.05  # type: ignore[operator]
+    assert named["B.opening_mm"] is None
 
 
 def test_a_page_shows_the_axis_that_there_is() -> None:
@@ -441,6 +445,10 @@ def test_a_page_shows_the_axis_that_there_is() -> None:
     mirror.hear(message | {"registers": registers(0xF9, 0, 0, 255, 228), "timestamp": 1.0, "sequence": 3})
     assert mirror.model is HAND_E
     assert mirror.samples[-1].positions == (228,)
+    assert (axis_title(mirror, 0), opening_words(mirror)) == ("jaw", "0.0 mm (nominal)")
+    own = {"registers": registers(0xF9, 0, 0, 255, 228), "timestamp": 2.0, "sequence": 4}
+    mirror.hear(message | own | {"stroke": [[3, 60.0], [240, 10.0]]})
+    assert opening_words(mirror) == "12.5 mm (measured)"
 
 
 async def test_calls_that_need_three_fingers_say_so() -> None:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, make_dataclass
 from importlib.util import find_spec
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, NamedTuple
 
 from cyclopts import Parameter, Token
 
@@ -36,6 +36,33 @@ def _integer(name: str, low: int, high: int) -> Callable[[object, Sequence[Token
     return convert
 
 
+class Amount(NamedTuple):
+    """A position, a speed or a force as it was typed: an argument of a hand, and its value."""
+
+    argument: str
+    value: float
+
+    def __str__(self) -> str:
+        """As a person reads it."""
+        return f"{self.value:g} mm" if self.argument == "mm" else f"{self.value:g}"
+
+
+def _amount(name: str, counts: str, unit: str, argument: str) -> Callable[[object, Sequence[Token]], Amount]:
+    """A converter for counts, or a number with its unit; the hand knows the range of that."""
+    integer = _integer(name, 0, 255)
+
+    def convert(kind: object, tokens: Sequence[Token]) -> Amount:
+        found = re.fullmatch(rf"([0-9]{{1,6}}(?:\.[0-9]{{1,6}})?) ?{re.escape(unit)}", tokens[0].value)
+        if found:
+            return Amount(argument, float(found[1]))
+        try:
+            return Amount(counts, integer(kind, tokens))
+        except UsageError as error:
+            raise UsageError(f"{error}; or give it in {unit}, as in 40{unit}") from None
+
+    return convert
+
+
 def _fingers(_type: object, tokens: Sequence[Token]) -> Finger:
     with usage():
         return parse_fingers("--fingers", tokens[0].value)
@@ -52,7 +79,28 @@ Flag = Annotated[bool, Parameter(negative=(), show_default=False)]
 """Off unless given. There is no --no- form, and the help shows no default."""
 Yes = Annotated[Flag, Parameter(name=("--yes", "-y"))]
 Host = Annotated[str, Parameter(metavar="HOST")]
-Position = Annotated[int, Parameter(converter=_integer("POSITION", 0, 255))]
+Position = Annotated[
+    Amount,
+    Parameter(converter=_amount("POSITION", "position", "mm", "mm"), n_tokens=1, accepts_keys=False),
+]
+Speed = Annotated[
+    Amount | None,
+    Parameter(
+        converter=_amount("the value", "speed", "mm/s", "mm_per_s"),
+        n_tokens=1,
+        accepts_keys=False,
+        metavar="0..255|MM/S",
+    ),
+]
+Force = Annotated[
+    Amount | None,
+    Parameter(
+        converter=_amount("the value", "force", "N", "label_n"),
+        n_tokens=1,
+        accepts_keys=False,
+        metavar="0..255|N",
+    ),
+]
 Byte = Annotated[int, Parameter(converter=_integer("the value", 0, 255), metavar="0..255")]
 Port = Annotated[int, Parameter(converter=_integer("the port", 0, 65535), metavar="0..65535")]
 Unit = Annotated[int, Parameter(converter=_integer("the unit id", 0, 255), metavar="0..255")]

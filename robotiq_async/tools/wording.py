@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from ..values.enums import ObjectStatus, State, Trigger
+from ..values.enums import Finger, ObjectStatus, State, Trigger
 from ..values.errors import GripperFaultError, InvalidStateError, NotActivatedError, RobotiqError
+from ..values.model import Model
 from ..values.status import NO_REQUEST
 
 STATE_WORDS: Final = {
@@ -42,6 +43,14 @@ TRIGGER_WORDS: Final = {each: each.value.removesuffix("()") for each in Trigger}
     Trigger.ASK_STOP: "the end",
 }
 """A description of what changes a state."""
+
+JAW_NAME: Final = "jaw"
+"""What people call the one axis of a 2F or a Hand-E; in programs and files it is A."""
+
+
+def axis_name(axis: Finger, model: Model) -> str:
+    """What people call axes of a model."""
+    return JAW_NAME if len(model.axes) == 1 else str(axis.name)
 
 
 def refusal_words(error: RobotiqError, hints: Mapping[State, str]) -> str:

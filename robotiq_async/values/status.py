@@ -81,6 +81,7 @@ class RobotiqStatus:
         timestamp: float = 0.0,
         sequence: int = 0,
         model: Model = THREE_FINGER,
+        stroke: Stroke | None = None,
     ) -> RobotiqStatus:
         """A status from eight registers.
 
@@ -91,7 +92,7 @@ class RobotiqStatus:
         """
         at = check_seconds("timestamp", timestamp, -sys.float_info.max, sys.float_info.max)
         number = check_int("sequence", sequence, 0, sys.maxsize)
-        return cls(reg.check_registers(registers), at, number, model)
+        return cls(reg.check_registers(registers), at, number, model, stroke)
 
     @property
     def registers(self) -> reg.Registers:

@@ -5,21 +5,24 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import re
 import signal
 import sys
 import time
 from asyncio.subprocess import Process
 from collections.abc import AsyncIterator, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager, redirect_stdout
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
-from robotiq_async import Fault, Finger, RobotiqStatus
+from robotiq_async import JAW, TWO_FINGER_85, Fault, Finger, RobotiqStatus
 from robotiq_async.cli.commands.demo import _program
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values import registers as reg
+from robotiq_async.values.calibration.csv_tables import write_stroke
 from robotiq_async.values.request import Request
 from tests.cli.conftest import Outcome, served
 
@@ -98,6 +101,51 @@ def test_move_takes_fingers_speed_and_force(call: Call, there: SimulatorServer) 
     assert there.gripper.position(Finger.B) < 10
     last = [write.registers for write in there.gripper.writes if reg.rGTO.read(write.registers)][-1]
     assert (reg.rSP[0].read(last), reg.rFR[0].read(last)) == (200, 10)
+
+
+JAW_ADDRESS = "sim://?model=2f85&speedup=20"
+
+
+def test_move_takes_millimetres_and_shows_them(call: Call) -> None:
+    outcome = call("move", "40mm", JAW_ADDRESS, "--speed", "80mm/s", "--force", "60.5N")
+    outcome.assert_succeeded()
+    (row,) = re.findall(r"^ +jaw +(\d+) +([\d.]+) +AT_POSITION", outcome.out, re.MULTILINE)
+    position, mm = int(row[0]), float(row[1])
+    assert "nominal mm" in outcome.out
+    assert position == pytest.approx(TWO_FINGER_85.stroke.position_of(40), abs=2)
+    assert mm == round(TWO_FINGER_85.stroke.opening_mm(position), 1)
+
+
+def test_millimetres_follow_a_file_of_measured_points(call: Call, tmp_path: Path) -> None:
+    file = tmp_path / "left.csv"
+    write_stroke(file, ((3, 60.0), (228, 10.0)))
+    outcome = call("move", "60mm", JAW_ADDRESS, "--stroke", str(file))
+    outcome.assert_succeeded()
+    assert "measured mm" in outcome.out
+    outcome = call("move", "85mm", JAW_ADDRESS, "--stroke", str(file))
+    outcome.assert_failed(2, "mm must be millimetres in 10.0..60.0, got 85.0")
+    call("move", "3", JAW_ADDRESS, "--stroke", str(tmp_path / "none.csv")).assert_failed(2, "cannot be read")
+
+
+def test_millimetres_out_of_range_are_wrong_usage_and_move_nothing(call: Call) -> None:
+    outcome = call("move", "90mm", JAW_ADDRESS)
+    outcome.assert_failed(2, "mm must be millimetres in 0.0..85.0, got 90.0")
+    assert "Activating" not in outcome.out
+    call("move", "40mm", "sim://?speedup=20", "--fingers", "all").assert_failed(
+        2, "the scissor has no opening"
+    )
+
+
+def test_status_says_what_is_held_and_how_wide_it_is(call: Call) -> None:
+    gripper = SimulatedGripper(speedup=20, model="2f85")
+    gripper.place_object(JAW, position=150)
+    with served(gripper) as server:
+        call("move", "255", "--keep", "--yes", server.address).assert_succeeded()
+        outcome = call("status", server.address)
+        outcome.assert_succeeded()
+    found = re.search(r"^a part is held, ([\d.]+) mm wide \(nominal\)$", outcome.out, re.MULTILINE)
+    assert found
+    assert float(found[1]) == pytest.approx(TWO_FINGER_85.stroke.opening_mm(150), abs=2)
 
 
 def test_an_axis_that_the_model_lacks_is_wrong_usage_and_moves_nothing(call: Call) -> None:

@@ -111,7 +111,7 @@ async def test_at_a_terminal_nothing_happens_without_a_yes(
     assert list(file.parent.iterdir()) == []
 
 
-@pytest.mark.parametrize(("model", "axes"), [("3f", b"ABC"), ("hand-e", b"A")])
+@pytest.mark.parametrize(("model", "axes"), [("3f", b"ABC"), ("hand-e", b"jaw")])
 async def test_the_question_names_the_axes_of_the_model(
     server: SimulatorServer, model: str, axes: bytes
 ) -> None:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Coroutine
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+from ...hand.amounts import force_of, position_of, speed_of
+from ...tools.wording import axis_name
+from ...values.calibration import Units
 from ...values.checks import check_timeout
 from ...values.enums import Finger
 from ..addresses import gripper_words, named_model
-from ..arguments import USUAL, Address, Byte, Fingers, Flag, Link, Position, Yes
+from ..arguments import USUAL, Address, Amount, Fingers, Flag, Force, Link, Position, Speed, Yes
 from ..consent import consent
 from ..failures import usage
 
@@ -28,8 +31,8 @@ def move(
     /,
     *,
     fingers: Fingers = Finger.ABC,
-    speed: Byte | None = None,
-    force: Byte | None = None,
+    speed: Speed = None,
+    force: Force = None,
     timeout: Annotated[float | None, Parameter(metavar="SECONDS")] = None,
     keep: Flag = False,
     yes: Yes = False,
@@ -51,33 +54,46 @@ def move(
     For example:
 
         robotiq-async move 255
+        robotiq-async move 40mm 'rtu:///dev/ttyUSB0?model=2f85' --speed 80mm/s
         robotiq-async move 100 tcp://192.168.1.11 --fingers A,B --speed 64
         robotiq-async move 255 192.168.1.11 --fingers scissor --force 0 --yes
         robotiq-async move 255 192.168.1.11 --keep
 
     Args:
-        position: 0 is open, 255 is closed; for the scissor 0 is wide and 255 is pinch.
+        position: 0 is open, 255 closed, of the scissor wide and pinch; or 40mm, nominal without --stroke.
         fingers: The axes that move: ABC, A,B, scissor, all.
-        speed: 0 is the slowest (a full stroke in 10 s, of a jaw in 2.5 to 5 s), 255 the fastest (2 s, 0.6 s).
-        force: 0 is the weakest, 255 the strongest.
+        speed: 0 is the slowest (a full stroke in 10 s, of a jaw in 2.5 to 5 s), 255 the fastest; or 80mm/s.
+        force: 0 is the weakest, 255 the strongest; or 60N, a label and no measured force.
         timeout: Give up after so many seconds (default: from distance and speed).
         keep: Let a grip stay in force when the command ends.
         yes: Do not ask.
     """
     with usage():
         check_timeout("timeout", timeout)
-        axes = named_model(address).mask(fingers)
+        model = named_model(address)
+        axes = axis_name(model.mask(fingers), model)
     # Asked here and not in the coroutine: a question would block the event loop.
-    consent(address, WARNING.format(fingers=axes.name, position=position), yes=yes)
+    consent(address, WARNING.format(fingers=axes, position=position), yes=yes)
     return _move(position, address, fingers, speed, force, timeout, keep, link)
 
 
+def counts_of(units: Units, axes: Finger, *amounts: Amount | None) -> dict[str, int]:
+    """Position, speed and force in counts, by the names that a move has for them."""
+    given: dict[str, Any] = {each.argument: each.value for each in amounts if each is not None}
+    counts = {
+        "position": position_of(units, axes, given.get("position"), given.get("mm"), None),
+        "speed": speed_of(units, given.get("speed"), given.get("mm_per_s")),
+        "force": force_of(units, given.get("force"), given.get("label_n")),
+    }
+    return {name: value for name, value in counts.items() if value is not None}
+
+
 async def _move(
-    position: int,
+    position: Amount,
     address: str,
     fingers: Finger,
-    speed: int | None,
-    force: int | None,
+    speed: Amount | None,
+    force: Amount | None,
     timeout: float | None,
     keep: bool,
     link: Link,
@@ -88,11 +104,12 @@ async def _move(
     print(gripper_words(address), flush=True)
     async with connected(address, link, halt=True, keep_grip=keep) as hand:
         with usage():
-            hand.model.mask(fingers)  # before an activation moves anything
+            # Before an activation moves anything.
+            counts = counts_of(hand.units, hand.model.mask(fingers), position, speed, force)
         if not hand.is_activated:
             print("Activating: the fingers open and close.", flush=True)
             await hand.activate()
-        result = await hand.move(position, fingers, speed=speed, force=force, timeout=timeout)
+        result = await hand.move(**counts, fingers=fingers, timeout=timeout)
     print_outcomes(result)
     if result.status.contacts:  # also of axes that did not move
         print(IN_FORCE if hand.status.go_echo else LET_GO + HINT * (not keep))

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from ...runtime.concurrency import in_a_thread, write_all
 from ...tools.recording.feed import Timeline, compact
 from ...tools.recording.payloads import Fields, is_command
+from ...tools.wording import JAW_NAME
 from ...values.enums import Finger, State, Trigger
 from ...values.status import NO_REQUEST, RobotiqStatus
 from .messages import forwarded_warnings
@@ -34,10 +35,24 @@ def _axes_in(fields: Fields) -> list[str]:
     return [name for name in _NAMES if name == "A" or name in fields]  # a sibling has A alone
 
 
+def _title(name: str, fields: Fields) -> str:
+    return JAW_NAME if len(_axes_in(fields)) == 1 else name
+
+
 def status_line(fields: Fields) -> str:
-    """The line for a status: position and state of every axis."""
-    axes = (f"{n}={fields[n]['position']} {axis_words(fields[n]['axis_state'])}" for n in _axes_in(fields))
+    """The line for a status: position and state of every axis; of a jaw also its opening."""
+    axes = (
+        f"{_title(n, fields)}={fields[n]['position']}{_opening(n, fields)} "
+        f"{axis_words(fields[n]['axis_state'])}"
+        for n in _axes_in(fields)
+    )
     return f"status   {' '.join(axes)}"
+
+
+def _opening(name: str, fields: Fields) -> str:
+    # Recordings of earlier versions have none.
+    mm = fields[name].get("opening_mm") if _title(name, fields) == JAW_NAME else None
+    return "" if mm is None else f" ({float(mm):.1f} mm)"
 
 
 def axis_words(state: str) -> str:
@@ -48,7 +63,8 @@ def axis_words(state: str) -> str:
 def command_line(fields: Fields) -> str:
     """The line for a request that was written."""
     axes = (
-        f"{n}={fields[n]['position']}@{fields[n]['speed']}/{fields[n]['force']}" for n in _axes_in(fields)
+        f"{_title(n, fields)}={fields[n]['position']}@{fields[n]['speed']}/{fields[n]['force']}"
+        for n in _axes_in(fields)
     )
     bits = f"act={fields['activate']:d} go={fields['go']:d} release={fields['release']:d}"
     return f"command  {bits} {' '.join(axes)}{'' if fields['acknowledged'] else ' NOT ACKNOWLEDGED'}"
@@ -81,7 +97,8 @@ def brief_line(fields: Fields, contacts: dict[str, Any]) -> str:
         return ""
     contacts.clear()
     contacts.update(now)
-    return f"contact  {' '.join(f'{name}={position}' for name, position in now.items()) or 'none'}"
+    where = (f"{_title(n, fields)}={position}{_opening(n, fields)}" for n, position in now.items())
+    return f"contact  {' '.join(where) or 'none'}"
 
 
 FORMATTERS: Final[dict[str, Callable[[Fields], str]]] = {

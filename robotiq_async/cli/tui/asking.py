@@ -12,6 +12,7 @@ from typing import Final
 from rich.text import Text
 
 from ...runtime.clock import now
+from ...tools.wording import axis_name
 from ...values.enums import CLOSED, Finger
 from ...values.model import Model
 
@@ -55,6 +56,7 @@ class Target:
 
     def __init__(self, model: Model, move: Callable[[Finger, int], None]) -> None:
         self._move = move
+        self._model = model
         self._there = model.all_axes
         self._axes = self._there if len(model.axes) == 1 else Finger(0)
         self._digits = ""
@@ -63,7 +65,7 @@ class Target:
     def text(self) -> Text:
         text = Text("move axes to a position\n\naxes     ", "bold")
         for axis in self._there:
-            text.append(str(axis.name), "reverse" if axis in self._axes else "dim not bold")
+            text.append(axis_name(axis, self._model), "reverse" if axis in self._axes else "dim not bold")
             text.append(" ")
         text.append(f"\nposition {self._digits}", "bold")
         text.append("_", "blink")

@@ -11,7 +11,7 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from ...tools.recording.payloads import Fields
-from ...tools.wording import AXIS_WORDS, STATE_WORDS, TRIGGER_WORDS
+from ...tools.wording import AXIS_WORDS, STATE_WORDS, TRIGGER_WORDS, axis_name
 from ...values.enums import Fault, Finger, ObjectStatus, Severity, State, Trigger
 from ...values.model import Model
 from ...values.statistics import Statistics
@@ -37,6 +37,8 @@ STILL: Final = 4
 LEVELS: Final = "▁▂▃▄▅▆▇█"
 FIXED: Final = 47
 """Columns of a line that are neither bar nor sparkline."""
+OPENING: Final = 9
+"""And those of the opening of a jaw."""
 _STYLES: Final = {
     NO_REQUEST: "dim",
     ObjectStatus.IN_MOTION.name: "cyan",
@@ -90,9 +92,11 @@ class Axes(Widget):
 
     def render(self) -> Text:
         # Bar and sparkline share the rest of the width.
-        bar = max((self.size.width - FIXED) // 2, 8)
+        fixed = FIXED + OPENING * self._is_jaw
+        bar = max((self.size.width - fixed) // 2, 8)
         where, current = (f"{words:{bar}.{bar}}" for words in ("is █, asked ▼", "current, 5 s"))
-        head = Text(f"axis     {where}   counts   {'':15} {current}      now", "dim")
+        opening = f"{self._status.stroke.source:>8.8} " if self._is_jaw else ""
+        head = Text(f"axis     {where}   counts   {opening}{'':15} {current}      now", "dim")
         lines = [head, *(self._line(axis, bar) for axis in self._status.model.axes)]
         text = Text("\n", no_wrap=True, overflow="crop").join(lines)
         if self._stale:
@@ -102,13 +106,19 @@ class Axes(Widget):
     def _line(self, axis: Finger, bar: int) -> Text:
         status, currents = self._status, self._currents[axis]
         position, requested = status.position(axis), status.requested_position(axis)
-        line = Text(f"{axis.name:8} ", "bold")
+        line = Text(f"{axis_name(axis, status.model):8} ", "bold")
         line.append_text(position_bar(position, requested, bar))
         line.append(f" {position:3} → {requested:<3} ", "not bold")
+        if self._is_jaw:
+            line.append(f"{status.opening_mm(axis):5.1f} mm ", "bold")
         line.append_text(self._does(axis))
         line.append(f" {sparkline(list(currents), bar)} ", "cyan not bold")
         line.append(f"{max(currents[-1], 0):5} mA", "not bold")
         return line
+
+    @property
+    def _is_jaw(self) -> bool:
+        return len(self._status.model.axes) == 1
 
     def _does(self, axis: Finger) -> Text:
         state = self._status.axis_state(axis)

@@ -99,6 +99,7 @@ class HandUpdates:
             return {}
         return {
             "model": status.model.name,
+            "stroke": status.stroke.points,
             "registers": status.registers,
             "timestamp": status.timestamp,
             "sequence": status.sequence,

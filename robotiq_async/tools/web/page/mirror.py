@@ -6,6 +6,7 @@ import json
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import count, zip_longest
 from time import monotonic
 from typing import Any, Final
@@ -13,6 +14,7 @@ from typing import Any, Final
 from ....values.enums import DEFAULT_FORCE, DEFAULT_SPEED, State
 from ....values.model import THREE_FINGER, Model, model_of
 from ....values.status import RobotiqStatus
+from ....values.stroke import Points, Stroke
 
 HISTORY_S: Final = 30.0
 SAMPLE_S: Final = 0.2
@@ -29,6 +31,11 @@ class Sample:
     at: float  # monotonic seconds of this process
     positions: tuple[int, ...] | None  # in counts, of A, B, C and the scissor; None while they are unknown
     currents: tuple[int, ...]  # the peaks since the sample before, in mA
+
+
+@lru_cache(maxsize=64)
+def _stroke(model: Model, points: Points) -> Stroke:
+    return model.stroke.measured(points) if points else model.stroke
 
 
 @dataclass(slots=True)
@@ -62,11 +69,13 @@ class HandMirror:
         """Take in an update."""
         self.state, self.problem = State[update["state"]], update["problem"]
         if "registers" in update:
+            model = model_of(update["model"])
             self.status = RobotiqStatus.from_registers(
                 update["registers"],
                 timestamp=update["timestamp"],
                 sequence=update["sequence"],
-                model=model_of(update["model"]),
+                model=model,
+                stroke=_stroke(model, tuple(map(tuple, update.get("stroke", ())))),
             )
             self.age = update["age"]
         self.statistics = update.get("statistics", self.statistics)

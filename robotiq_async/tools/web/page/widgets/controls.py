@@ -10,6 +10,7 @@ from nicegui import events, ui
 
 from .....values.enums import CLOSED, FORCE_MAX, OPEN, SPEED_MAX, Finger, names_of
 from ....actions import ACTIONS, Action
+from ....wording import JAW_NAME
 from ..heartbeat import PRESS, PRESS_WITH_VALUE, Heartbeat
 from ..mirror import HandMirror, Mirror
 from .words import COLORS, NAMES
@@ -44,13 +45,15 @@ class Positions:
     def __init__(self, hand: HandMirror, pressed: Callable[[str, dict[str, Any], object], None]) -> None:
         self._hand, self._pressed = hand, pressed
         self._sliders: dict[str, Slider] = {}
+        self._titles: dict[str, ui.label] = {}
         self._rows: dict[str, tuple[ui.element, ...]] = {}
         self._targets: dict[str, object] = {}
         """The value at which each slider was released: the server knows its value a little later."""
         self._touched: set[str] = set()
         """Sliders that were moved and not sent yet."""
         self._is_placing = False
-        with ui.grid(columns="auto 1fr 2rem auto").classes("w-full items-center gap-x-3 gap-y-1"):
+        columns = "auto 1fr minmax(2rem, auto) auto"
+        with ui.grid(columns=columns).classes("w-full items-center gap-x-3 gap-y-1"):
             for name, axes, color in ROWS:
                 self._row(name, axes, color)
         self.show()
@@ -65,6 +68,8 @@ class Positions:
             for element in self._rows[name]:
                 if element.visible is not is_there:
                     element.set_visibility(is_there)
+        if len(status.model.axes) == 1:
+            self._titles[NAMES[0]].set_text(JAW_NAME)
         if status.is_moving:
             return
         self._is_placing = True
@@ -74,6 +79,12 @@ class Positions:
                 self._targets[name] = place = status.position(axis)
                 self._sliders[name].set_value(place)
         self._is_placing = False
+
+    def _target_words(self, counts: float) -> str:
+        status = self._hand.status
+        if status is None or len(status.model.axes) > 1:
+            return f"{counts:.0f}"
+        return f"{counts:.0f} = {status.stroke.opening_mm(round(counts)):.0f} mm"
 
     def _row(self, name: str, axes: Finger, color: str) -> None:
         def touch() -> None:
@@ -93,11 +104,12 @@ class Positions:
         slider = Slider(min=OPEN, max=CLOSED, value=OPEN).props(f"data-testid=position-{name}")
         slider.on_value_change(touch)
         slider.on("change", let_go, js_handler=PRESS_WITH_VALUE)
-        number = ui.label().bind_text_from(slider, "value", lambda each: f"{each:.0f}").classes("text-right")
+        number = ui.label().bind_text_from(slider, "value", self._target_words)
+        number.classes("text-right whitespace-nowrap")
         button = ui.button("move").props(f"dense no-caps data-testid=move-{name}").classes("px-3")
         button.tooltip(f"{name} to this position: 0 is open, 255 closed")
         button.on("click", send, js_handler=PRESS)
-        self._sliders[name] = slider
+        self._sliders[name], self._titles[name] = slider, title
         self._rows[name] = title, slider, number, button
 
 

@@ -9,7 +9,17 @@ from typing import Any, Final
 from nicegui import ui
 
 from ..mirror import HISTORY_S, HandMirror
-from .words import COLORS, NAMES, axis_words, event_words, fault_words, state_words, timed
+from .words import (
+    COLORS,
+    NAMES,
+    axis_title,
+    axis_words,
+    event_words,
+    fault_words,
+    opening_words,
+    state_words,
+    timed,
+)
 
 CURVES_S: Final = 0.5
 WIDTHS: Final = (6, 4, 2, 2)
@@ -55,19 +65,20 @@ class AxesPanel:
 def _axis_row(hand: HandMirror, index: int) -> str:
     axis, status = hand.model.axes[index], hand.status
     if status is None:
-        return f'<div class="rq-axis"><b>{NAMES[index]}</b></div>'
+        return f'<div class="rq-axis"><b>{axis_title(hand, index)}</b></div>'
     position, wanted = status.position(axis), status.requested_position(axis)
     contact = " rq-contact" if axis & status.contacts and not hand.is_lost else ""
     stale = " rq-stale" if hand.is_lost else ""
-    color = COLORS[index]
+    color, name = COLORS[index], axis_title(hand, index)
+    does = ", ".join(filter(None, (opening_words(hand), axis_words(hand, axis))))
     return (
-        f'<div class="rq-axis{contact}{stale}" data-axis="{NAMES[index]}" data-position="{position}">'
-        f'<b style="color:{color}">{NAMES[index]}</b>'
+        f'<div class="rq-axis{contact}{stale}" data-axis="{name}" data-position="{position}">'
+        f'<b style="color:{color}">{name}</b>'
         f'<span class="rq-bar"><i style="width:{position / 2.55:.1f}%;background:{color}"></i>'
         f'<u style="left:calc((100% - 3px) * {wanted / 255:.3f})"></u></span>'
         f'<span class="rq-number">{position}</span><span class="rq-wanted">&rarr; {wanted}</span>'
         f'<span class="rq-number">{status.current_ma(axis)} mA</span>'
-        f'<span class="rq-does">{escape(axis_words(hand, axis))}</span></div>'
+        f'<span class="rq-does">{escape(does)}</span></div>'
     )
 
 
@@ -92,8 +103,11 @@ class Curves:
             for chart, values in ((self._positions, places), (self._currents, peaks)):
                 points = [list(point) for point in zip(ages, values, strict=True)]
                 chart.options["series"][index]["data"] = points
+        names = [axis_title(hand, index) for index in range(len(hand.model.axes))]
         for chart in (self._positions, self._currents):
-            chart.options["legend"]["data"] = NAMES[: len(hand.model.axes)]
+            for index, name in enumerate(names):
+                chart.options["series"][index]["name"] = name
+            chart.options["legend"]["data"] = names
         highest = max((max(each.currents) for each in hand.samples), default=0)
         self._currents.options["yAxis"]["max"] = max(CURRENT_MAX, -(-highest // 200) * 200)
         self._positions.update()

@@ -6,14 +6,27 @@ from datetime import datetime
 from time import time
 from typing import Any, Final
 
-from .....values.enums import Fault, Finger, Severity, State
+from .....values.enums import JAW, Fault, Finger, Severity, State
 from .....values.status import NO_REQUEST
-from ....wording import AXIS_WORDS, STATE_WORDS
+from ....wording import AXIS_WORDS, JAW_NAME, STATE_WORDS
 from ..mirror import HandMirror
 
 NAMES: Final = tuple("scissor" if axis is Finger.SCISSOR else str(axis.name) for axis in Finger.ALL)
 COLORS: Final = ("#3b82f6", "#22a35a", "#e8890c", "#a855f7")
 """Colours of A, B, C and the scissor, for light and dark pages."""
+
+
+def axis_title(hand: HandMirror, index: int) -> str:
+    """The name of an axis, in the order of the model's."""
+    return JAW_NAME if len(hand.model.axes) == 1 else NAMES[index]
+
+
+def opening_words(hand: HandMirror) -> str:
+    """The opening of a jaw, and where the figure comes from; empty for a 3-Finger."""
+    status = hand.status
+    if status is None or len(status.model.axes) > 1:
+        return ""
+    return f"{status.opening_mm(JAW):.1f} mm ({status.stroke.source})"
 
 
 def state_words(hand: HandMirror, *, is_quiet: bool) -> tuple[str, str]:
