@@ -13,6 +13,10 @@ from robotiq_async import Finger
 from robotiq_async.tools.measure.campaigns import force_values
 from robotiq_async.tools.measure.plots import (
     LONGEST,
+    ROW,
+    ROWS,
+    _placed,
+    _right,
     plot_current_over_time,
     plot_peak_currents,
     plot_recording,
@@ -86,3 +90,30 @@ def test_a_part_is_drawn_with_the_times_of_the_whole(tmp_path: Path) -> None:
     assert "<!-- FIRST -->" not in text
     assert "<!-- SECOND -->" in text
     assert plot_recording(tmp_path / "none", recorded(), begin=1.5, end=3) == []
+
+
+def test_labels_take_as_many_rows_as_they_need_and_no_third_of_the_picture() -> None:
+    apart = _placed([(0.0, "READY", False), (5.0, "FAULT", True), (10.0, "READY", False)], 0.0, 10.0)
+    assert [each.row for each in apart] == [0, 0, 0]
+    assert apart[-1].left < 1, "the last one ends with the picture"
+    close = _placed([(each / 10, "X" * LONGEST, False) for each in range(20)], 0.0, 10.0)
+    assert {each.row for each in close} == set(range(ROWS))
+    assert ROW * ROWS / (ROW * ROWS + 6) < 0.15
+    whole = [each for each in close if not each.words.endswith("…")]
+    assert len(whole) == ROWS, "the last one of each row"
+    for row in range(ROWS):
+        inside = [each for each in close if each.row == row]
+        assert all(_right(one) <= other.left + 0.03 for one, other in pairwise(inside))
+
+
+def test_a_jaw_has_its_opening_beside_its_counts(tmp_path: Path) -> None:
+    axis = {"position": 6, "requested_position": 0, "current_ma": 0, "opening_mm": 84.2}
+    entries = [
+        Entry("/gripper/status", second * 10**9, 0, json.dumps({"A": axis}).encode(), is_json=True)
+        for second in range(3)
+    ]
+    _, picture = plot_recording(tmp_path / "it", entries)
+    assert {"jaw", "opening, mm"} <= set(words(picture))
+    assert "A" not in words(picture)
+    _, picture = plot_recording(tmp_path / "three", recorded())
+    assert "opening, mm" not in words(picture)

@@ -7,7 +7,7 @@ from array import array
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 try:
     import matplotlib as mpl
@@ -21,6 +21,7 @@ except ModuleNotFoundError as error:
 from ...runtime.log import printable
 from ...values.calibration.csv_tables import Table
 from ...values.calibration.scales import ForceCalibration, SpeedCalibration, mean, newton
+from ..wording import JAW_NAME
 from .campaigns import Currents, peak_currents
 
 if TYPE_CHECKING:
@@ -36,7 +37,9 @@ WIDTHS: Final = {"A": 4.2, "B": 2.6, "C": 1.1, "SCISSOR": 1.4}  # line widths in
 DRAWN: Final = ("position", "requested_position", "current_ma")
 LABEL: Final = 0.012  # width of a label, as a share of the picture's
 LONGEST: Final = 40  # characters of a label
-STRIP: Final = 0.075  # height of a character of a label, where that of the positions is 3
+LETTER: Final = 0.0092  # width of a character of a label, as a share of the picture's
+ROW: Final = 0.17  # height of a row of labels, where that of the positions is 3
+ROWS: Final = 6  # of labels, at most; where they do not suffice, labels are cut
 SHOWN_FORCES: Final = (0, 125, 250)  # force values whose currents are drawn over time, or the nearest to them
 
 Event = tuple[float, str, bool]  # when, what, and whether it is about a fault
@@ -146,6 +149,7 @@ def plot_recording(
     first: int | None = None
     events: list[Event] = []
     drawn = {axis: {what: array("h") for what in DRAWN} for axis in WIDTHS}
+    openings = array("d")  # of a jaw
 
     def take(status: dict[str, Any]) -> None:
         for axis, columns in drawn.items():
@@ -153,6 +157,8 @@ def plot_recording(
                 continue  # of a sibling of the 3-Finger, which has the one
             for what, column in columns.items():
                 column.append(status[axis][what])
+        if "B" not in status and "opening_mm" in status["A"]:
+            openings.append(status["A"]["opening_mm"])
 
     for entry in entries:
         first = entry.nanoseconds if first is None else first
@@ -167,16 +173,23 @@ def plot_recording(
     if not seconds:
         return []
     labels = list(_labels(events, apart=LABEL * (seconds[-1] - seconds[0])))
-    height = STRIP * max((len(words) for _, words, _ in labels), default=1)
-    with _figure(path, path.name, rows=3, ratios=(height, 3, 3)) as (axes, files):
-        strip, positions, currents = axes
+    placed = _placed(labels, seconds[0], seconds[-1])
+    height = ROW * max((each.row for each in placed), default=0) + ROW
+    panels = 3 if len(openings) == len(seconds) else 2
+    with _figure(path, path.name, rows=1 + panels, ratios=(height, *[3] * panels)) as (axes, files):
+        strip, positions, *others, currents = axes
+        for panel in others:
+            panel.plot(seconds, openings, color=COLOURS[0], lw=1.6)
+            panel.set_ylabel("opening, mm")
+            panel.set_ylim(bottom=0)
+        is_jaw = not drawn["B"]["position"]
         # Fingers that move together overlap: the first curve is the widest and shows at the sides.
         for (name, width), colour in zip(WIDTHS.items(), (*COLOURS, "0.5"), strict=True):
             line: Any = {"color": colour, "lw": width}
             dotted: Any = {"color": colour, "lw": 0.8, "ls": ":", "drawstyle": "steps"}
             if not drawn[name]["position"]:
                 continue
-            positions.plot(seconds, drawn[name]["position"], label=name, **line)
+            positions.plot(seconds, drawn[name]["position"], label=JAW_NAME if is_jaw else name, **line)
             positions.plot(seconds, drawn[name]["requested_position"], **dotted)
             currents.plot(seconds, drawn[name]["current_ma"], **line)
         positions.set_ylabel("position, counts\n(dotted: requested)")
@@ -185,20 +198,62 @@ def plot_recording(
         currents.set_ylabel("current, mA")
         currents.set_ylim(bottom=0)
         currents.set_xlabel("time, s")
-        _write_labels(strip, labels)
+        _write_labels(strip, placed, seconds[0], seconds[-1])
         for when, _, is_fault in labels:
-            for each in (positions, currents):
+            for each in (positions, *others, currents):
                 each.axvline(when, color=_colour(is_fault), lw=0.8, zorder=0)
     return files
 
 
-def _write_labels(strip: Axes, labels: Iterable[Event]) -> None:
+class Label(NamedTuple):
+    """A label in the strip above the curves.
+
+    Attributes:
+        at: when it happened, in seconds.
+        left: where the words begin, as a share of the width.
+        row: from the bottom, from 0.
+    """
+
+    at: float
+    left: float
+    row: int
+    words: str
+    is_fault: bool
+
+
+def _placed(labels: Iterable[Event], begin: float, end: float) -> list[Label]:
+    """Each label in the lowest row where it has room. Without any, the one before it in a row is cut."""
+    placed: list[Label] = []
+    last: dict[int, Label] = {}  # of each row
+    for at, words, is_fault in labels:
+        share = (at - begin) / (end - begin) if end > begin else 0.0
+        left = max(0.0, min(share, 1 - LETTER * len(words)))
+        row = next((n for n in range(ROWS) if n not in last or _right(last[n]) <= left), None)
+        if row is None:
+            row = min(last, key=lambda n: last[n].left)
+            cut = last[row]
+            room = max(1, int((left - cut.left) / LETTER) - 1)
+            placed[placed.index(cut)] = cut._replace(words=cut.words[:room].rstrip(", ") + "…")
+        last[row] = Label(at, left, row, words, is_fault)
+        placed.append(last[row])
+    return placed
+
+
+def _right(label: Label) -> float:
+    return label.left + LETTER * (len(label.words) + 1)
+
+
+def _write_labels(strip: Axes, labels: Iterable[Label], begin: float, end: float) -> None:
     strip.set_axis_off()
-    strip.set_ylim(0, 1)
-    style: Any = {"fontsize": 7, "rotation": 90, "va": "bottom", "ha": "center", "parse_math": False}
+    top = max((each.row for each in labels), default=0) + 1
+    strip.set_ylim(0, top)
+    style: Any = {"fontsize": 7, "va": "bottom", "ha": "left", "parse_math": False}
     style["in_layout"] = False  # labels do not make the curves smaller
-    for when, words, is_fault in labels:
-        strip.annotate(words, (when, 0), color=_colour(is_fault), **style)
+    for each in labels:
+        colour = _colour(each.is_fault)
+        strip.plot([each.at, each.at], [0, each.row + 0.1], color=colour, lw=0.8)
+        where = begin + each.left * (end - begin)
+        strip.annotate(each.words, (where, each.row + 0.1), color=colour, **style)
 
 
 def _colour(is_fault: bool) -> str:
@@ -243,7 +298,7 @@ def _figure(
     path: Path, title: str, rows: int = 1, ratios: tuple[float, ...] | None = None
 ) -> Iterator[tuple[list[Axes], list[Path]]]:
     """A figure with stacked axes, written at the end; the same data give the same bytes."""
-    height = 4.6 if rows == 1 else 6.4 + 1.0 * (rows > 2)
+    height = 4.6 if rows == 1 else 6.4 + 1.0 * (rows > 2) + 1.6 * (rows > 3)
     figure = Figure(figsize=(8, height), layout="constrained")
     FigureCanvasAgg(figure)
     grid = figure.subplots(rows, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": ratios})
