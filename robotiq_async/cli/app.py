@@ -16,6 +16,7 @@ from .commands.doctor import doctor
 from .commands.fleet import fleet, halt, keys
 from .commands.measure import speed
 from .commands.measure_force import force
+from .commands.measure_stroke import stroke
 from .commands.monitor import monitor, status
 from .commands.move import move
 from .commands.ports import ports
@@ -89,6 +90,7 @@ def _measure() -> App:
     app = _app("measure", "Measure what the values 0..255 mean on your own gripper. THE FINGERS MOVE.")
     _add(app, speed)
     _add(app, force)
+    _add(app, stroke)
     return app
 
 

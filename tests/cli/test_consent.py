@@ -13,6 +13,7 @@ import pytest
 from robotiq_async.cli.app import COMMANDS
 from robotiq_async.cli.commands.measure import speed
 from robotiq_async.cli.commands.measure_force import force
+from robotiq_async.cli.commands.measure_stroke import stroke
 from robotiq_async.cli.commands.verify import verify
 from robotiq_async.simulator import SimulatorServer
 from tests.cli.terminal import ROOT, Terminal
@@ -169,9 +170,9 @@ def test_nothing_is_asked_when_there_is_nothing_left_to_measure(
 
 
 def test_every_command_that_moves_takes_yes() -> None:
-    commands: list[Callable[..., object]] = [*COMMANDS, speed, force]
+    commands: list[Callable[..., object]] = [*COMMANDS, speed, force, stroke]
     moving = {each for each in commands if "FINGERS MOVE" in (each.__doc__ or "")}
-    assert {each.__name__ for each in moving} == {"demo", "move", "speed", "force", "verify"}
+    assert {each.__name__ for each in moving} == {"demo", "move", "speed", "force", "stroke", "verify"}
     # verify asks before each stage that moves, and takes no consent to one beforehand.
     assert {each for each in commands if "yes" in inspect.signature(each).parameters} == moving - {verify}
 

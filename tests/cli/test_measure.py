@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from robotiq_async import JAW, TWO_FINGER_85
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.measure.campaigns import read_currents
-from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, read_table, thesis_table
+from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, read_stroke, read_table, thesis_table
 from tests.cli.conftest import served
 from tests.grippers import until
 
@@ -86,6 +87,67 @@ async def test_the_scale_is_read_by_a_person(
     assert outcome.out.count("An integer in 0..100000, please.") == 3
     assert "Force 250, run 1: what does the scale show, in grams?" in outcome.out
     assert read_table(tmp_path / "f.csv", FORCE) == {0: (1500,), 250: (2500,)}
+
+
+@pytest.mark.usefixtures("virtually")
+def test_stroke_writes_the_points_of_a_jaw(call: Call, tmp_path: Path) -> None:
+    file = tmp_path / "stroke.csv"
+    arguments = ("measure", "stroke", "sim://?model=2f85", "--output", str(file))
+    outcome = call(*arguments, "--points", "3")
+    outcome.assert_succeeded()
+    assert outcome.out.splitlines()[-1] == str(file)
+    points = read_stroke(file)
+    assert len(points) == 3
+    assert [mm for _, mm in points] == [TWO_FINGER_85.stroke.opening_mm(position) for position, _ in points]
+    call(*arguments).assert_failed(2, "exists: choose another --output, or pass --overwrite")
+    call(*arguments, "--overwrite").assert_succeeded()
+    assert len(read_stroke(file)) == 5
+    call("status", "sim://?model=2f85", "--stroke", str(file)).assert_succeeded()
+
+
+async def test_stroke_asks_for_figures_that_fall_until_the_fingertips_meet(
+    shell: Shell, tmp_path: Path
+) -> None:
+    """Fingertips of one's own meet before the end of the gripper: the contact is the closed end."""
+    gripper = SimulatedGripper(speedup=20, model="2f85")
+    gripper.place_object(JAW, position=180)
+    async with SimulatorServer(gripper) as server:
+        file = tmp_path / "s.csv"
+        process = await shell.start(
+            *("measure", "stroke", "--yes", server.address, "--output", str(file), "--points", "3"),
+            stdin=PIPE,
+        )
+        assert process.stdin is not None
+        process.stdin.write(b"wide\n101.25\n101.3\n52\n0\n")
+        outcome = await shell.finish(process)
+    outcome.assert_succeeded()
+    assert outcome.out.count("Millimetres with at most two decimals, such as 42.5, please.") == 1
+    assert outcome.out.count("Less than the 101.25 mm before, please") == 1
+    assert "The fingertips met at" in outcome.out
+    points = read_stroke(file)
+    assert [mm for _, mm in points] == [101.25, 52, 0]
+    assert abs(points[-1][0] - 180) <= 5
+    assert gripper.writes[-1].registers[0] & 0x0800 == 0, "the jaw is stopped at the end"
+
+
+def test_stroke_needs_a_yes_without_a_terminal(call: Call, tmp_path: Path) -> None:
+    address = "tcp://127.0.0.1:1?model=2f85"
+    outcome = call("measure", "stroke", address, "--output", str(tmp_path / "s.csv"), stdin=b"y\n")
+    outcome.assert_failed(2, "--yes", "127.0.0.1:1")
+
+
+async def test_stroke_without_an_answer_writes_nothing(shell: Shell, tmp_path: Path) -> None:
+    gripper = SimulatedGripper(speedup=20, model="2f85")
+    async with SimulatorServer(gripper) as server:
+        file = tmp_path / "s.csv"
+        process = await shell.start(
+            "measure", "stroke", "--yes", server.address, "--output", str(file), stdin=PIPE
+        )
+        assert process.stdin is not None
+        process.stdin.write(b"85\n")
+        process.stdin.close()
+        (await shell.finish(process)).assert_failed(1, "no answer: the input ended")
+    assert not file.exists()
 
 
 async def test_ctrl_c_keeps_the_rows_and_stops_the_fingers(shell: Shell, tmp_path: Path) -> None:

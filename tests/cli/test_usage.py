@@ -18,6 +18,7 @@ from robotiq_async.cli.app import COMMANDS as FUNCTIONS
 from robotiq_async.cli.commands.fleet import fleet, halt, keys
 from robotiq_async.cli.commands.measure import speed
 from robotiq_async.cli.commands.measure_force import force
+from robotiq_async.cli.commands.measure_stroke import stroke
 from robotiq_async.simulator import SimulatorServer
 from tests.cli.conftest import WITHOUT
 
@@ -31,8 +32,9 @@ EVERY = {each.__name__: each for each in FUNCTIONS} | {
     "fleet keys": keys,
     "measure speed": speed,
     "measure force": force,
+    "measure stroke": stroke,
 }
-MOVE = {"demo", "move", "measure speed", "measure force"}
+MOVE = {"demo", "move", "measure speed", "measure force", "measure stroke"}
 SIMULATED = "Simulated gripper sim://"
 
 
@@ -140,6 +142,8 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
         ("measure speed 192.168.1.11 --speedup 2", ["--speedup is for sim:// only"]),
         ("measure speed sim://?speedup=2", ["takes no option but ?model=; there is --speedup"]),
         ("measure speed sim:// --output mine.png", ["--output must be a file named .csv, got 'mine.png'"]),
+        ("measure stroke sim://", ["between the fingertips of a jaw; sim:// names a 3-Finger"]),
+        ("measure stroke sim://?model=2f85 --points 1", ["--points must be an integer in 2..50, got 1"]),
         ("measure speed sim:// --fingers scissor", ["--fingers takes A, B and C only"]),
         ("measure force", ["ADDRESS"]),
         ("measure force sim://?model=2f85", ["with three fingers; sim://?model=2f85 names a 2F-85"]),

@@ -1,4 +1,4 @@
-"""``robotiq-async measure speed``, and what it shares with ``measure force``."""
+"""``robotiq-async measure speed``, and what it shares with the others of ``measure``."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ def check(address: str, output: Path, speedup: float | None, runs: int, step: in
 
 
 @asynccontextmanager
-async def _gripper(
-    address: str, speedup: float, prepare: Callable[[SimulatedGripper], None]
+async def gripper_to_measure(
+    address: str, speedup: float, prepare: Callable[[SimulatedGripper], None] = lambda _: None
 ) -> AsyncIterator[Hand]:
     """An active hand; sim:// runs in its own, faster time."""
     from ..connect import make_hand
@@ -101,7 +101,7 @@ async def measure_left(
     print(gripper_words(address), flush=True)
     import rich.progress  # noqa: F401  # now: that takes 0.1 s, in which a hand could not poll
 
-    async with _gripper(address, speedup, prepare) as hand:
+    async with gripper_to_measure(address, speedup, prepare) as hand:
         await _carry_out(hand, campaign, measure_run, seconds_of, what, bar=bar)
 
 

@@ -175,13 +175,13 @@ def _scale(
 
 async def _typed(value: int, run: int) -> int:
     while True:
-        text = await _prompt(f"Force {value}, run {run}: what does the scale show, in grams?")
+        text = await prompt(f"Force {value}, run {run}: what does the scale show, in grams?")
         if re.fullmatch("[0-9]{1,6}", text) and int(text) <= MOST_GRAMS:
             return int(text)
         print(f"An integer in 0..{MOST_GRAMS}, please.")
 
 
-async def _prompt(question: str) -> str:
+async def prompt(question: str) -> str:
     """A line that the user types; the event loop keeps running."""
     print(question, end=" ", flush=True)
     line = await in_a_thread(read_line)

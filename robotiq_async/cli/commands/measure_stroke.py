@@ -1,0 +1,140 @@
+"""``robotiq-async measure stroke``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Awaitable, Callable, Coroutine
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+from cyclopts import Parameter
+
+from ...link.address import is_remote
+from ..addresses import gripper_words, is_simulated, named_model
+from ..arguments import Address, Flag, Yes
+from ..consent import consent
+from ..failures import CommandError, UsageError
+from .measure import check, gripper_to_measure, table_errors
+from .measure_force import prompt
+
+if TYPE_CHECKING:
+    from ...hand import Hand
+    from ...values.stroke import Points
+
+WARNING: Final = """the jaw MOVES to {count} positions, from open to closed, at its least force, and waits at
+each for the figure of a calliper. Nothing but the calliper may be between the fingertips; take it out before
+you answer. If the gripper is not active yet the jaw opens and closes first, and what it holds drops."""
+QUESTION: Final = "At {position} counts: what does the calliper show between the fingertips, in mm?"
+MET: Final = """The fingertips met at {position} counts: that is the closed end. If they met something else,
+press Ctrl-C, take it out and begin again."""
+FORM: Final = r"[0-9]{1,3}(?:\.[0-9]{1,2})?"
+
+Calliper = Callable[[int], Awaitable[float]]  # takes the position, in counts
+
+
+def stroke(
+    address: Address,
+    /,
+    *,
+    output: Annotated[Path, Parameter(metavar="FILE.csv")] = Path("stroke.csv"),
+    points: Annotated[int, Parameter(metavar="N")] = 5,
+    overwrite: Annotated[Flag, Parameter(help="Replace an existing file.")] = False,
+    yes: Yes = False,
+) -> Coroutine[None, None, None]:
+    """Measure the opening of a jaw at some positions, with a calliper. THE FINGERS MOVE.
+
+    It goes to each position, from open to closed, and asks what a calliper shows
+    between the fingertips. The file has the reading of each position and the figure,
+    and is the option stroke of a hand: millimetres then follow this gripper and its
+    fingertips. Between two points the nominal shape is stretched, so that two points,
+    open and closed, will do for fingertips of your own. At sim:// a simulated calliper
+    answers. Unless the gripper is that of sim:// it asks first; without a terminal it
+    needs --yes.
+
+    For example:
+
+        robotiq-async measure stroke 'sim://?model=2f85'
+        robotiq-async measure stroke 'rtu:///dev/ttyUSB0?model=2f85' --output left.csv
+        robotiq-async status 'rtu:///dev/ttyUSB0?model=2f85' --stroke left.csv
+
+    Args:
+        output: The file; it is written when all points are there.
+        points: Number of positions, 2..50.
+        yes: Do not ask.
+    """
+    if not 2 <= points <= 50:
+        raise UsageError(f"--points must be an integer in 2..50, got {points}")
+    check(address, output, None, runs=1, step=1, plot=False)
+    if output.exists() and not overwrite:
+        raise UsageError(f"{output} exists: choose another --output, or pass --overwrite")
+    if len(named_model(address).axes) > 1 and not is_remote(address):
+        raise UsageError(f"a width is measured between the fingertips of a jaw; {address} names a 3-Finger")
+    consent(address, WARNING.format(count=points), yes=yes)
+    return _measure(address, output, points)
+
+
+async def _measure(address: str, output: Path, count: int) -> None:
+    from ...values.calibration.csv_tables import write_stroke
+
+    print(gripper_words(address), flush=True)
+    async with gripper_to_measure(address, 1.0) as hand:
+        points = await measured(hand, count, _calliper(address, hand))
+    with table_errors():
+        write_stroke(output, points)
+    print(output)
+
+
+async def measured(hand: Hand, count: int, calliper: Calliper) -> Points:
+    """The points of a jaw, from open to closed; the calliper is read at each.
+
+    Fingertips of one's own may meet before the gripper's end: a contact is the closed end.
+
+    Raises:
+        CommandError: the jaw does not open, did not move on, or the gripper has more than one axis.
+        RobotiqError: as :meth:`Hand.move`.
+    """
+    if len(hand.model.axes) > 1:
+        raise CommandError("a width is measured between the fingertips of a jaw; this is a 3-Finger")
+    points: list[tuple[int, float]] = []
+    for number in range(count):
+        result = await hand.move(round(255 * number / (count - 1)), force=0)
+        (position,) = result.positions.values()
+        has_met = result.object_detected
+        if has_met and not number:
+            raise CommandError(f"something blocks the opening at {position} counts")
+        if has_met:
+            print(MET.format(position=position), flush=True)
+        if points and position <= points[-1][0]:
+            raise CommandError(f"the jaw did not move on from {position} counts: ask for fewer --points")
+        points.append((position, await _falling(calliper, position, points)))
+        if has_met:
+            break
+    return tuple(points)
+
+
+async def _falling(calliper: Calliper, position: int, before: Points | list[tuple[int, float]]) -> float:
+    while True:
+        mm = await calliper(position)
+        if not before or mm < before[-1][1]:
+            return mm
+        print(f"Less than the {before[-1][1]:g} mm before, please: the jaw has closed further.", flush=True)
+
+
+def _calliper(address: str, hand: Hand) -> Calliper:
+    if not is_simulated(address):
+        return _typed
+
+    async def simulated(position: int) -> float:
+        mm = hand.model.stroke.opening_mm(position)
+        print(f"{position} counts: the simulated calliper shows {mm:g} mm", flush=True)
+        return mm
+
+    return simulated
+
+
+async def _typed(position: int) -> float:
+    while True:
+        text = await prompt(QUESTION.format(position=position))
+        if re.fullmatch(FORM, text):
+            return float(text)
+        print("Millimetres with at most two decimals, such as 42.5, please.", flush=True)
