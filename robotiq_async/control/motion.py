@@ -84,9 +84,7 @@ class Move:
         fail([self._waiter], error)
 
     def _result(self, status: RobotiqStatus) -> MoveResult:
-        reached = (
-            axis for axis in self._peak if status.model.has_reached(self.position, status.position(axis))
-        )
+        reached = (axis for axis in self._peak if status.has_reached(axis, self.position))
         return MoveResult(
             outcomes={axis: status.finger_status(axis) for axis in self._peak},
             positions={axis: status.position(axis) for axis in self._peak},

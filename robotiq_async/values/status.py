@@ -10,7 +10,7 @@ from typing import Any, Final
 from . import registers as reg
 from .checks import check_int, check_seconds
 from .enums import Fault, Finger, Initialization, Mode, ObjectStatus
-from .model import THREE_FINGER, Model
+from .model import THREE_FINGER, TOLERANCE, Model
 from .stroke import Stroke
 
 NO_REQUEST: Final = "NO_REQUEST"
@@ -167,6 +167,23 @@ class RobotiqStatus:
             TypeError, ValueError: as :meth:`opening_mm`.
         """
         return self._stroke.fractions[self._finger_position(finger)]
+
+    def has_reached(self, finger: Finger | int, request: int) -> bool:
+        """Whether an axis is within 2 counts of a request, or at the end of its stroke for one beyond it.
+
+        The end is that of the model, or of the points that were measured on this gripper.
+
+        Raises:
+            TypeError, ValueError: as :meth:`position`.
+        """
+        position, own = self.position(finger), self._stroke
+        if self._model.has_reached(request, position):
+            return True
+        if not own.points or finger == Finger.SCISSOR:
+            return False
+        return (request <= own.open_reading and position <= own.open_reading + TOLERANCE) or (
+            request >= own.closed_reading and position >= own.closed_reading - TOLERANCE
+        )
 
     def _finger_position(self, finger: Finger | int) -> int:
         position = self.position(finger)

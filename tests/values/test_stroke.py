@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import pickle
 import re
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from robotiq_async import (
     Units,
 )
 from robotiq_async.fleet.agent.agent_file import AgentFileError, read_agent_file
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.calibration import SpeedCalibration
 from robotiq_async.values.calibration.csv_tables import TableError, read_stroke, write_stroke
 from robotiq_async.values.model import MODELS
@@ -256,6 +258,35 @@ def test_a_status_has_the_opening_and_the_fraction_of_a_finger() -> None:
             read(Finger.SCISSOR)
         with pytest.raises(ValueError, match=r"finger must be one of"):
             read(Finger.ABC)
+
+
+def test_the_ends_of_a_gripper_are_those_that_were_measured() -> None:
+    """Fingertips of one's own that meet at 213: closed is there, and 210 asked for is not."""
+    own = TWO_FINGER_85.stroke.measured(OWN)
+    for position, request, reached in (
+        (213, 255, True),
+        (211, 213, True),
+        (210, 255, False),
+        (213, 200, False),
+        (14, 0, True),
+        (16, 0, False),
+        (14, 13, True),
+    ):
+        assert of_jaw(0xF9, position, stroke=own).has_reached(JAW, request) is reached, (position, request)
+    assert not of_jaw(0xF9, 213).has_reached(JAW, 255)
+
+
+async def test_a_move_to_a_measured_end_has_reached_it(caplog: pytest.LogCaptureFixture) -> None:
+    model = replace(TWO_FINGER_85, stroke=replace(TWO_FINGER_85.stroke, open_reading=13, closed_reading=213))
+    gripper = SimulatedGripper(speedup=20, model=model)
+    async with (
+        SimulatorServer(gripper) as server,
+        RobotiqHand(server.address, model="2f85", stroke=OWN) as hand,
+    ):
+        result = await hand.close()
+        assert result.reached == JAW
+        assert result.opening_mm == pytest.approx(2, abs=1.5)
+    assert "at position" not in caplog.text
 
 
 def test_a_part_is_held_while_the_gripper_reports_a_closing_contact() -> None:
