@@ -67,7 +67,7 @@ from .values.grip import GraspResult, GripChange, GripEvent
 from .values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
 from .values.move_result import MoveResult
 from .values.statistics import Statistics
-from .values.status import RobotiqStatus
+from .values.status import Part, RobotiqStatus
 
 __all__ = [
     "CLOSED",
@@ -103,6 +103,7 @@ __all__ = [
     "NotActivatedError",
     "NotStartedError",
     "ObjectStatus",
+    "Part",
     "ProtocolError",
     "ReconnectPolicy",
     "ResponseTimeoutError",

@@ -33,6 +33,7 @@ EXTRAS = {
     "Stream": "type of RobotiqHand.statuses() and .transitions()",
     "Units": "type of RobotiqHand.units",
     "GraspResult": "what RobotiqHand.grasp() gives",
+    "Part": "type of RobotiqHand.part",
     "GripEvent": "what RobotiqHand.grip_events() gives",
     "GripChange": "type of GripEvent.change",
     "SentRequest": "what RobotiqHand.requests() gives",

@@ -13,6 +13,7 @@ from textual.pilot import Pilot
 from textual.widgets import RichLog, Static
 
 from robotiq_async import (
+    JAW,
     Fault,
     Finger,
     GripperFaultError,
@@ -408,6 +409,18 @@ async def test_quitting_in_a_motion_holds_it(key: str, closing: tuple[RobotiqHan
     await until(pilot, lambda: not pilot.app.is_running)
     status = await shows(hand, lambda status: not status.is_moving)
     assert status.position(Finger.A) < 200
+
+
+def test_a_jaw_is_called_so_and_has_its_opening() -> None:
+    panel = Axes(TWO_FINGER_85)
+    own = TWO_FINGER_85.stroke.measured(((3, 60.0), (228, 10.0)))
+    for stroke, source, opening in ((None, "nominal", "46.2 mm"), (own, "measured", "37.2 mm")):
+        status = RobotiqStatus((0xF900, 255, 113 << 8, 0, 0, 0, 0, 0), model=TWO_FINGER_85, stroke=stroke)
+        panel.show(status, {JAW: 30})
+        head, line = panel.render().plain.split("\n")
+        assert line.startswith("jaw ")
+        assert opening in line
+        assert head.index(source) + len(source) <= line.index(opening) + len(opening)
 
 
 # -- pictures of numbers -----------------------------------------------------------------------------------

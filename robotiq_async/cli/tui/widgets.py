@@ -95,8 +95,8 @@ class Axes(Widget):
         fixed = FIXED + OPENING * self._is_jaw
         bar = max((self.size.width - fixed) // 2, 8)
         where, current = (f"{words:{bar}.{bar}}" for words in ("is █, asked ▼", "current, 5 s"))
-        opening = f"{self._status.stroke.source:>8.8} " if self._is_jaw else ""
-        head = Text(f"axis     {where}   counts   {opening}{'':15} {current}      now", "dim")
+        opening = f"{self._status.stroke.source:>8} " if self._is_jaw else " "
+        head = Text(f"axis     {where}   counts  {opening}{'':15} {current}      now", "dim")
         lines = [head, *(self._line(axis, bar) for axis in self._status.model.axes)]
         text = Text("\n", no_wrap=True, overflow="crop").join(lines)
         if self._stale:
