@@ -106,8 +106,9 @@ class RobotiqHand(Hand):
         force_calibration: what :attr:`units` labels force values with. None for the manual's figures.
         stroke: points that were measured on this gripper, from open to closed: two or more pairs of a
             position in counts and an opening in millimetres, or the path of a file that
-            ``robotiq-async measure stroke`` wrote. Millimetres and fractions of this hand, and of its
-            statuses and results, follow them. None for the nominal openings of the model.
+            ``robotiq-async measure stroke`` wrote, which is read when the hand is made. Millimetres and
+            fractions of this hand, and of its statuses and results, follow them. None for the nominal
+            openings of the model.
         keep_grip: what :meth:`stop` does by default, and leaving the block does always: False stops the
             fingers for certain (rGTO = 0), True holds axes that move and keeps a grip in force. A gripper
             that is not polled afterwards may lose its activation, and with it the grip.

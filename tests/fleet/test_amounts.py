@@ -9,6 +9,7 @@ import pytest
 from robotiq_async import JAW, TWO_FINGER_85
 from robotiq_async.fleet.remote.mirror import Mirror
 from robotiq_async.fleet.wire.values import reading
+from robotiq_async.runtime.clock import now
 from robotiq_async.runtime.log import log
 from robotiq_async.session.streams import Channels
 from robotiq_async.values.errors import ProtocolError
@@ -21,6 +22,10 @@ POINTS = ((13, 100.0), (213, 2.0))
 @virtual
 async def test_the_points_of_the_agents_hand_are_those_of_the_client() -> None:
     async with lab(model=TWO_FINGER_85, stroke=POINTS) as here, here.client("client") as hand:
+        assert hand.units.stroke == here.local.units.stroke
+        assert hand._session is not None
+        hand._session.mirror.points = ()
+        assert await hand._session._ask_info(now() + 1), "an answer tells them, without a summary"
         assert hand.units.stroke == here.local.units.stroke
         result = await hand.move(mm=40)
         assert here.gripper.writes[-1].registers[1] & 0xFF == hand.units.position(mm=40)

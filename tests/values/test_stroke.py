@@ -25,8 +25,11 @@ from robotiq_async import (
     RobotiqStatus,
     Units,
 )
+from robotiq_async.control.evidence import without_fault
 from robotiq_async.fleet.agent.agent_file import AgentFileError, read_agent_file
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.tools.web.page.mirror import HandMirror
+from robotiq_async.tools.web.server import HandUpdates
 from robotiq_async.values.calibration import SpeedCalibration
 from robotiq_async.values.calibration.csv_tables import TableError, read_stroke, write_stroke
 from robotiq_async.values.model import MODELS
@@ -260,6 +263,11 @@ def test_a_status_has_the_opening_and_the_fraction_of_a_finger() -> None:
             read(Finger.ABC)
 
 
+def test_a_status_whose_fault_is_passed_over_keeps_its_points() -> None:
+    own = TWO_FINGER_85.stroke.measured(OWN)
+    assert without_fault(of_jaw(0xF9, 113, fault=0x09, stroke=own)).stroke == own
+
+
 def test_the_ends_of_a_gripper_are_those_that_were_measured() -> None:
     """Fingertips of one's own that meet at 213: closed is there, and 210 asked for is not."""
     own = TWO_FINGER_85.stroke.measured(OWN)
@@ -283,6 +291,10 @@ async def test_a_move_to_a_measured_end_has_reached_it(caplog: pytest.LogCapture
         SimulatorServer(gripper) as server,
         RobotiqHand(server.address, model="2f85", stroke=OWN) as hand,
     ):
+        page = HandMirror(0, hand.address)
+        page.hear(HandUpdates(hand).take(0))
+        assert page.status is not None
+        assert page.status.stroke == hand.status.stroke == hand.units.stroke, "another process shows it"
         result = await hand.close()
         assert result.reached == JAW
         assert result.opening_mm == pytest.approx(2, abs=1.5)
