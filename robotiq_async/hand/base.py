@@ -275,9 +275,9 @@ class Hand(Kind):
         timeout: float | None = None,
     ) -> MoveResult:
         """Open fingers: :meth:`move` to 0. Returns and raises what it does."""
-        axes, units = self.model.mask(fingers), self.units
-        speed, force = speed_of(units, speed, mm_per_s), force_of(units, force, label_n)
-        return await self.move(OPEN, axes, speed=speed, force=force, timeout=timeout)
+        return await self.move(
+            OPEN, fingers, speed=speed, mm_per_s=mm_per_s, force=force, label_n=label_n, timeout=timeout
+        )
 
     async def close(
         self,
@@ -290,9 +290,9 @@ class Hand(Kind):
         timeout: float | None = None,
     ) -> MoveResult:
         """Close the fingers, not the connection (that is :meth:`stop`): :meth:`move` to 255."""
-        axes, units = self.model.mask(fingers), self.units
-        speed, force = speed_of(units, speed, mm_per_s), force_of(units, force, label_n)
-        return await self.move(CLOSED, axes, speed=speed, force=force, timeout=timeout)
+        return await self.move(
+            CLOSED, fingers, speed=speed, mm_per_s=mm_per_s, force=force, label_n=label_n, timeout=timeout
+        )
 
     async def grasp(
         self,
@@ -317,9 +317,10 @@ class Hand(Kind):
         """
         axes = self.model.mask(fingers)
         contacts = check_at_least(at_least, axes)
-        units = self.units
-        speed, force = speed_of(units, speed, mm_per_s), force_of(units, force, label_n)
-        return GraspResult(await self.close(axes, speed=speed, force=force, timeout=timeout), contacts)
+        move = await self.close(
+            axes, speed=speed, mm_per_s=mm_per_s, force=force, label_n=label_n, timeout=timeout
+        )
+        return GraspResult(move, contacts)
 
     async def hold(self, fingers: Finger | int = Finger.ALL) -> None:
         """Hold axes that move where they are; returns when the gripper has acknowledged it.
