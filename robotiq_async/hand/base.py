@@ -10,6 +10,7 @@ from ..runtime.concurrency import running_loop
 from ..session.options import LONGEST_WAIT_S
 from ..session.streams import Stream, check_buffer, check_limit
 from ..session.waiting import check_states
+from ..values.amounts import force_of, needed, position_of, speed_of
 from ..values.calibration import Units
 from ..values.checks import check_flag, check_optional_byte, check_seconds, check_timeout
 from ..values.enums import CLOSED, OPEN, Finger, State
@@ -20,7 +21,6 @@ from ..values.model import Model
 from ..values.move_result import MoveResult
 from ..values.statistics import Statistics
 from ..values.status import Part, RobotiqStatus
-from .amounts import force_of, needed, position_of, speed_of
 from .grip_watch import SLIP_COUNTS, GripWatch
 from .kind import Kind
 from .run import refuse_with

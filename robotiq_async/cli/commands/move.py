@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from ...hand.amounts import force_of, position_of, speed_of
 from ...tools.wording import axis_name
+from ...values.amounts import force_of, position_of, speed_of
 from ...values.calibration import Units
 from ...values.checks import check_timeout
 from ...values.enums import Finger

@@ -7,9 +7,9 @@ process and to other hosts, are counts alone.
 
 from __future__ import annotations
 
-from ..values.calibration import Units
-from ..values.checks import check_optional_byte, repr_of
-from ..values.enums import Finger
+from .calibration import Units
+from .checks import check_optional_byte, repr_of
+from .enums import Finger
 
 
 def position_of(
