@@ -15,6 +15,7 @@ from robotiq_async.fleet.agent.agent_file import (
 )
 from robotiq_async.fleet.network.configuration import LOOPBACK, LOOPBACK_TLS, agent_configuration
 from robotiq_async.fleet.wire.names import check_name
+from robotiq_async.values.calibration.csv_tables import write_stroke
 
 LEFT = '[grippers.left]\naddress = "tcp://192.168.1.11"\n'
 GOOD = f'site = "lab"\nhost = "cell-1"\n{LEFT}'
@@ -105,6 +106,16 @@ def test_two_grippers_on_one_serial_line(tmp_path: Path) -> None:
     assert len(read(tmp_path, f"{site}{left}device_id = 9\n{right}device_id = 12\n").grippers) == 2
     with pytest.raises(AgentFileError, match="give each of the grippers its device_id"):
         read(tmp_path, f"{site}{left}device_id = 9\n{right}")
+
+
+def test_the_opening_of_a_jaw_is_points_or_a_file_beside_it(tmp_path: Path) -> None:
+    own = ((13, 100.0), (213, 2.0))
+    write_stroke(tmp_path / "left.csv", own)
+    jaw = 'site = "lab"\n[grippers.left]\naddress = "sim://?model=2f85"\nstroke = '
+    for value in ('"left.csv"', "[[13, 100], [213, 2.0]]"):
+        assert read(tmp_path, jaw + value).grippers["left"].units.stroke.points == own
+    with pytest.raises(AgentFileError, match=r"line 4, in \[grippers.left\]: stroke: positions must rise"):
+        read(tmp_path, f"{jaw}[[13, 100], [5, 2.0]]")
 
 
 @pytest.mark.parametrize(
