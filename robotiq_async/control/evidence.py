@@ -167,4 +167,6 @@ def without_fault(status: RobotiqStatus) -> RobotiqStatus:
     """The same status, with gFLT = 0."""
     words = list(status.registers)
     reg.gFLT.write(words, 0)
-    return RobotiqStatus(tuple(words), status.timestamp, status.sequence, status.model, status.stroke)
+    return RobotiqStatus(
+        tuple(words), status.timestamp, status.sequence, status.model, status.stroke, status.has_current
+    )

@@ -56,7 +56,7 @@ class Move:
     def note_currents(self, status: RobotiqStatus) -> None:
         """Take in the currents of a status read after the write."""
         for axis, peak in self._peak.items():
-            self._peak[axis] = max(peak, status.current_ma(axis))
+            self._peak[axis] = max(peak, status.current_ma(axis) or 0)
 
     def is_under(self, status: RobotiqStatus, limited: Mapping[Finger, int]) -> bool:
         """Whether a status echoes the target for every axis of the move, or the limit in place of it."""
@@ -91,7 +91,7 @@ class Move:
             contacts=status.contacts & self.axes,
             reached=reduce(or_, reached, NO_AXES),
             duration=status.timestamp - self._started,
-            peak_current_ma=self._peak,
+            peak_current_ma={axis: peak if status.has_current else None for axis, peak in self._peak.items()},
             status=status,
         )
 

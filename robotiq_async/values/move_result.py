@@ -8,7 +8,7 @@ from typing import Any
 
 from .enums import JAW, Finger, ObjectStatus, names_of
 from .frozen_mapping import FrozenMapping
-from .status import RobotiqStatus
+from .status import RobotiqStatus, milliampere
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -24,7 +24,8 @@ class MoveResult:
         reached: the addressed axes that end within 2 counts of the target, or at the end of the stroke for a
             target beyond it. An axis whose fingertips end elsewhere is at position, and not in here.
         duration: seconds from the call to the status that ended the move.
-        peak_current_ma: highest motor current seen of each addressed axis, in milliamperes.
+        peak_current_ma: highest motor current seen of each addressed axis, in milliamperes; None where the
+            link does not tell it.
         status: the status that ended the move.
     """
 
@@ -33,7 +34,7 @@ class MoveResult:
     contacts: Finger
     reached: Finger
     duration: float
-    peak_current_ma: Mapping[Finger, int]
+    peak_current_ma: Mapping[Finger, int | None]
     status: RobotiqStatus
 
     def __post_init__(self) -> None:
@@ -59,7 +60,7 @@ class MoveResult:
         """The result in types that JSON and pandas accept; enumerations and masks as in a status.
 
         The key of each axis holds its ``outcome``, ``position``, ``reached`` and ``peak_current_ma``. What is
-        None is left out.
+        None is left out: openings, and the current where the link does not tell it.
         """
         return {
             "duration": self.duration,
@@ -71,7 +72,7 @@ class MoveResult:
                     "outcome": self.outcomes[axis].name,
                     "position": self.positions[axis],
                     "reached": axis in self.reached,
-                    "peak_current_ma": self.peak_current_ma[axis],
+                    **({} if (peak := self.peak_current_ma[axis]) is None else {"peak_current_ma": peak}),
                 }
                 for axis in self.outcomes
             },
@@ -80,7 +81,7 @@ class MoveResult:
 
     def __repr__(self) -> str:
         axes = ", ".join(
-            f"{axis}={self.positions.get(axis)} {how.name} {self.peak_current_ma.get(axis)}mA"
+            f"{axis}={self.positions.get(axis)} {how.name}{milliampere(self.peak_current_ma.get(axis))}"
             for axis, how in self.outcomes.items()
         )
         return f"<MoveResult {axes} in {self.duration:.3f} s>"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from . import registers as reg
-from .checks import check_int, check_seconds
+from .checks import check_flag, check_int, check_seconds
 from .enums import Fault, Finger, Initialization, Mode, ObjectStatus
 from .model import THREE_FINGER, TOLERANCE, Model
 from .stroke import Stroke
@@ -47,14 +47,16 @@ class RobotiqStatus:
         sequence: counts every poll of a hand, from 0.
         model: of the gripper.
         stroke: what its positions mean as openings; by default the model's.
+        has_current: whether the link tells the motor currents.
     """
 
-    __slots__ = ("_model", "_registers", "_sequence", "_stroke", "_timestamp")
+    __slots__ = ("_has_current", "_model", "_registers", "_sequence", "_stroke", "_timestamp")
     _registers: reg.Registers
     _timestamp: float
     _sequence: int
     _model: Model
     _stroke: Stroke
+    _has_current: bool
 
     # The hand makes one of these 200 times a second: it keeps the registers and nothing else.
     def __init__(
@@ -64,6 +66,7 @@ class RobotiqStatus:
         sequence: int = 0,
         model: Model = THREE_FINGER,
         stroke: Stroke | None = None,
+        has_current: bool = True,
     ) -> None:
         if hasattr(self, "_sequence"):
             raise AttributeError("RobotiqStatus is immutable: it is made once")
@@ -72,6 +75,7 @@ class RobotiqStatus:
         _set(self, "_sequence", sequence)
         _set(self, "_model", model)
         _set(self, "_stroke", model.stroke if stroke is None else stroke)
+        _set(self, "_has_current", has_current)
 
     @classmethod
     def from_registers(
@@ -82,17 +86,26 @@ class RobotiqStatus:
         sequence: int = 0,
         model: Model = THREE_FINGER,
         stroke: Stroke | None = None,
+        has_current: bool = True,
     ) -> RobotiqStatus:
         """A status from eight registers.
 
         Raises:
-            TypeError: a register or the sequence is not an int, or the timestamp not a number.
+            TypeError: a register or the sequence is not an int, the timestamp not a number, or has_current
+                not a bool.
             ValueError: not eight registers, or one outside 0..65535; a timestamp that is not finite, or a
                 sequence below 0.
         """
         at = check_seconds("timestamp", timestamp, -sys.float_info.max, sys.float_info.max)
         number = check_int("sequence", sequence, 0, sys.maxsize)
-        return cls(reg.check_registers(registers), at, number, model, stroke)
+        return cls(
+            reg.check_registers(registers),
+            at,
+            number,
+            model,
+            stroke,
+            check_flag("has_current", has_current),
+        )
 
     @property
     def registers(self) -> reg.Registers:
@@ -118,6 +131,11 @@ class RobotiqStatus:
     def stroke(self) -> Stroke:
         """What positions of the gripper mean as openings: of its model, or from points measured on it."""
         return self._stroke
+
+    @property
+    def has_current(self) -> bool:
+        """Whether the link tells the motor currents. A URCap's text port does not."""
+        return self._has_current
 
     # One axis. Each takes one Finger member; several, or one that the model lacks, is a ValueError.
 
@@ -197,13 +215,15 @@ class RobotiqStatus:
         """Echo of the position request, 0..255 (gPR)."""
         return reg.gPR[self._model.index(finger)].read(self._registers)
 
-    def current(self, finger: Finger | int) -> int:
-        """Motor current in counts, 0..255 (gCU)."""
-        return reg.gCU[self._model.index(finger)].read(self._registers)
+    def current(self, finger: Finger | int) -> int | None:
+        """Motor current in counts, 0..255 (gCU); None where the link does not tell it."""
+        index = self._model.index(finger)
+        return reg.gCU[index].read(self._registers) if self._has_current else None
 
-    def current_ma(self, finger: Finger | int) -> int:
-        """Motor current in milliampere, 10 a count."""
-        return self.current(finger) * reg.MILLIAMPERE_PER_COUNT
+    def current_ma(self, finger: Finger | int) -> int | None:
+        """Motor current in milliampere, 10 a count; None where the link does not tell it."""
+        counts = self.current(finger)
+        return None if counts is None else counts * reg.MILLIAMPERE_PER_COUNT
 
     # The whole hand.
 
@@ -320,15 +340,17 @@ class RobotiqStatus:
 
         Enumerations become their names, masks become lists of axis names. Values of one axis are below its
         name (``A``, ``B``, ``C``, ``SCISSOR``), and ``fault_code`` is the number of the fault.
-        :meth:`from_registers` makes the status again from the first three, and the model.
+        ``current_ma`` is left out where the link does not tell it. :meth:`from_registers` makes the status
+        again from the first three, the model, and whether there is a current.
         """
         # A recorder calls this at every poll: read registers and not the many properties.
         words, fault, states, model = self._registers, self.fault, self._states, self._model
+        scale = reg.MILLIAMPERE_PER_COUNT
         axes: dict[str, dict[str, Any]] = {
             name: {
                 "position": reg.gPO[n].read(words),
                 "requested_position": reg.gPR[n].read(words),
-                "current_ma": reg.gCU[n].read(words) * reg.MILLIAMPERE_PER_COUNT,
+                **({"current_ma": reg.gCU[n].read(words) * scale} if self._has_current else {}),
                 "axis_state": states[model.object_status[n].read(words)],
             }
             for n, name in enumerate(model.names)
@@ -363,8 +385,9 @@ class RobotiqStatus:
         return hash(self._key())
 
     def __reduce__(self) -> tuple[object, ...]:
+        *key, has_current = self._key()
         own = None if self._stroke == self._model.stroke else self._stroke
-        return RobotiqStatus, (*self._key(), own)
+        return RobotiqStatus, (*key, own, has_current)
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"RobotiqStatus is immutable: cannot set {name!r}")
@@ -372,7 +395,7 @@ class RobotiqStatus:
     def __repr__(self) -> str:
         axes = ", ".join(
             f"{axis.name}={self.position(axis)}->{self.requested_position(axis)} "
-            f"{self.axis_state(axis)} {self.current_ma(axis)}mA"
+            f"{self.axis_state(axis)}{milliampere(self.current_ma(axis))}"
             for axis in self._model.axes
         )
         return (
@@ -380,5 +403,10 @@ class RobotiqStatus:
             f"fault={self.fault.name} {axes}>"
         )
 
-    def _key(self) -> tuple[reg.Registers, float, int, Model]:
-        return self._registers, self._timestamp, self._sequence, self._model
+    def _key(self) -> tuple[reg.Registers, float, int, Model, bool]:
+        return self._registers, self._timestamp, self._sequence, self._model, self._has_current
+
+
+def milliampere(current: int | None) -> str:
+    """A current as the end of a text; empty for none."""
+    return "" if current is None else f" {current}mA"

@@ -172,7 +172,7 @@ async def test_of_the_currents_between_two_paints_the_highest_is_shown(active: O
         assert isinstance(pilot.app, Monitor)
         still = active.hand.status.registers
         strong = RobotiqStatus((*still[:2], still[2] & 0xFF00 | 9, *still[3:]))
-        peaks = [strong.current_ma(axis) for axis in THREE_FINGER.axes]
+        peaks = [strong.current_ma(axis) or 0 for axis in THREE_FINGER.axes]
         assert max(peaks) == 90
         for status in (strong, active.hand.status):
             pilot.app._timeline._statuses.push(status)

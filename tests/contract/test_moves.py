@@ -49,7 +49,7 @@ async def test_against_something(here: Bench, hand: Hand) -> None:
     assert result.contacts == Finger.ABC
     assert result.outcomes[B] is ObjectStatus.CONTACT_CLOSING
     assert result.positions[A] == pytest.approx(150, abs=3)
-    assert result.peak_current_ma[A] > 0
+    assert result.peak_current_ma[A]
     assert result.status.contacts == Finger.ABC
 
 

@@ -14,16 +14,23 @@ if TYPE_CHECKING:
     from tests.simulator.conftest import Bench
 
 
+def current(bench: Bench, axis: Finger) -> int:
+    """Of one axis, in counts."""
+    counts = bench.status.current(axis)
+    assert counts is not None
+    return counts
+
+
 def currents(bench: Bench) -> list[int]:
     """Of all axes, in counts."""
-    return [bench.status.current(axis) for axis in THREE_FINGER.axes]
+    return [current(bench, axis) for axis in THREE_FINGER.axes]
 
 
 def course(bench: Bench, axis: Finger) -> list[int]:
     """The current of an axis in every device cycle, until nothing moves."""
     seen = []
     while bench.gripper.is_moving:
-        seen.append(bench.status.current(axis))
+        seen.append(current(bench, axis))
         bench.wait(CYCLE)
     return seen
 
@@ -44,7 +51,7 @@ def test_a_slower_motion_draws_less(individual: Bench) -> None:
     drawn = []
     for speed in (0, 128, 255):
         individual.go({Finger.A: 255}, speed=speed)
-        drawn.append(individual.status.current(Finger.A))
+        drawn.append(current(individual, Finger.A))
     assert 0 < drawn[0] < drawn[1] < drawn[2]
 
 

@@ -218,7 +218,7 @@ async def test_a_peak_of_the_current_is_not_lost_between_two_looks(hand: Robotiq
     moving = asyncio.create_task(hand.close())
     async for status in hand.statuses():
         updates.gather()
-        peak = max(peak, status.current_ma(Finger.A))
+        peak = max(peak, status.current_ma(Finger.A) or 0)
         if moving.done():
             break
     assert updates.take(0)["peaks"][0] >= peak > 0

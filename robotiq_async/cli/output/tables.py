@@ -33,7 +33,7 @@ def print_status(hand: Hand) -> None:
             _opening(last, axis),
             last.requested_position(axis),
             axis_words(last.axis_state(axis)),
-            last.current_ma(axis),
+            _current(last.current_ma(axis)),
         )
         for axis in last.model.axes
     ]
@@ -62,12 +62,16 @@ def print_outcomes(result: MoveResult) -> None:
             result.positions[each],
             _opening(result.status, each),
             result.outcomes[each].name,
-            result.peak_current_ma[each],
+            _current(result.peak_current_ma[each]),
         )
         for each in axes
     ]
     _print_table(_heads(result.status, "outcome", "peak mA"), result.status, axes, rows)
     print(f"{result.duration:.2f} s, {'an object is in the way' if result.object_detected else 'no contact'}")
+
+
+def _current(milliampere: int | None) -> str:
+    return "-" if milliampere is None else str(milliampere)
 
 
 def _print_table(

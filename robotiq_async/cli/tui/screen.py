@@ -144,7 +144,7 @@ class Monitor(App[None]):
         for at, each in self._timeline.new():
             if isinstance(each, RobotiqStatus):
                 self._newest = each
-                peaks = {axis: max(peak, each.current_ma(axis)) for axis, peak in peaks.items()}
+                peaks = {axis: max(peak, _milliampere(each, axis)) for axis, peak in peaks.items()}
             elif each["kind"] == "fault":
                 self.write_log(event_line(each), "bold" if each["fault_code"] else "", at)
             elif words := transition_words(each):
@@ -217,3 +217,9 @@ class Monitor(App[None]):
                 self.write_log(f"{name}: {refusal_words(error, HINTS)}", "bold red")
 
         _: Worker[None] = self.run_worker(carry_out)
+
+
+def _milliampere(status: RobotiqStatus, axis: Finger) -> int:
+    """The current of an axis; -1 where the link does not tell it."""
+    current = status.current_ma(axis)
+    return -1 if current is None else current

@@ -113,7 +113,7 @@ class Axes(Widget):
             line.append(f"{status.opening_mm(axis):5.1f} mm ", "bold")
         line.append_text(self._does(axis))
         line.append(f" {sparkline(list(currents), bar)} ", "cyan not bold")
-        line.append(f"{max(currents[-1], 0):5} mA", "not bold")
+        line.append(f"{max(currents[-1], 0):5} mA" if status.has_current else f"{'-':>8}", "not bold")
         return line
 
     @property

@@ -93,6 +93,7 @@ class HandPublisher:
             age=0.0 if status is None else stamp - status.timestamp,
             registers=None if status is None else status.registers,
             model=self._hand.model,
+            has_current=status is None or status.has_current,
         ).pack()
 
     def send_summary(self) -> None:

@@ -205,7 +205,9 @@ class Mirror:
     def renumbered(self, status: RobotiqStatus) -> RobotiqStatus:
         """The status of an answer, with a sequence of ours."""
         model, sequence = status.model, self._base + status.sequence
-        return RobotiqStatus(status.registers, status.timestamp, sequence, model, self._stroke(model))
+        return RobotiqStatus(
+            status.registers, status.timestamp, sequence, model, self._stroke(model), status.has_current
+        )
 
     def receive_points(self, summary: Mapping[str, Any]) -> None:
         """Take over the points that were measured on the gripper; an older agent tells none."""
@@ -269,7 +271,8 @@ class Mirror:
         for other in (self._pushed, newest):
             if other is not None:
                 at = max(at, other.timestamp) if other.sequence < sequence else min(at, other.timestamp)
-        return RobotiqStatus(message.registers, at, sequence, message.model, self._stroke(message.model))
+        stroke = self._stroke(message.model)
+        return RobotiqStatus(message.registers, at, sequence, message.model, stroke, message.has_current)
 
     def _hand_on(self, event: Fields) -> None:
         with reading("an event"):

@@ -20,7 +20,7 @@ SIZE: Final = _LAYOUT.size
 _STATES: Final = tuple(State)
 _MODELS: Final = tuple(MODELS.values())
 _PLACES: Final = {state: place for place, state in enumerate(_STATES)}
-_READ, _MOVES, _HELD = 1, 2, 4
+_READ, _MOVES, _HELD, _NO_CURRENT = 1, 2, 4, 8
 _NO_REGISTERS: Final = (0,) * 8
 
 
@@ -40,6 +40,7 @@ class StatusMessage(NamedTuple):
         age: seconds from the gripper's reply to ``stamp``.
         registers: the status; None if none has been read yet.
         model: of the gripper.
+        has_current: whether the registers tell the motor currents.
     """
 
     mark: int
@@ -54,10 +55,15 @@ class StatusMessage(NamedTuple):
     age: float
     registers: Registers | None
     model: Model = THREE_FINGER
+    has_current: bool = True
 
     def pack(self) -> bytes:
-        mark, epoch, stamp, state, lease, is_held, events, is_moving, sequence, age, registers, model = self
+        (
+            *(mark, epoch, stamp, state, lease, is_held, events, is_moving, sequence, age, registers, model),
+            has_current,
+        ) = self
         flags = _READ * (registers is not None) | _MOVES * is_moving | _HELD * is_held
+        flags |= _NO_CURRENT * (not has_current)
         return _LAYOUT.pack(
             VERSION,
             _PLACES[state],
@@ -106,4 +112,5 @@ def unpack(data: bytes) -> StatusMessage:
         age=age,
         registers=tuple(registers) if flags & _READ else None,
         model=_MODELS[model],
+        has_current=not flags & _NO_CURRENT,
     )

@@ -67,6 +67,7 @@ def status_fields(status: RobotiqStatus) -> Fields:
         "timestamp": status.timestamp,
         "sequence": status.sequence,
         "model": status.model.name,
+        "has_current": status.has_current,
     }
 
 
@@ -76,6 +77,7 @@ def read_status(fields: Mapping[str, Any], clock: Clock) -> RobotiqStatus:
         timestamp=clock(fields["timestamp"]),
         sequence=fields["sequence"],
         model=model_of(fields.get("model")),
+        has_current=fields.get("has_current", True),
     )
 
 
@@ -155,7 +157,10 @@ def read_result(fields: Mapping[str, Any], clock: Clock) -> MoveResult:
         contacts=Finger(sum(Finger[name] for name in fields["contacts"])),
         reached=Finger(sum(axis for axis, end in axes.items() if end["reached"])),
         duration=float(fields["duration"]),
-        peak_current_ma={axis: int(end["peak_current_ma"]) for axis, end in axes.items()},
+        peak_current_ma={
+            axis: int(end["peak_current_ma"]) if "peak_current_ma" in end else None
+            for axis, end in axes.items()
+        },
         status=read_status(fields["status"], clock),
     )
 

@@ -74,7 +74,8 @@ def _gripper(hand: Hand) -> Diagnosis:
     for axis in status.model.axes:
         values[f"{axis.name} position"] = str(status.position(axis))
         values[f"{axis.name} state"] = status.axis_state(axis)
-        values[f"{axis.name} current [mA]"] = str(status.current_ma(axis))
+        if (current := status.current_ma(axis)) is not None:
+            values[f"{axis.name} current [mA]"] = str(current)
     level = _LEVELS[status.fault.severity]
     return Diagnosis(
         "gripper", level, hand.state.name if level is Level.OK else status.fault.description, values

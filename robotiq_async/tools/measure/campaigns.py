@@ -139,7 +139,7 @@ def _sampling(hand: Hand, speedup: float) -> Iterator[list[Sample]]:
     async def watch() -> None:
         async for status in statuses:
             time = max(0, round(1000 * (status.timestamp - began) * speedup))
-            a, b, c = (status.current_ma(finger) for finger in FINGERS)
+            a, b, c = (status.current_ma(finger) or 0 for finger in FINGERS)
             samples.append((time, a, b, c))
 
     watcher = asyncio.get_running_loop().create_task(watch())

@@ -21,6 +21,7 @@ except ModuleNotFoundError as error:
 from ...runtime.log import printable
 from ...values.calibration.csv_tables import Table
 from ...values.calibration.scales import ForceCalibration, SpeedCalibration, mean, newton
+from ..recording.table import CURRENT
 from ..wording import JAW_NAME
 from .campaigns import Currents, peak_currents
 
@@ -34,7 +35,7 @@ THEIRS: Final = "#d1731f"
 COLOURS: Final = ("#0b6ea8", "#2a8f4c", "#b03a6b")
 """Colours of the fingers A, B and C."""
 WIDTHS: Final = {"A": 4.2, "B": 2.6, "C": 1.1, "SCISSOR": 1.4}  # line widths in the plot of a recording
-DRAWN: Final = ("position", "requested_position", "current_ma")
+DRAWN: Final = ("position", "requested_position", CURRENT)
 LABEL: Final = 0.012  # width of a label, as a share of the picture's
 LONGEST: Final = 40  # characters of a label
 LETTER: Final = 0.0092  # width of a character of a label, as a share of the picture's
@@ -148,7 +149,7 @@ def plot_recording(
     seconds = array("d")
     first: int | None = None
     events: list[Event] = []
-    drawn = {axis: {what: array("h") for what in DRAWN} for axis in WIDTHS}
+    drawn = {axis: {what: array("f") for what in DRAWN} for axis in WIDTHS}
     openings = array("d")  # of a jaw
 
     def take(status: dict[str, Any]) -> None:
@@ -156,7 +157,7 @@ def plot_recording(
             if axis != "A" and axis not in status:
                 continue  # of a sibling of the 3-Finger, which has the one
             for what, column in columns.items():
-                column.append(status[axis][what])
+                column.append(status[axis].get(what, math.nan) if what == CURRENT else status[axis][what])
         if "B" not in status and "opening_mm" in status["A"]:
             openings.append(status["A"]["opening_mm"])
 

@@ -206,9 +206,17 @@ def state_fields(hand: Hand, now: float) -> Fields:
 
 
 def efforts(status: RobotiqStatus) -> list[float]:
-    """Motor currents in ampere, each at the first joint of its motor; torques are not known."""
+    """Motor currents in ampere, each at the first joint of its motor; torques are not known.
+
+    NaN where the link does not tell the current.
+    """
+
+    def ampere(axis: Finger) -> float:
+        current = status.current_ma(axis)
+        return math.nan if current is None else current / 1000
+
     if status.model is not THREE_FINGER:
-        return [status.current_ma(JAW) / 1000]
-    scissor = status.current_ma(Finger.SCISSOR) / 1000
-    one, two, middle = (status.current_ma(finger) / 1000 for finger in FINGER_NAMES)
+        return [ampere(JAW)]
+    scissor = ampere(Finger.SCISSOR)
+    one, two, middle = map(ampere, FINGER_NAMES)
     return [scissor, one, 0.0, 0.0, scissor, two, 0.0, 0.0, middle, 0.0, 0.0]

@@ -30,6 +30,8 @@ _MAY_LACK: Final = ("B", "C", "SCISSOR")
 """The axes that a sibling of the 3-Finger does not have."""
 _NEW: Final = ("opening_mm", "open_fraction")
 """What recordings of earlier versions do not have."""
+CURRENT: Final = "current_ma"
+"""A URCap does not tell it."""
 STATE: Final = "state"
 """The column with the state of the hand as of the last event; the JSON of a status does not have it."""
 LABEL: Final = "label"
@@ -90,7 +92,7 @@ def _value(fields: Fields, name: str, kind: str) -> Any:  # noqa: ANN401  # as J
         return fields.get(name)
     if axis not in fields and axis in _MAY_LACK:
         return None
-    if key in _NEW:
+    if key in _NEW or key == CURRENT:
         return fields[axis].get(key)
     return fields[axis][key] if axis else fields[name]
 

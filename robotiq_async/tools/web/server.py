@@ -72,7 +72,7 @@ class HandUpdates:
         """Collect what is new; call it often."""
         for at, each in self._timeline.new():
             if isinstance(each, RobotiqStatus):
-                currents = map(each.current_ma, each.model.axes)
+                currents = (each.current_ma(axis) or 0 for axis in each.model.axes)
                 self._peaks = [max(pair) for pair in zip_longest(self._peaks, currents, fillvalue=0)]
             elif not is_command(each):
                 self._events.append({**each, "time": at})
@@ -100,6 +100,7 @@ class HandUpdates:
         return {
             "model": status.model.name,
             "stroke": status.stroke.points,
+            "has_current": status.has_current,
             "registers": status.registers,
             "timestamp": status.timestamp,
             "sequence": status.sequence,

@@ -75,7 +75,7 @@ def _judge_contact(bench: Bench, held: RobotiqStatus) -> None:
         bench.as_assumed("soft.contact", words)
     else:
         bench.inconclusive("soft.contact", f"no finger touched anything: {words}")
-    drawn = max(held.current_ma(finger) for finger in bench.fingers)
+    drawn = max(held.current_ma(finger) or 0 for finger in bench.fingers)
     if not held.contacts:
         bench.inconclusive("soft.current", "nothing was held")
     else:

@@ -30,7 +30,7 @@ class Sample:
 
     at: float  # monotonic seconds of this process
     positions: tuple[int, ...] | None  # in counts, of A, B, C and the scissor; None while they are unknown
-    currents: tuple[int, ...]  # the peaks since the sample before, in mA
+    currents: tuple[int, ...] | None  # the peaks since the sample before, in mA; None where there are none
 
 
 @lru_cache(maxsize=64)
@@ -76,6 +76,7 @@ class HandMirror:
                 sequence=update["sequence"],
                 model=model,
                 stroke=_stroke(model, tuple(map(tuple, update.get("stroke", ())))),
+                has_current=update["has_current"],
             )
             self.age = update["age"]
         self.statistics = update.get("statistics", self.statistics)
@@ -91,10 +92,11 @@ class HandMirror:
         if self.samples and now - self.samples[-1].at < SAMPLE_S - 0.0005:
             return
         if self.samples and now - self.samples[-1].at > QUIET_S:
-            self.samples.append(Sample(now - SAMPLE_S, None, tuple(self.peaks)))  # a gap in the curve
+            self.samples.append(Sample(now - SAMPLE_S, None, None))  # a gap in the curve
         status = None if self.is_lost else self.status
         positions = None if status is None else tuple(status.position(axis) for axis in status.model.axes)
-        self.samples.append(Sample(now, positions, tuple(self.peaks)))
+        currents = None if status is None or not status.has_current else tuple(self.peaks)
+        self.samples.append(Sample(now, positions, currents))
         self.peaks = [0] * len(self.peaks)
         while now - self.samples[0].at > HISTORY_S:
             self.samples.popleft()

@@ -66,7 +66,11 @@ def _axis_row(hand: HandMirror, index: int) -> str:
     axis, status = hand.model.axes[index], hand.status
     if status is None:
         return f'<div class="rq-axis"><b>{axis_title(hand, index)}</b></div>'
-    position, wanted = status.position(axis), status.requested_position(axis)
+    position, wanted, current = (
+        status.position(axis),
+        status.requested_position(axis),
+        status.current_ma(axis),
+    )
     contact = " rq-contact" if axis & status.contacts and not hand.is_lost else ""
     stale = " rq-stale" if hand.is_lost else ""
     color, name = COLORS[index], axis_title(hand, index)
@@ -77,7 +81,7 @@ def _axis_row(hand: HandMirror, index: int) -> str:
         f'<span class="rq-bar"><i style="width:{position / 2.55:.1f}%;background:{color}"></i>'
         f'<u style="left:calc((100% - 3px) * {wanted / 255:.3f})"></u></span>'
         f'<span class="rq-number">{position}</span><span class="rq-wanted">&rarr; {wanted}</span>'
-        f'<span class="rq-number">{status.current_ma(axis)} mA</span>'
+        f'<span class="rq-number">{"" if current is None else f"{current} mA"}</span>'
         f'<span class="rq-does">{escape(does)}</span></div>'
     )
 
@@ -99,7 +103,7 @@ class Curves:
         for index in range(len(hand.model.axes)):
             # A gap in the curve where nothing was known.
             places = [None if each.positions is None else each.positions[index] for each in hand.samples]
-            peaks = [None if each.positions is None else each.currents[index] for each in hand.samples]
+            peaks = [None if each.currents is None else each.currents[index] for each in hand.samples]
             for chart, values in ((self._positions, places), (self._currents, peaks)):
                 points = [list(point) for point in zip(ages, values, strict=True)]
                 chart.options["series"][index]["data"] = points
@@ -108,7 +112,7 @@ class Curves:
             for index, name in enumerate(names):
                 chart.options["series"][index]["name"] = name
             chart.options["legend"]["data"] = names
-        highest = max((max(each.currents) for each in hand.samples), default=0)
+        highest = max((max(each.currents) for each in hand.samples if each.currents), default=0)
         self._currents.options["yAxis"]["max"] = max(CURRENT_MAX, -(-highest // 200) * 200)
         self._positions.update()
         self._currents.update()
