@@ -31,7 +31,7 @@ from robotiq_async import (
 )
 from robotiq_async.cli.output.lines import status_line
 from robotiq_async.link.address import parse_address
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer, UrcapSimulatorServer
 from robotiq_async.tools.actions import ACTIONS
 from robotiq_async.tools.measure.campaigns import grasp, time_closing
 from robotiq_async.tools.recording.recorder import Recorder
@@ -43,7 +43,7 @@ from robotiq_async.values.checks import parse_fingers
 from robotiq_async.values.errors import MeasuringError, RobotiqStateError
 from robotiq_async.values.model import MODELS, model_of
 from robotiq_async.values.request import AxisRequest, Request
-from tests.contract.bench import MODEL
+from tests.contract.bench import MODEL, SERVER
 from tests.fleet.lab import lab
 from tests.verify.test_contract import scenes
 from tests.virtual import virtual
@@ -391,9 +391,10 @@ OTHERWISE = {
 
 
 @siblings
-def test_a_hand_on_a_sibling_keeps_its_contract(model: Model) -> None:
+@pytest.mark.parametrize("server", [SimulatorServer, UrcapSimulatorServer], ids=["Modbus", "URCap"])
+def test_a_hand_on_a_sibling_keeps_its_contract(model: Model, server: type[SimulatorServer]) -> None:
     """All scenes of the contract, but those that name an axis that the model lacks."""
-    token, failed, kept = MODEL.set(model), set(), 0
+    token, link, failed, kept = MODEL.set(model), SERVER.set(server), set(), 0
     try:
         for name, scene in scenes():
             try:
@@ -404,6 +405,7 @@ def test_a_hand_on_a_sibling_keeps_its_contract(model: Model) -> None:
                     failed.add(name)
     finally:
         MODEL.reset(token)
+        SERVER.reset(link)
     assert failed == OTHERWISE.keys()
     assert kept >= 180
 
@@ -440,11 +442,13 @@ def test_a_page_shows_the_axis_that_there_is() -> None:
         "events": [],
         "peaks": [150],
         "model": "hand-e",
+        "has_current": True,
         "age": 0.0,
     }
     mirror.hear(message | {"registers": registers(0xF9, 0, 0, 255, 228), "timestamp": 1.0, "sequence": 3})
     assert mirror.model is HAND_E
     assert mirror.samples[-1].positions == (228,)
+    assert mirror.samples[-1].currents == (150,)
     assert (axis_title(mirror, 0), opening_words(mirror)) == ("jaw", "0.0 mm (nominal)")
     own = {"registers": registers(0xF9, 0, 0, 255, 228), "timestamp": 2.0, "sequence": 4}
     mirror.hear(message | own | {"stroke": [[3, 60.0], [240, 10.0]]})

@@ -39,6 +39,7 @@ Every command that talks to a gripper takes its address as the last argument, an
     tcp://192.168.1.11    Modbus TCP; tcp:// and the port (:502) may be left out
     rtu:///dev/ttyUSB0    Modbus RTU on a serial line (extra serial)
     rtu+tcp://HOST:PORT   Modbus RTU through a serial server
+    urcap://HOST          the text port of Robotiq's URCap on a UR controller
     zenoh://lab/cell/left one that an agent on another host serves (extra fleet)
     sim://                a gripper simulated inside the command
 

@@ -72,7 +72,7 @@ Address = Annotated[
     str,
     Parameter(
         help="The gripper: tcp://HOST[:PORT], rtu:///dev/ttyUSB0, rtu+tcp://HOST:PORT, "
-        "zenoh://SITE/HOST/NAME or sim://."
+        "urcap://HOST, zenoh://SITE/HOST/NAME or sim://."
     ),
 ]
 Flag = Annotated[bool, Parameter(negative=(), show_default=False)]

@@ -70,22 +70,25 @@ class RobotiqHand(Hand):
 
     Args:
         address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``rtu+tcp://HOST:PORT``
-            (a serial line behind a socket), ``sim://`` (or ``sim://?speedup=10&object=150``), or a
-            transport object. Without one the gripper is simulated, and the first start logs a warning
-            that says so. A serial port sends at 115200 baud, 8N1, unless the address ends in
+            (a serial line behind a socket), ``urcap://HOST[:63352]`` (a UR with Robotiq's URCap, for a jaw:
+            it tells no currents), ``sim://`` (or ``sim://?speedup=10&object=150``), or a transport object.
+            Without one the gripper is simulated, and the first start logs a warning that says so. A serial
+            port sends at 115200 baud, 8N1, unless the address ends in
             ``?baud=500000``, ``&parity=E`` or ``&stopbits=2``.
         name: what to call this hand, in 1..64 printable characters: errors and the log begin with it, and
             metrics and recordings carry it. None calls it by its address.
         device_id: Modbus unit id, 0..255 over TCP and 1..247 over RTU; by default 2 over TCP and 9 over
             RTU, of a jaw 9 on either. Two hands on one TCP address need one each: that of their gripper
-            behind the gateway.
+            behind the gateway. Over ``urcap://`` which of several grippers it is (SID), 1..247; by default
+            the one that the URCap has. The other options of Modbus are refused there.
         read_function: Modbus function that reads the status, 3 or 4; by default 4 over TCP and 3 over
             RTU, of a jaw 3 on either.
         write_function: Modbus function that writes the request, 16 or 23; by default 16, and over RTU to a
             jaw 23, which reads the status in the same exchange. A gripper that does not serve 23 gets 16. No
             source says whether a 3-Finger serves it.
-        poll_interval: seconds between polls, 0.001..0.1. On a serial line a read and a write may take longer
-            than the default; the next poll follows at once then, and no poll counts as missed.
+        poll_interval: seconds between polls, 0.001..0.1. On a serial line or over ``urcap://`` a read and a
+            write may take longer than the default; the next poll follows at once then, and no poll counts as
+            missed.
         write_spacing: seconds from sending a write to the next one, 0..0.1; 0.005 unless given for a jaw.
             Requests made meanwhile are merged. A gripper may lose writes that come sooner (3-Finger manual of
             2014: 10 ms; manual of the 2F-85: 5 ms); pass 0 for one that does not. A stop and a halt do not

@@ -17,12 +17,15 @@ from ..values.checks import check_byte, repr_of
 from ..values.model import MODELS, Model, model_of
 
 TCP_PORT: Final = 502  # the port of Modbus TCP, and the gripper's
+URCAP_PORT: Final = 63352  # the text port of Robotiq's URCap on a UR controller
 
 REMOTE_SCHEME: Final = "zenoh://"  # of a gripper on another host, for a remote hand
 FORMS: Final = (
     "tcp://HOST[:PORT] (or bare HOST or HOST:PORT), "
     "rtu:///dev/ttyUSB0 (a serial port; rtu://COM3 on Windows), "
-    "rtu+tcp://HOST:PORT (a serial line behind a TCP socket), sim:// (or sim://?speedup=10&object=150), "
+    "rtu+tcp://HOST:PORT (a serial line behind a TCP socket), "
+    "urcap://HOST[:PORT] (a UR with Robotiq's URCap; it needs a model), "
+    "sim:// (or sim://?speedup=10&object=150), "
     "zenoh://SITE/HOST/GRIPPER (on another host: for robotiq_async.fleet.RemoteHand and for commands); "
     "?model=2f85, 2f140 or hand-e at the end for a sibling of the 3-Finger, ?baud=500000 for a serial port "
     "with another rate than 115200"
@@ -92,20 +95,30 @@ USUAL_LINE: Final = Line()
 USUAL: Final = "without them 115200 baud, 8N1, as a gripper comes"
 
 
+Kind = Literal["tcp", "rtu", "rtu+tcp", "urcap", "sim"]
+
+_SOCKETS: Final[dict[str, tuple[Kind, int | None]]] = {
+    "tcp": ("tcp", TCP_PORT),
+    "rtu+tcp": ("rtu+tcp", None),
+    "urcap": ("urcap", URCAP_PORT),
+}
+"""The schemes of sockets, and their ports unless one is given. Serial servers have no usual one."""
+
+
 @dataclass(frozen=True, slots=True)
 class Address:
     """A checked address.
 
     Attributes:
-        kind: "tcp", "rtu", "rtu+tcp" or "sim".
-        host: host name or IP address (tcp, rtu+tcp), device of the serial port (rtu), empty (sim).
+        kind: "tcp", "rtu", "rtu+tcp", "urcap" or "sim".
+        host: host name or IP address (tcp, rtu+tcp, urcap), device of the serial port (rtu), empty (sim).
         port: TCP port; 0 for the others.
         simulation: what the gripper is like (sim); nothing special for the others.
         line: how the serial port sends (rtu); the usual for the others.
         model: of the gripper; None if the address does not name it.
     """
 
-    kind: Literal["tcp", "rtu", "rtu+tcp", "sim"]
+    kind: Kind
     host: str = ""
     port: int = 0
     simulation: Simulation = NOTHING_SPECIAL
@@ -120,7 +133,7 @@ class Address:
     @property
     def is_socket(self) -> bool:
         """Whether it is reached through a network."""
-        return self.kind in ("tcp", "rtu+tcp")
+        return self.kind in _SOCKETS
 
     def __str__(self) -> str:
         query = str(self.simulation) + str(self.line)
@@ -162,17 +175,17 @@ def parse_address(address: object) -> Address:
         except ValueError as error:
             raise ValueError(f"malformed address {address!r}: {error}; accepted: {FORMS}") from None
         return Address("rtu", device, line=line, model=model)
-    if scheme in ("tcp", "rtu+tcp"):
+    if scheme in _SOCKETS:
         if any(option.partition("=")[0] in LINE_OPTIONS for option in rest.partition("?")[2].split("&")):
             what = "baud, parity and stopbits are options of a serial port; a serial server has its own"
             raise ValueError(f"malformed address {address!r}: {what}; accepted: {FORMS}")
-        # Serial servers have no usual port, so one must be given.
-        host, port = _host_and_port(rest, TCP_PORT if scheme == "tcp" else None)
+        kind, usual_port = _SOCKETS[scheme]
+        host, port = _host_and_port(rest, usual_port)
         if ":" not in host and _ends_in_a_number(host) and not _is_ipv4(host):
             what = f"{host} is not an IPv4 address: four numbers in 0..255, without leading zeros"
             raise ValueError(f"malformed address {address!r}: {what}; accepted: {FORMS}")
         if host and port is not None:
-            return Address("tcp" if scheme == "tcp" else "rtu+tcp", host, port, model=model)
+            return Address(kind, host, port, model=model)
     if scheme == "zenoh":
         raise ValueError(
             f"{address!r} is a gripper on another host: use robotiq_async.fleet.RemoteHand; accepted: {FORMS}"

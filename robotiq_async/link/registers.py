@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final
 
 from ..values.checks import check_int
@@ -27,8 +28,8 @@ def registers_of(
     model = model_of(address.model)
     usual = model.rtu if address.is_rtu else model.tcp
     # On a serial line 0 is a broadcast, which no device answers, and ids above 247 are reserved. Over TCP
-    # grippers in the field answer to any id, and drivers have used 0 and 255.
-    units = (1, 247) if address.is_rtu else (0, 255)
+    # grippers in the field answer to any id, and drivers have used 0 and 255. A URCap has a serial line.
+    units = (1, 247) if address.is_rtu or address.kind == "urcap" else (0, 255)
     return RegisterMap(
         request=_int_or("request_address", request_address, 0, LAST_BLOCK, usual.request),
         status=_int_or("status_address", status_address, 0, LAST_BLOCK, usual.status),
@@ -39,6 +40,23 @@ def registers_of(
             usual.write_function if write_function is None else write_function
         ),
     )
+
+
+def check_urcap(address: Address, options: Mapping[str, object]) -> None:
+    """Refuse what a gripper behind a URCap cannot be, and options that mean nothing there.
+
+    Raises:
+        ValueError: the model has more than one axis or is not named, or an option is one of Modbus.
+    """
+    if len(model_of(address.model).axes) > 1:
+        raise ValueError(
+            f"a gripper behind a URCap is a 2F-85, 2F-140 or Hand-E: name it, as in {address}?model=2f85"
+            if address.model is None
+            else f"{address}: Robotiq's URCap has no {address.model.title}"
+        )
+    for option, given in options.items():
+        if given is not None and option != "device_id":
+            raise ValueError(f"{option} is an option of Modbus, and {address} is not Modbus")
 
 
 def check_write_function(value: object) -> int:

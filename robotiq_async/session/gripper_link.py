@@ -12,9 +12,10 @@ from typing import Final, Generic, TypeVar
 from ..link.address import Address, canonical_address, parse_address
 from ..link.guard import GuardedTransport
 from ..link.modbus import ModbusTransport
-from ..link.registers import registers_of
+from ..link.registers import check_urcap, registers_of
 from ..link.sim_transport import SimulatedTransport, new_gripper
 from ..link.transport import Link, Transport
+from ..link.urcap import UrcapTransport
 from ..runtime.log import Log
 from ..values.checks import repr_of
 from ..values.model import THREE_FINGER, Model, model_of
@@ -22,6 +23,7 @@ from ..values.registers import RegisterMap
 
 _GATEWAY: Final = " (two grippers behind one gateway: give each of the hands its device_id)"
 _LINE: Final = " (two grippers on one serial line: give each of the hands its device_id, in one event loop)"
+_URCAP: Final = " (two grippers behind one URCap: give each of the hands its device_id)"
 
 T = TypeVar("T")
 
@@ -59,15 +61,17 @@ class GripperLink:
         address: in its full form, as errors and the log show it.
         gripper: identifies the gripper at the time of the call: a serial port may have been plugged in since.
         make: makes a transport for one start of the hand, from ``connect_timeout`` and ``response_timeout``.
-        is_rtu: whether frames go over a serial line, which is slower.
+        is_slow: whether a status takes a good part of a poll interval: over a serial line, or in questions.
         model: of the gripper.
+        has_current: whether a status tells the motor currents.
     """
 
     address: str
     gripper: Callable[[], Gripper]
     make: Callable[..., Link]
-    is_rtu: bool = False
+    is_slow: bool = False
     model: Model = THREE_FINGER
+    has_current: bool = True
 
 
 def gripper_link(
@@ -85,7 +89,10 @@ def gripper_link(
         parsed = parse_address(address)
         names_unit = registers["device_id"] is not None
         parsed = with_model(parsed, model)
-        return _over_modbus(parsed, registers_of(parsed, **registers), names_unit, name)
+        if parsed.kind == "urcap":
+            check_urcap(parsed, registers)
+        make = _over_urcap if parsed.kind == "urcap" else _over_modbus
+        return make(parsed, registers_of(parsed, **registers), names_unit, name)
     if isinstance(address, Transport):
         shown = f"<{type(address).__name__} at {id(address):#x}>"
         guarded = partial(GuardedTransport, address, shown, log=Log(name or shown))
@@ -121,6 +128,18 @@ def _over_modbus(address: Address, registers: RegisterMap, names_unit: bool, nam
         partial(ModbusTransport, address, registers, shares_line=shares_line, log=Log(name or str(address))),
         address.is_rtu,
         model,
+    )
+
+
+def _over_urcap(address: Address, registers: RegisterMap, names_unit: bool, name: str) -> GripperLink:
+    chosen = registers.device_id if names_unit else None
+    return GripperLink(
+        str(address),
+        lambda: Gripper(canonical_address(address), chosen, _URCAP),
+        partial(UrcapTransport, address, chosen, log=Log(name or str(address))),
+        is_slow=True,
+        model=model_of(address.model),
+        has_current=False,
     )
 
 

@@ -227,7 +227,9 @@ class HandOptions:
 
     address: Annotated[
         str | Transport,
-        Option("Gripper: tcp://, rtu://, rtu+tcp:// or sim://", _check_address, Place.FILE | Place.ROS),
+        Option(
+            "Gripper: tcp://, rtu://, rtu+tcp://, urcap:// or sim://", _check_address, Place.FILE | Place.ROS
+        ),
     ] = "sim://"
     name: Annotated[str | None, Option("What errors and the log call the hand", _check_name)] = None
     device_id: Annotated[

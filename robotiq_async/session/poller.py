@@ -2,8 +2,8 @@
 
 Every cycle reads the status, decides and writes at once, like the scan of a PLC, so each decision is made on
 what the gripper has just shown. What stops the gripper does not wait for the read. Nor does a command on a
-serial line while the newest status is fresh: a read takes as long there as the status is old, and the read
-after the write shows the command's echo.
+slow link (a serial line, a URCap) while the newest status is fresh: a read takes as long there as the status
+is old, and the read after the write shows the command's echo.
 
 No other task touches the transport: callers leave their requests with the controller and wait. So no exchange
 is cancelled in flight, except when a stop has waited for it long enough; then the link is closed with it.
@@ -60,7 +60,7 @@ SHUTDOWN_S: Final = 1.2  # of STOP_S: time to reach the gripper and to see the f
 SHUTDOWN_PAUSE_S: Final = 0.05  # between two attempts at that
 READS: Final = 3  # the most reads in a cycle that has a request to write, while the loop is held up
 FRESH_S: Final = 0.006
-"""On a serial line a command is decided on the newest status if that was asked for within this time: the poll
+"""On a slow link a command is decided on the newest status if that was asked for within this time: the poll
 interval and a bit. A read of three registers takes half of it."""
 SOON_S: Final = 0.0025
 """How long a cycle waits for write_spacing: half of a usual period, so that its status is still fresh."""
@@ -158,7 +158,7 @@ class Poller:
     def hurry(self) -> None:
         """Begin the next cycle at once, and not with the tick, if it may begin with a write."""
         due = self._due()
-        if due is not None and (due.is_urgent or (self._options.link.is_rtu and due.wait <= SOON_S)):
+        if due is not None and (due.is_urgent or (self._options.link.is_slow and due.wait <= SOON_S)):
             self._tick.hurry()
 
     def abandon(self) -> None:
@@ -284,9 +284,9 @@ class Poller:
         return self._controller.due(self._tick.time())
 
     def _is_fresh_for(self, due: Due) -> bool:
-        """Whether it is a command for a serial line, and the newest status is new enough to decide on."""
+        """Whether it is a command for a slow link, and the newest status is new enough to decide on."""
         is_fresh = self._tick.time() + due.wait - self._asked <= FRESH_S
-        return is_fresh and due.is_command and self._options.link.is_rtu
+        return is_fresh and due.is_command and self._options.link.is_slow
 
     @staticmethod
     async def _is_soon(due: Due, soon: float) -> bool:
@@ -373,7 +373,8 @@ class Poller:
         self._take(self._status(registers, answered), asked)
 
     def _status(self, registers: Registers, answered: float) -> RobotiqStatus:
-        return RobotiqStatus(registers, answered, next(self._channels.numbers), self._model, self._stroke)
+        number, has_current = next(self._channels.numbers), self._options.link.has_current
+        return RobotiqStatus(registers, answered, number, self._model, self._stroke, has_current)
 
     def _take(self, status: RobotiqStatus, asked: float) -> None:
         """Pass on a status that was asked for at ``asked``."""
@@ -412,7 +413,7 @@ class Poller:
 
     def _is_line_the_limit(self) -> bool:
         """Whether a cycle that outlasts the interval is the line's doing, and not that of a loop held up."""
-        return self._options.link.is_rtu and self._tick.late <= HELD_S
+        return self._options.link.is_slow and self._tick.late <= HELD_S
 
     def _warn_late(self, late: float) -> None:
         self._late.append(late)

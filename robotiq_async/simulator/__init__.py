@@ -6,7 +6,8 @@ room            what it holds
 ``physics``     :class:`SimulatedGripper`: axes, contacts, faults, power, and the words it reports;
                 :class:`Habits`: how it does what the manual leaves open
 ``server``      :class:`SimulatorServer` (Modbus TCP), :class:`SerialSimulatorServer` (Modbus RTU),
-                :class:`RtuOverTcpSimulatorServer` (Modbus RTU behind a serial server)
+                :class:`RtuOverTcpSimulatorServer` (Modbus RTU behind a serial server),
+                :class:`UrcapSimulatorServer` (the text port of a UR's URCap)
 ``troubles``    what can go wrong, as data and as words: :class:`Trouble`, :func:`parse_troubles`;
                 :class:`FaultInjector`, ``server.fault_injector``, makes it happen;
                 :func:`own_habits` and :func:`like_hardware`: what real grippers do
@@ -21,6 +22,7 @@ from .physics.habits import Habits
 from .physics.scale import SimulatedScale
 from .server.serial_server import RtuOverTcpSimulatorServer, SerialSimulatorServer
 from .server.tcp_server import SimulatorServer
+from .server.urcap_server import UrcapSimulatorServer
 from .troubles.fault_injector import FaultInjector
 from .troubles.like_hardware import like_hardware, own_habits
 from .troubles.trouble import KINDS, Trouble, parse_troubles
@@ -35,6 +37,7 @@ __all__ = [
     "SimulatedScale",
     "SimulatorServer",
     "Trouble",
+    "UrcapSimulatorServer",
     "like_hardware",
     "own_habits",
     "parse_troubles",

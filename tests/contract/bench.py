@@ -28,6 +28,8 @@ HABIT: ContextVar[tuple[Trouble | None, Mapping[str, Any]]] = ContextVar("habit"
 """What is otherwise with the gripper of a hand of this process, and the options of that hand."""
 MODEL: ContextVar[Model] = ContextVar("model", default=THREE_FINGER)
 """What the gripper is."""
+SERVER: ContextVar[type[SimulatorServer]] = ContextVar("server", default=SimulatorServer)
+"""What its link is, for a hand of this process and for that of an agent."""
 
 
 @dataclass
@@ -89,7 +91,7 @@ class Bench:
 async def bench(where: str, *, active: bool = True) -> AsyncIterator[Bench]:
     """A gripper that is active, or reset, and a way to make hands on it."""
     if where == REMOTE:
-        async with lab(active=active, model=MODEL.get()) as here:
+        async with lab(active=active, model=MODEL.get(), kind_of_server=SERVER.get()) as here:
             # Until the agent has its gripper.
             await until(lambda: here.local.state not in (State.DISCONNECTED, State.SHUTDOWN))
             names = iter(range(1000))
@@ -98,7 +100,7 @@ async def bench(where: str, *, active: bool = True) -> AsyncIterator[Bench]:
     loop = asyncio.get_running_loop()
     cycle, model = 0.005 * SPEEDUP, MODEL.get()
     gripper = SimulatedGripper(loop.time, speedup=SPEEDUP, device_cycle=cycle, spread=False, model=model)
-    async with SimulatorServer(gripper) as server:
+    async with SERVER.get()(gripper) as server:
         if active:
             await activate_beforehand(gripper)
         habit, options = HABIT.get()

@@ -112,12 +112,13 @@ async def lab(
     keep_grip: bool = False,
     model: Model = THREE_FINGER,
     stroke: Points | None = None,
+    kind_of_server: type[SimulatorServer] = SimulatorServer,
 ) -> AsyncIterator[Lab]:
     """An agent that serves zenoh://lab/cell/left, under a name in a network, by default one of its own."""
     network = network or Network()
     clock = asyncio.get_running_loop().time
     gripper = kind(clock, speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP, spread=False, model=model)
-    async with SimulatorServer(gripper) as server:
+    async with kind_of_server(gripper) as server:
         if active:
             await activate_beforehand(gripper)
         hand = RobotiqHand(server.address, keep_grip=keep_grip, model=model, stroke=stroke)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ...link.address import is_remote, parse_address
-from ...link.registers import registers_of
+from ...link.registers import check_urcap, registers_of
 from ...runtime.log import printable
 from ..addresses import full_address, gripper_words
 from ..arguments import Address, Unit, need
@@ -23,7 +23,7 @@ async def doctor(
 ) -> None:
     """Find out what is wrong with a connection. Nothing moves and nothing is written.
 
-    Name, port, Modbus, unit id, register addresses, round trip and rate, activation,
+    Name, port, Modbus or URCap, unit id, register addresses, round trip and rate, activation,
     fault, other clients: one line each, with advice. For a gripper on another host:
     certificates, port, agent, access, round trip, statuses, the gripper, and who commands
     it. It takes some seconds. Exits with 1 when something is broken.
@@ -33,10 +33,11 @@ async def doctor(
         robotiq-async doctor tcp://192.168.1.11
         robotiq-async doctor rtu:///dev/ttyUSB0
         robotiq-async doctor rtu+tcp://192.168.1.20:54321
+        robotiq-async doctor "urcap://192.168.1.20?model=2f85"
         robotiq-async doctor "zenoh://lab/cell-1/left?connect=tls/192.168.1.20:7447"
 
     Args:
-        device_id: Modbus unit id (default: 2 over TCP, 9 over a serial line).
+        device_id: Modbus unit id (default: 2 over TCP, 9 over a serial line, a URCap's own).
     """
     from ...tools.doctor import Level, examine, examine_remote
 
@@ -57,7 +58,10 @@ async def doctor(
             raise UsageError("a gripper on another host is set up there: its agent's file has device_id")
     else:
         with usage():
-            registers_of(parse_address(address), device_id=device_id)
+            parsed = parse_address(address)
+            registers_of(parsed, device_id=device_id)
+            if parsed.kind == "urcap":
+                check_urcap(parsed, {})
     print(gripper_words(address), flush=True)
     if is_remote(address):
         await examine_remote(address, report)

@@ -13,7 +13,7 @@ from ...link.serial_ports import why_no_port
 from ...runtime.sockets import is_loopback
 from ...values.enums import Finger
 from ...values.errors import RobotiqError
-from ...values.model import model_of
+from ...values.model import Model, model_of
 from ...values.registers import RTU_REGISTERS
 from ..arguments import Byte, Flag, Host, Port, Unit
 from ..failures import normal_end, usage
@@ -38,6 +38,7 @@ async def simulate(
     fixed: Flag = False,
     serial: Annotated[str | None, Parameter(metavar="DEVICE")] = None,
     rtu_over_tcp: Flag = False,
+    urcap: Flag = False,
     unpaced: Flag = False,
     device_id: Unit | None = None,
     trouble: Annotated[list[str] | None, Parameter(metavar="WORDS", negative=())] = None,
@@ -72,6 +73,7 @@ async def simulate(
         robotiq-async simulate --serial /dev/pts/3
         robotiq-async simulate --serial /dev/pts/3 --device-id 12
         robotiq-async simulate --rtu-over-tcp --port 54321
+        robotiq-async simulate --urcap --model 2f85 --port 63352
         robotiq-async simulate --trouble "drop at 5 every 10" --trouble "delay 0.02"
         robotiq-async simulate --trouble "power-cut at 20 for 2; foreign 0 at 30"
 
@@ -86,8 +88,9 @@ async def simulate(
         fixed: The object stays there in an activation, which then fails with fault 0x0D.
         serial: Serve Modbus RTU on this serial device in place of TCP (extra serial).
         rtu_over_tcp: Serve Modbus RTU through a TCP socket, as serial servers and tool ports do.
+        urcap: Serve the text port of Robotiq's URCap, as a UR controller does; for a 2F or a Hand-E.
         unpaced: Do not simulate the transmission time of bytes; for a real serial port, which takes it.
-        device_id: The only Modbus unit id that is answered (default: 9 for RTU, any on TCP).
+        device_id: The only Modbus unit id that is answered (default: 9 for RTU and a URCap, any on TCP).
         trouble: What goes wrong, and when; may be given again.
         troubles: List what can go wrong, and end.
     """
@@ -96,6 +99,7 @@ async def simulate(
         SerialSimulatorServer,
         SimulatedGripper,
         SimulatorServer,
+        UrcapSimulatorServer,
         own_habits,
         parse_troubles,
     )
@@ -106,6 +110,7 @@ async def simulate(
         return
     with usage():
         kind = model_of(model)
+        _check_wire(kind, serial=serial is not None, rtu_over_tcp=rtu_over_tcp, urcap=urcap, unpaced=unpaced)
         plan = parse_troubles("\n".join(trouble or ()))
         gripper = SimulatedGripper(
             speedup=speedup,
@@ -114,10 +119,6 @@ async def simulate(
             model=kind,
         )
         _place(gripper, object_, fixed=fixed)
-        if serial is not None and rtu_over_tcp:
-            raise ValueError("--serial and --rtu-over-tcp cannot be combined")
-        if unpaced and serial is None and not rtu_over_tcp:
-            raise ValueError("--unpaced is for a serial line: --serial or --rtu-over-tcp")
         server: SimulatorServer | SerialSimulatorServer
         unit = RTU_REGISTERS.device_id if device_id is None else device_id
         if serial is not None:
@@ -126,6 +127,8 @@ async def simulate(
             server = RtuOverTcpSimulatorServer(
                 gripper, port=port, host=host, device_id=unit, paced=not unpaced
             )
+        elif urcap:
+            server = UrcapSimulatorServer(gripper, port=port, host=host, device_id=unit)
         else:
             server = SimulatorServer(gripper, port=port, host=host, device_id=device_id)
         server.fault_injector.check(plan)
@@ -135,7 +138,8 @@ async def simulate(
     try:
         with normal_end():
             async with server:
-                for habit in habits_like_hardware(kind) if like_hardware else ():
+                # A URCap asks its gripper all the time, so there is no silence to show.
+                for habit in habits_like_hardware(kind) if like_hardware and not urcap else ():
                     await server.fault_injector.begin(habit)
                 print(server.address, flush=True)
                 await server.fault_injector.run(plan, lambda trouble: tell(f"trouble: {trouble}"))
@@ -148,6 +152,15 @@ async def simulate(
         if serial is not None:
             raise RobotiqError(f"cannot listen on {serial}: {why_no_port(error)}") from error
         raise RobotiqError(f"cannot listen on {host}:{port}: {error.strerror or error}") from error
+
+
+def _check_wire(model: Model, *, serial: bool, rtu_over_tcp: bool, urcap: bool, unpaced: bool) -> None:
+    if serial + rtu_over_tcp + urcap > 1:
+        raise ValueError("--serial, --rtu-over-tcp and --urcap cannot be combined")
+    if urcap and len(model.axes) > 1:
+        raise ValueError("a URCap has a 2F or a Hand-E: --model 2f85, 2f140 or hand-e")
+    if unpaced and not serial and not rtu_over_tcp:
+        raise ValueError("--unpaced is for a serial line: --serial or --rtu-over-tcp")
 
 
 def _without_tracebacks() -> Callable[[asyncio.AbstractEventLoop, dict[str, Any]], None]:

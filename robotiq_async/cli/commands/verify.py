@@ -86,6 +86,8 @@ async def verify(
         parsed = parse_address(address)
         if model is not None:
             parsed = replace(parsed, model=model_of(model))
+    if parsed.kind == "urcap":
+        raise UsageError("verify tries registers, which a URCap does not have: doctor is for this address")
     need("mcap", "record")
     from ...tools.verify import Plan
     from ...tools.verify.files import Folder

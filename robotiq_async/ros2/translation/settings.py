@@ -48,8 +48,9 @@ PARAMETERS: Final[Mapping[str, Parameter]] = {
     **{name: _of_hand(name, option) for name, option in OF_HAND.items()},
     "address": Parameter(
         "sim://",
-        "The gripper: tcp://HOST[:502], rtu:///dev/ttyUSB0, rtu+tcp://HOST:PORT, zenoh://SITE/HOST/GRIPPER "
-        "(set up on its host: the other options of the hand have no effect), or sim://, simulated.",
+        "The gripper: tcp://HOST[:502], rtu:///dev/ttyUSB0, rtu+tcp://HOST:PORT, urcap://HOST, "
+        "zenoh://SITE/HOST/GRIPPER (set up on its host: the other options of the hand have no effect), "
+        "or sim://, simulated.",
     ),
     "publish_rate": Parameter(50.0, "Joint states a second.", 1.0, 200.0),
     "joint_prefix": Parameter(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, Final, Self
 from robotiq_async.values.model import THREE_FINGER
 
 from ..physics.gripper import SimulatedGripper
-from ..troubles.corruption import ReplyPolicy, unchanged
+from ..troubles.corruption import Reply, ReplyPolicy, unchanged
 from ..troubles.fault_injector import FaultInjector
 from ..troubles.like_hardware import own_habits
 from .connection import Connection
@@ -161,6 +161,10 @@ class SimulatorEndpoint(ABC):
         """Carry out a request; the frame of the reply."""
         served = set(self.functions) - self.fault_injector.refused_functions
         return self._reply(frame, self._bank.answer(frame.pdu, served))
+
+    def as_reply(self, frame: bytes) -> Reply:
+        """A reply as troubles look at it."""
+        return Reply(frame, serial=self.link != "tcp")
 
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
         """What to send for a reply."""

@@ -1,4 +1,4 @@
-"""What can be done to the bytes of one reply, on either kind of link. No I/O: a reply in, bytes out.
+"""What can be done to the bytes of one reply, on any kind of link. No I/O: a reply in, bytes out.
 
 Apart from what a function is named after, the frame it makes is in order: length and checksum are made
 anew, so that a client which finds it out has looked at the right thing.
@@ -66,6 +66,20 @@ class Reply:
         if self.serial:
             return ((0.0, body + FramerRTU.compute_CRC(body).to_bytes(2, "big")),)
         return ((0.0, self.frame[:4] + len(body).to_bytes(2, "big") + body),)
+
+
+class TextReply(Reply):
+    """A reply of the URCap's text port, which has no PDU."""
+
+    @property
+    def is_to_a_write(self) -> bool:
+        """Whether it acknowledges a SET."""
+        return self.frame == b"ack"
+
+    @property
+    def is_exception(self) -> bool:
+        """The text port has none."""
+        return False
 
 
 Corruption = Callable[[Reply, float], Parts]

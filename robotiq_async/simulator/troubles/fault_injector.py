@@ -14,7 +14,6 @@ from robotiq_async.values.registers import REGISTER_COUNT
 from robotiq_async.values.request import AxisRequest, Request
 
 from ..functions import READ_INPUT, READ_WRITE
-from .corruption import Reply
 from .trouble import KINDS, Trouble
 
 if TYPE_CHECKING:
@@ -200,7 +199,7 @@ class FaultInjector:
 
     def deliver(self, frame: bytes) -> Iterable[tuple[float, bytes]] | None:
         """What to send for a reply; None to hang up."""
-        reply = Reply(frame, serial=self._target.link != "tcp")
+        reply = self._target.as_reply(frame)
         for ongoing in self._ongoing:
             parts = ongoing.trouble.corrupt(reply)
             if parts is not None:

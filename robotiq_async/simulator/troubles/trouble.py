@@ -26,7 +26,7 @@ _EVENT: Final = 0.0
 _CONDITION: Final = math.inf
 
 On = Literal["read", "write", "any"]
-Link = Literal["tcp", "rtu", "rtu+tcp"]
+Link = Literal["tcp", "rtu", "rtu+tcp", "urcap"]
 
 
 class Kind(NamedTuple):
@@ -42,6 +42,7 @@ class Kind(NamedTuple):
         on: the requests whose replies it can be about.
         link: the only kind of link it fits, if there is only one.
         habit: the habit of the gripper that it changes, if it does.
+        is_modbus: whether it is about what only Modbus has: functions, registers, checksums.
     """
 
     meaning: str
@@ -53,12 +54,15 @@ class Kind(NamedTuple):
     on: On = "any"
     link: Link | None = None
     habit: str | None = None
+    is_modbus: bool = False
 
     def fits(self, link: Link) -> bool:
         """Whether it can happen on a kind of link.
 
         A serial server has the frames of a line, and connections. It keeps the silence between frames itself.
         """
+        if link == "urcap":
+            return self.link in (None, "tcp") and not self.is_modbus
         if link == "rtu+tcp":
             is_about_frames = self.corruption is not None
             return self is not KINDS["strict-silence"] and (self.link != "tcp" or not is_about_frames)
@@ -83,18 +87,31 @@ KINDS: Final[dict[str, Kind]] = {
         "replies come in three pieces, VALUE seconds apart", _CONDITION, 0.002, 0, 1, corruption.pieces
     ),
     "twice": Kind("a reply comes twice in one segment", corruption=corruption.twice),
-    "wrong-function": Kind("a reply is one to another function", corruption=corruption.wrong_function),
-    "wrong-length": Kind("a reply is one register short", corruption=corruption.wrong_length),
-    "wrong-count": Kind("a reply lies about how much it holds", corruption=corruption.wrong_count),
-    "wrong-transaction": Kind(
-        "a reply carries an old transaction number", corruption=corruption.wrong_transaction, link="tcp"
+    "wrong-function": Kind(
+        "a reply is one to another function", corruption=corruption.wrong_function, is_modbus=True
     ),
-    "wrong-unit": Kind("a reply comes from another unit", corruption=corruption.wrong_unit),
+    "wrong-length": Kind("a reply is one register short", corruption=corruption.wrong_length, is_modbus=True),
+    "wrong-count": Kind(
+        "a reply lies about how much it holds", corruption=corruption.wrong_count, is_modbus=True
+    ),
+    "wrong-transaction": Kind(
+        "a reply carries an old transaction number",
+        corruption=corruption.wrong_transaction,
+        link="tcp",
+        is_modbus=True,
+    ),
+    "wrong-unit": Kind("a reply comes from another unit", corruption=corruption.wrong_unit, is_modbus=True),
     "wrong-protocol": Kind(
-        "a reply is of another protocol than Modbus", corruption=corruption.wrong_protocol, link="tcp"
+        "a reply is of another protocol than Modbus",
+        corruption=corruption.wrong_protocol,
+        link="tcp",
+        is_modbus=True,
     ),
     "wrong-echo": Kind(
-        "a reply to a write names another register", corruption=corruption.wrong_echo, on="write"
+        "a reply to a write names another register",
+        corruption=corruption.wrong_echo,
+        on="write",
+        is_modbus=True,
     ),
     "wrong-checksum": Kind("a reply has a wrong checksum", corruption=corruption.wrong_checksum, link="rtu"),
     "byte-before": Kind(
@@ -113,7 +130,10 @@ KINDS: Final[dict[str, Kind]] = {
         link="rtu",
     ),
     "exception": Kind(
-        "a request is answered by exception VALUE", _EVENT, 4, 1, 255, corruption.refusal, link="tcp"
+        "a request is answered by exception VALUE",
+        *(_EVENT, 4, 1, 255, corruption.refusal),
+        link="tcp",
+        is_modbus=True,
     ),
     # Requests and connections.
     "silence": Kind("requests are not heard; connections stay open", _CONDITION),
@@ -176,9 +196,13 @@ KINDS: Final[dict[str, Kind]] = {
         link="tcp",
     ),
     "registers": Kind(
-        "more than VALUE registers of a block are refused: no answer on a serial line", _CONDITION, 3, 1, 8
+        "more than VALUE registers of a block are refused: no answer on a serial line",
+        *(_CONDITION, 3, 1, 8),
+        is_modbus=True,
     ),
-    "function-3-only": Kind("function 4 is refused, and function 3 reads the status", _CONDITION),
+    "function-3-only": Kind(
+        "function 4 is refused, and function 3 reads the status", _CONDITION, is_modbus=True
+    ),
     "no-function-23": Kind("function 23 is refused: no answer on a serial line", _CONDITION, link="rtu"),
     "one-connection-only": Kind("while there is a connection, a new one is reset", _CONDITION, link="tcp"),
 }

@@ -80,7 +80,7 @@ async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> 
             report(Finding(Level.GOOD, "echo", "the line echoes what is sent, and the echo is dropped"))
         report(_answers(failure if registers == usual else None, tries, seconds))
         _report_place(usual, registers, report)
-        _report_silence(status, report)
+        report_silence(status, report)
         return Answering(link, registers)
     if stranger is not None:
         _report_stranger(stranger, report)
@@ -189,6 +189,11 @@ def _report_no_connection(
     if not (address.is_socket and is_first):
         report(Finding(Level.BAD, "open", error.args[0], _advice_for_opening(address, str(error))))
         return
+    report(no_connection(address, error))
+
+
+def no_connection(address: Address, error: ConnectFailedError) -> Finding:
+    """Why nothing could be connected to the port of a host."""
     cause = error.__cause__
     if isinstance(cause, ConnectionRefusedError):
         advice = "The host is up, but nothing listens on this port: is it the right address and port?"
@@ -196,7 +201,7 @@ def _report_no_connection(
         advice = "It cannot be reached: check the cable, and the IP address and subnet mask of this computer."
     else:
         advice = "Is it switched on, on this network, in this subnet? A firewall may drop the packets."
-    report(Finding(Level.BAD, "port", f"{address.port}: {error.args[0]}", advice))
+    return Finding(Level.BAD, "port", f"{address.port}: {error.args[0]}", advice)
 
 
 def _advice_for_opening(address: Address, why: str) -> str:
@@ -289,7 +294,8 @@ def _report_place(usual: RegisterMap, found: RegisterMap, report: Report) -> Non
     report(where)
 
 
-def _report_silence(status: RobotiqStatus, report: Report) -> None:
+def report_silence(status: RobotiqStatus, report: Report) -> None:
+    """Report a status that no gripper has."""
     if not any(status.registers):
         found = "all registers read 0, which never happens with a gripper"
         advice = "The gripper behind the fieldbus may have no power, or this is another device."

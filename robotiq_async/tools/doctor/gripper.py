@@ -1,4 +1,4 @@
-"""A gripper that this host reaches: name, port, Modbus, rate, activation, fault, other clients.
+"""A gripper that this host reaches: name, port, Modbus or URCap, rate, activation, fault, other clients.
 
 It only reads, as one client with one connection at a time: nothing is written and nothing moves.
 """
@@ -25,6 +25,7 @@ from ...values.statistics import percentile
 from ...values.status import RobotiqStatus
 from .answer import REACH_S, find_gripper, long_enough
 from .findings import Finding, GiveUpError, Level, Report
+from .urcap import find_urcap
 
 PROBES: Final = 300  # reads for measuring round trip and rate
 WATCH_S: Final = 2.0  # how long to watch for another client
@@ -34,7 +35,7 @@ LONGEST_PERIOD_S: Final = 0.1  # the longest poll_interval of a hand
 async def examine(address: Address, report: Report, *, device_id: int | None = None) -> None:
     """Examine a connection; reports each finding at once, and never raises for a bad one.
 
-    ``device_id`` is the Modbus unit id; None for the usual one.
+    ``device_id`` is the Modbus unit id, or the gripper of a URCap; None for the usual one.
 
     Raises:
         ValueError: a unit id that is not valid on such a link.
@@ -43,7 +44,10 @@ async def examine(address: Address, report: Report, *, device_id: int | None = N
     try:
         if address.is_socket:
             await _resolve(address, report)
-        link, _ = await find_gripper(address, registers, report)
+        if address.kind == "urcap":
+            link = await find_urcap(address, device_id, report)
+        else:
+            link, _ = await find_gripper(address, registers, report)
         try:
             if address.kind == "rtu":
                 report_adapter(address, report)

@@ -1,0 +1,108 @@
+"""The lines of the URCap's text port, and what they mean in registers. No I/O: bytes in, a verdict out.
+
+Robotiq's URCap on a UR controller serves TCP port 63352. ``GET POS`` is answered by ``POS 12`` and an end of
+line, ``SET POS 255 GTO 1`` by ``ack`` without one. No document of the vendor's describes the port. Clients
+that ran on hardware show this: the example of ur_rtde, with GELLO's after it, airo-robots, and the URScript
+that the URCap adds to programs. The variables are the registers of a jaw by name, so what is read becomes the
+status registers that a serial line would carry, but for the motor current, which has no variable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from ..values import registers as reg
+from ..values.errors import ProtocolError
+from ..values.registers import Registers
+
+HIGHEST: Final = {"ACT": 1, "GTO": 1, "PRE": 255, "OBJ": 3, "STA": 3, "FLT": 255, "POS": 255}
+"""The variables of a status, and the highest value of each."""
+DIGITS: Final = 3
+"""The most digits of a value; the URCap's own script reads PRE with leading zeros."""
+ACKNOWLEDGED: Final = b"ack"
+_END: Final = b"\r\n"
+_LONGEST: Final = 16
+"""More bytes than this are no line of this port."""
+
+
+def question(name: str) -> bytes:
+    """The line that asks for a variable."""
+    return f"GET {name}\n".encode()
+
+
+def command(image: Sequence[int]) -> bytes:
+    """The one line that sets all that an image of a jaw says.
+
+    Nothing tells whether the URCap takes the variables of a line at once or one by one. So they stand in the
+    order that is right for both. What stops the fingers comes first; what starts them comes last, when
+    position, speed and force are set. ARD means nothing without ATR, and is left out then.
+    """
+    act, gto, atr, ard = (field.read(image) for field in (reg.rACT, reg.rGTO, reg.rATR, reg.rARD))
+    release = [("ARD", ard), ("ATR", atr)] if atr else [("ATR", atr)]
+    motion = [(name, field[0].read(image)) for name, field in _MOTION]
+    go = [("GTO", gto)]
+    first, last = ([], go) if gto else (go, [])
+    pairs = [("ACT", act), *first, *release, *motion, *last]
+    return ("SET " + " ".join(f"{name} {value}" for name, value in pairs) + "\n").encode()
+
+
+_MOTION: Final = (("SPE", reg.rSP), ("FOR", reg.rFR), ("POS", reg.rPR))
+
+
+def choice(gripper: int) -> bytes:
+    """The line that says which of several grippers this connection is about."""
+    return f"SET SID {gripper}\n".encode()
+
+
+def value_in(received: bytes, name: str) -> int | None:
+    """The value in the answer to the question for a variable; None while it is not whole.
+
+    Raises:
+        ProtocolError: the bytes cannot become the answer.
+    """
+    text = without_ends(received)
+    head, digits = f"{name} ".encode(), text[len(name) + 1 :]
+    if text[: len(head)] != head[: len(text)] or len(text) > _LONGEST:
+        raise _misfit(received, name)
+    is_whole = digits.endswith(b"\n")
+    number = digits.strip()
+    if number and not number.isdigit():
+        raise _misfit(received, name)
+    if not is_whole:
+        return None
+    if not 1 <= len(number) <= DIGITS or int(number) > HIGHEST[name]:
+        raise _misfit(received, name)
+    return int(number)
+
+
+def is_acknowledged(received: bytes) -> bool:
+    """Whether the bytes are the whole answer to a SET; False while they are not.
+
+    Raises:
+        ProtocolError: the bytes cannot become the answer.
+    """
+    text = received.strip(_END)
+    if not ACKNOWLEDGED.startswith(text):
+        raise ProtocolError(f"not an acknowledgement: {show(received)}")
+    return text == ACKNOWLEDGED
+
+
+def without_ends(received: bytes) -> bytes:
+    """What is left without empty lines before it: an ``ack`` may have had an end of line after all."""
+    return received.lstrip(_END)
+
+
+def status_registers(values: Mapping[str, int]) -> Registers:
+    """The status registers of a jaw with these values of its variables; the current reads 0."""
+    first = values["ACT"] | values["GTO"] << 3 | values["STA"] << 4 | values["OBJ"] << 6
+    return (first << 8, values["FLT"] << 8 | values["PRE"], values["POS"] << 8, 0, 0, 0, 0, 0)
+
+
+def _misfit(received: bytes, name: str) -> ProtocolError:
+    return ProtocolError(f"not the answer to GET {name}: {show(received)}")
+
+
+def show(received: bytes) -> str:
+    """Bytes for a message, shortened."""
+    return repr(received)[1:] if len(received) <= 2 * _LONGEST else f"{repr(received[: 2 * _LONGEST])[1:]}..."

@@ -1,0 +1,154 @@
+"""UrcapSimulatorServer: a simulated jaw behind the text port of Robotiq's URCap."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from robotiq_async.values import registers as reg
+from robotiq_async.values.checks import check_int
+from robotiq_async.values.model import TWO_FINGER_85
+from robotiq_async.values.registers import RTU_REGISTERS
+
+from ..physics.gripper import SimulatedGripper
+from ..troubles.corruption import Reply, TextReply
+from ..troubles.like_hardware import own_habits
+from .framing import BadFrameError, Frame
+from .tcp_server import SimulatorServer
+
+if TYPE_CHECKING:
+    from robotiq_async.values.registers import Field
+
+REFUSED: Final = b"?"
+"""The answer to a line that is not understood. Made up: no source shows what the URCap says."""
+LONGEST_LINE: Final = 256
+
+_STATUS: Final = {
+    "ACT": reg.gACT,
+    "GTO": reg.gGTO,
+    "STA": reg.gIMC,
+    "OBJ": reg.gOBJ,
+    "FLT": reg.gFLT,
+    "PRE": reg.gPR[0],
+    "POS": reg.gPO[0],
+}
+"""What is read of the status; two names are those of a request, too."""
+_REQUEST: Final = {
+    "ACT": reg.rACT,
+    "GTO": reg.rGTO,
+    "ATR": reg.rATR,
+    "ARD": reg.rARD,
+    "POS": reg.rPR[0],
+    "SPE": reg.rSP[0],
+    "FOR": reg.rFR[0],
+}
+"""What can be set."""
+_REGISTERS: Final = 3
+_FAULT_DIGITS: Final = 2
+"""The URScript that the URCap adds to programs reads two digits of FLT."""
+
+
+class _RefusedError(Exception):
+    """A line that is not understood."""
+
+
+class UrcapSimulatorServer(SimulatorServer):
+    """Serves a simulated jaw as Robotiq's URCap on a UR controller does, to any number of clients.
+
+    A line is ``GET NAME`` or ``SET NAME VALUE NAME VALUE ...``. The answer to a GET ends with an end of line,
+    the ``ack`` of a SET without one, as clients want it that ran on hardware. All variables of a SET take
+    effect at once. What is not understood is answered by a question mark.
+    """
+
+    link = "urcap"
+
+    def __init__(
+        self,
+        gripper: SimulatedGripper | None = None,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        device_id: int = RTU_REGISTERS.device_id,
+    ) -> None:
+        """A server that is not started; needs no running loop.
+
+        Args:
+            gripper: what answers; None for a new 2F-85.
+            host: address to listen on.
+            port: TCP port, 0 for any free one; the URCap's is 63352.
+            device_id: the only gripper that can be chosen (SID).
+
+        Raises:
+            TypeError: port or device_id is not an int.
+            ValueError: port is outside 0..65535, device_id outside 1..247, or the gripper is a 3-Finger.
+        """
+        jaw = gripper or SimulatedGripper(model=TWO_FINGER_85, habits=own_habits(TWO_FINGER_85))
+        if len(jaw.model.axes) > 1:
+            raise ValueError(f"a URCap has a 2F-85, 2F-140 or Hand-E, got a {jaw.model.title}")
+        super().__init__(jaw, host=host, port=port, device_id=check_int("device_id", device_id, 1, 247))
+
+    @property
+    def address(self) -> str:
+        """The address for :class:`~robotiq_async.RobotiqHand`."""
+        return f"urcap://{self._host}:{self._port}{self._query}"
+
+    def take(self, inbox: bytearray) -> Frame | None:
+        """Cut the next line out of what has arrived."""
+        end = inbox.find(b"\n")
+        if end < 0:
+            if len(inbox) > LONGEST_LINE:
+                raise BadFrameError(inbox[:16].hex(" "))
+            return None
+        line = bytes(inbox[:end])
+        del inbox[: end + 1]
+        return Frame(0, 0, line)
+
+    def answer(self, frame: Frame) -> bytes:
+        """Carry out a line; the answer."""
+        match frame.pdu.decode("ascii", "replace").split():
+            case ["GET", name]:
+                return self._get(name)
+            case ["SET", *words] if words and not len(words) % 2:
+                return self._set(words[::2], words[1::2])
+        return REFUSED
+
+    def as_reply(self, frame: bytes) -> Reply:
+        """An answer as troubles look at it."""
+        return TextReply(frame, serial=False)
+
+    def _is_meant(self, unit: int) -> bool:  # noqa: ARG002  # lines have none
+        return True
+
+    def _get(self, name: str) -> bytes:
+        if name == "SID":
+            value = self._device_id or 0
+        elif name in _STATUS:
+            value = _STATUS[name].read(self.gripper.status_registers())
+        elif name in _REQUEST:
+            value = _REQUEST[name].read(self.gripper.request_registers)
+        else:
+            return REFUSED
+        digits = _FAULT_DIGITS if name == "FLT" else 1
+        return f"{name} {value:0{digits}}\n".encode()
+
+    def _set(self, names: list[str], values: list[str]) -> bytes:
+        image = list(self.gripper.request_registers)
+        try:
+            for name, value in zip(names, values, strict=True):
+                self._put(image, name, value)
+        except _RefusedError:
+            return REFUSED
+        if names != ["SID"]:
+            self.gripper.write(0, image[:_REGISTERS])
+        return b"ack"
+
+    def _put(self, image: list[int], name: str, value: str) -> None:
+        field: Field | None = _REQUEST.get(name)
+        if not (value.isascii() and value.isdigit() and len(value) <= 3):
+            raise _RefusedError
+        if name == "SID":
+            if int(value) != self._device_id:
+                raise _RefusedError
+        elif field is None or int(value) >= 1 << field.width:
+            raise _RefusedError
+        else:
+            field.write(image, int(value))

@@ -1,0 +1,326 @@
+"""A hand at a UR with Robotiq's URCap, in virtual time: motions, other clients, troubles, and no current."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from robotiq_async import (
+    HAND_E,
+    JAW,
+    TWO_FINGER_85,
+    InvalidStateError,
+    Model,
+    MoveSupersededError,
+    ObjectStatus,
+    RobotiqHand,
+    RobotiqStatus,
+    State,
+)
+from robotiq_async.cli.output.tables import print_outcomes, print_status
+from robotiq_async.ros2.translation.diagnosis import diagnose
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble, UrcapSimulatorServer
+from robotiq_async.tools.measure.plots import plot_recording
+from robotiq_async.tools.recording.payloads import efforts
+from robotiq_async.tools.recording.recorder import Recorder
+from robotiq_async.tools.recording.recordings import read_recording
+from robotiq_async.tools.recording.table import COLUMNS, Table
+from robotiq_async.tools.web.page.mirror import HandMirror
+from robotiq_async.tools.web.server import HandUpdates
+from tests.fleet.lab import lab
+from tests.grippers import activate_beforehand, until_moving
+from tests.virtual import until
+
+pytestmark = pytest.mark.virtual_time
+
+
+@asynccontextmanager
+async def at_a_ur(
+    model: Model = TWO_FINGER_85, **options: Any
+) -> AsyncIterator[tuple[UrcapSimulatorServer, RobotiqHand]]:
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, model=model)
+    async with UrcapSimulatorServer(gripper) as server:
+        await activate_beforehand(gripper)
+        async with RobotiqHand(server.address, **options) as hand:
+            yield server, hand
+
+
+class OtherClient:
+    """Another program on the text port."""
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._reader = reader
+        self._writer = writer
+
+    @classmethod
+    async def at(cls, server: UrcapSimulatorServer) -> OtherClient:
+        return cls(*await asyncio.open_connection("127.0.0.1", server.port))
+
+    async def says(self, line: str) -> str:
+        self._writer.write(f"{line}\n".encode())
+        return (await self._reader.read(100)).decode()
+
+    def leaves(self) -> None:
+        self._writer.close()
+
+
+# -- motions ------------------------------------------------------------------------------------------------
+
+
+async def test_a_part_is_met_and_let_go() -> None:
+    async with at_a_ur() as (server, hand):
+        server.gripper.place_object(JAW, 120)
+        closed = await hand.close()
+        assert closed.outcomes[JAW] is ObjectStatus.CONTACT_CLOSING
+        assert closed.positions[JAW] == pytest.approx(120, abs=5)
+        opened = await hand.open()
+        assert opened.outcomes[JAW] is ObjectStatus.AT_POSITION
+        assert hand.statistics.foreign_commands == 0
+
+
+async def test_a_stop_on_the_way_clears_the_go() -> None:
+    async with at_a_ur() as (server, hand):
+        moving = asyncio.ensure_future(hand.close(speed=0))
+        await until_moving(server, hand)
+        await hand.halt()
+        assert not hand.status.go_echo
+        assert not server.gripper.is_moving
+        with pytest.raises(MoveSupersededError):
+            await moving
+
+
+async def test_a_stream_of_commands_is_never_taken_for_those_of_another_client() -> None:
+    async with at_a_ur() as (_, hand):
+        for step in range(200):
+            hand.command(position=step, speed=255)
+            await asyncio.sleep(0.008)
+        await hand.halt()
+        assert hand.statistics.foreign_commands == 0
+
+
+# -- other clients -------------------------------------------------------------------------------------------
+
+
+async def test_a_set_of_another_client_takes_over_as_it_does_over_modbus() -> None:
+    async with at_a_ur() as (server, hand):
+        moving = asyncio.ensure_future(hand.close(speed=0))
+        await until_moving(server, hand)
+        other = await OtherClient.at(server)
+        assert await other.says("SET POS 30 SPE 255 FOR 10 GTO 1") == "ack"
+        with pytest.raises(MoveSupersededError):
+            await moving
+        assert hand.statistics.foreign_commands == 1
+        assert hand.status.requested_position(JAW) == 30
+        other.leaves()
+
+
+async def test_a_go_that_another_client_clears_is_seen() -> None:
+    async with at_a_ur() as (server, hand):
+        moving = asyncio.ensure_future(hand.close(speed=0))
+        await until_moving(server, hand)
+        other = await OtherClient.at(server)
+        assert await other.says("SET GTO 0") == "ack"
+        with pytest.raises(MoveSupersededError):
+            await moving
+        other.leaves()
+
+
+async def test_an_active_gripper_is_adopted_with_what_it_was_asked_for() -> None:
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, model=HAND_E)
+    async with UrcapSimulatorServer(gripper) as server:
+        await activate_beforehand(gripper)
+        other = await OtherClient.at(server)
+        assert await other.says("SET POS 100 SPE 255 FOR 0 GTO 1") == "ack"
+        await until(lambda: gripper.is_moving)
+        await until(lambda: not gripper.is_moving)
+        assert await other.says("GET OBJ") == "OBJ 3\n"
+        writes = len(gripper.writes)
+        async with RobotiqHand(server.address) as hand:
+            assert hand.state is State.RUNNING_IDLE
+            assert hand.status.requested_position(JAW) == 100
+            assert len(gripper.writes) == writes
+        other.leaves()
+
+
+async def test_two_hands_on_one_urcap_need_the_ids_of_their_grippers() -> None:
+    async with at_a_ur() as (server, _):
+        with pytest.raises(
+            InvalidStateError, match="two grippers behind one URCap: give each of the hands its"
+        ):
+            await RobotiqHand(server.address).start(activate=False)
+
+
+async def test_the_gripper_that_was_asked_for_is_chosen() -> None:
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, model=HAND_E)
+    async with UrcapSimulatorServer(gripper, device_id=3) as server:
+        await activate_beforehand(gripper)
+        async with RobotiqHand(server.address, device_id=3) as hand:
+            await hand.close()
+        with pytest.raises(Exception, match="the URCap does not choose gripper 2"):
+            await RobotiqHand(server.address, device_id=2).start(activate=False)
+
+
+# -- troubles ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "words", ["reset", "close", "accept-silence", "refuse", "silence", "half", "drop", "late", "twice"]
+)
+async def test_it_comes_back(words: str) -> None:
+    async with at_a_ur() as (server, hand):
+        lasting = {"lasts": 3.0} if words in ("accept-silence", "refuse", "silence") else {}
+        ongoing = await server.fault_injector.begin(Trouble(words, **lasting))  # type: ignore[arg-type]
+        await hand.wait_for_state(State.DISCONNECTED, timeout=5)
+        await server.fault_injector.end(ongoing)
+        await hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
+        await hand.move(100)
+
+
+async def test_slow_answers_make_a_slow_hand_and_no_lost_one() -> None:
+    """A controller that takes 4 ms a question: some 60 statuses a second, and motions that end."""
+    async with at_a_ur() as (server, hand):
+        await server.fault_injector.begin(Trouble("delay", 0.004))
+        before = hand.statistics
+        await hand.close()
+        await hand.open()
+        after = hand.statistics
+        assert after.reconnects == 0
+        assert after.overruns == before.overruns, "a link that is the limit misses no poll"
+        assert after.round_trip_p50 == pytest.approx(0.0176, abs=0.001)
+
+
+async def test_answers_in_pieces_are_answers() -> None:
+    async with at_a_ur() as (server, hand):
+        await server.fault_injector.begin(Trouble("pieces"))
+        await hand.close()
+        assert hand.statistics.reconnects == 0
+
+
+async def test_a_proxy_that_delivers_late_is_noticed() -> None:
+    async with at_a_ur() as (server, hand):
+        before = hand.status
+        async with server.fault_injector.making(Trouble("multiplexer", 0.5)):
+            await hand.wait_for_state(State.DISCONNECTED, timeout=5)
+            server.gripper.place_object(JAW, 200)
+            await asyncio.sleep(10)
+            assert hand.state is State.DISCONNECTED
+            assert hand.status == before, "none of its answers became a status"
+        await hand.wait_for_state(State.RUNNING_IDLE, timeout=20)
+
+
+@pytest.mark.parametrize("words", ["wrong-checksum", "wrong-transaction", "exception", "function-3-only"])
+async def test_troubles_of_modbus_do_not_fit(words: str) -> None:
+    async with UrcapSimulatorServer() as server:
+        with pytest.raises(ValueError, match=f"{words} does not fit a simulator on urcap"):
+            await server.fault_injector.begin(Trouble(words))
+
+
+def test_a_urcap_has_no_3_finger() -> None:
+    with pytest.raises(ValueError, match="a URCap has a 2F-85, 2F-140 or Hand-E, got a 3-Finger"):
+        UrcapSimulatorServer(SimulatedGripper())
+
+
+@pytest.mark.parametrize(
+    ("line", "answer"),
+    [
+        ("GET POS", "POS 3\n"),
+        ("GET  FLT ", "FLT 00\n"),
+        ("GET SID", "SID 9\n"),
+        ("SET SID 9", "ack"),
+        ("SET SID 2", "?"),
+        ("SET  POS 12", "ack"),
+        ("SET POS 256", "?"),
+        ("SET POS", "?"),
+        ("SET POS -1", "?"),
+        ("SET OBJ 1", "?"),
+        ("GET", "?"),
+        ("GET NON", "?"),
+        ("", "?"),
+        ("\xff", "?"),
+    ],
+)
+async def test_the_lines_of_the_simulator(line: str, answer: str) -> None:
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, spread=False, model=TWO_FINGER_85)
+    async with UrcapSimulatorServer(gripper) as server:
+        await activate_beforehand(gripper)
+        other = await OtherClient.at(server)
+        assert await other.says(line) == answer
+        other.leaves()
+
+
+async def test_a_modbus_server_is_no_urcap() -> None:
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, model=TWO_FINGER_85)
+    async with SimulatorServer(gripper) as server:
+        address = server.address.replace("tcp://", "urcap://")
+        with pytest.raises(Exception, match="cannot connect to urcap://"):
+            await RobotiqHand(address).start(activate=False)
+
+
+# -- no current ----------------------------------------------------------------------------------------------
+
+
+async def test_there_is_no_current_and_not_a_current_of_0(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "ur.mcap"
+    async with at_a_ur() as (_, hand):
+        async with Recorder(hand, path):
+            result = await hand.close()
+        status, updates = hand.status, HandUpdates(hand)
+        print_status(hand)
+        print_outcomes(result)
+        shown = [each.values for each in diagnose(hand, now=status.timestamp)]
+        update = json.loads(json.dumps(updates.take(0)))
+    assert (status.has_current, status.current(JAW), status.current_ma(JAW)) == (False, None, None)
+    assert "mA" not in repr(status) + repr(result)
+    assert result.peak_current_ma == {JAW: None}
+    assert set(result.as_dict()["A"]) == {"outcome", "position", "reached"}
+    assert set(status.as_dict()["A"]) == {"position", "requested_position", "axis_state"}
+    assert RobotiqStatus.from_registers(status.registers, has_current=False).current(JAW) is None
+    assert all(map(math.isnan, efforts(status)))
+
+    printed = capsys.readouterr().out
+    assert [line.split()[-1] for line in printed.splitlines() if line.strip().startswith("A ")] == ["-", "-"]
+    assert not any("current" in name for values in shown for name in values)
+
+    mirror = HandMirror(0, "urcap://192.168.1.20")
+    mirror.hear(update)
+    assert mirror.status is not None
+    assert mirror.status.current_ma(JAW) is None
+    assert mirror.samples[-1].currents is None
+
+    rows, table = [], Table("status")
+    for entry in read_recording(path):
+        if entry.topic == "/gripper/status":
+            assert "current_ma" not in entry.fields["A"]
+            rows.append(table.row("status", entry.nanoseconds, entry.fields))
+    named = dict(zip(COLUMNS["status"], rows[-1] or [], strict=True))
+    assert (named["A.current_ma"], named["A.position"]) == (None, status.position(JAW))
+    assert plot_recording(tmp_path / "picture", read_recording(path))
+
+
+async def test_a_remote_hand_has_none_either() -> None:
+    async with (
+        lab(model=TWO_FINGER_85, kind_of_server=UrcapSimulatorServer) as here,
+        here.client() as hand,
+    ):
+        result = await hand.close()
+        assert (hand.status.has_current, hand.status.current(JAW)) == (False, None)
+        assert result.status.current(JAW) is None
+        assert result.peak_current_ma == {JAW: None}
+
+
+async def test_a_current_that_is_told_is_there_as_ever() -> None:
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, model=TWO_FINGER_85)
+    async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
+        result = await hand.close()
+        assert result.peak_current_ma[JAW]
+        assert hand.status.has_current
+        assert hand.status.current_ma(JAW) == 0
