@@ -7,8 +7,10 @@ translation). What the port makes different is decided here:
   for OBJ and POS, and for one of the slow variables in turn (GTO, STA, FLT, ACT). The echo of a request comes
   before the object status: an old OBJ beside a new echo would look like an arrival.
 * Echo, activation and go belong together: a go that is newer than the echo beside it would look like the
-  request of another client. So everything is read when a part of it changes, and after a write until the echo
-  shows it; then PRE lies between two equal answers to ACT and GTO, and was true together with them.
+  request of another client. So everything is read when a part of it changes, and after a write that changes
+  activation or go until they show it; then PRE lies between two equal answers to ACT and GTO, and was true
+  together with them. A new PRE that this link has written is no surprise: a stream of positions goes on with
+  the short read.
 * Answers carry no number. There is one question at a time, and after whatever is not the one whole answer, in
   time, the connection is closed. A new connection begins with a silence, and with another question than the
   one that was open before: what a proxy delivers late is noticed by that.
@@ -22,6 +24,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any, Final, Generic, TypeVar
 
@@ -48,6 +51,8 @@ SHOWS_S: Final = 0.5
 """After a write everything is read for this long at most, until the echo shows it."""
 SLOW: Final = ("GTO", "STA", "FLT", "ACT")
 """Asked for in turn, one in each read."""
+LATEST: Final = 4
+"""Written positions that may still show as echo: a write or two are under way, in a fast stream."""
 TRIES: Final = 4
 """Of reading activation, go and echo of one moment. Both change at a stop or a start, not all the time."""
 
@@ -128,8 +133,10 @@ class UrcapTransport:
         """Which of the slow variables comes next."""
         self._changes = True
         """Whether the next read asks for everything."""
+        self._positions: deque[int] = deque(maxlen=LATEST)
+        """The positions that were written last: an echo of one is expected."""
         self._written: tuple[int, ...] = ()
-        """Activation, go and echo that the last write will show; empty once they have been seen."""
+        """Activation, go and echo that the last write will show, if it changes activation or go."""
         self._shows_by = -math.inf
         """Until when that is awaited."""
         self._loop: asyncio.AbstractEventLoop
@@ -153,6 +160,7 @@ class UrcapTransport:
         self._watchdog = Watchdog(loop, self._response_timeout, lambda: self._is_waiting, self._on_timeout)
         self._failure, self._changes, self._written = None, True, ()
         self._values.clear()
+        self._positions.clear()
         try:
             with anyio.fail_after(self._connect_timeout):
                 client = await connected_client(
@@ -201,8 +209,11 @@ class UrcapTransport:
         Raises:
             RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
         """
-        self._changes, self._shows_by = True, self._now() + SHOWS_S
-        self._written = reg.rACT.read(registers), reg.rGTO.read(registers), reg.rPR[0].read(registers)
+        act, go, position = (field.read(registers) for field in (reg.rACT, reg.rGTO, reg.rPR[0]))
+        self._positions.append(position)
+        if self._changes or (act, go) != (self._values["ACT"], self._values["GTO"]):
+            self._changes, self._shows_by = True, self._now() + SHOWS_S
+            self._written = act, go, position
         await self._set(lines.command(registers))
 
     async def close(self) -> None:
@@ -213,7 +224,7 @@ class UrcapTransport:
 
     async def _read_some(self, by: float) -> None:
         """What changes in a motion, and one of the slow variables."""
-        if await self._is_new("PRE", by):
+        if await self._is_new("PRE", by) and self._values["PRE"] not in self._positions:
             self._changes = True
             return
         await self._is_new("OBJ", by)

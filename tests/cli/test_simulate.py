@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import re
 import resource
 import signal
 import socket
@@ -138,6 +139,36 @@ def test_rtu_over_tcp(call: Call, beside: Callable[..., Beside]) -> None:
     call("status", "--read-function", "4", address).assert_succeeded()
     call("status", "--device-id", "12", address).assert_failed(1, "no device answers")
     call("status", address.removeprefix("rtu+")).assert_failed(1, "no device answers")
+
+
+def test_urcap(call: Call, beside: Callable[..., Beside]) -> None:
+    address = beside("simulate", "--urcap", "--model", "2f85", "--port", "0").read_line()
+    assert re.fullmatch(r"urcap://127\.0\.0\.1:[0-9]+\?model=2f85", address)
+    shown = call("status", address)
+    shown.assert_succeeded()
+    assert "mA" in shown.out, "the column is there, and empty"
+    assert "current_ma" not in json.loads(call("status", "--json", address).out)["A"]
+    call("status", "--device-id", "9", address).assert_succeeded()
+    call("status", "--device-id", "2", address).assert_failed(1, "the URCap does not choose gripper 2")
+    call("status", "--read-function", "3", address).assert_failed(2, "read_function is an option of Modbus")
+    call("status", address.removesuffix("?model=2f85")).assert_failed(2, "name it, as in urcap://")
+    call("verify", address, "--up-to", "0", "--yes-to", "0").assert_failed(2, "doctor is for this address")
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (("--urcap",), "a URCap has a 2F or a Hand-E: --model 2f85, 2f140 or hand-e"),
+        (("--urcap", "--rtu-over-tcp", "--model", "2f85"), "cannot be combined"),
+        (("--urcap", "--model", "2f85", "--unpaced"), "--unpaced is for a serial line"),
+        (
+            ("--urcap", "--model", "2f85", "--trouble", "wrong-unit"),
+            "wrong-unit does not fit a simulator on urcap",
+        ),
+    ],
+)
+def test_what_does_not_fit_a_urcap(call: Call, options: tuple[str, ...], why: str) -> None:
+    call("simulate", "--port", "0", *options).assert_failed(2, why)
 
 
 @pytest.mark.parametrize(

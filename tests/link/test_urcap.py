@@ -238,6 +238,22 @@ async def test_after_a_write_everything_is_read_until_the_echo_shows_it() -> Non
         assert len(served.asked) == 4
 
 
+async def test_a_stream_of_positions_goes_on_with_the_short_read() -> None:
+    async with linked() as (link, served):
+        await link.read()
+        await link.write(image(100))
+        await link.read()
+        for position in (110, 120, 130):
+            served.lines.clear()
+            await link.write(image(position))
+            assert (await status(link)).echo == (True, True, position)
+            assert len(served.lines) == 1 + 4
+        served.lines.clear()
+        served.values["PRE"] = 7
+        await link.read()
+        assert served.asked == ["PRE", *ALL], "a position that another client has written"
+
+
 @pytest.mark.parametrize("said", [b"ack\n", b"ack\r\n", b"\nack"])
 async def test_an_acknowledgement_may_have_an_end_of_line(said: bytes) -> None:
     async with linked() as (link, served):

@@ -18,12 +18,13 @@ from robotiq_async.simulator import (
     SerialSimulatorServer,
     SimulatorServer,
     Trouble,
+    UrcapSimulatorServer,
 )
 from robotiq_async.simulator import parse_troubles as plan_of
 from robotiq_async.simulator.server.endpoint import SimulatorEndpoint
 from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values.enums import Fault
-from robotiq_async.values.model import THREE_FINGER
+from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 from tests.simulator.conftest import simulator
@@ -46,6 +47,11 @@ MISFITS = {
         *("multiplexer", "wake-needed", "one-connection-only"),
     },
     "rtu+tcp": {"wrong-transaction", "wrong-protocol", "exception", "strict-silence"},
+    "urcap": {
+        *("wrong-function", "wrong-length", "wrong-count", "wrong-transaction", "wrong-unit"),
+        *("wrong-protocol", "wrong-echo", "wrong-checksum", "exception", "function-3-only", "registers"),
+        *("byte-before", "byte-after", "seven-bits", "garbled", "echo", "strict-silence", "no-function-23"),
+    },
 }
 """What cannot happen on a kind of link."""
 
@@ -488,8 +494,13 @@ async def test_a_trouble_that_cannot_begin_changes_nothing(
 
 
 def test_which_troubles_fit_which_link() -> None:
-    servers = SimulatorServer(), SerialSimulatorServer("/dev/ttyFAR"), RtuOverTcpSimulatorServer()
+    servers = (
+        *(SimulatorServer(), SerialSimulatorServer("/dev/ttyFAR"), RtuOverTcpSimulatorServer()),
+        UrcapSimulatorServer(),
+    )
     for kind, server in itertools.product(KINDS, servers):
+        if kind == "interference" and server.gripper.model is TWO_FINGER_85:
+            continue  # of a scissor
         if kind not in MISFITS[server.link]:
             server.fault_injector.check([Trouble(kind)])
         else:

@@ -192,5 +192,5 @@ def _list_troubles() -> None:
     for name, kind in KINDS.items():
         usual = "" if kind.value is None else f" (VALUE: {kind.value:g} unless given)"
         lasts = "" if kind.lasts == 0 else "; lasts for ever unless a duration is given"
-        link = "" if kind.link is None else f"; {kind.link} only"
+        link = f"; {kind.link} only" if kind.link else "; Modbus only" if kind.is_modbus else ""
         print(f"{name:19} {kind.meaning}{usual}{lasts}{link}")

@@ -1,0 +1,72 @@
+"""Clients of others for the URCap's text port, which drive real grippers on a UR, on the simulated one."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+
+import pytest
+
+from robotiq_async import JAW, TWO_FINGER_85, RobotiqHand
+from robotiq_async.simulator import SimulatedGripper, UrcapSimulatorServer
+
+
+@pytest.fixture
+def gripper() -> SimulatedGripper:
+    return SimulatedGripper(speedup=20, spread=False, model=TWO_FINGER_85)
+
+
+@pytest.fixture
+async def server(gripper: SimulatedGripper) -> AsyncIterator[UrcapSimulatorServer]:
+    async with UrcapSimulatorServer(gripper) as server:
+        yield server
+
+
+async def test_pyrobotiqur(gripper: SimulatedGripper, server: UrcapSimulatorServer) -> None:
+    ur = pytest.importorskip("pyrobotiqur", reason="needs pyrobotiqur (extra dev)")
+
+    def use() -> list[tuple[int, int]]:
+        with ur.RobotiqGripper("127.0.0.1", server.port) as driver:
+            driver.activate(poll_interval=0.01)
+            gripper.place_object(JAW, 120)
+            ends = [driver.close(speed=255), driver.open(speed=255), driver.move_percent(20)]
+            assert (driver.get_fault(), driver.get_requested_position()) == (0, 51)
+            return [(position, int(status)) for position, status in ends]
+
+    assert await asyncio.to_thread(use) == [(120, 2), (3, 3), (51, 3)]
+
+
+async def test_pyrobotiqur_beside_a_hand_is_another_client(server: UrcapSimulatorServer) -> None:
+    ur = pytest.importorskip("pyrobotiqur", reason="needs pyrobotiqur (extra dev)")
+
+    def use() -> None:
+        with ur.RobotiqGripper("127.0.0.1", server.port) as driver:
+            driver.move(80, speed=255)
+
+    async with RobotiqHand(server.address) as hand:
+        await hand.open()
+        await asyncio.to_thread(use)
+        assert hand.status.requested_position(JAW) == 80
+        assert hand.statistics.foreign_commands >= 1
+        await hand.close()
+
+
+async def test_airo_robots(gripper: SimulatedGripper, server: UrcapSimulatorServer) -> None:
+    """It opens a connection for each line, cuts one character off each answer, and writes two blanks."""
+    module = "airo_robots.grippers.hardware.robotiq_2f85_urcap"
+    airo = pytest.importorskip(
+        module, reason="needs airo-robots, which brings scipy and more: pip install it"
+    )
+
+    def use() -> tuple[float, bool, float]:
+        driver = airo.Robotiq2F85("127.0.0.1", server.port)
+        driver.move(0.04).wait()
+        width = driver.get_current_width()
+        gripper.place_object(JAW, 200)
+        driver.close().wait()
+        return width, driver.is_an_object_grasped(), driver.get_current_width()
+
+    width, is_held, held = await asyncio.to_thread(use)
+    assert width == pytest.approx(0.04, abs=0.002)
+    assert is_held
+    assert held == pytest.approx(0.085 * 30 / 230, abs=0.002)
