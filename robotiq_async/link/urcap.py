@@ -14,8 +14,7 @@ translation). What the port makes different is decided here:
 * Answers carry no number. There is one question at a time, and after whatever is not the one whole answer, in
   time, the connection is closed. A new connection begins with a silence, and with another question than the
   one that was open before: what a proxy delivers late is noticed by that.
-* A write is one line with all variables, and never repeated. Another client's SET shows in the echo, as it
-  does over Modbus.
+* A write is one line and never repeated. Another client's SET shows in the echo, as it does over Modbus.
 
 Nothing of this has met a real controller.
 """
@@ -135,6 +134,8 @@ class UrcapTransport:
         """Whether the next read asks for everything."""
         self._positions: deque[int] = deque(maxlen=LATEST)
         """The positions that were written last: an echo of one is expected."""
+        self._releases = False
+        """Whether the last write set ATR."""
         self._written: tuple[int, ...] = ()
         """Activation, go and echo that the last write will show, if it changes activation or go."""
         self._shows_by = -math.inf
@@ -214,7 +215,9 @@ class UrcapTransport:
         if self._changes or (act, go) != (self._values["ACT"], self._values["GTO"]):
             self._changes, self._shows_by = True, self._now() + SHOWS_S
             self._written = act, go, position
-        await self._set(lines.command(registers))
+        shown = None if self._releases else self._values.get("ACT")
+        self._releases = bool(reg.rATR.read(registers))
+        await self._set(lines.command(registers, shown))
 
     async def close(self) -> None:
         """Disconnect; does nothing when closed."""

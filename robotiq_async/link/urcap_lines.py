@@ -31,19 +31,32 @@ def question(name: str) -> bytes:
     return f"GET {name}\n".encode()
 
 
-def command(image: Sequence[int]) -> bytes:
-    """The one line that sets all that an image of a jaw says.
+def command(image: Sequence[int], activation: int | None) -> bytes:
+    """The one line that sets what an image of a jaw says.
 
     Nothing tells whether the URCap takes the variables of a line at once or one by one. So they stand in the
     order that is right for both. What stops the fingers comes first; what starts them comes last, when
-    position, speed and force are set. ARD means nothing without ATR, and is left out then.
+    position, speed and force are set.
+
+    A motion is the line that clients send: position, speed, force, go. Activation and release are in it only
+    if the image changes them: a motion must not activate a gripper that another client has just reset. ARD
+    means nothing without ATR.
+
+    Args:
+        image: the eight request registers.
+        activation: ACT as it was read last; None if it was not, or if ATR may be set.
     """
     act, gto, atr, ard = (field.read(image) for field in (reg.rACT, reg.rGTO, reg.rATR, reg.rARD))
     release = [("ARD", ard), ("ATR", atr)] if atr else [("ATR", atr)]
-    motion = [(name, field[0].read(image)) for name, field in _MOTION]
+    is_motion = act == activation and not atr
     go = [("GTO", gto)]
-    first, last = ([], go) if gto else (go, [])
-    pairs = [("ACT", act), *first, *release, *motion, *last]
+    pairs = [
+        *([] if is_motion else [("ACT", act)]),
+        *([] if gto else go),
+        *([] if is_motion else release),
+        *((name, field[0].read(image)) for name, field in _MOTION),
+        *(go if gto else []),
+    ]
     return ("SET " + " ".join(f"{name} {value}" for name, value in pairs) + "\n").encode()
 
 

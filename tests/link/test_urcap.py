@@ -216,8 +216,8 @@ async def test_a_go_that_never_stays_is_an_error() -> None:
 @pytest.mark.parametrize(
     ("registers", "line"),
     [
-        (image(255), "SET ACT 1 ATR 0 SPE 50 FOR 60 POS 255 GTO 1"),
-        (image(80, go=False), "SET ACT 1 GTO 0 ATR 0 SPE 50 FOR 60 POS 80"),
+        (image(255), "SET SPE 50 FOR 60 POS 255 GTO 1"),
+        (image(80, go=False), "SET GTO 0 SPE 50 FOR 60 POS 80"),
         (image(0, go=False, activate=False), "SET ACT 0 GTO 0 ATR 0 SPE 50 FOR 60 POS 0"),
         ((0x3100, 0, 0, 0, 0, 0, 0, 0), "SET ACT 1 GTO 0 ARD 1 ATR 1 SPE 0 FOR 0 POS 0"),
     ],
@@ -226,9 +226,36 @@ async def test_an_image_is_one_line_in_which_a_stop_comes_first_and_a_go_last(
     registers: Registers, line: str
 ) -> None:
     async with linked() as (link, served):
+        await link.read()
         served.lines.clear()
         assert await link.send(lambda: registers)
         assert served.lines == [line]
+
+
+async def test_a_motion_does_not_activate_a_gripper_that_another_client_has_reset() -> None:
+    async with linked() as (link, served):
+        await link.read()
+        served.values |= {"ACT": 0, "STA": 0}
+        await link.write(image(255))
+        assert served.values["ACT"] == 0
+        assert not (await status(link)).activation_echo
+
+
+async def test_a_release_is_taken_back_by_the_next_write() -> None:
+    async with linked() as (link, served):
+        await link.read()
+        await link.write((0x3100, 0, 0, 0, 0, 0, 0, 0))
+        await link.read()
+        await link.write(image(0, go=False))
+        assert served.lines[-1] == "SET ACT 1 GTO 0 ATR 0 SPE 50 FOR 60 POS 0"
+        await link.write(image(0, go=False))
+        assert served.lines[-1] == "SET GTO 0 SPE 50 FOR 60 POS 0"
+
+
+async def test_what_was_not_read_yet_is_set() -> None:
+    async with linked() as (link, served):
+        await link.write(image(255))
+        assert served.lines[-1] == "SET ACT 1 ATR 0 SPE 50 FOR 60 POS 255 GTO 1"
 
 
 async def test_nothing_is_written_without_an_image() -> None:
