@@ -167,6 +167,14 @@ async def test_an_activation_is_shown_as_a_motion() -> None:
         await hand.stop()
 
 
+async def test_a_current_that_is_not_told_is_not_shown_as_0(active: Operator) -> None:
+    async with shown(active) as pilot:
+        axes, words = pilot.app.query_one(Axes), active.hand.status.registers
+        for has_current in (True, False):
+            axes.show(RobotiqStatus(words, has_current=has_current), dict.fromkeys(THREE_FINGER.axes, -1))
+            assert ("mA" in axes.render().plain) is has_current
+
+
 async def test_of_the_currents_between_two_paints_the_highest_is_shown(active: Operator) -> None:
     async with shown(active) as pilot:
         assert isinstance(pilot.app, Monitor)

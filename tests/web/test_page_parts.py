@@ -15,13 +15,14 @@ import pytest
 
 pytest.importorskip("nicegui", reason="the page needs the extra web")
 
-from robotiq_async import CLOSED, Fault, Finger, RobotiqHand, State
+from robotiq_async import CLOSED, HAND_E, Fault, Finger, RobotiqHand, RobotiqStatus, State
 from robotiq_async.control.state_machine import TABLE, Verdict, refusal
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import Operator
 from robotiq_async.tools.web.commands import BUTTONS, FRESH_S, MAX_COMMANDS, PageCommands
 from robotiq_async.tools.web.page.heartbeat import LOST_S, Heartbeat
-from robotiq_async.tools.web.page.mirror import HISTORY_S, Mirror
+from robotiq_async.tools.web.page.mirror import HISTORY_S, HandMirror, Mirror
+from robotiq_async.tools.web.page.widgets.panels import _axis_row
 from robotiq_async.tools.web.page.widgets.words import event_words, fault_words, state_words
 from robotiq_async.tools.web.server import HandUpdates, PageServer
 from robotiq_async.tools.web.settings import PageSettings
@@ -326,3 +327,14 @@ def test_a_process_of_the_page_without_settings_ends_and_leaves_no_folder(tmp_pa
     environment = os.environ | {"TMPDIR": str(tmp_path)}
     assert subprocess.call(command, stdin=subprocess.DEVNULL, env=environment) == 1
     assert not list(tmp_path.iterdir())
+
+
+def test_a_row_without_a_current_shows_none() -> None:
+    told, untold = (
+        _axis_row(
+            HandMirror(0, "", status=RobotiqStatus((0xF900, 0, 0, 0, 0, 0, 0, 0), 0.0, 0, HAND_E, has)), 0
+        )
+        for has in (True, False)
+    )
+    assert "0 mA" in told
+    assert "mA" not in untold
