@@ -15,7 +15,7 @@ from ..link.modbus import ModbusTransport
 from ..link.registers import check_urcap, registers_of
 from ..link.sim_transport import SimulatedTransport, new_gripper
 from ..link.transport import Link, Transport
-from ..link.urcap import UrcapTransport
+from ..link.urcap.transport import UrcapTransport
 from ..runtime.log import Log
 from ..values.checks import repr_of
 from ..values.model import THREE_FINGER, Model, model_of

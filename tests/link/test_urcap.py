@@ -24,9 +24,9 @@ from robotiq_async import (
     RobotiqHand,
     RobotiqStatus,
 )
-from robotiq_async.link import urcap_lines as lines
 from robotiq_async.link.address import Address, parse_address
-from robotiq_async.link.urcap import UrcapTransport
+from robotiq_async.link.urcap import lines
+from robotiq_async.link.urcap.transport import UrcapTransport
 from robotiq_async.values.model import TWO_FINGER_85
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import AxisRequest, Request

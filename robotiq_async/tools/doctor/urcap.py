@@ -6,7 +6,7 @@ from typing import Final
 
 from ...link.address import URCAP_PORT, Address
 from ...link.transport import Link
-from ...link.urcap import UrcapTransport
+from ...link.urcap.transport import UrcapTransport
 from ...values.errors import (
     ConnectFailedError,
     ConnectionLostError,

@@ -1,6 +1,6 @@
 """The link to a jaw behind Robotiq's URCap on a UR: the text port 63352, one variable a question.
 
-To the rest of the library it is a link like the others: registers in, registers out (urcap_lines.py has the
+To the rest of the library it is a link like the others: registers in, registers out (lines.py has the
 translation). What the port makes different is decided here:
 
 * A status takes a question for each variable, so it is not of one moment. Each read asks for PRE first, then
@@ -29,20 +29,20 @@ from typing import Any, Final, Generic, TypeVar
 
 import anyio
 
-from ..runtime.log import Log, log
-from ..values import registers as reg
-from ..values.errors import (
+from ...runtime.log import Log, log
+from ...values import registers as reg
+from ...values.errors import (
     ConnectFailedError,
     ConnectionLostError,
     ProtocolError,
     ResponseTimeoutError,
     RobotiqConnectionError,
 )
-from ..values.registers import Registers
-from . import urcap_lines as lines
-from .address import Address
-from .connecting import Client, connected_client, disconnect
-from .watchdog import Watchdog
+from ...values.registers import Registers
+from ..address import Address
+from ..connecting import Client, connected_client, disconnect
+from ..watchdog import Watchdog
+from . import lines
 
 SETTLE_S: Final = 0.02
 """From connecting to the first question, as over Modbus TCP: what comes meanwhile answers nothing of ours."""

@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from ..values import registers as reg
-from ..values.errors import ProtocolError
-from ..values.registers import Registers
+from ...values import registers as reg
+from ...values.errors import ProtocolError
+from ...values.registers import Registers
 
 HIGHEST: Final = {"ACT": 1, "GTO": 1, "PRE": 255, "OBJ": 3, "STA": 3, "FLT": 255, "POS": 255}
 """The variables of a status, and the highest value of each."""
