@@ -332,7 +332,10 @@ def test_a_process_of_the_page_without_settings_ends_and_leaves_no_folder(tmp_pa
 def test_a_row_without_a_current_shows_none() -> None:
     told, untold = (
         _axis_row(
-            HandMirror(0, "", status=RobotiqStatus((0xF900, 0, 0, 0, 0, 0, 0, 0), 0.0, 0, HAND_E, has)), 0
+            HandMirror(
+                0, "", status=RobotiqStatus((0xF900, 0, 0, 0, 0, 0, 0, 0), model=HAND_E, has_current=has)
+            ),
+            0,
         )
         for has in (True, False)
     )
