@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from robotiq_async.tools.description import hand_model
 from robotiq_async.values.enums import Fault, Severity, State
-from robotiq_async.values.model import THREE_FINGER
+from robotiq_async.values.model import MODELS, THREE_FINGER
 
 FILE: Final = Path(__file__).parents[1] / "robotiq_async" / "data" / "foxglove_layout.json"
 GREEN, YELLOW, RED, GREY = "#4caf50", "#ffb300", "#e53935", "#9e9e9e"
@@ -112,7 +112,9 @@ def _hand() -> Panel:
         "topics": {"/robot_description": {"visible": True}},
         # Their axes would be metres long, and the hand is not.
         "scene": {"transforms": {"showLabel": False, "axisScale": 0.03}},
-        "transforms": {f"frame:{link}": {"visible": False} for link in model.links},
+        "transforms": {
+            f"frame:{link}": {"visible": False} for kind in MODELS for link in hand_model(kind).links
+        },
     }
 
 

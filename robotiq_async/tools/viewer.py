@@ -33,12 +33,11 @@ from ..runtime.concurrency import in_a_thread, wait_shielded
 from ..values.checks import check_int
 from ..values.enums import State
 from ..values.errors import ViewerError
-from ..values.model import THREE_FINGER
+from ..values.model import Model
 from ..values.status import RobotiqStatus
 from .description import hand_model, urdf
 from .description.joint_states import ENCAPSULATION, add_string
-from .description.kinematics import JOINTS as JOINT_NAMES
-from .description.kinematics import joint_angles
+from .description.kinematics import joint_angles, joint_names
 from .recording.feed import EVENT, JOINTS, TOPICS, Feed, Message, Topic, compact, json_topic
 from .recording.payloads import INTEGER, NUMBER, SCHEMAS, STRING, object_schema, state_fields, title
 
@@ -156,15 +155,13 @@ class Viewer:
             self._publish_state()
 
         is_due = message.nanoseconds - self._transformed_at >= TRANSFORMS_S * 1e9
-        if message.topic is JOINTS and is_due and self._hand.model is THREE_FINGER:
+        if message.topic is JOINTS and is_due:
             self._transformed_at = message.nanoseconds
             data = compact(transforms(self._hand.status, message.nanoseconds))
             self._channels[TRANSFORMS].log(data, log_time=message.nanoseconds)
 
     def _describe(self) -> None:
-        if self._hand.model is not THREE_FINGER:
-            return  # the description is that of the 3-Finger
-        self._channels[DESCRIPTION].log(_description_message())
+        self._channels[DESCRIPTION].log(_description_message(self._hand.model))
 
     def _publish_state(self) -> None:
         self._published_state = self._hand.state
@@ -189,19 +186,20 @@ class _Listener(ServerListener):
             self._describe()
 
 
-def _description_message() -> bytes:
+def _description_message(model: Model) -> bytes:
     body = bytearray(ENCAPSULATION)
-    add_string(body, urdf())
+    add_string(body, urdf(model))
     return bytes(body)
 
 
 def transforms(status: RobotiqStatus, nanoseconds: int) -> dict[str, Any]:
     """The transform of every joint, from parent to child, at the time of the status since 1970."""
     seconds, rest = divmod(nanoseconds, 1_000_000_000)
-    angles = dict(zip(JOINT_NAMES, joint_angles(status), strict=True))
+    model = hand_model(status.model)
+    values = model.completed(dict(zip(joint_names(status.model), joint_angles(status), strict=True)))
     found = []
-    for joint in hand_model().joints:
-        pose = joint.pose(angles.get(joint.name, 0.0))
+    for joint in model.joints:
+        pose = joint.pose(values.get(joint.name, 0.0))
         found.append(
             {
                 "timestamp": {"sec": seconds, "nsec": rest},

@@ -40,6 +40,7 @@ IN_THE_WHEEL: Final = (
     "robotiq_async/py.typed",
     "robotiq_async/_demo.py",
     "robotiq_async/data/robotiq_3f.urdf",
+    "robotiq_async/data/robotiq_2f85.xml",
 )
 LAST_PART: Final = "What the hand went through"
 """The demo's heading of its last part."""

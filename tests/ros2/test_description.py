@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
 
 from robotiq_async.ros2.translation.description import prefixed, robot_description
 from robotiq_async.ros2.translation.joints import joint_names
-from robotiq_async.tools.description import HandModel, urdf
+from robotiq_async.tools.description import kinematics, urdf
+from robotiq_async.values.model import MODELS
 
 URDF = (
     "<robot name='hand'><link name='palm' /><link name='tip' /><joint name='j' type='revolute'>"
@@ -16,11 +18,26 @@ URDF = (
 )
 
 
+def moving(text: str) -> set[str]:
+    """The joints that something must name: neither fixed nor following another."""
+    joints = ET.fromstring(text).findall("joint")
+    return {
+        joint.attrib["name"]
+        for joint in joints
+        if joint.get("type") != "fixed" and joint.find("mimic") is None
+    }
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_joint_states_name_every_joint_of_the_description_that_is_free(name: str) -> None:
+    text = robot_description("", "left_", name)
+    assert moving(text) == {f"left_{each}" for each in kinematics.joint_names(MODELS[name])}
+    assert text == prefixed(urdf(name), "left_")
+
+
 def test_a_prefix_stands_before_links_and_joints() -> None:
     assert robot_description("", "") == urdf()
-    assert {joint.name for joint in HandModel.parse(robot_description("", "cell/3.")).moving} == set(
-        joint_names("cell/3.")
-    )
+    assert moving(robot_description("", "cell/3.")) == set(joint_names("cell/3."))
     assert prefixed(URDF, "") == URDF
     text = prefixed(URDF, "left_").replace('"', "'")
     expected = URDF

@@ -1,17 +1,15 @@
-"""The description of the hand: what it says, and where its links are."""
+"""The description of the 3-Finger: what it says, and where its links are. The others: test_jaws.py."""
 
 from __future__ import annotations
 
 import cmath
-import re
-import xml.etree.ElementTree as ET
 from math import cos, dist, isclose, pi, sin, sqrt
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.tools.description import HandModel, Pose, hand_model, urdf
+from robotiq_async.tools.description import Pose, hand_model
 from robotiq_async.tools.description.geometry import Vector, from_rpy, turned
 from robotiq_async.tools.description.kinematics import FINGER_NAMES, JOINTS, finger_angles, palm_angle
 
@@ -26,13 +24,6 @@ def at(position: int, scissor: int = 137) -> dict[str, float]:
     return dict(zip(JOINTS, (palm, *finger, -palm, *finger, *finger), strict=True))
 
 
-def test_any_parser_of_xml_reads_it() -> None:
-    robot = ET.fromstring(urdf())
-    assert (robot.tag, robot.attrib["name"]) == ("robot", "robotiq_3f")
-    materials = {each.attrib["name"] for each in robot.findall("material")}
-    assert {each.attrib["name"] for each in robot.iterfind("link/visual/material")} == materials
-
-
 def test_the_joints_are_those_of_the_joint_states() -> None:
     assert {joint.name for joint in MODEL.moving} == set(JOINTS)
     assert len(MODEL.moving) == 11
@@ -45,17 +36,6 @@ def test_the_links_form_one_tree_on_the_frame_that_joint_states_name() -> None:
         chain = [joint for joint in MODEL.joints if joint.child.startswith(finger)]
         assert [joint.child for joint in chain] == [f"{finger}_link_{number}" for number in range(4)]
         assert [joint.parent for joint in chain] == ["palm", *[f"{finger}_link_{n}" for n in range(3)]]
-
-
-def test_its_comments_name_the_fingers_as_the_map_does() -> None:
-    comments = re.findall(r"<!-- Finger ([ABC]) -->(.*?)(?=<!-- Finger|</robot>)", urdf(), re.DOTALL)
-    named = {name: str(finger.name) for finger, name in FINGER_NAMES.items()}
-    assert len(comments) == 3
-    for letter, text in comments:
-        links = set(re.findall(r'<link name="(\w+)_link_0"', text))
-        assert [named[link] for link in links] == [letter]
-    words = ", ".join(f"{name} is {letter}" for name, letter in named.items())
-    assert words in " ".join(urdf().split())
 
 
 def test_no_position_of_the_gripper_leaves_the_limits() -> None:
@@ -180,20 +160,6 @@ def test_an_axis_may_have_any_length_but_zero() -> None:
     assert turned((0, sqrt(2), 0), 0) == Pose()
     with pytest.raises(ValueError, match="must have a length"):
         turned((0, 0, 0), 1)
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("<robot>", "not XML"),
-        ("<robot/>", "one root link"),
-        ('<robot><link name="a"/><link name="b"/></robot>', "one root link"),
-        ('<robot><link name="a"><visual/></link></robot>', "a visual without geometry"),
-    ],
-)
-def test_malformed_descriptions_are_refused(text: str, words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        HandModel.parse(text)
 
 
 def test_a_link_without_a_pad_is_an_error() -> None:

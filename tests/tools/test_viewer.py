@@ -15,11 +15,12 @@ from rosbags.typesys import Stores, get_typestore
 from docs import make_layout
 from robotiq_async import Fault, Finger, RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.tools.description import HandModel, hand_model
-from robotiq_async.tools.description.kinematics import JOINTS
+from robotiq_async.tools.description import hand_model, urdf
+from robotiq_async.tools.description.kinematics import JOINTS, joint_angles, joint_names
 from robotiq_async.tools.recording.payloads import SCHEMAS
 from robotiq_async.tools.viewer import SHOWN, Viewer
 from robotiq_async.values.errors import ViewerError
+from robotiq_async.values.model import MODELS
 from tests.foxglove_client import Client, client
 from tests.grippers import active_gripper, lose_link, shows, until
 
@@ -116,13 +117,33 @@ async def test_the_hand_can_be_drawn(hand: RobotiqHand) -> None:
         await one.until(lambda: {topic for topic, *_ in one.received} == {"/robot_description", "/tf"})
     data = next(data for topic, _, data in one.received if topic == "/robot_description")
     message: Any = store.deserialize_cdr(data, "std_msgs/msg/String")
-    model = HandModel.parse(message.data)
+    model = hand_model()
+    assert message.data == urdf()
     placed = {model.root: (0.0, 0.0, 0.0)}
     shown = {each["child_frame_id"]: each for each in one.objects("/tf")[-1]["transforms"]}
     assert {(each["parent_frame_id"], child) for child, each in shown.items()} == {
         (joint.parent, joint.child) for joint in model.joints
     }
     assert len(placed | shown) == len(model.links)
+
+
+@pytest.mark.parametrize("name", ["2f85", "2f140", "hand-e"])
+async def test_a_sibling_can_be_drawn(name: str) -> None:
+    """Joint states name one joint: the transforms have those that follow it."""
+    async with RobotiqHand(f"sim://?model={name}&speedup=20") as jaw, viewed(jaw) as one:
+        await jaw.activate()
+        await jaw.move(120)
+        await one.subscribe("/robot_description", "/tf")
+        await one.until(lambda: {topic for topic, *_ in one.received} == {"/robot_description", "/tf"})
+    model, angles = hand_model(name), dict(zip(joint_names(jaw.model), joint_angles(jaw.status), strict=True))
+    shown = {each["child_frame_id"]: each for each in one.objects("/tf")[-1]["transforms"]}
+    values = model.completed(angles)
+    for joint in model.joints:
+        pose = joint.pose(values[joint.name])
+        assert list(shown[joint.child]["translation"].values()) == pytest.approx(pose.position, abs=1e-3)
+        assert list(shown[joint.child]["rotation"].values()) == pytest.approx(pose.quaternion, abs=0.02)
+    described = next(data for topic, _, data in one.received if topic == "/robot_description")
+    assert f'<robot name="{model.name}">'.encode() in described
 
 
 # -- beginning and end--------------------------------------------------------------------------------------
@@ -223,7 +244,8 @@ def test_the_layout_and_the_description_mean_the_same_hand() -> None:
     """A viewer finds the parts by the names of frames and joints, and by nothing else."""
     panel, model = make_layout.panels()["3D!hand"], hand_model()
     assert panel["followTf"] == model.root
-    assert set(panel["transforms"]) == {f"frame:{link}" for link in model.links}
+    links = {link for kind in MODELS for link in hand_model(kind).links}
+    assert set(panel["transforms"]) == {f"frame:{link}" for link in links}
     assert set(panel["topics"]) == {"/robot_description"}
 
 

@@ -40,12 +40,12 @@ FLAGS: Final = (
 )
 LINK: Final = """
 const scene = window[Object.keys(window).find((key) => key.startsWith('scene_'))];
-const [palm, link] = ['palm', arguments[0]].map((name) => scene.getObjectByName(name));
+const [palm, link] = [arguments[1], arguments[0]].map((name) => scene.getObjectByName(name));
 if (!palm || !link) return null;
 scene.updateMatrixWorld(true);
 return palm.worldToLocal(link.getWorldPosition(palm.position.clone())).toArray();
 """
-"""Where the browser draws a link, in the frame of the palm."""
+"""Where the browser draws a link, in the frame of the root."""
 MIDDLE: Final = "arguments[0].scrollIntoView({block: 'center'})"
 VISIBLE: Final = """
 const scene = window[Object.keys(window).find((key) => key.startsWith('scene_'))];
@@ -118,9 +118,9 @@ class Browser:
     async def run(self, script: str, *arguments: object) -> Any:
         return await self.do(lambda: self.driver.execute_script(script, *arguments))
 
-    def link(self, name: str) -> Any:
-        """Where it draws a link, in the frame of the palm; None before it does."""
-        return self.driver.execute_script(LINK, name)
+    def link(self, name: str, root: str = "palm") -> Any:
+        """Where it draws a link, in the frame of the root; None before it does."""
+        return self.driver.execute_script(LINK, name, root)
 
     async def in_touch(self) -> None:
         """Wait until the page knows the time of the server, and may press buttons."""

@@ -26,11 +26,11 @@ from robotiq_async.hand import Hand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import Operator
 from robotiq_async.tools.description import hand_model
-from robotiq_async.tools.description.kinematics import JOINTS, joint_angles
+from robotiq_async.tools.description.kinematics import JOINTS, joint_angles, joint_names
 from robotiq_async.tools.web.page.widgets.controls import ROWS
 from robotiq_async.tools.web.server import PageServer
 from robotiq_async.tools.web.settings import PageSettings
-from robotiq_async.values.enums import DEFAULT_SPEED
+from robotiq_async.values.enums import DEFAULT_SPEED, JAW
 from robotiq_async.values.model import THREE_FINGER
 from tests.conftest import watched
 from tests.fake_hand import FakeHand
@@ -201,15 +201,22 @@ async def test_the_joints_move_when_the_gripper_moves(browser: Browser, hand: Ro
             await browser.until(partial(is_at, browser, link, expected))
 
 
-def is_at(browser: Browser, link: str, position: tuple[float, float, float]) -> bool:
-    return bool(browser.link(link) == pytest.approx(position, abs=1e-4))
+def is_at(browser: Browser, link: str, position: tuple[float, float, float], root: str = "palm") -> bool:
+    return bool(browser.link(link, root) == pytest.approx(position, abs=1e-4))
 
 
-async def test_a_page_says_that_it_draws_no_sibling(window: Browser) -> None:
-    async with RobotiqHand("sim://?model=2f85&speedup=20") as jaw, shown(jaw) as page:
+@pytest.mark.parametrize("name", ["2f85", "2f140", "hand-e"])
+async def test_a_sibling_is_drawn_where_its_joint_says(window: Browser, name: str) -> None:
+    async with RobotiqHand(f"sim://?model={name}&speedup=20") as jaw, shown(jaw) as page:
+        await jaw.activate()
+        await jaw.move(150)
         await window.open(page.url)
         await window.in_touch()
-        await window.until(lambda: "There is no drawing of a 2F-85 yet." in window.driver.page_source)
+        model = hand_model(name)
+        poses = model.link_poses(dict(zip(joint_names(jaw.model), joint_angles(jaw.status), strict=True)))
+        for link in model.touching[JAW]:
+            expected = poses[link].position
+            await window.until(partial(is_at, window, link, expected, model.root))
         assert await window.says("state", "ready")
         shown_rows = [
             name for name, *_ in ROWS if await window.do(window.find(f"position-{name}").is_displayed)

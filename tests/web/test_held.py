@@ -13,6 +13,7 @@ from robotiq_async.tools.description import Pose, hand_model
 from robotiq_async.tools.description.geometry import Vector
 from robotiq_async.tools.description.kinematics import FINGER_NAMES, JOINTS, joint_angles
 from robotiq_async.tools.web.page.widgets.held import Thing, grasp, pads
+from robotiq_async.values.model import MODELS
 from tests.register_words import status_of
 
 MODEL = hand_model()
@@ -102,6 +103,23 @@ def test_a_part_met_on_one_side_is_drawn_before_it(met: int, is_bar: bool) -> No
     assert tuple(angles[name] for name in JOINTS) == joint_angles(status)
     assert thing is not None
     assert bool(thing.length) is is_bar
+
+
+@pytest.mark.parametrize("name", ["2f85", "2f140", "hand-e"])
+def test_a_jaw_holds_a_bar_between_its_pads(name: str) -> None:
+    model, radii = hand_model(name), []
+    for position in (60, 120, 180):
+        registers = (0xB900, 0x00FF, position << 8, 0, 0, 0, 0, 0)
+        status = RobotiqStatus.from_registers(registers, timestamp=0.0, sequence=0, model=MODELS[name])
+        angles, thing = grasp(model, status)
+        assert thing is not None
+        poses = model.link_poses(angles)
+        for link in model.touching[Finger.A]:
+            pad = poses[link].apply(model.pad(link).origin.position)
+            assert abs(pad[0]) == pytest.approx(thing.radius + 0.0025), "the face of the pad touches it"
+            assert pad[1:] == pytest.approx(thing.middle[1:])
+        radii.append(thing.radius)
+    assert radii == sorted(radii, reverse=True)
 
 
 def test_nothing_is_held() -> None:

@@ -18,7 +18,6 @@ from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
 from ...values.errors import RobotiqError
-from ...values.model import THREE_FINGER
 from ..gripper.connection import COMMANDS, Connection, RefusedError, make_hand
 from ..translation.description import robot_description
 from . import parameters
@@ -108,7 +107,7 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
 
     def _configure(self) -> str:
         settings = parameters.read(self)
-        urdf = robot_description(settings.urdf, settings.joint_prefix)
+        given = robot_description(settings.urdf, settings.joint_prefix) if settings.urdf else ""
         connection = Connection(make_hand(settings), settings)
         joints = JointStates(self.get_clock(), settings.joint_prefix, settings.frame_id)
         self._current = connection, joints, settings
@@ -117,11 +116,8 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
         except BaseException:
             self._current = None
             raise
-        model = connection.hand.model
-        if model is THREE_FINGER or settings.urdf:
-            self._publishing.describe(urdf)
-        else:
-            self.get_logger().info(f"no robot description: the packaged one is not of a {model.title}")
+        own = robot_description("", settings.joint_prefix, connection.hand.model)
+        self._publishing.describe(given or own)
         return f"connected to {connection.hand.address}: {connection.hand.state.name}"
 
     def _activate(self) -> str:

@@ -7,20 +7,21 @@ from pathlib import Path
 from typing import Final
 
 from ...tools.description import urdf
+from ...values.model import Model
 
 _REFERENCES: Final = {"parent": "link", "child": "link", "mimic": "joint"}
 """Elements of a joint that refer to another part, with the attribute that has its name."""
 
 
-def robot_description(path: str, prefix: str) -> str:
-    """The URDF in a file, unchanged; without a path the packaged one, with the prefix on all names.
+def robot_description(path: str, prefix: str, model: Model | str | None = None) -> str:
+    """The URDF in a file, unchanged; without a path that of the model, with the prefix on all names.
 
     Raises:
         OSError: the file cannot be read.
         ValueError: it is not a URDF.
     """
     if not path:
-        return prefixed(urdf(), prefix)
+        return prefixed(urdf(model), prefix)
     text = Path(path).read_text(encoding="utf-8")
     _parse(text, path)
     return text

@@ -17,7 +17,7 @@ earlier. Nothing here has been checked on a real hand.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache, lru_cache
 from math import radians
 from types import MappingProxyType
@@ -134,9 +134,18 @@ def palm_angle(scissor: int) -> float:
 
 def joint_angles(status: RobotiqStatus) -> tuple[float, ...]:
     """The joints in radians, or a Hand-E's in metres, in the order of :func:`joint_names`."""
-    if (model := status.model) is not THREE_FINGER:
-        return (JAW_JOINTS[model].at(model.stroke, status.position(JAW)),)
-    return _joint_angles(*(status.position(axis) for axis in (Finger.SCISSOR, *FINGER_NAMES)))
+    return _angles_at(status.model, status.position)
+
+
+def requested_angles(status: RobotiqStatus) -> tuple[float, ...]:
+    """The same at the positions that the gripper echoes as requested."""
+    return _angles_at(status.model, status.requested_position)
+
+
+def _angles_at(model: Model, position: Callable[[Finger], int]) -> tuple[float, ...]:
+    if model is not THREE_FINGER:
+        return (JAW_JOINTS[model].at(model.stroke, position(JAW)),)
+    return _joint_angles(*(position(axis) for axis in (Finger.SCISSOR, *FINGER_NAMES)))
 
 
 @lru_cache(maxsize=16)

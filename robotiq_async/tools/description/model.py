@@ -1,13 +1,18 @@
-"""Reads links and joints of a URDF, and computes the poses of the links at given joint angles."""
+"""Rigid links, the joints between them and what drives these: the form of every description.
+
+A description is data. The drawing, the URDF and the MJCF are made from it, so none of them can say what
+another does not. Metres, radians, kilograms.
+"""
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Final, Self
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Final
 
-from .geometry import Pose, Vector, from_rpy, turned
+from ...values.enums import Finger
+from .geometry import Pose, Vector, turned
 
 Color = tuple[float, float, float, float]
 """Red, green, blue and opacity, 0..1."""
@@ -15,24 +20,40 @@ Color = tuple[float, float, float, float]
 PAD: Final = "pad"
 """Name of the shape of a fingertip's pad."""
 
+MATERIALS: Final[Mapping[str, Color]] = MappingProxyType(
+    {
+        "body": (0.16, 0.17, 0.19, 1.0),
+        "plate": (0.55, 0.58, 0.62, 1.0),
+        "finger": (0.62, 0.65, 0.70, 1.0),
+        "joint": (0.22, 0.24, 0.27, 1.0),
+        "pad": (0.09, 0.09, 0.10, 1.0),
+    }
+)
+"""The colours by name."""
+
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A box, a cylinder (along z) or a sphere of a link.
+    """A box, a cylinder (along z) or a sphere of a link: drawn, and what a contact is computed with.
 
     Attributes:
         kind: ``box``, ``cylinder`` or ``sphere``.
         size: of a box the three edges; of a cylinder radius and length; of a sphere the radius.
         origin: in the frame of the link.
-        color: of its material.
+        material: one of :data:`MATERIALS`.
         name: of the shape; empty if it has none.
     """
 
     kind: str
     size: tuple[float, ...]
     origin: Pose
-    color: Color
+    material: str
     name: str = ""
+
+    @property
+    def color(self) -> Color:
+        """The colour of its material."""
+        return MATERIALS[self.material]
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,11 +62,26 @@ class Link:
 
     Attributes:
         name: of the link, which is the name of its frame.
-        shapes: what it looks like.
+        mass: in kilograms, spread evenly over its shapes.
+        shapes: what it consists of.
     """
 
     name: str
+    mass: float
     shapes: tuple[Shape, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Mimic:
+    """A joint that follows another: its value is that of the other, times a factor.
+
+    Attributes:
+        joint: the name of the other.
+        multiplier: the factor.
+    """
+
+    joint: str
+    multiplier: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,10 +92,14 @@ class Joint:
         name: as joint states name it.
         parent: name of the parent link.
         child: name of the child link.
-        origin: the frame of the child at angle 0, in the frame of the parent.
+        origin: the frame of the child at 0, in the frame of the parent.
         axis: in the frame of the child; None when the joint is fixed.
-        lower: the smallest angle in radians.
-        upper: the largest angle in radians.
+        lower: the smallest value, in radians, or metres of one that slides.
+        upper: the largest.
+        slides: it moves along its axis, and does not turn about it.
+        effort: the most its drive gives, in N m, or N of one that slides.
+        velocity: the fastest it moves, in rad/s, or m/s.
+        mimic: what it follows; None if it is free.
     """
 
     name: str
@@ -69,60 +109,98 @@ class Joint:
     axis: Vector | None = None
     lower: float = 0.0
     upper: float = 0.0
+    slides: bool = False
+    effort: float = 0.0
+    velocity: float = 0.0
+    mimic: Mimic | None = None
 
-    def pose(self, angle: float = 0.0) -> Pose:
+    def pose(self, value: float = 0.0) -> Pose:
         """The frame of the child in the frame of the parent."""
-        return self.origin if self.axis is None else self.origin @ turned(self.axis, angle)
+        if self.axis is None:
+            return self.origin
+        if self.slides:
+            x, y, z = self.axis
+            return self.origin @ Pose((x * value, y * value, z * value))
+        return self.origin @ turned(self.axis, value)
+
+
+@dataclass(frozen=True, slots=True)
+class Tendon:
+    """A weighted sum of joints. A simulator drives it as one motor drives several joints.
+
+    Attributes:
+        name: of the tendon.
+        joints: the weight of each joint, by name.
+        lower: the smallest value of the sum; None for no limit.
+        upper: the largest.
+        stiffness: of a spring that pulls the sum to 0, in N m/rad; 0 for none.
+    """
+
+    name: str
+    joints: Mapping[str, float]
+    lower: float | None = None
+    upper: float | None = None
+    stiffness: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class HandModel:
-    """A tree of links.
+    """A tree of links, with what moves them.
 
     Attributes:
+        name: of the robot in a URDF.
         root: name of the root link.
         links: by name.
         joints: every parent before its children.
+        stand: the root where the gripper stands on its mounting face and opens upwards.
+        fingers: by axis, the links at which what it moves begins.
+        touching: by axis, the links that touch what it grips.
+        drives: by axis, the joint or the tendon that its motor drives.
+        tendons: joints that one motor shares, and springs.
+        springs: stiffness and rest angle of joints with a spring, in N m/rad and rad.
+        couplings: joints that follow another although joint states name both.
     """
 
+    name: str
     root: str
     links: Mapping[str, Link]
     joints: tuple[Joint, ...]
-
-    @classmethod
-    def parse(cls, text: str) -> Self:
-        """Read a URDF with boxes, cylinders, spheres, fixed joints and revolute joints, as ours has.
-
-        Raises:
-            ValueError: the text is not XML, or the links do not form a single tree.
-        """
-        try:
-            robot = ET.fromstring(text)
-        except ET.ParseError as error:
-            raise ValueError(f"the description is not XML: {error}") from error
-        colors = {each.attrib["name"]: _color(each) for each in robot.findall("material")}
-        links = {each.attrib["name"]: _link(each, colors) for each in robot.findall("link")}
-        joints = [_joint(each) for each in robot.findall("joint")]
-        roots = links.keys() - {joint.child for joint in joints}
-        if len(roots) != 1:
-            raise ValueError(f"the description must have one root link, got {sorted(roots)}")
-        root = roots.pop()
-        return cls(root, links, _ordered(root, joints))
+    stand: Pose
+    fingers: Mapping[Finger, tuple[str, ...]]
+    touching: Mapping[Finger, tuple[str, ...]]
+    drives: Mapping[Finger, str]
+    tendons: tuple[Tendon, ...] = ()
+    springs: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    couplings: Mapping[str, Mimic] = field(default_factory=dict)
 
     @property
     def moving(self) -> tuple[Joint, ...]:
         """The joints that are not fixed."""
         return tuple(joint for joint in self.joints if joint.axis is not None)
 
-    def link_poses(self, angles: Mapping[str, float]) -> dict[str, Pose]:
-        """The pose of every link in the frame of the root.
+    @property
+    def mass(self) -> float:
+        """Of all links, in kilograms."""
+        return sum(link.mass for link in self.links.values())
+
+    def completed(self, values: Mapping[str, float]) -> dict[str, float]:
+        """The value of every joint that moves, those that follow another included.
 
         Args:
-            angles: radians by the names of joints; missing joints are at 0, unknown ones are ignored.
+            values: radians or metres by the names of joints; missing ones are at 0, unknown ones are ignored.
         """
+        own = {joint.name: values.get(joint.name, 0.0) for joint in self.moving}
+        for joint in self.moving:
+            if joint.mimic is not None:
+                own[joint.name] = joint.mimic.multiplier * own[joint.mimic.joint]
+        return own
+
+    def link_poses(self, values: Mapping[str, float]) -> dict[str, Pose]:
+        """The pose of every link in the frame of the root, at values as :meth:`completed` takes."""
+        all_values = self.completed(values)
         poses = {self.root: Pose()}
         for joint in self.joints:
-            poses[joint.child] = poses[joint.parent] @ joint.pose(angles.get(joint.name, 0.0))
+            poses[joint.child] = poses[joint.parent] @ joint.pose(all_values.get(joint.name, 0.0))
         return poses
 
     def pad(self, link: str) -> Shape:
@@ -135,66 +213,3 @@ class HandModel:
             if shape.name == PAD:
                 return shape
         raise KeyError(f"{link} has no {PAD}")
-
-
-def _ordered(root: str, joints: list[Joint]) -> tuple[Joint, ...]:
-    placed, ordered = {root}, []
-    while waiting := [joint for joint in joints if joint.child not in placed]:
-        ready = [joint for joint in waiting if joint.parent in placed]
-        if not ready:
-            raise ValueError(f"the joint {waiting[0].name} is not connected to the root")
-        ordered += ready
-        placed |= {joint.child for joint in ready}
-    return tuple(ordered)
-
-
-def _link(element: ET.Element, colors: Mapping[str, Color]) -> Link:
-    return Link(element.attrib["name"], tuple(_shape(each, colors) for each in element.findall("visual")))
-
-
-def _shape(element: ET.Element, colors: Mapping[str, Color]) -> Shape:
-    geometry = _child(_child(element, "geometry"), "*")
-    if geometry.tag == "box":
-        size = _numbers(geometry.attrib["size"])
-    elif geometry.tag == "cylinder":
-        size = (float(geometry.attrib["radius"]), float(geometry.attrib["length"]))
-    else:
-        size = (float(geometry.attrib["radius"]),)
-    color = colors[_child(element, "material").attrib["name"]]
-    return Shape(geometry.tag, size, _origin(element), color, element.get("name", ""))
-
-
-def _joint(element: ET.Element) -> Joint:
-    name, origin = element.attrib["name"], _origin(element)
-    parent, child = (_child(element, each).attrib["link"] for each in ("parent", "child"))
-    if element.attrib["type"] == "fixed":
-        return Joint(name, parent, child, origin)
-    limit = _child(element, "limit").attrib
-    axis = _vector(_child(element, "axis").attrib["xyz"])
-    return Joint(name, parent, child, origin, axis, float(limit["lower"]), float(limit["upper"]))
-
-
-def _origin(element: ET.Element) -> Pose:
-    attributes = _child(element, "origin").attrib
-    return from_rpy(_vector(attributes["xyz"]), _vector(attributes["rpy"]))
-
-
-def _color(element: ET.Element) -> Color:
-    red, green, blue, opacity = _numbers(_child(element, "color").attrib["rgba"])
-    return red, green, blue, opacity
-
-
-def _child(element: ET.Element, tag: str) -> ET.Element:
-    found = element.find(tag)
-    if found is None:
-        raise ValueError(f"the description has a {element.tag} without {tag}")
-    return found
-
-
-def _vector(text: str) -> Vector:
-    x, y, z = _numbers(text)
-    return x, y, z
-
-
-def _numbers(text: str) -> tuple[float, ...]:
-    return tuple(float(each) for each in text.split())

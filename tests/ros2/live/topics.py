@@ -10,8 +10,7 @@ import pytest
 from std_msgs.msg import String
 
 from robotiq_async import Finger
-from robotiq_async.ros2.translation.joints import joint_names
-from robotiq_async.tools.description import HandModel
+from robotiq_async.ros2.translation.description import robot_description
 from tests.ros2.live.bench import LATEST, SUCCEEDED, Client, active
 from tests.ros2.live.goals import position
 from tests.ros2.live.processes import node
@@ -34,7 +33,7 @@ def test_a_prefix_is_before_every_joint(simulator: Simulator) -> None:
         assert position(simulator) >= 238
         assert position(other) == 70
         described = one.listen(String, "/left/robot_description", LATEST).wait(new=False).data
-        assert {joint.name for joint in HandModel.parse(described).moving} == set(joint_names("left_"))
+        assert described == robot_description("", "left_")
         assert one.joint_states("/left/joint_states").wait().name[0] == "left_palm_finger_1_joint"
         assert two.joint_states("/right/joint_states").wait().name[0] == "right_palm_finger_1_joint"
         assert one.send(["right_fingers"], [0.0]) is None

@@ -1,6 +1,6 @@
 """The pose of the fingers, and the object that they hold. Pure.
 
-Only the positions are known, so this is an approximation.
+Only the positions are known, so this is an approximation. A jaw holds a round bar between its pads.
 
 Fingertips that meet an object before they meet each other are drawn at their positions, with the object
 between them. Beyond that, a real finger has bent around the object: its base has stopped earlier than the
@@ -18,11 +18,12 @@ from functools import lru_cache
 from math import asin, degrees, dist, radians
 from typing import Final
 
-from .....values.enums import Finger, ObjectStatus
+from .....values.enums import JAW, Finger, ObjectStatus
+from .....values.model import THREE_FINGER
 from .....values.status import RobotiqStatus
 from ....description import HandModel, Pose
 from ....description.geometry import Vector
-from ....description.kinematics import BASE, FINGER_NAMES, JOINTS, MIDDLE, TIP, joint_angles
+from ....description.kinematics import BASE, FINGER_NAMES, MIDDLE, TIP, joint_angles, joint_names
 
 ALONE_M: Final = 0.02
 """Radius of an object that is held from one side only."""
@@ -59,17 +60,19 @@ _HIGHEST_M: Final = 0.075
 
 @dataclass(frozen=True, slots=True)
 class Thing:
-    """An object between the fingers, in the frame of the palm, in metres."""
+    """An object between the fingers, in the frame of the root, in metres."""
 
     middle: Vector
     radius: float
-    length: float = 0.0  # of a bar along z; 0 for a ball
+    length: float = 0.0  # of a bar, along z for a 3-Finger and y for a jaw; 0 for a ball
 
 
 def grasp(model: HandModel, status: RobotiqStatus) -> tuple[dict[str, float], Thing | None]:
     """The joint angles in radians by the names of joints, and the object; None for no object."""
-    free = dict(zip(JOINTS, joint_angles(status), strict=True))
+    free = dict(zip(joint_names(status.model), joint_angles(status), strict=True))
     closing = _met_something_closing(status)
+    if status.model is not THREE_FINGER:
+        return free, _between_pads(model, free) if closing else None
     fingers = [finger for finger in FINGER_NAMES if finger & closing]
     faces = pads(model, model.link_poses(free))
     opposite = [finger for finger in fingers if finger is not Finger.A]
@@ -86,6 +89,14 @@ def grasp(model: HandModel, status: RobotiqStatus) -> tuple[dict[str, float], Th
         names = (f"{FINGER_NAMES[finger]}_joint_{number}" for number in (1, 2, 3))
         free |= zip(names, bent, strict=True)
     return free, Thing((0.0, _FOOT_M + height, length[0]), radius, length[1])
+
+
+def _between_pads(model: HandModel, free: Mapping[str, float]) -> Thing:
+    poses = model.link_poses(free)
+    shapes = {link: model.pad(link) for link in model.touching[JAW]}
+    middles = [poses[link].apply(shape.origin.position) for link, shape in shapes.items()]
+    thick, width, _ = next(iter(shapes.values())).size
+    return Thing(_middle(middles), max(dist(*middles) / 2 - thick / 2, THIN_M), 2 * width)
 
 
 def pads(model: HandModel, poses: Mapping[str, Pose]) -> dict[Finger, Pose]:

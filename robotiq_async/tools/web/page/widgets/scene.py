@@ -1,4 +1,8 @@
-"""The hand in three dimensions."""
+"""The gripper in three dimensions.
+
+What is drawn follows from the description of the model. A scene is made before the model is known: until the
+first status it is a 3-Finger.
+"""
 
 from __future__ import annotations
 
@@ -14,15 +18,13 @@ from .....values.model import THREE_FINGER, Model
 from .....values.status import RobotiqStatus
 from ....description import HandModel, Pose, Shape, hand_model
 from ....description.geometry import turned
-from ....description.kinematics import FINGER_NAMES, JOINTS, finger_angles, palm_angle
+from ....description.kinematics import FINGER_NAMES, joint_names, requested_angles
 from ..mirror import HandMirror
 from .held import Thing, grasp
 from .words import COLORS
 
 SCALE: Final = 10.0
 """Scale: three.js works best with objects of size 1."""
-LIFT: Final = 0.45
-"""Height at which the mounting face lies on the ground."""
 GLOW: Final = "#ff5a1f"
 GHOST: Final = "#0ea5e9"
 STAGE: Final = "#b9c3cf"
@@ -38,6 +40,8 @@ APART: Final = 3
 """Minimum distance in counts between position and request for drawing the request."""
 TURNED: Final = 2e-4
 """Minimum visible change of an angle in radians."""
+MOVED: Final = 2e-5
+"""The same of a joint that slides, in metres."""
 
 Calls = list[list[Any]]
 
@@ -54,8 +58,9 @@ class Figure:
         self._angles: dict[str, float] = {}
         self._shapes: dict[str, list[tuple[Shape, Object3D]]] = {}
         self._looks: dict[str, tuple[str, float]] = {}
-        self.root = ui.scene.group().move(0, 0, LIFT).scale(SCALE)
-        self.root.rotate(pi / 2, 0, 0)  # the palm faces upwards
+        x, y, z = model.stand.position
+        self.root = ui.scene.group().move(x * SCALE, y * SCALE, z * SCALE).scale(SCALE)
+        self.root.rotate_R([list(row) for row in model.stand.rotation])
         self._groups: dict[str, Object3D] = {model.root: self.root}
         if not ghost:
             self.root.with_name(model.root)
@@ -73,13 +78,18 @@ class Figure:
         calls: Calls = []
         for joint in self._model.moving:
             angle = angles[joint.name]
-            if abs(angle - self._angles.get(joint.name, 0.0)) < TURNED:
+            least = MOVED if joint.slides else TURNED
+            if abs(angle - self._angles.get(joint.name, 0.0)) < least:
                 continue
             self._angles[joint.name] = angle
-            group = self._groups[joint.child]
+            group, pose = self._groups[joint.child], joint.pose(angle)
             # All joints go in one message. The value is also kept: a returning browser gets all of it.
-            group.R = [list(row) for row in joint.pose(angle).rotation]
-            calls.append(["rotate", group.id, group.R])
+            if joint.slides:
+                group.x, group.y, group.z = pose.position
+                calls.append(["move", group.id, *pose.position, None])
+            else:
+                group.R = [list(row) for row in pose.rotation]
+                calls.append(["rotate", group.id, group.R])
         return calls
 
     def group(self, link: str) -> Object3D:
@@ -113,87 +123,94 @@ class Figure:
         self.look(link, GHOST if self._ghost else None, STALE if self._ghost else 1.0)
 
 
+class Drawing:
+    """A gripper, its request, and what it holds."""
+
+    def __init__(self, kind: Model, *, compact: bool) -> None:
+        model = hand_model(kind)
+        self.kind, self.model = kind, model
+        self.ghost = None if compact else Figure(model, ghost=True)
+        self.figure = Figure(model, ghost=False)
+        with self.figure.root:
+            # A cylinder of three.js lies along y, that of a 3-Finger's bar along z.
+            self.bar = ui.scene.cylinder(1.0, 1.0, 1.0, 48).with_name("bar")
+            if kind is THREE_FINGER:
+                self.bar.rotate(pi / 2, 0, 0)
+            self.ball = ui.scene.sphere(1.0).with_name("ball")
+        for each in (self.bar, self.ball):
+            each.material(HELD, 0.7).visible(False)
+        if kind is THREE_FINGER and not compact:
+            self._name_fingers()
+
+    def _name_fingers(self) -> None:
+        # The gripper's letter of each finger, and below it the name in joint states.
+        for axis, color in zip(Finger.ALL, COLORS, strict=True):
+            if axis in FINGER_NAMES:
+                with self.figure.group(f"{FINGER_NAMES[axis]}_link_3"):
+                    for words, font in ((str(axis.name), LETTER), (FINGER_NAMES[axis], NAME)):
+                        ui.scene.text(words, f"color:{color};{font};{HALO}").move(0.052, 0.032, 0.0)
+
+
 class HandScene:
-    """A scene with a hand, its request, and the object that it holds; for a tile without the request."""
+    """A scene with a gripper, its request, and the object that it holds; for a tile without the request."""
 
     def __init__(self, *, compact: bool = False) -> None:
-        model = hand_model()
         with ui.scene(grid=(4, 16), background_color=STAGE, fps=30).classes("w-full h-full") as scene:
             self.scene = scene
-            self._ghost = None if compact else Figure(model, ghost=True)
-            self._figure = Figure(model, ghost=False)
-            # A cylinder of three.js lies along y, which is z of the palm.
-            self._bar = ui.scene.cylinder(1.0, 1.0, 1.0, 48).with_name("bar")
-            self._ball = ui.scene.sphere(1.0).with_name("ball")
-            for each in (self._bar, self._ball):
-                each.material(HELD, 0.7).visible(False)
-            if not compact:
-                self._labels()
-        self._model = model
-        self._is_left_out = False
-        scene.move_camera(0.8, -2.2, 2.1, 0, 0, 1.05, duration=0)
+        self._compact = compact
+        self._drawing: Drawing | None = None
 
     def show(self, hand: HandMirror) -> None:
         """Draw the newest status; cheap if nothing has changed."""
+        drawing = self._drawing_of(hand.model)
         if hand.status is None:
-            self._figure.look_all(None, STALE)
+            drawing.figure.look_all(None, STALE)
             return
-        if hand.model is not THREE_FINGER:
-            self._leave_out(hand.model)
-            return
-        angles, thing = grasp(self._model, hand.status)
-        calls = self._figure.turn(angles)
-        if self._ghost is not None:
-            calls += self._show_ghost(self._ghost, hand, hand.status)
+        angles, thing = grasp(drawing.model, hand.status)
+        calls = drawing.figure.turn(drawing.model.completed(angles))
+        if drawing.ghost is not None:
+            calls += self._show_ghost(drawing.model, drawing.ghost, hand, hand.status)
         if calls:
             self.scene.run_method("run_methods", calls)
-        self._show_contacts(hand, hand.status)
-        self._show_held(None if hand.is_lost else thing)
+        self._show_contacts(drawing, hand, hand.status)
+        self._show_held(drawing, None if hand.is_lost else thing)
 
-    def _leave_out(self, model: Model) -> None:
-        # The drawing is that of the 3-Finger.
-        if not self._is_left_out:
-            self._is_left_out = True
-            self._figure.show(self._model.root, is_shown=False)
-            if self._ghost is not None:
-                self._ghost.show(self._model.root, is_shown=False)
-            words = f"There is no drawing of a {model.title} yet."
+    def _drawing_of(self, kind: Model) -> Drawing:
+        if self._drawing is None or self._drawing.kind is not kind:
+            self.scene.clear()
             with self.scene:
-                ui.scene.text(words, f"{LETTER};{HALO}").move(0, 0, LIFT)
+                self._drawing = Drawing(kind, compact=self._compact)
+            near = _reach(self._drawing.model) * SCALE
+            self.scene.move_camera(0.4 * near, -1.1 * near, 1.05 * near, 0, 0, 0.52 * near, duration=0)
+        return self._drawing
 
-    def _show_ghost(self, ghost: Figure, hand: HandMirror, status: RobotiqStatus) -> Calls:
+    def _show_ghost(self, model: HandModel, ghost: Figure, hand: HandMirror, status: RobotiqStatus) -> Calls:
         away = _away(status) if status.go_echo and status.is_activated and not hand.is_lost else Finger(0)
-        for finger, prefix in FINGER_NAMES.items():
-            ghost.show(f"{prefix}_link_0", is_shown=bool(finger & away))
-        return ghost.turn(_asked_angles(status)) if away else []
+        for finger, links in model.fingers.items():
+            for link in links:
+                ghost.show(link, is_shown=bool(finger & away))
+        asked = dict(zip(joint_names(status.model), requested_angles(status), strict=True))
+        return ghost.turn(model.completed(asked)) if away else []
 
-    def _show_contacts(self, hand: HandMirror, status: RobotiqStatus) -> None:
+    def _show_contacts(self, drawing: Drawing, hand: HandMirror, status: RobotiqStatus) -> None:
         opacity = STALE if hand.is_lost else 1.0
         glowing = Finger(0) if hand.is_lost else status.contacts
         if glowing & Finger.SCISSOR:
             glowing |= Finger.B | Finger.C
-        fingers = {f"{prefix}_link_{n}": finger for finger, prefix in FINGER_NAMES.items() for n in (2, 3)}
-        for link in self._model.links:
-            is_hot = bool(fingers.get(link, Finger(0)) & glowing)
-            self._figure.look(link, GLOW if is_hot else None, opacity)
+        touching = {
+            link for finger, links in drawing.model.touching.items() if finger & glowing for link in links
+        }
+        for link in drawing.model.links:
+            drawing.figure.look(link, GLOW if link in touching else None, opacity)
 
-    def _show_held(self, thing: Thing | None) -> None:
+    def _show_held(self, drawing: Drawing, thing: Thing | None) -> None:
         is_bar = thing is not None and thing.length > 0
-        self._bar.visible(is_bar)
-        self._ball.visible(thing is not None and not is_bar)
+        drawing.bar.visible(is_bar)
+        drawing.ball.visible(thing is not None and not is_bar)
         if thing is not None:
-            (x, y, z), radius = thing.middle, thing.radius * SCALE
-            drawn = self._bar if is_bar else self._ball
-            drawn.move(x * SCALE, -z * SCALE, y * SCALE + LIFT)
-            drawn.scale(radius, thing.length * SCALE if is_bar else radius, radius)
-
-    def _labels(self) -> None:
-        # The gripper's letter of each finger, and below it the name in joint states.
-        for axis, color in zip(Finger.ALL, COLORS, strict=True):
-            if axis in FINGER_NAMES:
-                with self._figure.group(f"{FINGER_NAMES[axis]}_link_3"):
-                    for words, font in ((str(axis.name), LETTER), (FINGER_NAMES[axis], NAME)):
-                        ui.scene.text(words, f"color:{color};{font};{HALO}").move(0.052, 0.032, 0.0)
+            drawn = drawing.bar if is_bar else drawing.ball
+            drawn.move(*thing.middle)
+            drawn.scale(thing.radius, thing.length if is_bar else thing.radius, thing.radius)
 
 
 def _away(status: RobotiqStatus) -> Finger:
@@ -208,10 +225,10 @@ def _away(status: RobotiqStatus) -> Finger:
     return away
 
 
-def _asked_angles(status: RobotiqStatus) -> dict[str, float]:
-    palm = palm_angle(status.requested_position(Finger.SCISSOR))
-    one, two, middle = (finger_angles(status.requested_position(finger)) for finger in FINGER_NAMES)
-    return dict(zip(JOINTS, (palm, *one, -palm, *two, *middle), strict=True))
+def _reach(model: HandModel) -> float:
+    """From the mounting face about to the ends of the fingers, in metres."""
+    heights = [(model.stand @ pose).position[2] for pose in model.link_poses({}).values()]
+    return max(heights) + 0.04
 
 
 def _drawn(shape: Shape) -> Object3D:
