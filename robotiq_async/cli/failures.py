@@ -18,11 +18,13 @@ class CommandError(Exception):
 
 @contextmanager
 def usage() -> Iterator[None]:
-    """Turn ValueError and TypeError of constructors into UsageError."""
+    """Turn ValueError and TypeError of constructors into UsageError, a missing extra into CommandError."""
     try:
         yield
     except (ValueError, TypeError) as error:
         raise UsageError(str(error)) from error
+    except ImportError as error:
+        raise CommandError(str(error)) from error
 
 
 @contextmanager

@@ -40,7 +40,7 @@ LINE_OPTIONS: Final = ("baud", "parity", "stopbits")
 SLOWEST: Final = 0.01
 FASTEST: Final = 1000.0
 """Speedups of a simulated gripper; faster than that, whole motions pass between two polls."""
-SIMULATION_OPTIONS: Final = ("speedup", "object")
+SIMULATION_OPTIONS: Final = ("speedup", "object", "physics")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,15 +51,19 @@ class Simulation:
         speedup: simulated seconds in one second of the clock, 0.01..1000.
         object: position in counts, 0..255, at which the fingers A, B and C meet an object when they close;
             None for no object.
+        physics: the scene in which bodies move, as ``table`` or ``box:40x60x80,0.3``; None for no physics. It
+            is read when the hand is made.
     """
 
     speedup: float = 1.0
     object: int | None = None
+    physics: str | None = None
 
     def __str__(self) -> str:
         speedup = int(self.speedup) if self.speedup == int(self.speedup) else self.speedup
         options = [f"speedup={speedup!r}"] if speedup != 1 else []
         options += [] if self.object is None else [f"object={self.object}"]
+        options += [] if self.physics is None else [f"physics={self.physics}"]
         return f"?{'&'.join(options)}" if options else ""
 
 
@@ -317,9 +321,12 @@ def parse_simulation(query: str) -> Simulation:
         SIMULATION_OPTIONS,
         lambda name: f"no option {name!r}; known are: {known}",
     )
+    if "object" in given and "physics" in given:
+        raise ValueError("object and physics cannot be combined: physics has its own part")
     return Simulation(
         speedup=_speedup(given["speedup"]) if "speedup" in given else 1.0,
         object=_object(given["object"]) if "object" in given else None,
+        physics=given.get("physics"),
     )
 
 

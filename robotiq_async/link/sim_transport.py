@@ -23,9 +23,12 @@ def new_gripper(simulation: Simulation, model: Model = THREE_FINGER) -> Simulate
     Imports the simulator, which takes tens of milliseconds: only for sim://, and when the hand is made,
     because a later import would block the running loop.
     """
-    from ..simulator import SimulatedGripper  # noqa: PLC0415
+    from ..simulator import Physics, SimulatedGripper  # noqa: PLC0415
 
-    gripper = SimulatedGripper(speedup=simulation.speedup, model=model)
+    scene = simulation.physics
+    # A thread of its own steps it: the loop must not wait.
+    physics = None if scene is None else Physics(scene, threaded=True)
+    gripper = SimulatedGripper(speedup=simulation.speedup, model=model, physics=physics)
     if simulation.object is not None:
         gripper.place_object(Finger.ABC, simulation.object)
     return gripper

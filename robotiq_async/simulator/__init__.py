@@ -5,6 +5,7 @@ room            what it holds
 ==============  ===========================================================================
 ``physics``     :class:`SimulatedGripper`: axes, contacts, faults, power, and the words it reports;
                 :class:`Habits`: how it does what the manual leaves open
+``mechanics``   :class:`Physics`: bodies and contacts that move the axes in its place (extra ``physics``)
 ``server``      :class:`SimulatorServer` (Modbus TCP), :class:`SerialSimulatorServer` (Modbus RTU),
                 :class:`RtuOverTcpSimulatorServer` (Modbus RTU behind a serial server),
                 :class:`UrcapSimulatorServer` (the text port of a UR's URCap)
@@ -17,6 +18,7 @@ room            what it holds
 The physics imports neither pymodbus nor asyncio.
 """
 
+from .mechanics.physics import Physics
 from .physics.gripper import SimulatedGripper
 from .physics.habits import Habits
 from .physics.scale import SimulatedScale
@@ -31,6 +33,7 @@ __all__ = [
     "KINDS",
     "FaultInjector",
     "Habits",
+    "Physics",
     "RtuOverTcpSimulatorServer",
     "SerialSimulatorServer",
     "SimulatedGripper",

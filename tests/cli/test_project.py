@@ -86,6 +86,7 @@ def test_a_missing_module_names_the_extra_that_brings_it() -> None:
         "cli",
         "fleet",
         "metrics",
+        "physics",
         "plot",
         "record",
         "serial",

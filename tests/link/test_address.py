@@ -53,6 +53,7 @@ def test_a_serial_address_names_the_port(device: str) -> None:
     [
         ("sim://?speedup=10&object=150", Simulation(10.0, 150)),
         ("sim://?object=0", Simulation(object=0)),
+        ("sim://?physics=box:40x60x80,0.3", Simulation(physics="box:40x60x80,0.3")),
         ("sim://", Simulation()),
     ],
 )
@@ -256,9 +257,9 @@ def test_an_ipv4_address_is_four_numbers(host: str) -> None:
         ("object=1.5", "object must be an integer in 0..255, got '1.5'"),
         ("speedup", "speedup must be given once, as speedup=VALUE"),
         ("object=1&object=2", "object must be given once, as object=VALUE"),
-        ("speed=10", "no option 'speed'; known are: speedup, object"),
-        ("", "no option ''; known are: speedup, object"),
-        ("object=1&", "no option ''; known are: speedup, object"),
+        ("speed=10", "no option 'speed'; known are: speedup, object, physics"),
+        ("", "no option ''; known are: speedup, object, physics"),
+        ("object=1&", "no option ''; known are: speedup, object, physics"),
     ],
 )
 def test_a_malformed_option_of_a_simulated_gripper_is_named_with_its_range(query: str, words: str) -> None:

@@ -20,7 +20,7 @@ from ..failures import normal_end, usage
 from ..output.messages import tell
 
 if TYPE_CHECKING:
-    from ...simulator import SimulatedGripper
+    from ...simulator import Physics, SimulatedGripper
 
 
 _EXHAUSTED: Final = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
@@ -36,6 +36,7 @@ async def simulate(
     exact: Flag = False,
     object_: Annotated[Byte | None, Parameter(name="--object")] = None,
     fixed: Flag = False,
+    physics: Annotated[str | None, Parameter(metavar="SCENE")] = None,
     serial: Annotated[str | None, Parameter(metavar="DEVICE")] = None,
     rtu_over_tcp: Flag = False,
     urcap: Flag = False,
@@ -70,6 +71,7 @@ async def simulate(
         robotiq-async simulate --port 5021 --speedup 10 --object 150
         robotiq-async simulate --plain
         robotiq-async simulate --model 2f85 --rtu-over-tcp
+        robotiq-async simulate --model 2f85 --physics box:40x60x60,0.3
         robotiq-async simulate --serial /dev/pts/3
         robotiq-async simulate --serial /dev/pts/3 --device-id 12
         robotiq-async simulate --rtu-over-tcp --port 54321
@@ -86,6 +88,8 @@ async def simulate(
         exact: Stop exactly at the requested position, which no real gripper does.
         object_: Count at which the fingers A, B and C meet something when they close.
         fixed: The object stays there in an activation, which then fails with fault 0x0D.
+        physics: Move bodies in place of counts (extra physics): "table", a part on it as "box:40x60x60,0.3"
+            or "cylinder:50x60,0.2" (millimetres, kilograms), or an MJCF file with a site named gripper.
         serial: Serve Modbus RTU on this serial device in place of TCP (extra serial).
         rtu_over_tcp: Serve Modbus RTU through a TCP socket, as serial servers and tool ports do.
         urcap: Serve the text port of Robotiq's URCap, as a UR controller does; for a 2F or a Hand-E.
@@ -117,6 +121,7 @@ async def simulate(
             spread=not exact,
             habits=own_habits(kind) if like_hardware else None,
             model=kind,
+            physics=_physics(physics, object_),
         )
         _place(gripper, object_, fixed=fixed)
         server: SimulatorServer | SerialSimulatorServer
@@ -177,6 +182,14 @@ def _without_tracebacks() -> Callable[[asyncio.AbstractEventLoop, dict[str, Any]
             tell(f"no further connection can be accepted: {error.strerror} (ulimit -n shows the limit)")
 
     return handle
+
+
+def _physics(scene: str | None, position: int | None) -> Physics | None:
+    from ...simulator import Physics
+
+    if scene is not None and position is not None:
+        raise ValueError("--physics and --object cannot be combined: physics has its own part")
+    return None if scene is None else Physics(scene, threaded=True)
 
 
 def _place(gripper: SimulatedGripper, position: int | None, *, fixed: bool) -> None:

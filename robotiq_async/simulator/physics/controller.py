@@ -25,6 +25,7 @@ from robotiq_async.values.request import Request
 
 from . import control_modes as control
 from .axis import MOTORS, Axis, Motor
+from .driven_axis import DrivenAxis
 from .faults import PresentFaults
 from .spread import Spread
 
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
     from robotiq_async.values.model import Model
 
+    from .driven_axis import Mechanism
     from .habits import Habits
 
 ZEROS: Final = (0,) * reg.REGISTER_COUNT
@@ -81,6 +83,7 @@ class Controller:
     Attributes:
         model: of the gripper.
         axes: in the order of the model.
+        driven: the same if a mechanism moves them, and none otherwise.
         habits: how it does what the manual leaves open.
         request: the image in force.
         progress: what gIMC says.
@@ -90,14 +93,28 @@ class Controller:
     """
 
     def __init__(
-        self, model: Model, scissor_limit: tuple[int, int], seed: int | None, habits: Habits
+        self,
+        model: Model,
+        scissor_limit: tuple[int, int],
+        seed: int | None,
+        habits: Habits,
+        mechanism: Mechanism | None = None,
     ) -> None:
         self.model = model
         self._speeds = SpeedCalibration.usual(model)
-        self.axes = tuple(
-            self._scissor(scissor_limit, seed) if axis is Finger.SCISSOR else self._finger(motor, axis, seed)
-            for axis, motor in zip(model.axes, MOTORS, strict=False)
-        )
+        named = zip(model.axes, MOTORS, strict=False)
+        if mechanism is None:
+            self.driven: tuple[DrivenAxis, ...] = ()
+            self.axes: tuple[Axis, ...] = tuple(
+                self._scissor(scissor_limit, seed)
+                if axis is Finger.SCISSOR
+                else self._finger(motor, axis, seed)
+                for axis, motor in named
+            )
+        else:
+            self.axes = self.driven = tuple(
+                self._driven(mechanism, axis, motor, scissor_limit) for axis, motor in named
+            )
         self._nothing = (ObjectStatus.IN_MOTION,) * len(model.axes)
         """What gDT says when it says nothing: zeros."""
         self._nowhere: control.Goals = (None,) * len(model.axes)
@@ -370,6 +387,11 @@ class Controller:
         spread, stroke = Spread(seed, axis), self.model.stroke
         low, high = stroke.open_reading + spread.open_reading, stroke.closed_reading + spread.closed_reading
         return Axis(low, low, high, motor, spread, self._speeds)
+
+    def _driven(self, mechanism: Mechanism, axis: Finger, motor: Motor, limit: tuple[int, int]) -> DrivenAxis:
+        stroke = self.model.stroke
+        low, high = limit if axis is Finger.SCISSOR else (stroke.open_reading, stroke.closed_reading)
+        return DrivenAxis(mechanism.drive(axis), axis, low, high, motor, self._speeds)
 
     def _scissor(self, limit: tuple[int, int], seed: int | None) -> Axis:
         spread = Spread(seed, Finger.SCISSOR)

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from .axis import Axis
+    from .driven_axis import Mechanism
 
 _LONGEST: Final = 1e9
 _HISTORY: Final = 10_000
@@ -68,6 +69,7 @@ class SimulatedGripper(Surroundings):
         seed: int = SEED,
         habits: Habits | None = None,
         model: Model | str | None = None,
+        physics: Mechanism | None = None,
     ) -> None:
         """A gripper that was just switched on: open, reset, all registers 0.
 
@@ -83,6 +85,8 @@ class SimulatedGripper(Surroundings):
             seed: which gripper it is, 0 or more: another seed, other counts; the same seed, the same.
             habits: how it does what the manual leaves open; None for the usual ones.
             model: which gripper it is, a :class:`Model` or its name; None for a 3-Finger.
+            physics: a :class:`Physics` of its own, which moves the axes and has the parts they meet; None for
+                straight lines in time and the obstacles of :meth:`place_object`. There is no spread with it.
 
         Raises:
             TypeError: an argument is of the wrong type.
@@ -92,11 +96,15 @@ class SimulatedGripper(Surroundings):
         self._cycle = check_seconds("device_cycle", device_cycle, 0, _LONGEST)
         number = check_int("seed", seed, 0, sys.maxsize)
         limit, seed_or_none = check_scissor_limit(scissor_limit), number if spread else None
-        super().__init__(Controller(model_of(model), limit, seed_or_none, habits or Habits()))
-        self._clock = clock
         self._speedup = check_seconds("speedup", speedup, 0, _LONGEST)
         if self._speedup == 0:
             raise ValueError(f"speedup must be above 0, got {speedup!r}")
+        kind = model_of(model)
+        self._physics = physics
+        if physics is not None:
+            physics.attach(kind, clock, self._speedup)
+        super().__init__(Controller(kind, limit, seed_or_none, habits or Habits(), physics))
+        self._clock = clock
         self._began = clock()
         self._off_until = -math.inf if powered else math.inf
         self._heard_at = 0.0
@@ -285,8 +293,10 @@ class SimulatedGripper(Surroundings):
         now = max(self._time, self._now)
         pending = self._inbox.pending
         while True:
-            event = self._controller.next_event
             effect = pending[0][0] if pending else math.inf
+            if self._physics is not None:
+                self._let_move(self._physics, min(now, effect, self._controller.next_event))
+            event = self._controller.next_event
             if event > now and effect > now:
                 break
             if event <= effect:
@@ -294,6 +304,16 @@ class SimulatedGripper(Surroundings):
             else:
                 self._controller.apply(*pending.popleft())
         self._time = now
+
+    def _let_move(self, physics: Mechanism, until: float) -> None:
+        """Let the bodies move until a time, or until an axis has something to report."""
+        axes = self._controller.driven
+        while physics.step(until):
+            self._time = max(self._time, physics.time)
+            for axis in axes:
+                axis.observe(self._time)
+            if any(axis.ends_at <= self._time for axis in axes):
+                return
 
 
 class Write(NamedTuple):

@@ -57,6 +57,8 @@ class Surroundings(ABC):
             TypeError: an argument is not an int.
             ValueError: fingers is not a mask of axes, or another argument is outside 0..255.
         """
+        if self._controller.driven:
+            raise ValueError("a gripper with physics meets the parts of its scene, not obstacles at a count")
         met = Obstacle(check_byte("position", position), check_byte("soft", soft), fixed)
         obstacle = None if thin else met
         for axis in self._axes(self._controller.model.mask(fingers)):

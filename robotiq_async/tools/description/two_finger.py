@@ -219,7 +219,7 @@ def _tip(model: Model, side: str) -> tuple[Shape, ...]:
     return (
         # From the crank to the inner crank, and the finger on it.
         box(
-            (-across + 0.014, 0.020, 0.014),
+            (-across + 0.004, 0.020, 0.012),
             (sign * across / 2, 0.0, up / 2),
             "body",
             (0, -sign * _slope(across, up), 0),

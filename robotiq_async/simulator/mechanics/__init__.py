@@ -1,0 +1,1 @@
+"""Bodies, contacts and motors: what :class:`Physics` computes with MuJoCo (extra ``physics``)."""

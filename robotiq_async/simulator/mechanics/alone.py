@@ -1,0 +1,96 @@
+"""The gripper alone: how far it reaches, and what its pads move when a motor does. No forces, no time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+
+from robotiq_async.values.enums import Finger
+
+_GRID: Final = 48
+"""Places from open to closed at which a motion is looked at."""
+
+
+def pads(model: Any) -> list[int]:
+    return [geom for geom in range(model.ngeom) if model.geom(geom).name.endswith("_pad")]
+
+
+def reach(text: str) -> float:
+    """The farthest that a fingertip comes from the mounting face, in metres."""
+    model = mujoco.MjModel.from_xml_string(text)
+    data, most = mujoco.MjData(model), 0.0
+    for share in np.linspace(0, 1, _GRID):
+        put_at(model, data, range(model.nu), share)
+        for geom in range(model.ngeom):
+            half = np.abs(data.geom_xmat[geom].reshape(3, 3)[2]) @ _half(model, geom)
+            most = max(most, float(data.geom_xpos[geom][2] + half))
+    return most
+
+
+def _half(model: Any, geom: int) -> Any:
+    size, kind = model.geom_size[geom], model.geom_type[geom]
+    if kind == mujoco.mjtGeom.mjGEOM_BOX:
+        return size
+    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        return np.array([size[0], size[0], size[1]])
+    return np.full(3, size[0])
+
+
+def levers_of(text: str, axis: Finger) -> tuple[Any, Any]:
+    """Values of an axis, and for each what all pads move by a small motion of it.
+
+    By this newtons at the pads become the force of the motor.
+    """
+    model = mujoco.MjModel.from_xml_string(text)
+    data, index = mujoco.MjData(model), model.actuator(str(axis.name)).id
+    faces, shares, places = pads(model), np.linspace(0, 1, _GRID), []
+    for share in shares:
+        put_at(model, data, [index], share)
+        normals = [data.geom_xmat[pad].reshape(3, 3)[:, np.argmin(model.geom_size[pad])] for pad in faces]
+        places.append((data.geom_xpos[faces].copy(), np.array(normals)))
+    low, high = model.actuator_ctrlrange[index]
+    values, levers = low + (high - low) * shares, []
+    for number in range(_GRID):
+        before, after = places[max(number - 1, 0)], places[min(number + 1, _GRID - 1)]
+        moved = after[0] - before[0]
+        along = moved if axis is Finger.SCISSOR else (moved * places[number][1]).sum(axis=1, keepdims=True)
+        way = values[min(number + 1, _GRID - 1)] - values[max(number - 1, 0)]
+        levers.append(np.linalg.norm(along, axis=1).sum() / way)
+    return values, np.array(levers)
+
+
+def put_at(model: Any, data: Any, drives: Iterable[int], share: float) -> None:
+    """Put the joints where free drives have them at a share of their ranges."""
+    for index in drives:
+        low, high = model.actuator_ctrlrange[index]
+        value, target = low + (high - low) * share, model.actuator_trnid[index][0]
+        if model.actuator_trntype[index] == mujoco.mjtTrn.mjTRN_JOINT:
+            data.qpos[model.jnt_qposadr[target]] = value
+            continue
+        first = model.tendon_adr[target]
+        for wrap in range(
+            first, first + model.tendon_num[target]
+        ):  # the base as far as it goes, then the next
+            joint, weight = model.wrap_objid[wrap], model.wrap_prm[wrap]
+            turned = min(value / weight, model.jnt_range[joint][1])
+            data.qpos[model.jnt_qposadr[joint]] = turned
+            value -= turned * weight
+    for number in np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT):
+        follower, leader = model.eq_obj1id[number], model.eq_obj2id[number]
+        if leader >= 0:
+            led = data.qpos[model.jnt_qposadr[leader]]
+            data.qpos[model.jnt_qposadr[follower]] = model.eq_data[number][1] * led
+    _keep_tips_parallel(model, data)
+    mujoco.mj_kinematics(model, data)
+
+
+def _keep_tips_parallel(model: Any, data: Any) -> None:
+    for tendon in range(model.ntendon):
+        if model.tendon(tendon).name.endswith("_parallel"):
+            first = model.tendon_adr[tendon]
+            base, tip = model.wrap_objid[first : first + 2]
+            turned = data.qpos[model.jnt_qposadr[base]]
+            data.qpos[model.jnt_qposadr[tip]] = max(-turned, model.jnt_range[tip][0])

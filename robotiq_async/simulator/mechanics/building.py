@@ -1,0 +1,106 @@
+"""Makes what MuJoCo compiles: the packaged gripper above a table, or in a world of the user's own."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from math import cos, pi, sin
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import mujoco
+import numpy as np
+
+if TYPE_CHECKING:
+    from robotiq_async.values.model import Model
+
+    from .scene import Part
+
+_TIMESTEP: Final = 0.002
+_CLEARANCE: Final = 0.006
+"""Between the table and the lowest point that the fingertips reach, in metres."""
+_FRICTION: Final = (0.6, 0.005, 0.0001)
+_MOUNT: Final = (30_000.0, 1500.0)
+"""Stiffness and damping of the mount."""
+
+
+def packaged(model: Model) -> str:
+    """The MJCF of a model."""
+    name = f"robotiq_{model.name.replace('-', '_')}.xml"
+    return (files("robotiq_async") / "data" / name).read_text(encoding="utf-8")
+
+
+def above_table(text: str, reach: float, part: Part | None) -> Any:
+    """The gripper upside down above a table, on a mount that moves up, with a part between its fingers."""
+    spec = mujoco.MjSpec()
+    spec.option.timestep = _TIMESTEP
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = 10
+    spec.worldbody.add_geom(
+        name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.5, 0.5, 0.1], friction=list(_FRICTION)
+    )
+    height = reach + _CLEARANCE
+    if part is not None:
+        _add_part(spec, part, height)
+    mount = spec.worldbody.add_body(name="mount", pos=[0, 0, height])
+    mount.add_joint(name="mount", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1])
+    mount.mass, mount.inertia, mount.explicitinertial = 1.0, [0.001] * 3, True
+    frame = mount.add_frame(quat=[0, 1, 0, 0])
+    spec.attach(mujoco.MjSpec.from_string(text), frame=frame, prefix="gripper/")
+    _rename_actuators(spec)
+    drive = spec.add_actuator(name="mount", target="mount", trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    drive.set_to_position(kp=_MOUNT[0], kv=_MOUNT[1])
+    return spec
+
+
+def in_own_world(text: str, file: str) -> Any:
+    """The gripper at the site ``gripper`` of a file.
+
+    Raises:
+        ValueError: there is no such file, MuJoCo cannot read it, or it has no such site.
+    """
+    if not Path(file).is_file():
+        raise ValueError(f"physics: there is no file {file!r:.100}")
+    try:
+        spec = mujoco.MjSpec.from_file(file)
+    except ValueError as error:
+        raise ValueError(f"physics: MuJoCo cannot read {file!r:.100}: {error}") from error
+    if not any(site.name == "gripper" for site in spec.sites):
+        raise ValueError(f"physics: {file!r:.100} has no site named gripper, where the gripper is mounted")
+    gripper = mujoco.MjSpec.from_string(text)
+    for option in ("timestep", "integrator", "cone", "impratio"):  # those of the file, without a complaint
+        setattr(gripper.option, option, getattr(spec.option, option))
+    spec.attach(gripper, site="gripper", prefix="gripper/")
+    _rename_actuators(spec)
+    return spec
+
+
+def _rename_actuators(spec: Any) -> None:
+    # The axes are found by their names; a user's own actuators keep theirs.
+    for actuator in spec.actuators:
+        actuator.name = actuator.name.removeprefix("gripper/")
+
+
+def _add_part(spec: Any, part: Part, height: float) -> None:
+    size = [each / 1000 for each in part.size]
+    middle = part.height / 2000 if part.at is None else height - part.at / 1000
+    body = spec.worldbody.add_body(name="part", pos=[0, 0, middle])
+    body.add_freejoint(name="part")
+    kinds = mujoco.mjtGeom
+    shape: dict[str, Any] = {
+        "box": {"type": kinds.mjGEOM_BOX, "size": [each / 2 for each in size]},
+        "cylinder": {"type": kinds.mjGEOM_CYLINDER, "size": [size[0] / 2, size[-1] / 2, 0]},
+        "rod": {
+            "type": kinds.mjGEOM_CYLINDER,
+            "size": [size[0] / 2, size[-1] / 2, 0],
+            "quat": [cos(pi / 4), sin(pi / 4), 0, 0],
+        },
+        "sphere": {"type": kinds.mjGEOM_SPHERE, "size": [size[0] / 2, 0, 0]},
+    }[part.kind]
+    body.add_geom(name="part", mass=part.mass, friction=list(_FRICTION), **shape)
+    if part.at is not None:
+        weld = spec.add_equality(type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY)
+        weld.name1, weld.name2 = "part", "world"
+        weld.data = np.array([0] * 10 + [1, 0], dtype=float)  # where it is now
+        # A hand gives way: the fingers may push the part into their middle.
+        weld.solref = [-5000.0, -150.0]

@@ -1,0 +1,199 @@
+"""One motor: follows a reference with the speed and the force that registers ask for, and judges what it met.
+
+A motor is a position servo whose reference moves at the speed of the request, never farther ahead of the axis
+than its force reaches. So a blocked axis pushes with its force and no more, and does not jump when the part
+goes. Its gears lock themselves: what pushes an axis back meets more than the force of the request.
+
+It reports a contact when it has rested for 50 ms before its target (``axis.PRESSING``). A jaw that moves on
+after that, because the part slips or is taken away, is in motion again: the manual of the 2F says that its
+object status tells a lost part. A finger of the 3-Finger locks where it met the part, and its status stays.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from robotiq_async.values.enums import Finger, ObjectStatus
+
+if TYPE_CHECKING:
+    from robotiq_async.values.model import Model
+
+_ENDS: Final = {"finger": (0, 240), "scissor": (240, 15)}
+"""Counts at the ends of a drive's range, of a 3-Finger: tools/description/kinematics.py has them from the
+sources named there. A jaw has its readings."""
+_RESTING: Final = 0.4
+"""Counts within which an axis rests: the slowest moves by more than one while a contact is awaited."""
+_CONTACT_S: Final = 0.05
+_ARRIVED_S: Final = 0.01
+_NEAR: Final = 0.6
+"""Counts from the target at which an axis has arrived."""
+_SLIPPED: Final = 2.0
+"""Counts that a jaw moves on after a contact before the part counts as lost."""
+_LOCK: Final = 4.0
+"""Times its full force that a locked motor withstands (ESTIMATE): gears that lock themselves."""
+_LEAD: Final = 1.3
+"""Share of the way at which the servo gives its full force that the reference may be ahead."""
+
+
+class MotorDrive:
+    """The motor of one axis. Positions are counts.
+
+    Attributes:
+        index: of its actuator in the world.
+        position: where the axis is.
+        travel: the distance that it has travelled.
+        outcome: what became of the last goal.
+        clears: parts are out of the way while it goes to its goal.
+    """
+
+    def __init__(
+        self, model: Model, axis: Finger, index: int, levers: tuple[Any, Any], gains: tuple[float, float]
+    ) -> None:
+        self.index = index
+        self._values, self._levers = levers
+        self._gain, self._damping = gains
+        self._forces = model.forces_n
+        self._locks = model.has_modes
+        first, last = _counts_at_ends(model, axis, self._values)
+        self._ends = min(first, last), max(first, last)
+        low, high = float(self._values[0]), float(self._values[-1])
+        self._scale = (high - low) / (last - first)
+        self._zero = low - first * self._scale
+        self.position = float(model.stroke.open_reading)
+        if axis is Finger.SCISSOR:
+            self.position = (first + last) / 2
+        self.travel = 0.0
+        self.outcome = ObjectStatus.IN_MOTION
+        self.clears = False
+        self._target = self._reference = self._farthest = self.position
+        self._sign = 1.0
+        self._rate = 0.0
+        self._force = 0
+        self._has_goal = False
+        self._is_free = True
+        self._is_locked = False
+        self._rested = 0.0
+        self._rests_at = self.position
+        self._met_at = 0.0
+
+    @property
+    def share(self) -> float:
+        """Where it is between the ends of its actuator, 0..1."""
+        low, high = float(self._values[0]), float(self._values[-1])
+        return (self._zero + self._scale * self.position - low) / (high - low)
+
+    @property
+    def is_pressing(self) -> bool:
+        return self._rested > 0 and not self._is_near
+
+    @property
+    def _is_near(self) -> bool:
+        return abs(self._target - self.position) <= _NEAR
+
+    def go(self, target: float, rate: float, force: int, *, clears: bool) -> None:
+        self._target = float(min(max(target, self._ends[0]), self._ends[1]))
+        self._rate, self._force = rate, force
+        self._sign = 1.0 if self._target > self.position else -1.0
+        self.clears = clears
+        self.outcome = ObjectStatus.IN_MOTION
+        self._has_goal, self._is_free, self._is_locked = True, False, False
+        self._reference = self._farthest = self.position
+        self._rested = 0.0
+
+    def hold(self) -> None:
+        self._lock(presses=self._has_goal and self.outcome.is_contact)
+        self._has_goal = self._is_free = self.clears = False
+
+    def release(self) -> None:
+        self._has_goal = self.clears = False
+        self._is_free = True
+
+    def command(self, step_s: float) -> tuple[float, float]:
+        """The servo's reference and the limit of its force for a step, in the units of the actuator."""
+        if self._is_free:
+            return self._value(self.position), 0.0
+        if self._is_locked:
+            return self._value(self._reference), _LOCK * self._full_force()
+        limit = self._limit()
+        back = self._pushed_back()
+        way = self._target - self._reference
+        moved = min(max(way, -self._rate * step_s), self._rate * step_s)
+        lead = _LEAD * limit / self._stiffness + back + 2 * self._rate * step_s
+        self._reference = min(max(self._reference + moved, self.position - lead), self.position + lead)
+        # What damping would cost of the speed.
+        ahead = self._damping * self._scale * moved / step_s / self._gain
+        return self._value(self._reference) + ahead, limit + self._stiffness * back
+
+    def _pushed_back(self) -> float:
+        """Counts that a finger was pushed back.
+
+        That turns no gear: it meets the servo besides the force of the request. The pads of a jaw have one
+        motor, and push each other nowhere.
+        """
+        self._farthest = self._sign * max(self._sign * self._farthest, self._sign * self.position)
+        return abs(self._farthest - self.position) if self._locks else 0.0
+
+    def _value(self, counts: float) -> float:
+        return self._zero + self._scale * counts
+
+    def _lever(self) -> float:
+        return float(np.interp(self._value(self.position), self._values, self._levers))
+
+    def _limit(self) -> float:
+        """The force of the request, in the units of the actuator."""
+        low, high = self._forces
+        return (low + (high - low) * self._force / 255) * self._lever()
+
+    def _full_force(self) -> float:
+        return self._forces[1] * self._lever()
+
+    @property
+    def _stiffness(self) -> float:
+        """Force of the servo by a count."""
+        return self._gain * abs(self._scale)
+
+    def _lock(self, *, presses: bool) -> None:
+        """Stay here, with the force of the request if it presses against something."""
+        if not self._is_locked:
+            ahead = self._sign * self._limit() / self._stiffness if presses else 0.0
+            self._reference = self.position + ahead
+        self._is_locked = True
+
+    def see(self, value: float, step_s: float) -> None:
+        """Take where the axis is after a step, and judge."""
+        position = (value - self._zero) / self._scale
+        self.travel += abs(position - self.position)
+        self.position = position
+        if not self._has_goal:
+            return
+        if abs(position - self._rests_at) <= _RESTING:
+            self._rested += step_s
+        else:
+            self._rested, self._rests_at = 0.0, position
+        if self.outcome is ObjectStatus.IN_MOTION:
+            self._judge()
+        elif self.outcome.is_contact and not self._locks and abs(position - self._met_at) > _SLIPPED:
+            self.outcome = ObjectStatus.IN_MOTION
+            self._rested = 0.0
+
+    def _judge(self) -> None:
+        if self._is_near and self._reference == self._target and self._rested >= _ARRIVED_S:
+            self.outcome = ObjectStatus.AT_POSITION
+            self.clears = False
+        elif self._rested >= _CONTACT_S and not self._is_near:
+            closing = self._target > self.position
+            self.outcome = ObjectStatus.CONTACT_CLOSING if closing else ObjectStatus.CONTACT_OPENING
+            self._met_at = self.position
+            self.clears = False
+            if self._locks:
+                self._lock(presses=True)
+
+
+def _counts_at_ends(model: Model, axis: Finger, values: Any) -> tuple[int, int]:
+    if model.has_modes:
+        return _ENDS["scissor" if axis is Finger.SCISSOR else "finger"]
+    open_first = model.stroke.open_reading, model.stroke.closed_reading
+    # A Hand-E's joint grows as it opens.
+    return open_first if values[0] == 0 and values[-1] > 0.1 else open_first[::-1]

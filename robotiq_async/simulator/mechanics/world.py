@@ -1,0 +1,177 @@
+"""The bodies: a gripper above a table, or in a world of the user's own, in MuJoCo.
+
+The gripper is the packaged MJCF. Over a table it points downwards, on a mount that :meth:`World.lift` raises.
+One step is 2 ms, or that of the user's file. Nothing here knows a clock.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from robotiq_async.runtime.extras import install
+
+try:
+    import mujoco
+except ModuleNotFoundError as error:
+    raise ImportError(f"physics needs mujoco: {install('physics')}") from error
+
+import numpy as np
+
+from robotiq_async.values.enums import Finger
+
+from .alone import levers_of, pads, put_at, reach
+from .building import above_table, in_own_world, packaged
+from .drive import MotorDrive
+
+if TYPE_CHECKING:
+    from robotiq_async.values.model import Model
+
+    from .scene import Scene
+
+_LIFTING: Final = 0.1
+"""Speed of the mount, in m/s: slow for an arm."""
+_FAR: Final = 100.0
+"""Where a part is that was taken away, in metres above."""
+
+
+class World:
+    """A gripper and what is around it.
+
+    Attributes:
+        drives: the motor of each axis.
+        time: simulated seconds since it was made.
+        step_s: seconds of a step.
+    """
+
+    def __init__(self, model: Model, scene: Scene) -> None:
+        text = packaged(model)
+        if scene.file is None:
+            spec = above_table(text, reach(text), scene.part)
+        else:
+            spec = in_own_world(text, scene.file)
+        self._model: Any = spec.compile()
+        self._data: Any = mujoco.MjData(self._model)
+        is_ours = scene.file is None
+        self._mount: int | None = self._model.actuator("mount").id if is_ours else None
+        self._lifted = self._height = 0.0
+        self._is_aside = self._is_taken = False
+        if self._model.nkey:
+            mujoco.mj_resetDataKeyframe(self._model, self._data, 0)
+        self.drives = {axis: self._drive(model, axis) for axis in model.axes}
+        for drive in self.drives.values():
+            put_at(self._model, self._data, [drive.index], drive.share)
+        mujoco.mj_forward(self._model, self._data)
+        if scene.part is not None and self._touches_part():
+            raise ValueError(f"physics: there is no room for a {scene.part} between the open fingers")
+        self._start = self._data.qpos.copy()
+        self._parts = [
+            joint
+            for joint in range(self._model.njnt)
+            if self._model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
+        ]
+        self._collides = self._model.geom_contype.copy(), self._model.geom_conaffinity.copy()
+        welds = np.flatnonzero(self._model.eq_type == mujoco.mjtEq.mjEQ_WELD)
+        self._hands: list[int] = [int(each) for each in welds] if is_ours else []
+        """The hands that hold a part: constraints that end when the gripper holds it."""
+        self.step_s: float = self._model.opt.timestep
+
+    @property
+    def time(self) -> float:
+        return float(self._data.time)
+
+    def step(self) -> None:
+        """Let one step pass."""
+        data, drives = self._data, self.drives.values()
+        self._set_aside(self._is_taken or any(drive.clears for drive in drives))
+        for drive in drives:
+            index = drive.index
+            data.ctrl[index], limit = drive.command(self.step_s)
+            self._model.actuator_forcerange[index] = (-limit, limit)
+        if self._mount is not None:
+            way = self._height - self._lifted
+            self._lifted += min(max(way, -_LIFTING * self.step_s), _LIFTING * self.step_s)
+            data.ctrl[self._mount] = self._lifted
+        mujoco.mj_step(self._model, data)
+        for drive in drives:
+            drive.see(float(data.actuator_length[drive.index]), self.step_s)
+        fingers = [drive for axis, drive in self.drives.items() if axis is not Finger.SCISSOR]
+        if self._hands and all(drive.outcome.is_contact for drive in fingers):
+            self._let_go()
+
+    def lift(self, millimetres: float) -> None:
+        """Raise the gripper to so many millimetres above where it began; it takes its time."""
+        self._height = millimetres / 1000
+
+    def take_away(self) -> None:
+        """Take the parts away, out of the fingers too."""
+        self._is_taken = True
+
+    def put_back(self) -> None:
+        """Put the parts where they were at first."""
+        self._is_taken = False
+        self._put()
+
+    def part(self) -> tuple[float, float, float] | None:
+        """The middle of the first part in millimetres, with z upwards from the table; None for no part."""
+        if not self._parts:
+            return None
+        at = self._model.jnt_qposadr[self._parts[0]]
+        x, y, z = (1000 * float(each) for each in self._data.qpos[at : at + 3])
+        return x, y, z
+
+    def grip_force(self) -> float:
+        """The force between the pads and whatever they touch, in newtons: of the pad with the largest."""
+        forces: dict[int, float] = {}
+        found = np.zeros(6)
+        for number in range(self._data.ncon):
+            contact = self._data.contact[number]
+            mujoco.mj_contactForce(self._model, self._data, number, found)
+            for geom in contact.geom:
+                if self._model.geom(int(geom)).name.endswith("_pad"):
+                    forces[int(geom)] = forces.get(int(geom), 0.0) + float(found[0])
+        return max(forces.values(), default=0.0)
+
+    def opening_mm(self) -> float:
+        """Between the faces of the two pads of a jaw, or the first two of a 3-Finger, in millimetres."""
+        one, other = pads(self._model)[:2]
+        apart = np.linalg.norm(self._data.geom_xpos[one] - self._data.geom_xpos[other])
+        thick = min(self._model.geom_size[one]) + min(self._model.geom_size[other])
+        return 1000 * float(apart - thick)
+
+    def _touches_part(self) -> bool:
+        names = ({self._model.geom(int(geom)).name for geom in each.geom} for each in self._data.contact)
+        return any("part" in pair and "table" not in pair for pair in names)
+
+    def _put(self, z: float = 0.0) -> None:
+        for joint in self._parts:
+            at, speed = self._model.jnt_qposadr[joint], self._model.jnt_dofadr[joint]
+            self._data.qpos[at : at + 7] = self._start[at : at + 7]
+            self._data.qpos[at + 2] += z
+            self._data.qvel[speed : speed + 6] = 0
+
+    def _set_aside(self, aside: bool) -> None:
+        # For an activation, or taken away: parts stay where they are put, and nothing meets them.
+        if aside != self._is_aside:
+            self._is_aside = aside
+            contype, conaffinity = self._collides
+            for joint in self._parts:
+                body = self._model.jnt_bodyid[joint]
+                first = self._model.body_geomadr[body]
+                geoms = slice(first, first + self._model.body_geomnum[body])
+                self._model.geom_contype[geoms] = 0 if aside else contype[geoms]
+                self._model.geom_conaffinity[geoms] = 0 if aside else conaffinity[geoms]
+            if not aside:
+                self._put()
+        if aside:
+            self._put(_FAR if self._is_taken else 0.0)
+
+    def _let_go(self) -> None:
+        for each in self._hands:
+            self._data.eq_active[each] = 0
+        self._hands = []
+
+    def _drive(self, model: Model, axis: Finger) -> MotorDrive:
+        index = self._model.actuator(str(axis.name)).id
+        levers = levers_of(packaged(model), axis)
+        gain, damping = self._model.actuator_gainprm[index][0], -self._model.actuator_biasprm[index][2]
+        return MotorDrive(model, axis, index, levers, (float(gain), float(damping)))

@@ -1,0 +1,143 @@
+"""An axis that a mechanism moves: where it is and what stops it comes from a simulation of bodies.
+
+The registers, the firmware and their timing are as without one. A mechanism moves drives; an axis gives its
+drive goals, and reports what becomes of them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Protocol
+
+from robotiq_async.values.enums import ObjectStatus
+
+from .axis import Axis, Motor, peak
+from .spread import Spread
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from robotiq_async.values.calibration.scales import SpeedCalibration
+    from robotiq_async.values.enums import Finger
+    from robotiq_async.values.model import Model
+
+
+class Drive(Protocol):
+    """One motor of a mechanism, in counts.
+
+    Attributes:
+        position: where it is.
+        travel: the distance it has travelled, in both directions.
+        outcome: what became of the last goal: IN_MOTION until it rests.
+        is_pressing: whether it presses against something that it has not reported yet.
+    """
+
+    @property
+    def position(self) -> float: ...
+
+    @property
+    def travel(self) -> float: ...
+
+    @property
+    def outcome(self) -> ObjectStatus: ...
+
+    @property
+    def is_pressing(self) -> bool: ...
+
+    def go(self, target: float, rate: float, force: int, *, clears: bool) -> None:
+        """Go to a position in counts, at a rate in counts a second.
+
+        Args:
+            target: the position.
+            rate: how fast.
+            force: of the register, 0..255.
+            clears: parts are out of the way until it arrives.
+        """
+
+    def hold(self) -> None:
+        """Stop and stay, with the force it has."""
+
+    def release(self) -> None:
+        """Stop without force."""
+
+
+class Mechanism(Protocol):
+    """What moves the axes of a gripper.
+
+    Attributes:
+        time: how far it has moved, in simulated seconds.
+    """
+
+    @property
+    def time(self) -> float: ...
+
+    def attach(self, model: Model, clock: Callable[[], float], speedup: float) -> None:
+        """Become the mechanism of a gripper of this model, with this clock; once."""
+
+    def drive(self, axis: Finger) -> Drive: ...
+
+    def step(self, until: float) -> bool:
+        """Make one step if that does not lead beyond a time, in simulated seconds; whether it did."""
+
+
+class DrivenAxis(Axis):
+    """An axis without a plan: it waits for what its drive reports.
+
+    It is exact: its stops are those of the mechanism, and what it meets is where it is.
+    """
+
+    def __init__(
+        self, drive: Drive, axis: Finger, low: int, high: int, motor: Motor, speeds: SpeedCalibration
+    ) -> None:
+        super().__init__(round(drive.position), low, high, motor, Spread(None, axis), speeds)
+        self._drive = drive
+        self._stays = False
+        """Whether the drive was told to stay, and nothing since."""
+
+    @property
+    def is_moving(self) -> bool:
+        return self._goal is not None and self.status is ObjectStatus.IN_MOTION
+
+    def position(self, time: float) -> float:  # noqa: ARG002
+        return min(max(self._drive.position, 0.0), 255.0)
+
+    def travel(self, time: float) -> float:  # noqa: ARG002
+        return self._drive.travel
+
+    def current(self, time: float) -> int:  # noqa: ARG002
+        if not self.is_moving or self._goal is None:
+            return 0
+        return round(peak(self._goal.force) if self._drive.is_pressing else self._running)
+
+    def hold(self, time: float, *, locks: bool) -> None:
+        self._is_locked = locks and self.holds
+        if self._goal is not None or not self._stays:
+            self._stays = True
+            if locks:
+                self._drive.hold()
+            else:
+                self._drive.release()
+        self._origin = float(round(self.position(time)))
+        self.ends_at = math.inf
+        self._goal = None
+
+    def arrive(self) -> None:
+        self.ends_at = math.inf
+        self._origin = self._drive.position
+        self.status = self._drive.outcome
+
+    def observe(self, time: float) -> None:
+        """See what has become of the goal: the end of a motion is due at once, and so is a slipping part."""
+        if self._goal is not None and self._drive.outcome is not self.status:
+            self.ends_at = time
+
+    def _plan(self, time: float) -> None:
+        assert self._goal is not None, "only a motion with a goal is planned"
+        goal = self._goal
+        self.ends_at = math.inf
+        self.status = ObjectStatus.IN_MOTION
+        self._stays = False
+        rate = goal.rate(self._speeds)
+        target = self.within_stops(goal.position)
+        self._running = self._motor.running(rate / self._full_rate, closing=target > self.position(time))
+        self._drive.go(target, rate, goal.force, clears=goal.clears)

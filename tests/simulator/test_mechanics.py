@@ -1,0 +1,368 @@
+"""A gripper whose axes bodies move: the same registers, contacts that come from parts.
+
+The world is stepped by the clock of the test, so that every run is the same. Forces and widths are those of
+the models' tables and of the parts; nothing was compared with a gripper.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("mujoco", reason="needs the extra physics")
+
+from robotiq_async import Finger, ObjectStatus, RobotiqHand, RobotiqStatus
+from robotiq_async.simulator import Habits, Physics, SimulatedGripper
+from robotiq_async.simulator.mechanics.scene import Part, Scene, parse_scene
+from robotiq_async.values.enums import JAW
+from robotiq_async.values.model import HAND_E, MODELS, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
+
+JAWS = pytest.mark.parametrize("model", [TWO_FINGER_85, TWO_FINGER_140, HAND_E], ids=str)
+POLL_S = 0.005
+BOX = "box:30x40x60,0.3"
+
+
+class Bench:
+    """A gripper, its world and the clock of both."""
+
+    def __init__(self, scene: str, model: Model = TWO_FINGER_85, habits: Habits | None = None) -> None:
+        self.now = 0.0
+        self.physics = Physics(scene)
+        self.gripper = SimulatedGripper(
+            lambda: self.now, model=model, physics=self.physics, habits=habits or Habits()
+        )
+
+    @property
+    def status(self) -> RobotiqStatus:
+        return RobotiqStatus.from_registers(self.gripper.status_registers(), model=self.gripper.model)
+
+    def run(self, seconds: float) -> None:
+        for _ in range(round(seconds / POLL_S)):
+            self.now += POLL_S
+            self.gripper.status_registers()
+
+    def ask(self, position: int, *, speed: int = 255, force: int = 255, go: bool = True) -> None:
+        self.gripper.write(0, [0x0900 if go else 0x0100, position, speed << 8 | force])
+
+    def activate(self) -> None:
+        self.ask(0, go=False)
+        self.run(6)
+        assert self.status.is_activated
+
+    def move(self, position: int, *, speed: int = 255, force: int = 255) -> float:
+        """Until no finger moves: seconds."""
+        began = self.now
+        self.ask(position, speed=speed, force=force)
+        self.run(0.02)
+        while self.status.moving & Finger.ABC:
+            self.run(POLL_S)
+            assert self.now - began < 20, "it ends"
+        return self.now - began
+
+
+def active(scene: str, model: Model = TWO_FINGER_85) -> Bench:
+    bench = Bench(scene, model)
+    bench.activate()
+    return bench
+
+
+# -- motion ----------------------------------------------------------------------------------------------
+
+
+@JAWS
+@pytest.mark.parametrize("speed", [0, 255])
+def test_a_jaw_closes_at_the_speed_of_its_table_and_reads_what_it_should(model: Model, speed: int) -> None:
+    bench = active("table", model)
+    bench.move(0)
+    took = bench.move(255, speed=speed)
+    assert took == pytest.approx(model.stroke.mm / model.speeds_mm_s[speed // 255], rel=0.05, abs=0.05)
+    assert bench.status.finger_status(JAW) is ObjectStatus.AT_POSITION
+    assert bench.status.position(JAW) == model.stroke.closed_reading
+    assert bench.physics.opening_mm == pytest.approx(0, abs=0.3)
+    bench.move(0)
+    assert bench.status.position(JAW) == model.stroke.open_reading
+    assert bench.physics.opening_mm == pytest.approx(model.stroke.mm, abs=0.3)
+
+
+def test_every_place_between_is_reached_within_a_count() -> None:
+    bench = active("table")
+    for position in (20, 100, 101, 180, 60):
+        bench.move(position, speed=128)
+        assert bench.status.position(JAW) == pytest.approx(position, abs=1)
+        assert bench.status.finger_status(JAW) is ObjectStatus.AT_POSITION
+
+
+def test_a_halt_stops_it_and_a_go_takes_it_on() -> None:
+    bench = active("table")
+    bench.ask(255, speed=0)
+    bench.run(1)
+    bench.ask(255, speed=0, go=False)
+    bench.run(0.1)
+    at = bench.status.position(JAW)
+    bench.run(1)
+    assert bench.status.position(JAW) == at
+    bench.move(255)
+    assert bench.status.position(JAW) == 228
+
+
+def test_the_same_clock_gives_the_same_bits() -> None:
+    runs = []
+    for _ in range(2):
+        bench = active("cylinder:45x60,0.2")
+        bench.move(255, force=100)
+        runs.append((bench.physics.part, bench.physics.grip_force, bench.gripper.status_registers()))
+    assert runs[0] == runs[1]
+
+
+# -- contact ---------------------------------------------------------------------------------------------
+
+
+@JAWS
+@pytest.mark.parametrize("force", [0, 128, 255])
+def test_pads_press_with_the_force_of_the_table(model: Model, force: int) -> None:
+    bench = active(BOX, model)
+    bench.move(255, force=force)
+    assert bench.status.finger_status(JAW) is ObjectStatus.CONTACT_CLOSING
+    bench.run(0.3)
+    low, high = model.forces_n
+    assert bench.physics.grip_force == pytest.approx(low + (high - low) * force / 255, rel=0.15)
+
+
+@JAWS
+def test_a_part_is_met_where_it_is(model: Model) -> None:
+    """Within what pads and part give way."""
+    bench = active(BOX, model)
+    bench.move(255, force=20)
+    assert bench.physics.opening_mm == pytest.approx(30, abs=0.7)
+    assert bench.status.current_ma(JAW) == 0, "at rest it draws nothing"
+
+
+@JAWS
+def test_what_is_held_comes_along_and_what_is_too_heavy_slips(model: Model) -> None:
+    held = active(BOX, model)
+    held.move(255, force=255)
+    before = held.physics.part
+    held.physics.lift(80)
+    held.run(2)
+    assert before is not None
+    assert held.physics.part is not None
+    assert held.physics.part[2] - before[2] == pytest.approx(80, abs=4)
+    assert held.status.finger_status(JAW) is ObjectStatus.CONTACT_CLOSING
+
+    heavy = active("box:30x40x60,9", model)
+    heavy.move(255, force=0)
+    assert heavy.status.finger_status(JAW) is ObjectStatus.CONTACT_CLOSING
+    heavy.physics.lift(80)
+    heavy.run(2)
+    assert heavy.physics.part is not None
+    assert heavy.physics.part[2] == pytest.approx(30, abs=2), "it stands where it stood"
+    assert heavy.status.finger_status(JAW) is ObjectStatus.AT_POSITION, "the part is lost"
+    assert heavy.status.position(JAW) == model.stroke.closed_reading
+
+
+def test_a_part_that_is_taken_away_is_lost_and_one_put_back_is_found() -> None:
+    bench = active(BOX)
+    bench.move(255, force=60)
+    bench.physics.take_away()
+    bench.run(1.5)
+    assert bench.status.finger_status(JAW) is ObjectStatus.AT_POSITION
+    assert bench.status.position(JAW) == 228
+    bench.move(0)
+    bench.physics.put_back()
+    bench.move(255)
+    assert bench.status.finger_status(JAW) is ObjectStatus.CONTACT_CLOSING
+
+
+def test_a_ball_that_is_met_above_its_middle_is_squeezed_out() -> None:
+    """Pads that reach over only the top of a ball push it down and out; with a table it stays below them."""
+    bench = active("sphere:50,0.05@145")
+    bench.move(255, force=255)
+    bench.run(1)
+    assert bench.physics.part is not None
+    away = bench.physics.opening_mm
+    assert away < 45, "the pads have gone past its widest part"
+
+
+def test_more_force_closes_farther_on_the_same_part() -> None:
+    bench = active(BOX)
+    bench.move(255, force=0)
+    gentle = bench.physics.opening_mm
+    bench.move(255, force=255)
+    assert bench.physics.opening_mm < gentle
+
+
+def test_no_contact_in_an_activation_for_parts_are_taken_out() -> None:
+    bench = Bench(BOX)
+    before = bench.physics.part
+    bench.activate()
+    assert bench.status.fault == 0
+    assert bench.physics.part == pytest.approx(before, abs=0.5)
+
+
+def test_a_halt_keeps_the_part_unless_the_gripper_has_that_habit() -> None:
+    for lets_go, height in ((False, 110), (True, 30)):
+        bench = Bench(BOX, habits=Habits(lets_go_on_halt=lets_go))
+        bench.activate()
+        bench.move(255, force=128)
+        bench.ask(255, force=128, go=False)
+        bench.run(0.5)
+        bench.physics.lift(80)
+        bench.run(2)
+        assert bench.physics.part is not None
+        assert bench.physics.part[2] == pytest.approx(height, abs=5)
+
+
+# -- the 3-Finger ----------------------------------------------------------------------------------------
+
+
+def test_fingers_wrap_around_a_rod_at_the_palm_and_pinch_one_at_the_tips() -> None:
+    bent = {}
+    for at in (105, 170):
+        bench = active(f"rod:60x140,0.3@{at}", THREE_FINGER)
+        bench.move(255, force=128)
+        bench.run(0.5)
+        assert bench.status.contacts & Finger.ABC == Finger.ABC
+        before = bench.physics.part
+        assert before is not None
+        bench.physics.lift(60)
+        bench.run(2)
+        assert bench.physics.part is not None
+        assert bench.physics.part[2] - before[2] == pytest.approx(60, abs=8), "it is held"
+        bent[at] = bench.status.position(Finger.A)
+    assert bent[105] > 140 > bent[170], "beyond 140 counts a finger that meets nothing bends its middle joint"
+
+
+def test_a_finger_that_is_stopped_early_bends_earlier_than_a_free_one() -> None:
+    bench = active("rod:70x140,0.3@110", THREE_FINGER)
+    bench.move(255)
+    world = bench.physics._world
+    assert world is not None
+    base, middle = (
+        float(world._data.joint(f"gripper/finger_middle_joint_{number}").qpos[0]) for number in (1, 2)
+    )
+    assert middle > 0.3, "the middle phalanx goes on"
+    assert base < 1.15, "although the base has not reached its stop"
+
+
+def test_a_3_finger_keeps_its_contact_when_the_part_is_gone() -> None:
+    """By its manual fingers that met something stay there; those of a jaw go on."""
+    bench = active("box:60x60x60,0.3", THREE_FINGER)
+    bench.move(255, force=60)
+    at = bench.status.position(Finger.A)
+    bench.physics.take_away()
+    bench.run(2)
+    assert bench.status.contacts & Finger.ABC == Finger.ABC
+    assert bench.status.position(Finger.A) == pytest.approx(at, abs=8)
+
+
+def test_a_stronger_pair_does_not_push_a_finger_open() -> None:
+    """B and C press against A alone: its gears lock."""
+    bench = active("box:60x60x60,0.3", THREE_FINGER)
+    bench.move(255, force=255)
+    bench.run(1)
+    positions = [bench.status.position(finger) for finger in (Finger.A, Finger.B, Finger.C)]
+    assert max(positions) - min(positions) < 30
+
+
+# -- scenes ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "scene"),
+    [
+        ("table", Scene()),
+        ("box:40x60x80,0.3", Scene(Part("box", (40, 60, 80), 0.3))),
+        ("rod:40x120,0.25@95", Scene(Part("rod", (40, 120), 0.25, 95))),
+        ("sphere:60,1", Scene(Part("sphere", (60,), 1))),
+        ("cell.xml", Scene(file="cell.xml")),
+    ],
+)
+def test_scenes_in_words(text: str, scene: Scene) -> None:
+    assert parse_scene(text) == scene
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "physics must be table"),
+        ("cone:40,1", "box, cylinder, rod, sphere"),
+        ("box:40x60,0.3", "a box has 3 lengths, got 40x60"),
+        ("box:40x60x0,0.3", "size must be a number above 0 and at most 1000, got '0'"),
+        ("sphere:60,0", "mass must be"),
+        ("sphere:60,1000", "mass must be"),
+    ],
+)
+def test_words_that_are_no_scene(text: str, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        Physics(text)
+
+
+def test_a_part_without_room_between_the_fingers_is_refused() -> None:
+    with pytest.raises(ValueError, match="no room for a box of 90x40x60 mm"):
+        Bench("box:90x40x60,0.3")
+
+
+def test_physics_has_one_gripper() -> None:
+    bench = Bench("table")
+    with pytest.raises(RuntimeError, match="one for each"):
+        SimulatedGripper(physics=bench.physics)
+    with pytest.raises(RuntimeError, match="no gripper yet"):
+        Physics("table").lift(10)
+
+
+def test_obstacles_at_a_count_are_for_grippers_without_physics() -> None:
+    with pytest.raises(ValueError, match="not obstacles at a count"):
+        Bench("table").gripper.place_object(JAW, 100)
+
+
+OWN = """<mujoco><worldbody>
+  <geom type="plane" size="1 1 0.1"/>
+  <body name="arm" pos="0 0 0.17">
+    <joint name="elbow" type="hinge" axis="0 0 1" damping="1"/>
+    <geom type="box" size="0.02 0.02 0.02" pos="0 0 0.05" mass="1" contype="0" conaffinity="0"/>
+    <site name="gripper" quat="0 1 0 0"/>
+  </body>
+  <body name="can" pos="0 0 0.03"><freejoint/><geom type="cylinder" size="0.02 0.03" mass="0.1"/></body>
+</worldbody><actuator><position name="elbow" joint="elbow" kp="50"/></actuator></mujoco>"""
+
+
+def test_the_gripper_is_mounted_in_a_world_of_ones_own(tmp_path: Path) -> None:
+    file = tmp_path / "cell.xml"
+    file.write_text(OWN, encoding="utf-8")
+    bench = active(str(file))
+    bench.move(255)
+    assert bench.status.finger_status(JAW) is ObjectStatus.CONTACT_CLOSING
+    assert bench.physics.opening_mm == pytest.approx(40, abs=4)
+
+
+def test_a_world_that_is_none_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "cell.xml"
+    with pytest.raises(ValueError, match="there is no file"):
+        Bench(str(file))
+    file.write_text("<mujoco>", encoding="utf-8")
+    with pytest.raises(ValueError, match="MuJoCo cannot read"):
+        Bench(str(file))
+    file.write_text("<mujoco/>", encoding="utf-8")
+    with pytest.raises(ValueError, match="no site named gripper"):
+        Bench(str(file))
+
+
+# -- behind the wire -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", MODELS)
+async def test_a_hand_grips_and_releases_a_part(name: str) -> None:
+    part = "box:60x60x60,0.3" if name == "3f" else BOX
+    async with RobotiqHand(f"sim://?speedup=4&physics={part}&model={name}") as hand:
+        await hand.activate()
+        for _ in range(2):
+            assert (await hand.close()).object_detected
+            assert not (await hand.open()).object_detected
+
+
+def test_an_address_has_one_part() -> None:
+    with pytest.raises(ValueError, match="cannot be combined"):
+        RobotiqHand("sim://?object=100&physics=table")
+    with pytest.raises(ValueError, match="physics must be table"):
+        RobotiqHand("sim://?physics=cone")
