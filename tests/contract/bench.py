@@ -14,7 +14,7 @@ import pytest
 
 from robotiq_async import RobotiqHand, State
 from robotiq_async.hand import Hand
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
+from robotiq_async.simulator import Physics, SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.values.model import THREE_FINGER, Model
 from robotiq_async.values.request import Request
 from tests.fleet.lab import SPEEDUP, Lab, lab
@@ -30,6 +30,8 @@ MODEL: ContextVar[Model] = ContextVar("model", default=THREE_FINGER)
 """What the gripper is."""
 SERVER: ContextVar[type[SimulatorServer]] = ContextVar("server", default=SimulatorServer)
 """What its link is, for a hand of this process and for that of an agent."""
+PHYSICS: ContextVar[bool] = ContextVar("physics", default=False)
+"""Whether bodies move the axes of the gripper of a hand of this process."""
 
 
 @dataclass
@@ -99,7 +101,14 @@ async def bench(where: str, *, active: bool = True) -> AsyncIterator[Bench]:
         return
     loop = asyncio.get_running_loop()
     cycle, model = 0.005 * SPEEDUP, MODEL.get()
-    gripper = SimulatedGripper(loop.time, speedup=SPEEDUP, device_cycle=cycle, spread=False, model=model)
+    gripper = SimulatedGripper(
+        loop.time,
+        speedup=SPEEDUP,
+        device_cycle=cycle,
+        spread=False,
+        model=model,
+        physics=Physics("table") if PHYSICS.get() else None,
+    )
     async with SERVER.get()(gripper) as server:
         if active:
             await activate_beforehand(gripper)

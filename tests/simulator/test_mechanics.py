@@ -6,6 +6,8 @@ the models' tables and of the parts; nothing was compared with a gripper.
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -19,6 +21,7 @@ from robotiq_async.values.enums import JAW
 from robotiq_async.values.model import HAND_E, MODELS, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
 
 JAWS = pytest.mark.parametrize("model", [TWO_FINGER_85, TWO_FINGER_140, HAND_E], ids=str)
+ROOT = Path(__file__).parents[2]
 POLL_S = 0.005
 BOX = "box:30x40x60,0.3"
 
@@ -182,6 +185,19 @@ def test_a_ball_that_is_met_above_its_middle_is_squeezed_out() -> None:
     assert bench.physics.part is not None
     away = bench.physics.opening_mm
     assert away < 45, "the pads have gone past its widest part"
+
+
+def test_a_loop_that_asks_for_a_little_more_each_time_finds_the_part() -> None:
+    """New requests in the same direction do not restart the pressing."""
+    bench = active(BOX)
+    bench.move(0)
+    for position in range(10, 255, 2):
+        bench.ask(position, speed=128, force=20)
+        bench.run(0.02)
+        if bench.status.contacts:
+            break
+    assert bench.status.contacts == JAW
+    assert bench.physics.opening_mm == pytest.approx(30, abs=0.7)
 
 
 def test_more_force_closes_farther_on_the_same_part() -> None:
@@ -359,6 +375,19 @@ async def test_a_hand_grips_and_releases_a_part(name: str) -> None:
         for _ in range(2):
             assert (await hand.close()).object_detected
             assert not (await hand.open()).object_detected
+
+
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [
+        ("sim://?model=2f85&speedup=2&physics=box:30x40x60,0.3", "held at 15"),
+        ("sim://?model=2f85", "nothing there"),
+    ],
+)
+def test_the_example_runs_with_and_without_physics(address: str, said: str) -> None:
+    command = [sys.executable, str(ROOT / "demo" / "grasp_loop.py"), address]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    assert done.stdout.startswith(said)
 
 
 def test_an_address_has_one_part() -> None:

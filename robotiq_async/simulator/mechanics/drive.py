@@ -25,6 +25,8 @@ _ENDS: Final = {"finger": (0, 240), "scissor": (240, 15)}
 sources named there. A jaw has its readings."""
 _RESTING: Final = 0.4
 """Counts within which an axis rests: the slowest moves by more than one while a contact is awaited."""
+_TREMBLING: Final = 0.1
+"""Counts that are no travel: bodies in contact never rest entirely."""
 _CONTACT_S: Final = 0.05
 _ARRIVED_S: Final = 0.01
 _NEAR: Final = 0.6
@@ -75,7 +77,7 @@ class MotorDrive:
         self._is_free = True
         self._is_locked = False
         self._rested = 0.0
-        self._rests_at = self.position
+        self._rests_at = self._counted_at = self.position
         self._met_at = 0.0
 
     @property
@@ -89,18 +91,24 @@ class MotorDrive:
         return self._rested > 0 and not self._is_near
 
     @property
+    def _is_going(self) -> bool:
+        return self._has_goal and self.outcome is ObjectStatus.IN_MOTION
+
+    @property
     def _is_near(self) -> bool:
         return abs(self._target - self.position) <= _NEAR
 
     def go(self, target: float, rate: float, force: int, *, clears: bool) -> None:
         self._target = float(min(max(target, self._ends[0]), self._ends[1]))
         self._rate, self._force = rate, force
-        self._sign = 1.0 if self._target > self.position else -1.0
+        before, self._sign = self._sign, 1.0 if self._target > self.position else -1.0
+        # A new request in the same direction does not restart the pressing: a loop of 50 Hz sends many.
+        if not self._is_going or before != self._sign:
+            self._reference = self._farthest = self.position
+            self._rested = 0.0
         self.clears = clears
         self.outcome = ObjectStatus.IN_MOTION
         self._has_goal, self._is_free, self._is_locked = True, False, False
-        self._reference = self._farthest = self.position
-        self._rested = 0.0
 
     def hold(self) -> None:
         self._lock(presses=self._has_goal and self.outcome.is_contact)
@@ -164,7 +172,9 @@ class MotorDrive:
     def see(self, value: float, step_s: float) -> None:
         """Take where the axis is after a step, and judge."""
         position = (value - self._zero) / self._scale
-        self.travel += abs(position - self.position)
+        if abs(position - self._counted_at) >= _TREMBLING:
+            self.travel += abs(position - self._counted_at)
+            self._counted_at = position
         self.position = position
         if not self._has_goal:
             return

@@ -227,8 +227,9 @@ def _away(status: RobotiqStatus) -> Finger:
 
 def _reach(model: HandModel) -> float:
     """From the mounting face about to the ends of the fingers, in metres."""
-    heights = [(model.stand @ pose).position[2] for pose in model.link_poses({}).values()]
-    return max(heights) + 0.04
+    ends = ({joint.name: end for joint in model.moving} for end in (0.0, 0.4))
+    poses = (pose for values in ends for pose in model.link_poses(values).values())
+    return max((model.stand @ pose).position[2] for pose in poses) + 0.05
 
 
 def _drawn(shape: Shape) -> Object3D:
