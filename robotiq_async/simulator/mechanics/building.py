@@ -36,8 +36,13 @@ def above_table(text: str, reach: float, part: Part | None) -> Any:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = 10
+    spec.visual.headlight.ambient = [0.5, 0.5, 0.5]
     spec.worldbody.add_geom(
-        name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.5, 0.5, 0.1], friction=list(_FRICTION)
+        name="table",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[0.5, 0.5, 0.1],
+        friction=list(_FRICTION),
+        rgba=[0.73, 0.76, 0.81, 1],
     )
     height = reach + _CLEARANCE
     if part is not None:
@@ -97,7 +102,8 @@ def _add_part(spec: Any, part: Part, height: float) -> None:
         },
         "sphere": {"type": kinds.mjGEOM_SPHERE, "size": [size[0] / 2, 0, 0]},
     }[part.kind]
-    body.add_geom(name="part", mass=part.mass, friction=list(_FRICTION), **shape)
+    yellow = [0.95, 0.76, 0.19, 1]
+    body.add_geom(name="part", mass=part.mass, friction=list(_FRICTION), rgba=yellow, **shape)
     if part.at is not None:
         weld = spec.add_equality(type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY)
         weld.name1, weld.name2 = "part", "world"
