@@ -35,6 +35,8 @@ _SLIPPED: Final = 2.0
 """Counts that a jaw moves on after a contact before the part counts as lost."""
 _LOCK: Final = 4.0
 """Times its full force that a locked motor withstands (ESTIMATE): gears that lock themselves."""
+_LET_GO: Final = 4.0
+"""Counts that an axis goes back to let go of a part (ESTIMATE)."""
 _LEAD: Final = 1.3
 """Share of the way at which the servo gives its full force that the reference may be ahead."""
 
@@ -69,13 +71,12 @@ class MotorDrive:
         self.travel = 0.0
         self.outcome = ObjectStatus.IN_MOTION
         self.clears = False
-        self._target = self._reference = self._farthest = self.position
+        self._target = self._aim = self._reference = self._farthest = self.position
         self._sign = 1.0
         self._rate = 0.0
         self._force = 0
         self._has_goal = False
-        self._is_free = True
-        self._is_locked = False
+        self._is_locked = True
         self._rested = 0.0
         self._rests_at = self._counted_at = self.position
         self._met_at = 0.0
@@ -99,7 +100,9 @@ class MotorDrive:
         return abs(self._target - self.position) <= _NEAR
 
     def go(self, target: float, rate: float, force: int, *, clears: bool) -> None:
-        self._target = float(min(max(target, self._ends[0]), self._ends[1]))
+        low, high = self._ends
+        self._target = min(max(target, low), high)
+        self._aim = min(max(target, low - 1), high + 1)  # pressed against a stop, it reads the stop
         self._rate, self._force = rate, force
         before, self._sign = self._sign, 1.0 if self._target > self.position else -1.0
         # A new request in the same direction does not restart the pressing: a loop of 50 Hz sends many.
@@ -108,25 +111,23 @@ class MotorDrive:
             self._rested = 0.0
         self.clears = clears
         self.outcome = ObjectStatus.IN_MOTION
-        self._has_goal, self._is_free, self._is_locked = True, False, False
+        self._has_goal, self._is_locked = True, False
 
     def hold(self) -> None:
         self._lock(presses=self._has_goal and self.outcome.is_contact)
-        self._has_goal = self._is_free = self.clears = False
+        self._has_goal = self.clears = False
 
     def release(self) -> None:
-        self._has_goal = self.clears = False
-        self._is_free = True
+        self.hold()
+        self._reference = self.position - self._sign * _LET_GO
 
     def command(self, step_s: float) -> tuple[float, float]:
         """The servo's reference and the limit of its force for a step, in the units of the actuator."""
-        if self._is_free:
-            return self._value(self.position), 0.0
         if self._is_locked:
             return self._value(self._reference), _LOCK * self._full_force()
         limit = self._limit()
         back = self._pushed_back()
-        way = self._target - self._reference
+        way = self._aim - self._reference
         moved = min(max(way, -self._rate * step_s), self._rate * step_s)
         lead = _LEAD * limit / self._stiffness + back + 2 * self._rate * step_s
         self._reference = min(max(self._reference + moved, self.position - lead), self.position + lead)
@@ -189,7 +190,7 @@ class MotorDrive:
             self._rested = 0.0
 
     def _judge(self) -> None:
-        if self._is_near and self._reference == self._target and self._rested >= _ARRIVED_S:
+        if self._is_near and self._reference == self._aim and self._rested >= _ARRIVED_S:
             self.outcome = ObjectStatus.AT_POSITION
             self.clears = False
         elif self._rested >= _CONTACT_S and not self._is_near:

@@ -172,6 +172,7 @@ class World:
 
     def _drive(self, model: Model, axis: Finger) -> MotorDrive:
         index = self._model.actuator(str(axis.name)).id
+        self._model.actuator_ctrllimited[index] = 0  # a motor presses its axis against a stop
         levers = levers_of(packaged(model), axis)
         gain, damping = self._model.actuator_gainprm[index][0], -self._model.actuator_biasprm[index][2]
         return MotorDrive(model, axis, index, levers, (float(gain), float(damping)))

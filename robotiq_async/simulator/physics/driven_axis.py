@@ -58,7 +58,7 @@ class Drive(Protocol):
         """Stop and stay, with the force it has."""
 
     def release(self) -> None:
-        """Stop without force."""
+        """Stop, and let go of what is gripped."""
 
 
 class Mechanism(Protocol):
@@ -110,13 +110,14 @@ class DrivenAxis(Axis):
         return round(peak(self._goal.force) if self._drive.is_pressing else self._running)
 
     def hold(self, time: float, *, locks: bool) -> None:
-        self._is_locked = locks and self.holds
-        if self._goal is not None or not self._stays:
+        held = self.holds
+        self._is_locked = locks and held
+        if self._goal is not None or not self._stays or (held and not locks):
             self._stays = True
-            if locks:
-                self._drive.hold()
-            else:
+            if held and not locks:
                 self._drive.release()
+            else:
+                self._drive.hold()
         self._origin = float(round(self.position(time)))
         self.ends_at = math.inf
         self._goal = None

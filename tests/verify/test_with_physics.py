@@ -1,0 +1,28 @@
+"""A whole run of verify against grippers whose axes bodies move: all is as assumed, but for the soft part."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip("mujoco", reason="needs the extra physics")
+
+from robotiq_async.simulator import Physics
+from robotiq_async.tools.verify import Verdict
+from robotiq_async.values.model import MODELS
+from tests.verify.people import Helper, Roll, served, soft_part, verified
+
+pytestmark = pytest.mark.virtual_time
+
+
+@pytest.mark.parametrize("name", MODELS)
+async def test_every_stage_ends_well_but_the_one_with_foam(name: str) -> None:
+    """No foam among bodies that are rigid: nobody puts any there."""
+    async with served(model=name, physics=Physics("table")) as server:
+        helper = Helper(server)
+        helper.before = lambda words: True if words in (soft_part.PLACE, soft_part.RELEASE) else None
+        report = await verified(server, helper, Roll())
+    assert report.why == "done", report.words
+    assert report.stages == list(range(10))
+    other = {each for each, check in report.checks.items() if check.verdict is not Verdict.AS_ASSUMED}
+    assert {each for each in other if not each.startswith("soft.")} == set()
+    assert not helper.alarms
