@@ -8,8 +8,9 @@ pytest.importorskip("mujoco", reason="needs the extra physics")
 
 from robotiq_async.simulator import Physics
 from robotiq_async.tools.verify import Verdict
+from robotiq_async.tools.verify.stages import soft_part
 from robotiq_async.values.model import MODELS
-from tests.verify.people import Helper, Roll, served, soft_part, verified
+from tests.verify.people import Helper, Roll, served, verified
 
 pytestmark = pytest.mark.virtual_time
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cache
 from typing import Any, Final
 
 import mujoco
@@ -18,6 +19,7 @@ def pads(model: Any) -> list[int]:
     return [geom for geom in range(model.ngeom) if model.geom(geom).name.endswith("_pad")]
 
 
+@cache
 def reach(text: str) -> float:
     """The farthest that a fingertip comes from the mounting face, in metres."""
     model = mujoco.MjModel.from_xml_string(text)
@@ -39,6 +41,7 @@ def _half(model: Any, geom: int) -> Any:
     return np.full(3, size[0])
 
 
+@cache
 def levers_of(text: str, axis: Finger) -> tuple[Any, Any]:
     """Values of an axis, and for each what all pads move by a small motion of it.
 

@@ -29,6 +29,7 @@ _TREMBLING: Final = 0.1
 """Counts that are no travel: bodies in contact never rest entirely."""
 _CONTACT_S: Final = 0.05
 _ARRIVED_S: Final = 0.01
+_STILL_S: Final = 0.3
 _NEAR: Final = 0.6
 """Counts from the target at which an axis has arrived."""
 _SLIPPED: Final = 2.0
@@ -90,6 +91,11 @@ class MotorDrive:
     @property
     def is_pressing(self) -> bool:
         return self._rested > 0 and not self._is_near
+
+    @property
+    def is_still(self) -> bool:
+        """Whether it has rested for a while, and nothing is asked of it."""
+        return not self._is_going and self._rested > _STILL_S
 
     @property
     def _is_going(self) -> bool:
@@ -177,12 +183,12 @@ class MotorDrive:
             self.travel += abs(position - self._counted_at)
             self._counted_at = position
         self.position = position
-        if not self._has_goal:
-            return
         if abs(position - self._rests_at) <= _RESTING:
             self._rested += step_s
         else:
             self._rested, self._rests_at = 0.0, position
+        if not self._has_goal:
+            return
         if self.outcome is ObjectStatus.IN_MOTION:
             self._judge()
         elif self.outcome.is_contact and not self._locks and abs(position - self._met_at) > _SLIPPED:

@@ -69,6 +69,8 @@ class World:
             for joint in range(self._model.njnt)
             if self._model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
         ]
+        self._sleeps = is_ours and not self._parts
+        """Nothing moves while the motors rest: no part, and no world of others."""
         self._collides = self._model.geom_contype.copy(), self._model.geom_conaffinity.copy()
         welds = np.flatnonzero(self._model.eq_type == mujoco.mjtEq.mjEQ_WELD)
         self._hands: list[int] = [int(each) for each in welds] if is_ours else []
@@ -82,6 +84,9 @@ class World:
     def step(self) -> None:
         """Let one step pass."""
         data, drives = self._data, self.drives.values()
+        if self._sleeps and self._lifted == self._height and all(drive.is_still for drive in drives):
+            data.time += self.step_s
+            return
         self._set_aside(self._is_taken or any(drive.clears for drive in drives))
         for drive in drives:
             index = drive.index

@@ -1,0 +1,44 @@
+"""The contract on grippers whose axes bodies move. The 2F-140 and the Hand-E keep it as the 2F-85 does.
+
+What cannot pass: scenes that put an obstacle at a count, for with physics parts have places and sizes; and
+those that are about a 3-Finger, as on any sibling (tests/test_models.py).
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("mujoco", reason="needs the extra physics")
+
+from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
+from tests.contract.bench import MODEL, PHYSICS
+from tests.test_models import OTHERWISE
+from tests.verify.test_contract import scenes
+
+FILES = sorted(file.stem for file in (Path(__file__).parents[1] / "contract").glob("test_*.py"))
+ELSEWHERE = re.compile("axes of a|axis of a|not obstacles at a count")
+
+
+@pytest.mark.parametrize("kind", [TWO_FINGER_85, THREE_FINGER], ids=str)
+@pytest.mark.parametrize(
+    "file", [each for each in FILES if each not in ("test_arguments", "test_differences")]
+)
+def test_bodies_keep_the_contract(file: str, kind: Model) -> None:
+    model, physics = MODEL.set(kind), PHYSICS.set(True)
+    failed, kept = set(), 0
+    try:
+        for name, scene in scenes(*(other for other in FILES if other != file)):
+            try:
+                scene()
+                kept += 1
+            except Exception as error:  # noqa: BLE001  # every way to fail counts
+                if not ELSEWHERE.search(str(error)):
+                    failed.add(name)
+    finally:
+        MODEL.reset(model)
+        PHYSICS.reset(physics)
+    assert failed <= (OTHERWISE.keys() if kind is TWO_FINGER_85 else set())
+    assert kept > 0
