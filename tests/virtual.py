@@ -149,6 +149,11 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         """The longest time, in real seconds, that callbacks have kept the loop."""
         return self._virtual.hold.longest
 
+    @property
+    def turns(self) -> int:
+        """How often the loop has looked for something to do."""
+        return self._virtual.turns
+
     def end_after(self, seconds: float) -> None:
         """Let what takes longer fail.
 

@@ -24,6 +24,14 @@ def clock_of(loop: asyncio.AbstractEventLoop) -> Callable[[], float]:
     return loop.time if is_own or "time" in getattr(loop, "__dict__", ()) else time.monotonic
 
 
+def resolution_of(loop: asyncio.AbstractEventLoop) -> float:
+    """The step of a loop's clock in seconds: asyncio calls what is due within it. 0 if the loop tells none.
+
+    15.6 ms on Windows before Python 3.13, and else a millionth of a second or less.
+    """
+    return float(getattr(loop, "_clock_resolution", 0.0))
+
+
 def now() -> float:
     """The time by the clock of the running loop."""
     return clock_of(asyncio.get_running_loop())()

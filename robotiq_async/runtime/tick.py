@@ -6,6 +6,8 @@ watches like a socket. Elsewhere, and in a loop with a clock of its own, the loo
 of a loop share one timer, so those that are due wake together, and many hands do not wake a busy loop more
 often.
 
+Where the clock counts in steps of 15.6 ms (Windows before Python 3.13), ticks come once a step at most.
+
 A missed tick is counted and not caught up with. The delay of a tick tells for how long the loop was held up,
 whatever the poller task was doing meanwhile.
 """
@@ -19,7 +21,7 @@ import math
 import time
 from typing import ClassVar, Final, Literal
 
-from .clock import clock_of
+from .clock import clock_of, resolution_of
 from .timerfd import TimerFd
 
 Source = Literal["timerfd", "loop timer"]
@@ -125,6 +127,7 @@ class _LoopTimer:
         self._heap: list[tuple[float, int, Tick]] = []
         self._handle: asyncio.TimerHandle | None = None
         self._clock = clock_of(loop)
+        self._step = resolution_of(loop)
         self._timerfd = self._watched_timerfd()
 
     @property
@@ -164,6 +167,10 @@ class _LoopTimer:
             return
         if self._handle is not None:
             self._handle.cancel()
+        # The loop calls what is due within a step of its clock. A deadline in this step has not passed before
+        # the next one: it would be called and armed again and again until then.
+        if due > (now := self._clock()):
+            due = max(due, now + self._step)
         self._handle = self._loop.call_at(due, self._expire_due)
 
     def _watched_timerfd(self) -> TimerFd | None:
