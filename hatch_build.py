@@ -6,23 +6,15 @@ to lead to: a link leads to the repository at the release's tag instead.
 
 from __future__ import annotations
 
-import re
+import sys
 from pathlib import Path
 from typing import Any
 
 from hatchling.metadata.plugin.interface import MetadataHookInterface
 
-LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\((?![a-z]+:|#)([^)\s]+)\)")
+sys.path.insert(0, str(Path(__file__).parent))
 
-
-def absolute(text: str, repository: str, version: str) -> str:
-    """A page with links that lead to the tag of a version in a repository."""
-
-    def link(found: re.Match[str]) -> str:
-        mark, words, path = found.groups()
-        return f"{mark}[{words}]({repository}/{'raw' if mark else 'blob'}/v{version}/{path})"
-
-    return LINK.sub(link, text)
+from docs.site.absolute import absolute
 
 
 class Readme(MetadataHookInterface):

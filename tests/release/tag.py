@@ -13,6 +13,7 @@ import sys
 import tomllib
 import xml.etree.ElementTree as ET
 
+from docs.site.absolute import absolute
 from docs.site.versions import version
 from tests.release.environments import ROOT, FailedError, exit_code
 
@@ -60,7 +61,7 @@ def check(tag: str, repository: str) -> str:
     wrong = {file: found for file, found in repositories().items() if found != repository}
     if wrong:
         raise FailedError(f"this repository is {repository}, and not as in {wrong}")
-    return notes(_read("CHANGELOG.md"), version())
+    return absolute(notes(_read("CHANGELOG.md"), version()), repository, version())
 
 
 def main() -> None:

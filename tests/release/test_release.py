@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-import runpy
 import sys
 import tomllib
-from types import ModuleType
 
 import pytest
 
+from docs.site.absolute import absolute
 from docs.site.versions import version
 from tests.release.canary import news, pinned
 from tests.release.dist import relative
@@ -82,11 +81,7 @@ def test_the_notes_of_a_release_are_what_the_changelog_says_of_it() -> None:
 # -- the description on the package index --------------------------------------------------------------------
 
 
-def test_links_of_the_description_lead_to_the_tag(monkeypatch: pytest.MonkeyPatch) -> None:
-    interface = ModuleType("hatchling.metadata.plugin.interface")
-    interface.MetadataHookInterface = object  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, interface.__name__, interface)
-    absolute = runpy.run_path(str(ROOT / "hatch_build.py"))["absolute"]
+def test_links_of_the_description_lead_to_the_tag() -> None:
     page = "![a\nb](docs/a.webp) [c [d]](docs/c.md#e) [f](https://f.org) [g](#g)"
     assert absolute(page, "https://github.com/me/it", "1.2.3") == (
         "![a\nb](https://github.com/me/it/raw/v1.2.3/docs/a.webp)"
