@@ -118,7 +118,8 @@ async def test_it_follows_the_axes(active: Operator, gripper: SimulatedGripper) 
         await until(pilot, lambda: "241 → 255 there" in axes(pilot)[1])
         assert "120 → 255 CONTACT closing" in axes(pilot)[0]
         assert set(sparkline_of(axes(pilot)[0])) & set("▅▆▇█"), "half an ampere before it grips"
-        assert set(sparkline_of(axes(pilot)[3])) == {"▁"}
+        assert "▁" in sparkline_of(axes(pilot)[3])
+        assert set(sparkline_of(axes(pilot)[3])) <= {"▁", " "}, "a gap is a poll that came late"
 
 
 def sparkline_of(line: str) -> str:
@@ -387,8 +388,8 @@ async def test_the_log_keeps_clear_of_its_scroll_bar(operator: Operator) -> None
 
 @pytest.fixture
 async def closing() -> AsyncIterator[tuple[RobotiqHand, Screen]]:
-    """A hand whose monitor has just closed it."""
-    async with SimulatorServer(active_gripper()) as slow:
+    """A hand whose monitor has just closed it; that takes long enough for any machine to see it move."""
+    async with SimulatorServer(active_gripper(speedup=0.2)) as slow:
         hand = RobotiqHand(slow.address, poll_interval=SLOWLY)
         async with hand, shown(Operator(hand)) as pilot:
             await pilot.press("c")
