@@ -14,6 +14,7 @@ from robotiq_async.values import registers as reg
 from robotiq_async.values.enums import ObjectStatus
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import AxisRequest, Request
+from tests.patience import patience
 
 _OPEN: Final = (AxisRequest(0, 255, 64),) * 3 + (AxisRequest(128, 255, 64),)
 ACTIVATION: Final = Request(activate=True, axes=_OPEN).registers
@@ -44,14 +45,14 @@ async def activate_beforehand(gripper: SimulatedGripper) -> None:
 
 async def until(condition: Callable[[], bool], within: float = 20.0) -> None:
     """Look again and again: a gripper, a file and another process send no events."""
-    async with asyncio.timeout(within):
+    async with asyncio.timeout(patience(within)):
         while not condition():  # noqa: ASYNC110
             await asyncio.sleep(0.005)
 
 
 async def shows(hand: Hand, wanted: Callable[[RobotiqStatus], bool]) -> RobotiqStatus:
     """Wait for a status."""
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(patience(60)):
         async for status in hand.statuses():
             if wanted(status):
                 return status

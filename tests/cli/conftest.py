@@ -33,6 +33,7 @@ from robotiq_async.cli import main
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.recording.recorder import Recorder
 from tests.cli.terminal import ROOT, Terminal
+from tests.patience import patience
 from tests.virtual import VirtualLoop
 
 WITHOUT = """
@@ -109,7 +110,7 @@ class Call:
             handlers, root.handlers = root.handlers, []
             stack.callback(setattr, root, "handlers", handlers)
             # One that hangs is interrupted, and ends with 130.
-            impatience = threading.Timer(PATIENCE, os.kill, (os.getpid(), signal.SIGINT))
+            impatience = threading.Timer(patience(PATIENCE), os.kill, (os.getpid(), signal.SIGINT))
             impatience.start()
             stack.callback(impatience.join)
             stack.callback(impatience.cancel)
@@ -155,11 +156,11 @@ def served(gripper: SimulatedGripper) -> Iterator[SimulatorServer]:
     thread = threading.Thread(target=loop.run_forever)
     thread.start()
     try:
-        asyncio.run_coroutine_threadsafe(server.start(), loop).result(PATIENCE)
+        asyncio.run_coroutine_threadsafe(server.start(), loop).result(patience(PATIENCE))
         try:
             yield server
         finally:
-            asyncio.run_coroutine_threadsafe(server.stop(), loop).result(PATIENCE)
+            asyncio.run_coroutine_threadsafe(server.stop(), loop).result(patience(PATIENCE))
     finally:
         loop.call_soon_threadsafe(loop.stop)
         thread.join()
@@ -236,7 +237,7 @@ class Beside:
         """Send it a signal, if one is given, and wait until it has ended."""
         if number is not None:
             self.process.send_signal(number)
-        out, err = self.process.communicate(timeout=PATIENCE)
+        out, err = self.process.communicate(timeout=patience(PATIENCE))
         return Outcome(self.process.returncode, out, err)
 
 
@@ -280,7 +281,7 @@ class Shell:
 
     async def finish(self, process: Process) -> Outcome:
         """Wait until a command has ended."""
-        async with asyncio.timeout(PATIENCE):
+        async with asyncio.timeout(patience(PATIENCE)):
             out, err = await process.communicate()
         assert process.returncode is not None
         return Outcome(process.returncode, out.decode(), err.decode())
@@ -288,7 +289,7 @@ class Shell:
     async def read_line(self, process: Process) -> str:
         """The next line of its standard output, which is empty when it has ended."""
         assert process.stdout is not None
-        async with asyncio.timeout(PATIENCE):
+        async with asyncio.timeout(patience(PATIENCE)):
             return (await process.stdout.readline()).decode().rstrip("\n")
 
 

@@ -13,6 +13,8 @@ import termios
 from pathlib import Path
 from typing import ClassVar
 
+from tests.patience import patience
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -40,7 +42,7 @@ class Terminal:
         self._read_something.set()
 
     async def shows(self, words: bytes, after: bytes = b"") -> None:
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(patience(30)):
             while words not in self.out[self.out.find(after) :]:
                 self._read_something.clear()
                 await self._read_something.wait()
@@ -62,7 +64,7 @@ class Terminal:
         os.close(self._fd)
 
     async def end(self) -> int:
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(patience(30)):
             return await asyncio.to_thread(self._wait)
 
     def _wait(self) -> int:

@@ -25,6 +25,7 @@ from robotiq_async.values import registers as reg
 from robotiq_async.values.calibration.csv_tables import write_stroke
 from robotiq_async.values.request import Request
 from tests.cli.conftest import Outcome, served
+from tests.patience import patience
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Call, Shell
@@ -217,7 +218,7 @@ async def moving(shell: Shell) -> AsyncIterator[tuple[SimulatorServer, WatchedGr
     gripper.activate()
     async with SimulatorServer(gripper) as server:
         process = await shell.start("move", "255", "--yes", server.address, "--speed", "0")
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(patience(20)):
             await gripper.went.wait()
         yield server, gripper, process
 

@@ -33,6 +33,7 @@ from robotiq_async.tools.wording import refusal_words
 from robotiq_async.values.enums import Trigger
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85
 from tests.grippers import active_gripper, shows
+from tests.patience import patience
 
 if TYPE_CHECKING:
     Screen = Pilot[None]
@@ -65,7 +66,7 @@ async def shown(operator: Operator) -> AsyncIterator[Screen]:
 
 async def until(pilot: Screen, condition: Callable[[], bool]) -> None:
     """Let the screen live until it is so."""
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(patience(20)):
         while not condition():
             await pilot.pause(0.02)
 

@@ -18,6 +18,7 @@ from robotiq_async.session.options import LATE_POLLS
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.terminal import ROOT
 from tests.grippers import shows
+from tests.patience import patience
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Shell
@@ -95,7 +96,7 @@ async def test_a_hand_that_has_ended_ends_it(
     for _ in range(5):
         await anext(hand.statuses())
     await hand.stop()
-    async with asyncio.timeout(5):
+    async with asyncio.timeout(patience(5)):
         await printing
     assert '"target":"SHUTDOWN"' in capfd.readouterr().out
 
@@ -146,7 +147,7 @@ async def test_a_signal_ends_it_although_its_output_is_not_read(
         started = asyncio.get_running_loop().time()
         await shows(hand, lambda status: status.timestamp > started + 3)  # three times what fills the pipe
         process.send_signal(signal.SIGTERM)
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(patience(10)):
             assert await process.wait() == 0
         assert gripper.request_registers == before
         os.close(reading)

@@ -21,6 +21,7 @@ from tests.cli.conftest import PATIENCE, Beside, Call, Shell
 pytest.importorskip("zenoh")
 from tests.fleet.sessions import free_port
 from tests.grippers import until
+from tests.patience import patience
 
 ADDRESS = "zenoh://lab/cell/left"
 
@@ -129,11 +130,11 @@ def test_an_agent_serves_although_its_output_is_not_read(call: Call, serving: Ca
     assert process.stdout is not None
     assert process.stderr is not None
     process.stdout.close()
-    ends = time.monotonic() + PATIENCE
+    ends = time.monotonic() + patience(PATIENCE)
     while call("status", ADDRESS).code and time.monotonic() < ends:
         assert process.poll() is None
     process.send_signal(signal.SIGTERM)
-    assert process.wait(PATIENCE) == 0
+    assert process.wait(patience(PATIENCE)) == 0
     assert "Error" not in process.stderr.read()
 
 

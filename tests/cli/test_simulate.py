@@ -20,6 +20,7 @@ from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values.model import THREE_FINGER
 from tests.cli.conftest import Outcome
 from tests.grippers import shows
+from tests.patience import patience
 from tests.serial_line import SerialLine
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 async def next_line(process: Process) -> str:
     """The next line on its standard error."""
     assert process.stderr is not None
-    async with asyncio.timeout(30):
+    async with asyncio.timeout(patience(30)):
         return (await process.stderr.readline()).decode().rstrip("\n")
 
 
@@ -88,7 +89,7 @@ async def test_the_habits_of_real_grippers_unless_it_is_plain(
         header = await reader.readexactly(7)
         return await reader.readexactly(int.from_bytes(header[4:6]) - 1)
 
-    async with asyncio.timeout(30):
+    async with asyncio.timeout(patience(30)):
         await asyncio.sleep(1.1)
         faults = [(await ask("04 0001 0001"))[2] & 0x0F for _ in range(2)]
         assert faults == second_status

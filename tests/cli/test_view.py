@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from docs import make_layout
 from robotiq_async import RobotiqHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.patience import patience
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Call, Shell
@@ -34,7 +35,7 @@ async def test_a_lost_gripper_is_reported_at_once(shell: Shell, server: Simulato
     await shell.read_line(process)
     server.cut()
     assert process.stderr is not None
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(patience(20)):
         while b"link lost" not in (line := await process.stderr.readline()):
             assert line
 

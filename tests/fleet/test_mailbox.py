@@ -19,6 +19,7 @@ from robotiq_async.fleet.network.mailbox import (
     Mailbox,
     ReplySender,
 )
+from tests.patience import patience
 from tests.virtual import virtual
 
 PATIENCE_S = 10.0
@@ -175,7 +176,7 @@ def test_answers_go_out_in_their_order_and_then_it_ends() -> None:
     for number in range(100):
         reply_sender.put(lambda number=number: sent.append(number), lambda: sent.append(-1))  # type: ignore[misc]
     reply_sender.close()
-    reply_sender.join(PATIENCE_S)
+    reply_sender.join(patience(PATIENCE_S))
     assert sent == list(range(100))
 
 
@@ -192,7 +193,7 @@ def test_a_client_that_does_not_read_delays_no_other_and_excess_replies_are_drop
     assert not sent
     read.set()
     reply_sender.close()
-    reply_sender.join(PATIENCE_S)
+    reply_sender.join(patience(PATIENCE_S))
     assert MOST_REPLIES - 1 <= len(sent) <= MOST_REPLIES
     assert dropped_in
     assert threading.current_thread() not in dropped_in
@@ -201,4 +202,4 @@ def test_a_client_that_does_not_read_delays_no_other_and_excess_replies_are_drop
 def test_an_unused_sender_ends_at_once() -> None:
     reply_sender = ReplySender()
     reply_sender.close()
-    reply_sender.join(PATIENCE_S)
+    reply_sender.join(patience(PATIENCE_S))

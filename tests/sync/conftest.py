@@ -23,6 +23,7 @@ from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import AxisRequest, Request
 from tests.conftest import Clock
 from tests.docs.pages import ROOT
+from tests.patience import patience
 
 T = TypeVar("T")
 PATIENCE = 5.0
@@ -171,7 +172,7 @@ def no_thread_is_left() -> Iterator[None]:
     caller._stop_all()  # what a test that failed has left must not fail the others
     assert not left
     for thread in loop_threads():
-        thread.join(PATIENCE)
+        thread.join(patience(PATIENCE))
         assert not thread.is_alive()
 
 
@@ -181,7 +182,7 @@ def loop_threads() -> list[threading.Thread]:
 
 def until(condition: Callable[[], bool]) -> None:
     """Wait for what happens in another thread."""
-    due = time.monotonic() + PATIENCE
+    due = time.monotonic() + patience(PATIENCE)
     while not condition():
         assert time.monotonic() < due, "it did not happen"
         time.sleep(0.001)

@@ -21,6 +21,7 @@ from robotiq_async import (
     Transition,
 )
 from robotiq_async.sync import RobotiqHand, Stream
+from tests.patience import patience
 from tests.sync.conftest import PATIENCE, Wire, in_a_thread, loop_threads, until
 
 A, B = Finger.A, Finger.B
@@ -135,7 +136,7 @@ def test_a_stream_that_waits_ends_when_another_thread_stops_the_hand(hand: Robot
     thread, outcome = in_a_thread(lambda: [each.target for each in hand.transitions()])
     until(lambda: len(loop_threads()) == 1)
     hand.stop()
-    thread.join(PATIENCE)
+    thread.join(patience(PATIENCE))
     (targets,) = outcome
     assert targets == [] or targets[-1] is State.SHUTDOWN  # type: ignore[index]
 
@@ -195,7 +196,7 @@ def test_threads_that_begin_at_once_share_one_thread() -> None:
 
     begun = [in_a_thread(lambda hand=hand: begin(hand)) for hand in hands]  # type: ignore[misc]
     for thread, _ in begun:
-        thread.join(PATIENCE)
+        thread.join(patience(PATIENCE))
     until(lambda: len(loop_threads()) == 1)
     assert all(hand.state is State.RESET for hand in hands)
     for hand in hands:
@@ -223,7 +224,7 @@ def test_calls_of_several_threads_go_side_by_side(hand: RobotiqHand, wire: Wire)
     until(lambda: wire.targets()[:2] == [200, 200])
     wire.ahead += 10
     for thread, outcome in threads:
-        thread.join(PATIENCE)
+        thread.join(patience(PATIENCE))
         assert isinstance(outcome[0], MoveResult)
 
 

@@ -1,0 +1,14 @@
+"""How long a test waits for what never comes on a machine that is broken, and comes late on a busy one."""
+
+from __future__ import annotations
+
+import os
+
+
+def patience(seconds: float) -> float:
+    """A limit that is generous on an idle machine and grows with the processes that wait for a core.
+
+    The load is the average of the last minute. Windows tells none.
+    """
+    waiting = os.getloadavg()[0] / (os.cpu_count() or 1) if hasattr(os, "getloadavg") else 1.0
+    return seconds * max(1.0, waiting)
