@@ -19,6 +19,7 @@ from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.fleet import cuts
 from tests.grippers import active_gripper
+from tests.patience import patience
 
 ROOT = Path(__file__).parents[2]
 LIMIT_S = 8.0
@@ -31,7 +32,7 @@ LIMIT_S = 8.0
 async def said(process: Process) -> str:
     """The next line of a program, which says where it stands."""
     assert process.stdout is not None
-    async with asyncio.timeout(2 * LIMIT_S):
+    async with asyncio.timeout(patience(2 * LIMIT_S)):
         return (await process.stdout.readline()).decode().strip()
 
 
@@ -66,7 +67,7 @@ class Site:
         """Wait until something is true; returns how long that took."""
         loop = asyncio.get_running_loop()
         began = loop.time()
-        async with asyncio.timeout(LIMIT_S):
+        async with asyncio.timeout(patience(LIMIT_S)):
             while not condition():  # noqa: ASYNC110  # there is no event to wait for
                 await asyncio.sleep(0.01)
         return loop.time() - began
@@ -94,13 +95,13 @@ async def test_a_client_is_frozen_and_goes_on(site: Site) -> None:
     mover = await site.start("move", says="moving")
     await site.until(lambda: site.gripper.is_moving)
     mover.send_signal(signal.SIGSTOP)
-    assert await site.until(lambda: not site.gripper.is_moving) < 3
+    assert await site.until(lambda: not site.gripper.is_moving) < patience(3)
     stood = site.gripper.position(Finger.A)
     async with site.hand() as hand:
         await hand.halt()
     mover.send_signal(signal.SIGCONT)
     assert await said(mover) in ("ControlLostError", "ConnectionLostError", "NoAnswerError")
-    async with asyncio.timeout(LIMIT_S):
+    async with asyncio.timeout(patience(LIMIT_S)):
         await mover.wait()
     assert site.gripper.position(Finger.A) == stood
 
@@ -112,7 +113,7 @@ async def test_an_agent_is_killed_and_the_next_one_holds(site: Site) -> None:
         await site.until(lambda: site.gripper.position(Finger.A) > 15)
         agent.send_signal(signal.SIGKILL)
         with pytest.raises(ConnectionLostError):
-            async with asyncio.timeout(LIMIT_S):
+            async with asyncio.timeout(patience(LIMIT_S)):
                 await moving
         assert site.gripper.is_moving
         await site.until(lambda: not hand.is_in_control)
@@ -133,7 +134,7 @@ async def test_a_frozen_reader_delays_no_other(site: Site) -> None:
         ends = loop.time() + 3
         statuses = hand.statuses()
         while loop.time() < ends:
-            async with asyncio.timeout(LIMIT_S):
+            async with asyncio.timeout(patience(LIMIT_S)):
                 await anext(statuses)
             longest, before = max(longest, loop.time() - before), loop.time()
         assert longest < 1
@@ -150,9 +151,9 @@ async def test_a_router_is_killed_and_comes_back(site: Site) -> None:
         moving = asyncio.ensure_future(hand.move(255, Finger.A, speed=0))
         await site.until(lambda: site.gripper.position(Finger.A) > 15)
         router.send_signal(signal.SIGKILL)
-        assert await site.until(lambda: not site.gripper.is_moving) < 3
+        assert await site.until(lambda: not site.gripper.is_moving) < patience(3)
         with pytest.raises(ConnectionLostError):
-            async with asyncio.timeout(LIMIT_S):
+            async with asyncio.timeout(patience(LIMIT_S)):
                 await moving
         await site.until(lambda: hand.state is State.DISCONNECTED)
         assert not hand.is_in_control
