@@ -17,8 +17,10 @@ from typing import Any
 
 import pytest
 
+from robotiq_async.session.options import LATE_POLLS
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.docs.pages import ROOT, TUTORIAL, Block, blocks, compiled_prompt, read, run_prompt
+from tests.patience import patience
 
 BLOCKS = blocks(read(TUTORIAL))
 TYPED = [
@@ -82,9 +84,11 @@ async def test_the_program_at_its_end(tmp_path: Path) -> None:
             stdout=PIPE,
             stderr=STDOUT,
         )
-        printed, _ = await asyncio.wait_for(process.communicate(), 30)
+        printed, _ = await asyncio.wait_for(process.communicate(), patience(30))
     assert process.returncode == 0, printed.decode()
-    assert agree(output.text, printed.decode()), printed.decode()
+    # A busy machine may poll late, and the log says so.
+    lines = [each for each in printed.decode().splitlines(keepends=True) if LATE_POLLS not in each]
+    assert agree(output.text, "".join(lines)), printed.decode()
 
 
 def test_blocks_can_be_pasted() -> None:
