@@ -61,6 +61,7 @@ from robotiq_async.values.model import HAND_E
 from robotiq_async.values.registers import TCP_REGISTERS, gDT
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.statistics import Counters
+from robotiq_async.values.status import Part
 from tests.register_words import status_of
 
 A, B = Finger.A, Finger.B
@@ -102,6 +103,7 @@ VALUES: list[object] = [
     Transition(State.RESET, State.DO_ACTIVATION, Trigger.ASK_ACTIVATE, 12.5),
     SentRequest(Request(activate=True, axes=(AxisRequest(1, 2, 3),) * 4), 12.5, acknowledged=True),
     AxisRequest(1, 2, 3),
+    Part(A, 30.5),
     ReconnectPolicy(give_up_after=3.0),
     Simulation(speedup=10.0, object=150),
     Habits(status_lag=0.05),
