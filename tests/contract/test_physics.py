@@ -18,14 +18,13 @@ from tests.contract.bench import MODEL, PHYSICS
 from tests.test_models import OTHERWISE
 from tests.verify.test_contract import scenes
 
-FILES = sorted(file.stem for file in (Path(__file__).parents[1] / "contract").glob("test_*.py"))
+FILES = sorted(file.stem for file in Path(__file__).parent.glob("test_*.py"))
+WITHOUT_SCENES = ("test_arguments", "test_differences", "test_physics", "test_units")
 ELSEWHERE = re.compile("axes of a|axis of a|not obstacles at a count")
 
 
 @pytest.mark.parametrize("kind", [TWO_FINGER_85, THREE_FINGER], ids=str)
-@pytest.mark.parametrize(
-    "file", [each for each in FILES if each not in ("test_arguments", "test_differences")]
-)
+@pytest.mark.parametrize("file", [each for each in FILES if each not in WITHOUT_SCENES])
 def test_bodies_keep_the_contract(file: str, kind: Model) -> None:
     model, physics = MODEL.set(kind), PHYSICS.set(True)
     failed, kept = set(), 0
