@@ -294,15 +294,21 @@ class Ledger:
             past.popleft()
 
     def _find(self, status: RobotiqStatus) -> Entry | None:
-        """The entry that a status shows: of those that fit its echo the first after the one shown before."""
+        """The entry that a status shows, perhaps with software limits in place of its requests."""
+        found = self._entry_of(status)
+        if found is None and self._is_limit(self._waiting(), status):
+            # Even so it may have to wait: while the echo has not changed, the write may not act yet.
+            found = self._entry_of(status)
+        return found
+
+    def _entry_of(self, status: RobotiqStatus) -> Entry | None:
+        """Of the entries that fit the echo the first after the one shown before."""
         # A control loop leaves a hundred entries in the window. Those that wait are few, and looked at first.
-        waiting = self._waiting()
-        newer = next((each for each in waiting if self._fits(each, status.echo)), None)
+        newer = next((each for each in self._waiting() if self._fits(each, status.echo)), None)
         if newer is not None:
             self._show(newer, status.echo)
             return newer
-        older = next((each for each in self._entries if self._fits(each, status.echo)), None)
-        return self._find(status) if older is None and self._is_limit(waiting, status) else older
+        return next((each for each in self._entries if self._fits(each, status.echo)), None)
 
     def _fits(self, entry: Entry, echo: Echo) -> bool:
         """Whether an echo shows an entry, or the software limits in place of its requests."""
