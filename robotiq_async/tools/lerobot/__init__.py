@@ -1,0 +1,24 @@
+"""A gripper in LeRobot's units: the part that an arm's robot class embeds, and the robot around it.
+
+================  =================================================================================
+module            what it holds
+================  =================================================================================
+``gripper_part``  the part: connect, observe, act, disconnect; imports nothing of LeRobot
+``robot``         the robot, which ``--robot.discover_packages_path=robotiq_async.tools.lerobot`` finds
+================  =================================================================================
+"""
+
+from __future__ import annotations
+
+from .gripper_part import GripperPart
+
+__all__ = ["GripperPart"]
+
+
+def __getattr__(name: str) -> object:
+    """The robot, for which LeRobot looks here: it comes late, because the part works without LeRobot."""
+    if name not in ("RobotiqGripper", "RobotiqGripperConfig"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from . import robot  # noqa: PLC0415  # needs LeRobot
+
+    return getattr(robot, name)

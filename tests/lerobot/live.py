@@ -1,0 +1,193 @@
+"""The robot under the real LeRobot's commands, at a simulated 2F-85 behind a socket: make test-lerobot."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import sys
+from asyncio.subprocess import PIPE, STDOUT
+from collections.abc import AsyncIterator, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import pytest_asyncio
+from lerobot.robots import make_robot_from_config
+
+from robotiq_async import JAW, TWO_FINGER_85
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.simulator.troubles.trouble import Trouble
+from robotiq_async.tools.lerobot import GripperPart
+from robotiq_async.tools.lerobot.robot import RobotiqGripper, RobotiqGripperConfig
+from robotiq_async.values.request import Request
+from tests.docs.pages import ROOT
+from tests.grippers import active_gripper, until
+
+PATIENCE = 120.0  # a command needs 12 s to import torch
+LEADER = ("--teleop.discover_packages_path=leader", "--teleop.type=sweep")
+DATASET = ("--dataset.repo_id=me/grip", "--play_sounds=false")
+EPISODE = (
+    *("--dataset.num_episodes=1", "--dataset.episode_time_s=3", "--dataset.single_task=sweep"),
+    *("--dataset.fps=30", "--dataset.video=false", "--dataset.push_to_hub=false"),
+)
+
+
+class Commands:
+    """LeRobot's commands for the robot at one gripper. Nothing is asked of a hub."""
+
+    def __init__(self, server: SimulatorServer, folder: Path) -> None:
+        self.server = server
+        self.gripper = server.gripper
+        self.folder = folder
+
+    async def begin(self, name: str, *arguments: str) -> asyncio.subprocess.Process:
+        return await asyncio.create_subprocess_exec(
+            *(str(Path(sys.executable).with_name(name)), "--robot.type=robotiq_gripper"),
+            "--robot.discover_packages_path=robotiq_async.tools.lerobot",
+            f"--robot.address={self.server.address}",
+            *arguments,
+            env={
+                **os.environ,
+                "PYTHONPATH": str(ROOT / "tests" / "lerobot"),
+                "HF_HOME": str(self.folder),
+                "HF_HUB_OFFLINE": "1",
+            },
+            stdout=PIPE,
+            stderr=STDOUT,
+        )
+
+    async def run(self, name: str, *arguments: str, fails: bool = False) -> str:
+        """What a command prints."""
+        return await ended(await self.begin(name, *arguments), fails=fails)
+
+    def targets(self) -> list[int]:
+        """Where the fingers were sent, by every write so far."""
+        writes = [Request.from_registers(each.registers, TWO_FINGER_85) for each in self.gripper.writes]
+        return [each.position(JAW) for each in writes if each.go]
+
+
+async def ended(process: asyncio.subprocess.Process, *, fails: bool = False) -> str:
+    try:
+        async with asyncio.timeout(PATIENCE):
+            printed, _ = await process.communicate()
+    finally:
+        if process.returncode is None:
+            process.kill()
+    words = printed.decode()
+    assert (process.returncode != 0) == fails, words
+    return words
+
+
+@pytest_asyncio.fixture
+async def commands(tmp_path: Path) -> AsyncIterator[Commands]:
+    """At a gripper that is active and open."""
+    async with SimulatorServer(active_gripper(1.0, model=TWO_FINGER_85)) as server:
+        yield Commands(server, tmp_path)
+
+
+def sweeps(targets: list[int]) -> bool:
+    """Whether the fingers were sent from one end to the other, in steps."""
+    return min(targets) < 40 and max(targets) > 215 and len(set(targets)) > 20
+
+
+# -- the commands --------------------------------------------------------------------------------------
+
+
+async def test_teleoperate_drives_the_fingers_and_stops_them(commands: Commands) -> None:
+    printed = await commands.run("lerobot-teleoperate", *LEADER, "--teleop_time_s=3")
+    assert sweeps(commands.targets())
+    assert not commands.gripper.is_moving
+    rates = [int(line.partition("(")[2].split()[0]) for line in printed.splitlines() if "Hz)" in line]
+    print(f"{len(rates)} cycles, median {sorted(rates)[len(rates) // 2]} Hz")  # noqa: T201  # a figure for the page
+
+
+async def test_connecting_moves_nothing_unless_that_was_asked_for(tmp_path: Path) -> None:
+    async with SimulatorServer(SimulatedGripper(speedup=10, model=TWO_FINGER_85)) as server:
+        commands = Commands(server, tmp_path)
+        printed = await commands.run("lerobot-teleoperate", *LEADER, "--teleop_time_s=1", fails=True)
+        assert "--robot.activate=true), which MOVES the fingers" in printed
+        assert not commands.gripper.writes
+        printed = await commands.run(
+            "lerobot-teleoperate", *LEADER, "--teleop_time_s=1", "--robot.activate=true"
+        )
+        assert "its fingers MOVE" in printed
+        assert commands.targets()
+
+
+async def test_what_is_recorded_is_replayed(commands: Commands) -> None:
+    root = f"--dataset.root={commands.folder / 'data'}"
+    await commands.run("lerobot-record", *LEADER, *DATASET, root, *EPISODE)
+    about = json.loads((commands.folder / "data" / "meta" / "info.json").read_text())
+    assert about["features"]["action"]["names"] == ["gripper.pos", "gripper.force"]
+    assert about["features"]["observation.state"]["names"] == [*GripperPart.OBSERVATIONS]
+    assert about["total_frames"] > 30
+    recorded = len(commands.targets())
+    await commands.run("lerobot-replay", *DATASET, root, "--dataset.episode=0")
+    assert sweeps(commands.targets()[recorded:])
+
+
+async def test_a_position_alone_is_recorded_and_cannot_be_replayed(commands: Commands) -> None:
+    """Why there are two dimensions; when LeRobot replays one, ``action_force`` can go."""
+    root = f"--dataset.root={commands.folder / 'data'}"
+    alone = (*LEADER, "--teleop.force=false")
+    printed = await commands.run("lerobot-record", *alone, *DATASET, root, *EPISODE, fails=True)
+    assert "KeyError: 'gripper.force'" in printed
+    root += "-of-one"
+    without = "--robot.action_force=false"
+    await commands.run("lerobot-record", *alone, without, *DATASET, root, *EPISODE)
+    printed = await commands.run("lerobot-replay", without, *DATASET, root, "--dataset.episode=0", fails=True)
+    assert "IndexError: invalid index of a 0-dim tensor" in printed
+
+
+async def test_a_gripper_that_falls_silent_ends_the_demonstration(commands: Commands) -> None:
+    process = await commands.begin("lerobot-teleoperate", *LEADER)
+    await until(lambda: len(commands.targets()) > 20, within=PATIENCE)
+    async with commands.server.fault_injector.making(Trouble("silence")):
+        printed = await ended(process, fails=True)
+    assert "ConnectionLostError" in printed
+
+
+# -- the robot -----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Iterator[Any]:
+    config = RobotiqGripperConfig(
+        address="sim://?model=2f85&speedup=50", activate=True, calibration_dir=tmp_path
+    )
+    with make_robot_from_config(config) as robot:
+        yield robot
+
+
+def test_it_is_made_from_its_config_and_shows_what_it_promises(robot: Any) -> None:
+    assert isinstance(robot, RobotiqGripper)
+    assert robot.is_connected
+    assert robot.get_observation().keys() == robot.observation_features.keys()
+    assert {type(each) for each in robot.get_observation().values()} == {float}
+
+
+def test_what_a_policy_overshoots_is_sent_as_the_end_and_returned(robot: Any) -> None:
+    sent = robot.send_action({"gripper.pos": np.float32(100.7), "gripper.force": -2.0, "elbow.pos": 1e9})
+    assert sent == {"gripper.pos": 100.0, "gripper.force": 0.0}
+    assert robot.send_action({"gripper.pos": 40.0}) == {"gripper.pos": 40.0}
+
+
+@pytest.mark.parametrize("pos", [-11.0, 111.0, 255.0, float("nan")])
+def test_another_scale_is_refused(robot: Any, pos: float) -> None:
+    with pytest.raises(ValueError, match="pos must be percent"):
+        robot.send_action({"gripper.pos": pos})
+
+
+def test_an_action_without_a_position_is_refused(robot: Any) -> None:
+    with pytest.raises(KeyError, match=r"gripper\.pos"):
+        robot.send_action({"gripper.position": 50.0})
+
+
+def test_a_robot_that_was_not_connected_is_not_disconnected_when_it_goes(tmp_path: Path) -> None:
+    config = RobotiqGripperConfig(address="tcp://127.0.0.1:1", calibration_dir=tmp_path)
+    robot = make_robot_from_config(config)
+    with pytest.raises(ConnectionError):
+        robot.connect()
+    assert not robot.is_connected

@@ -1,0 +1,244 @@
+"""The part that a robot class of LeRobot embeds, at a gripper in memory; LeRobot is not needed."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from robotiq_async import (
+    ConnectionLostError,
+    Finger,
+    GripperFaultError,
+    NotActivatedError,
+    NotStartedError,
+    ReconnectPolicy,
+    State,
+)
+from robotiq_async.sync import RobotiqHand
+from robotiq_async.tools.lerobot import GripperPart
+from robotiq_async.values.request import Request
+from tests.sync.conftest import PATIENCE, Wire, in_a_thread, no_thread_is_left, until, wire
+
+__all__ = ["no_thread_is_left", "wire"]
+
+
+@pytest.fixture
+def part(wire: Wire) -> Iterator[GripperPart]:
+    """It has connected to a gripper that is active."""
+    part = GripperPart(RobotiqHand(wire, speed=255))
+    part.connect()
+    yield part
+    part.disconnect()
+
+
+def request(wire: Wire) -> tuple[int, int]:
+    """Position and force that the fingers were last asked for."""
+    (asked,) = {(axis.position, axis.force) for axis in decoded(wire).axes[:3]}
+    return asked
+
+
+def decoded(wire: Wire) -> Request:
+    return Request.from_registers(wire.look(lambda gripper: gripper.request_registers))
+
+
+# -- connecting ----------------------------------------------------------------------------------------
+
+
+def test_an_active_gripper_is_adopted_and_nothing_is_written(wire: Wire) -> None:
+    part = GripperPart(RobotiqHand(wire))
+    before = wire.writes()
+    part.connect()
+    assert part.is_connected
+    assert part.observe() == {"gripper.pos": 100.0, "gripper.current": 0.0, "gripper.contact": 0.0}
+    assert wire.writes() == before
+    part.disconnect()
+    part.disconnect()
+    assert not part.is_connected
+
+
+def test_a_gripper_that_is_reset_moves_only_when_that_was_asked_for(caplog: pytest.LogCaptureFixture) -> None:
+    wire = Wire()
+    hand = RobotiqHand(wire)
+    part = GripperPart(hand)
+    with pytest.raises(NotActivatedError, match=r"activate=True .*, which MOVES the fingers"):
+        part.connect()
+    assert not part.is_connected
+    assert hand.state is State.SHUTDOWN
+    assert wire.writes() == -1, "a look writes nothing"
+    assert "MOVE" not in caplog.text
+    thread, _ = in_a_thread(lambda: part.connect(activate=True))
+    until(lambda: wire.writes() >= 0)
+    assert "its fingers MOVE" in caplog.text
+    wire.ahead += 10
+    thread.join(PATIENCE)
+    assert part.is_connected
+    part.disconnect()
+
+
+def test_a_gripper_in_fault_is_refused(wire: Wire) -> None:
+    wire.look(lambda gripper: gripper.inject_fault(0x0E))
+    hand = RobotiqHand(wire)
+    with pytest.raises(GripperFaultError):
+        GripperPart(hand).connect(activate=True)
+    assert hand.state is State.SHUTDOWN
+
+
+# -- the loop ------------------------------------------------------------------------------------------
+
+
+def test_positions_are_0_closed_and_100_open(part: GripperPart, wire: Wire) -> None:
+    part.act(0, 50)
+    until(lambda: request(wire)[0] == 255)
+    part.act(100)
+    until(lambda: request(wire)[0] == 0)
+    part.act(40.0)
+    until(lambda: 0 < request(wire)[0] < 255)
+    wire.ahead += 10
+    until(lambda: part.observe()["gripper.pos"] == pytest.approx(40, abs=1))
+
+
+def test_force_is_in_percent_and_stays_when_it_is_left_out(part: GripperPart, wire: Wire) -> None:
+    for force, counts in ((100, 255), (0, 0), (20, 51), (None, 51)):
+        part.act(counts / 3, force)
+        until(lambda counts=counts: request(wire)[1] == counts)  # type: ignore[misc]
+
+
+def test_what_is_held_is_seen(part: GripperPart, wire: Wire) -> None:
+    wire.look(lambda gripper: gripper.place_object(Finger.A | Finger.B, position=150))
+    part.act(0)
+    until(lambda: request(wire)[0] == 255)
+    wire.ahead += 10
+    until(lambda: part.observe()["gripper.contact"] == pytest.approx(2 / 3))
+    # A and B are at the part, 39 % open, and C is closed.
+    assert part.observe()["gripper.pos"] == pytest.approx(100 * 2 / 3 * 0.39, abs=1)
+
+
+def test_a_jaw_is_observed_as_its_only_axis(jaw: GripperPart) -> None:
+    jaw.act(0)
+    until(lambda: jaw.observe()["gripper.contact"] == 1)
+    assert jaw.observe()["gripper.pos"] == pytest.approx(34.7, abs=2), "150 counts of 3..228"
+
+
+@pytest.fixture
+def jaw() -> Iterator[GripperPart]:
+    part = GripperPart(RobotiqHand("sim://?model=2f85&speedup=100&object=150"))
+    part.connect(activate=True)
+    yield part
+    part.disconnect()
+
+
+def test_numbers_of_numpy_and_arrays_of_one_value_are_numbers(part: GripperPart, wire: Wire) -> None:
+    """As tensors are, of which lerobot-replay sends one for each value."""
+    part.act(np.float32(0))
+    until(lambda: request(wire)[0] == 255)
+    part.act(np.array(100.0), np.array([20.0]))
+    until(lambda: request(wire) == (0, 51))
+
+
+@pytest.mark.parametrize("pos", [-0.1, 100.1, float("nan"), float("inf")])
+def test_what_is_outside_the_scale_is_refused(part: GripperPart, wire: Wire, pos: float) -> None:
+    before = wire.writes()
+    with pytest.raises(ValueError, match=r"pos must be percent in 0\.0\.\.100\.0, got"):
+        part.act(pos)
+    with pytest.raises(ValueError, match=r"force must be percent in 0\.0\.\.100\.0, got"):
+        part.act(50, pos)
+    assert wire.writes() == before
+
+
+def test_what_is_no_number_is_refused(part: GripperPart) -> None:
+    for value in (None, "50", True, [50.0]):
+        with pytest.raises(TypeError, match="pos must be percent in"):
+            part.act(value)
+
+
+def test_before_connecting_and_afterwards_nothing_goes(wire: Wire) -> None:
+    part = GripperPart(RobotiqHand(wire))
+    for _ in range(2):
+        with pytest.raises(NotStartedError):
+            part.observe()
+        with pytest.raises(NotStartedError):
+            part.act(50)
+        part.connect()
+        part.disconnect()
+
+
+# -- what must not pass in silence ---------------------------------------------------------------------
+
+
+def test_a_gripper_that_falls_silent_ends_the_loop(wire: Wire) -> None:
+    """While the hand still waits for an answer and takes the link for a good one."""
+    hand = RobotiqHand(wire)
+    part = GripperPart(hand, lost_after=0.1)
+    part.connect()
+    wire.is_slow = True
+    until(lambda: fails(part))
+    assert hand.state is not State.DISCONNECTED
+    with pytest.raises(ConnectionLostError, match=r"s old \(the limit is 0.1 s\)"):
+        part.act(50)
+    assert part.is_connected, "LeRobot disconnects only what is connected"
+    wire.is_slow = False
+    until(lambda: not fails(part))
+    part.disconnect()
+
+
+def fails(part: GripperPart) -> bool:
+    try:
+        part.observe()
+    except ConnectionLostError:
+        return True
+    return False
+
+
+def test_a_link_that_breaks_ends_the_loop_at_once(wire: Wire) -> None:
+    later = ReconnectPolicy(first_delay=10, max_delay=10)
+    part = GripperPart(RobotiqHand(wire, reconnect=later), lost_after=60)
+    part.connect()
+    wire.breaks = True
+    until(lambda: fails(part))
+    part.disconnect()
+
+
+def test_a_gripper_that_loses_its_activation_takes_no_action(part: GripperPart, wire: Wire) -> None:
+    wire.look(lambda gripper: gripper.power_cycle())
+    until(lambda: refuses(part))
+
+
+def refuses(part: GripperPart) -> bool:
+    try:
+        part.act(50)
+    except NotActivatedError:
+        return True
+    return False
+
+
+def test_disconnecting_stops_the_fingers(part: GripperPart, wire: Wire) -> None:
+    part.act(0)
+    until(wire.is_moving)
+    part.disconnect()
+    assert not wire.is_moving()
+
+
+def test_the_limit_is_checked(wire: Wire) -> None:
+    with pytest.raises(ValueError, match=r"lost_after must be seconds in 0\.05\.\.60\.0, got 0"):
+        GripperPart(RobotiqHand(wire), lost_after=0)
+
+
+# -- without LeRobot -----------------------------------------------------------------------------------
+
+
+def test_the_part_imports_nothing_of_lerobot_and_the_robot_says_that_it_is_missing() -> None:
+    program = """
+import sys
+sys.modules["lerobot"] = None  # as if it were not installed
+import robotiq_async.tools.lerobot as ours
+try:
+    ours.RobotiqGripper
+except ImportError as error:
+    print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert "the robot needs LeRobot 0.6 and Python 3.12 or newer: pip install" in done.stdout
