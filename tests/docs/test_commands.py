@@ -18,8 +18,11 @@ from robotiq_async.cli.app import build
 from tests.docs.pages import PAGES, ROOT, blocks, named, read
 
 READ = [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
-OTHERS = {"cp", "curl", "export", "ls", "python3", "ros2", "socat", "source", "sudo"}
-"""Programs that are not ours: ``python3 -m venv``, and what ROS and the shell have."""
+OTHERS = {
+    *("cp", "curl", "export", "ls", "python3", "python3.12", "ros2", "socat", "source", "sudo"),
+    *("lerobot-record", "lerobot-replay", "lerobot-teleoperate"),
+}
+"""Programs that are not ours: ``python3 -m venv``, and what ROS, LeRobot and the shell have."""
 TARGETS = set(re.findall(r"^([a-z0-9-]+):", read(ROOT / "Makefile"), re.MULTILINE))
 EXTRAS = tomllib.loads(read(ROOT / "pyproject.toml"))["project"]["optional-dependencies"]
 
