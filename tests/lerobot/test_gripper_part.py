@@ -13,6 +13,7 @@ from robotiq_async import (
     ConnectionLostError,
     Finger,
     GripperFaultError,
+    InvalidStateError,
     NotActivatedError,
     NotStartedError,
     ReconnectPolicy,
@@ -77,6 +78,28 @@ def test_a_gripper_that_is_reset_moves_only_when_that_was_asked_for(caplog: pyte
     thread.join(PATIENCE)
     assert part.is_connected
     part.disconnect()
+
+
+def test_connecting_twice_is_refused_and_ends_nothing(part: GripperPart) -> None:
+    with pytest.raises(InvalidStateError):
+        part.connect()
+    assert part.is_connected
+    part.observe()
+
+
+def test_an_interrupted_start_leaves_nothing_running(wire: Wire) -> None:
+    hand = StruckHand(wire)
+    with pytest.raises(KeyboardInterrupt):
+        GripperPart(hand).connect()
+    assert hand.state is State.SHUTDOWN
+
+
+class StruckHand(RobotiqHand):
+    """Ctrl-C comes when it has started, before the start has returned."""
+
+    def start(self, activate: bool = True, *, wait: float = 0.0) -> None:
+        super().start(activate, wait=wait)
+        raise KeyboardInterrupt
 
 
 def test_a_gripper_in_fault_is_refused(wire: Wire) -> None:

@@ -14,7 +14,7 @@ from ...runtime.log import Log
 from ...sync import RobotiqHand
 from ...values.checks import as_float, check_flag, check_number, check_seconds
 from ...values.enums import FORCE_MAX, Finger, State
-from ...values.errors import ConnectionLostError, GripperFaultError, NotActivatedError
+from ...values.errors import ConnectionLostError, GripperFaultError, InvalidStateError, NotActivatedError
 from ...values.status import RobotiqStatus
 
 LOST_AFTER_S: Final = 0.4
@@ -65,13 +65,14 @@ class GripperPart:
         Raises:
             NotActivatedError: the gripper is not active, and ``activate`` is False. Nothing was written.
             GripperFaultError: the gripper reports a fault.
+            InvalidStateError: connected already; the hand goes on.
             RobotiqError: what :meth:`RobotiqHand.start` raises besides.
         """
         hand = self._hand
         if check_flag("activate", activate):
             Log(hand.name).warning("connecting: a gripper that is reset is activated, and its fingers MOVE")
-        hand.start(activate)
         try:
+            hand.start(activate)
             if hand.state is State.FAULT:
                 raise GripperFaultError(hand.status.fault)
             if not hand.is_activated:
@@ -79,8 +80,10 @@ class GripperPart:
                     f"the gripper at {hand.address} is not active ({hand.state.name}): connect with "
                     "activate=True (--robot.activate=true), which MOVES the fingers to their stops"
                 )
-        except BaseException:
-            hand.stop(halt=False)  # nothing was commanded
+        except InvalidStateError:  # it runs already, and goes on
+            raise
+        except BaseException:  # Ctrl-C, too, perhaps after it had started
+            hand.stop(halt=False)  # nothing was commanded; a start that fails takes its activation back
             raise
         self._is_connected = True
 
