@@ -344,6 +344,8 @@ class Ledger:
                 continue
             if each is entry or each.acknowledged is not None:
                 each.is_doubtful, each.before = False, before
+                if each.acknowledged is None:  # its echo is its acknowledgement: it is not in flight any more
+                    each.acknowledged = self.now.time
                 each.asks = each.again = NO_AXES
                 self._unproven |= _changed(before, each.image)
                 self._note_asked(each)

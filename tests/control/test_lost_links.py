@@ -47,6 +47,23 @@ def test_a_write_that_arrived_unacknowledged_is_ours_when_it_shows(scan: Scan) -
     assert len(scan.written) == writes + 1
 
 
+def test_a_second_lost_link_brings_back_nothing_that_was_replaced(scan: Scan) -> None:
+    """A write that showed after the first loss was taken for lost at the second: B went back to 200."""
+    scan.move(200, B)
+    scan.run(0.5)
+    scan.command(B, position=10)
+    scan.step(answer=False)
+    scan.come_back(0.01)
+    scan.run(0.1)
+    assert scan.latest.requested_position(B) == 10
+    scan.controller.lost(None)
+    scan.come_back(0.01)
+    scan.moved(100, A)
+    assert scan.last_image.position(B) == 10
+    scan.until(lambda: not scan.controller.is_moving)
+    assert scan.gripper.position(B) == pytest.approx(10, abs=2)
+
+
 def test_a_motion_goes_on_over_a_lost_link_and_is_adopted(scan: Scan) -> None:
     scan.move(255, A)
     scan.run(0.5)
