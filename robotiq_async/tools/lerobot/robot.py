@@ -9,7 +9,7 @@ give a position alone: ``action_force`` is for those.
 """
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 try:
     from lerobot.robots import Robot, RobotConfig
@@ -22,9 +22,6 @@ except ImportError as error:
 from ...sync import RobotiqHand
 from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from .gripper_part import LOST_AFTER_S, GripperPart
-
-OVERSHOOT: Final = 10.0
-"""Percent beyond 0..100 that are the imprecision of a policy; more is another scale, and refused."""
 
 
 # Without `from __future__ import annotations`: draccus reads the types of the fields.
@@ -116,8 +113,7 @@ class RobotiqGripper(Robot):  # type: ignore[misc]  # LeRobot is not here
     def send_action(self, action: dict[str, Any]) -> dict[str, float]:
         """As :meth:`GripperPart.act`; does not wait. Keys of an arm are left alone.
 
-        ``gripper.force`` may be missing. Values up to 10 beyond 0..100 are sent as 0 or 100, for policies
-        overshoot.
+        ``gripper.force`` may be missing. A value beyond 0..100 is refused: clamp what a policy overshoots.
 
         Returns:
             What was sent.
@@ -127,18 +123,10 @@ class RobotiqGripper(Robot):  # type: ignore[misc]  # LeRobot is not here
             TypeError, ValueError, RobotiqError: as :meth:`GripperPart.act`.
         """
         keys = ["gripper.pos", *({"gripper.force"} & action.keys() & self.action_features.keys())]
-        sent = {key: _within(float(action[key])) for key in keys}
+        sent = {key: float(action[key]) for key in keys}
         self._part.act(sent["gripper.pos"], sent.get("gripper.force"))
         return sent
 
     def disconnect(self) -> None:
         """As :meth:`GripperPart.disconnect`: the fingers stop."""
         self._part.disconnect()
-
-
-def _within(value: float) -> float:
-    """The value, or the end that it is a little beyond."""
-    for end in (0.0, 100.0):
-        if abs(value - end) <= OVERSHOOT and not 0.0 <= value <= 100.0:
-            return end
-    return value
