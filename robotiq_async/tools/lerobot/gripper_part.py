@@ -7,6 +7,7 @@ gripper as a demonstration; so each call first looks at the age of the status.
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Final
 
@@ -91,7 +92,8 @@ class GripperPart:
         """What the newest status says; does not wait.
 
         * ``gripper.pos``: 0 (closed) .. 100 (open); of a 3-Finger the mean of its fingers.
-        * ``gripper.current``: of the motor, in milliampere; of a 3-Finger the highest of its fingers.
+        * ``gripper.current``: of the motor, in milliampere; of a 3-Finger the highest of its fingers; NaN where
+          the link does not tell it.
         * ``gripper.contact``: the share of the fingers that hold a part, 0..1; of a jaw 0 or 1. A contact
           latches, and a thin part may never be reported.
 
@@ -102,10 +104,11 @@ class GripperPart:
         """
         status = self._fresh_status()
         fingers = [finger for finger in status.model.axes if finger is not Finger.SCISSOR]
+        currents = [it for it in map(status.current_ma, fingers) if it is not None]
         held = status.part.holds if status.part else Finger(0)
         return {
             "gripper.pos": 100 * sum(map(status.open_fraction, fingers)) / len(fingers),
-            "gripper.current": float(max(map(status.current_ma, fingers))),
+            "gripper.current": float(max(currents)) if currents else math.nan,
             "gripper.contact": sum(finger in held for finger in fingers) / len(fingers),
         }
 
