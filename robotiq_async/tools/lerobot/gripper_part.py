@@ -92,8 +92,8 @@ class GripperPart:
         """What the newest status says; does not wait.
 
         * ``gripper.pos``: 0 (closed) .. 100 (open); of a 3-Finger the mean of its fingers.
-        * ``gripper.current``: of the motor, in milliampere; of a 3-Finger the highest of its fingers; NaN where
-          the link does not tell it.
+        * ``gripper.current``: of the motor, in milliampere; of a 3-Finger the highest of its fingers. It is
+          NaN where the link does not tell it.
         * ``gripper.contact``: the share of the fingers that hold a part, 0..1; of a jaw 0 or 1. A contact
           latches, and a thin part may never be reported.
 
