@@ -47,7 +47,10 @@ async def test_there_is_no_current_and_not_a_current_of_0(
     assert all(map(math.isnan, efforts(status)))
 
     printed = capsys.readouterr().out
-    assert [line.split()[-1] for line in printed.splitlines() if line.strip().startswith("A ")] == ["-", "-"]
+    assert [line.split()[-1] for line in printed.splitlines() if line.strip().startswith("jaw ")] == [
+        "-",
+        "-",
+    ]
     assert not any("current" in name for values in shown for name in values)
 
     mirror = HandMirror(0, "urcap://192.168.1.20")

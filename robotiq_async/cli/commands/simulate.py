@@ -88,8 +88,7 @@ async def simulate(
         exact: Stop exactly at the requested position, which no real gripper does.
         object_: Count at which the fingers A, B and C meet something when they close.
         fixed: The object stays there in an activation, which then fails with fault 0x0D.
-        physics: Move bodies in place of counts (extra physics): "table", a part on it as "box:40x60x60,0.3"
-            or "cylinder:50x60,0.2" (millimetres, kilograms), or an MJCF file with a site named gripper.
+        physics: Move bodies (extra physics): "table", a part as "box:40x60x60,0.3" (mm, kg), or an MJCF file.
         serial: Serve Modbus RTU on this serial device in place of TCP (extra serial).
         rtu_over_tcp: Serve Modbus RTU through a TCP socket, as serial servers and tool ports do.
         urcap: Serve the text port of Robotiq's URCap, as a UR controller does; for a 2F or a Hand-E.
