@@ -274,3 +274,17 @@ def test_a_request_at_a_limit_does_not_refute_it_and_one_beyond_does(asked: int,
     assert limits.apply(beyond) == {S: limit}
     limits.forget(beyond)
     assert not limits.apply(beyond)
+
+
+def test_a_limit_that_may_not_count_yet_is_no_endless_question(scan: Scan) -> None:
+    """Two writes are forgotten, and what shows could be a limit of the second: the ledger called itself."""
+    scan.command(C, position=1)
+    scan.run(0.01)
+    scan.forgets = 2
+    scan.command(C | S, position=0)
+    scan.run(0.3)
+    scan.command(C, position=1)
+    scan.run(1.0)
+    scan.moved(100, A)
+    scan.until(lambda: not scan.controller.is_moving)
+    assert scan.gripper.position(A) == pytest.approx(100, abs=2)

@@ -42,7 +42,8 @@ def test_a_prefix_is_before_every_joint(simulator: Simulator) -> None:
 
 def test_a_jaw_has_one_joint() -> None:
     with Simulator(model="2f85") as jaw, active(jaw.address) as (process, client):
-        process.prints("no robot description: the packaged one is not of a 2F-85")
+        described = client.listen(String, "/robot_description", LATEST).wait(new=False).data
+        assert described == robot_description("", "", "2f85")
         status, result = client.move(0.8, names=["robotiq_85_left_knuckle_joint"]).ends()
         assert status == SUCCEEDED
         assert list(result.state.name) == ["robotiq_85_left_knuckle_joint"]
