@@ -70,6 +70,7 @@ class Watched(Scan):
         written, state, shown = len(self.written), self.state, self.latest
         before = Request.from_registers(self.written[-1]) if self.written else Request()
         at = {axis: self.gripper.position(axis) for axis in AXES}
+        in_force = Request.from_registers(self.gripper.request_registers)
         super()._write(answer=answer)
         if len(self.written) == written:
             return
@@ -79,6 +80,8 @@ class Watched(Scan):
         for axis in AXES:
             asked = now.position(axis)
             is_new = now.go and (not before.go or before.position(axis) != asked)
+            # A write that the gripper forgot is undone by our next one, which sets no axis in motion.
+            is_new = is_new and not (in_force.go and in_force.position(axis) == asked)
             if is_new and abs(asked - at[axis]) > TOLERANCE:
                 self.motions[axis, asked] += 1
 
