@@ -24,6 +24,7 @@ import pytest
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.docs.agents import ROOM, agent_of_the_pages
 from tests.docs.pages import DOCS, PAGES, ROOT, TUTORIAL, Block, blocks, named, read, requirements
+from tests.docs.test_service import PAGE as SERVICE
 from tests.docs.test_tutorial import PROGRAM, TYPED, agree
 from tests.docs.test_web_service import PAGE as WEB_SERVICE
 from tests.docs.test_web_service import service, stops
@@ -33,8 +34,10 @@ PATIENCE = 60.0
 README = ROOT / "README.md"
 
 
-ELSEWHERE = (TUTORIAL, WEB_SERVICE)
-"""Pages whose code is no matter of the prompt: each has tests of its own."""
+LEROBOT = DOCS / "how-to" / "lerobot.md"
+ELSEWHERE = (TUTORIAL, WEB_SERVICE, SERVICE, LEROBOT)
+"""Pages whose code is no matter of the prompt: each has tests of its own. For LeRobot, of 5.7 GB, they are
+``make test-lerobot``."""
 CODE = {page: code for page in PAGES if page not in ELSEWHERE and (code := blocks(read(page), "python"))}
 WITH_TESTS = [page for page, code in CODE.items() if any("def test_" in block.text for block in code)]
 
