@@ -71,6 +71,7 @@ class Watched(Scan):
         before = Request.from_registers(self.written[-1]) if self.written else Request()
         at = {axis: self.gripper.position(axis) for axis in AXES}
         in_force = Request.from_registers(self.gripper.request_registers)
+        holds = self.gripper.holds
         super()._write(answer=answer)
         if len(self.written) == written:
             return
@@ -80,8 +81,10 @@ class Watched(Scan):
         for axis in AXES:
             asked = now.position(axis)
             is_new = now.go and (not before.go or before.position(axis) != asked)
-            # A write that the gripper forgot is undone by our next one, which sets no axis in motion.
-            is_new = is_new and not (in_force.go and in_force.position(axis) == asked)
+            # A write that the gripper forgot is undone by our next one, which sets no axis in motion. Nor
+            # does rGTO, set again, move a finger that holds something under the same request.
+            is_same = in_force.position(axis) == asked and (in_force.go or axis in holds)
+            is_new = is_new and not is_same
             if is_new and abs(asked - at[axis]) > TOLERANCE:
                 self.motions[axis, asked] += 1
 
