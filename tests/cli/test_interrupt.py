@@ -6,8 +6,11 @@ import asyncio
 import contextlib
 import os
 import signal
+import subprocess
+import sys
 from asyncio.subprocess import Process
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -16,6 +19,7 @@ from robotiq_async.cli.run import _Signals
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.values.request import Request
 from tests import conftest
+from tests.cli.terminal import ROOT
 from tests.grippers import active_gripper, until
 
 if TYPE_CHECKING:
@@ -67,6 +71,15 @@ async def test_while_it_is_still_importing(shell: Shell, command: list[str]) -> 
     outcome = await shell.finish(process)
     lines = [line for line in outcome.err.splitlines() if not line.startswith("import time:")]
     assert (outcome.code, lines) == (130, ["robotiq-async: interrupted"])
+
+
+def test_inside_the_exec_of_an_import(tmp_path: Path) -> None:
+    """Dataclasses are made with one; CPython then ended the process by the signal."""
+    (tmp_path / "cyclopts.py").write_text('exec("raise KeyboardInterrupt")\n', encoding="utf-8")
+    environment = os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
+    command = [sys.executable, "-m", "robotiq_async", "simulate"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "robotiq-async: interrupted\n")
 
 
 @pytest.mark.parametrize("lines", LINES)
