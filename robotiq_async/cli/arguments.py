@@ -47,8 +47,8 @@ class Amount(NamedTuple):
         return f"{self.value:g} mm" if self.argument == "mm" else f"{self.value:g}"
 
 
-def _amount(name: str, counts: str, unit: str, argument: str) -> Callable[[object, Sequence[Token]], Amount]:
-    """A converter for counts, or a number with its unit; the hand knows the range of that."""
+def _amount(name: str, counts: str, unit: str, argument: str, metavar: str | None = None) -> Parameter:
+    """A parameter of counts, or of a number with its unit; the hand knows the range of that."""
     integer = _integer(name, 0, 255)
 
     def convert(kind: object, tokens: Sequence[Token]) -> Amount:
@@ -60,7 +60,7 @@ def _amount(name: str, counts: str, unit: str, argument: str) -> Callable[[objec
         except UsageError as error:
             raise UsageError(f"{error}; or give it in {unit}, as in 40{unit}") from None
 
-    return convert
+    return Parameter(converter=convert, n_tokens=1, accepts_keys=False, metavar=metavar)
 
 
 def _fingers(_type: object, tokens: Sequence[Token]) -> Finger:
@@ -79,28 +79,9 @@ Flag = Annotated[bool, Parameter(negative=(), show_default=False)]
 """Off unless given. There is no --no- form, and the help shows no default."""
 Yes = Annotated[Flag, Parameter(name=("--yes", "-y"))]
 Host = Annotated[str, Parameter(metavar="HOST")]
-Position = Annotated[
-    Amount,
-    Parameter(converter=_amount("POSITION", "position", "mm", "mm"), n_tokens=1, accepts_keys=False),
-]
-Speed = Annotated[
-    Amount | None,
-    Parameter(
-        converter=_amount("the value", "speed", "mm/s", "mm_per_s"),
-        n_tokens=1,
-        accepts_keys=False,
-        metavar="0..255|MM/S",
-    ),
-]
-Force = Annotated[
-    Amount | None,
-    Parameter(
-        converter=_amount("the value", "force", "N", "label_n"),
-        n_tokens=1,
-        accepts_keys=False,
-        metavar="0..255|N",
-    ),
-]
+Position = Annotated[Amount, _amount("POSITION", "position", "mm", "mm")]
+Speed = Annotated[Amount | None, _amount("the value", "speed", "mm/s", "mm_per_s", metavar="0..255|MM/S")]
+Force = Annotated[Amount | None, _amount("the value", "force", "N", "label_n", metavar="0..255|N")]
 Byte = Annotated[int, Parameter(converter=_integer("the value", 0, 255), metavar="0..255")]
 Port = Annotated[int, Parameter(converter=_integer("the port", 0, 65535), metavar="0..65535")]
 Unit = Annotated[int, Parameter(converter=_integer("the unit id", 0, 255), metavar="0..255")]

@@ -17,13 +17,13 @@ from typing import Self
 
 from cyclopts import CycloptsError
 
+from ..runtime.signals import ending_signals
 from ..session.options import LATE_POLLS
 from ..values.errors import RobotiqError
 from .app import build
 from .failures import CommandError, UsageError
 from .output.messages import forget, forwarded_warnings, tell
 
-_ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 SUCCESS, FAILURE, WRONG_USAGE, SIGNALLED = 0, 1, 2, 128
 INSIST_S = 10.0
 """Seconds after the first signal in which a further Ctrl-C is ignored. A stop takes 2 s at most, a report of
@@ -108,9 +108,7 @@ class _Signals:
         self._end: Callable[[], object] = _interrupt
 
     def __enter__(self) -> Self:
-        # An ignored SIGINT stays ignored: so a shell keeps Ctrl-C from its background jobs.
-        numbers = [number for number in _ENDING if signal.getsignal(number) is not signal.SIG_IGN]
-        self._previous = {number: signal.signal(number, self._handle) for number in numbers}
+        self._previous = {number: signal.signal(number, self._handle) for number in ending_signals()}
         return self
 
     def __exit__(self, *_: object) -> None:

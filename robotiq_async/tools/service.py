@@ -33,6 +33,7 @@ from ..control.state_machine import RUNNING
 from ..hand import Hand
 from ..runtime.clock import now
 from ..runtime.log import log
+from ..runtime.signals import ending_signals
 from ..values.enums import Fault, Finger, ObjectStatus, State
 from ..values.errors import NotStartedError
 from ..values.status import RobotiqStatus
@@ -41,7 +42,6 @@ FRESH_S: Final = 1.0
 """A status that is older says nothing about the gripper: two hundred polls have brought none."""
 INSIST_S: Final = 3.0
 """Seconds after a signal in which further ones are ignored. A stop takes 2 s at most."""
-_ENDING: Final = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,11 +173,7 @@ async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator
         elif time.monotonic() - received_at > INSIST_S:
             _pass_on(previous[number], number, frame)
 
-    previous: dict[int, Any] = {
-        number: signal.signal(number, handle)
-        for number in _ENDING
-        if signal.getsignal(number) is not signal.SIG_IGN
-    }
+    previous: dict[int, Any] = {number: signal.signal(number, handle) for number in ending_signals()}
     try:
         with scope:
             yield signals

@@ -15,6 +15,14 @@ from robotiq_async.values.registers import RTU_REGISTERS, RegisterMap
 from tests.serial_line import with_crc
 
 
+def request_size(inbox: bytes) -> int:
+    """Bytes of the first request in eight bytes or more: at the least, while they do not tell."""
+    counts_at = {16: 6, 23: 10}.get(inbox[1])
+    if counts_at is None:
+        return 8
+    return counts_at + 3 + inbox[counts_at] if len(inbox) > counts_at else counts_at + 3
+
+
 class Device:
     """Answers reads with the number of the request in every register; replies can be kept back."""
 
@@ -58,7 +66,7 @@ class Device:
     def _ready(self) -> None:
         self._inbox += self._port.read(4096)
         while len(self._inbox) >= 8:
-            size = self._size()
+            size = request_size(self._inbox)
             if len(self._inbox) < size:
                 return
             request, self._inbox = self._inbox[:size], self._inbox[size:]
@@ -91,13 +99,6 @@ class Device:
                 kept, self.kept = self.kept, []
                 self.send(b"".join(kept) + reply)
                 self._answered_at = self._loop.time()
-
-    def _size(self) -> int:
-        """Bytes of the first request."""
-        inbox, counts_at = self._inbox, {16: 6, 23: 10}.get(self._inbox[1])
-        if counts_at is None:
-            return 8
-        return counts_at + 3 + inbox[counts_at] if len(inbox) > counts_at else counts_at + 3
 
     def _reply(self, request: bytes) -> bytes:
         if request[1] == 16:

@@ -24,7 +24,7 @@ from robotiq_async.link.address import parse_address
 from robotiq_async.link.modbus import ModbusTransport
 from robotiq_async.values.model import TWO_FINGER_85
 from robotiq_async.values.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap
-from tests.link.scripted_device import unopened
+from tests.link.scripted_device import request_size, unopened
 from tests.serial_line import with_crc
 from tests.virtual_line import VirtualLine
 
@@ -100,10 +100,7 @@ class SerialLiar(Liar):
     def _ready(self) -> None:
         self._inbox += self._port.read(4096)
         while len(self._inbox) >= 8:
-            counts_at = {16: 6, 23: 10}.get(self._inbox[1])
-            if counts_at is not None and len(self._inbox) <= counts_at:
-                return
-            size = 8 if counts_at is None else counts_at + 3 + self._inbox[counts_at]
+            size = request_size(self._inbox)
             if len(self._inbox) < size:
                 return
             request, self._inbox = self._inbox[:size], self._inbox[size:]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -21,6 +20,7 @@ from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.signals import SignalHandlerOptions
 
 from ...runtime.log import log
+from ...runtime.signals import ending_signals
 from .bridge import Bridge
 from .gripper_node import GripperNode
 
@@ -117,12 +117,7 @@ def _signals(loop: asyncio.AbstractEventLoop, ended: asyncio.Future[None]) -> It
         if not ended.done():
             ended.set_result(None)
 
-    numbers = [
-        number
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-        # An ignored SIGINT stays ignored: that is how a shell keeps Ctrl-C from its background jobs.
-        if signal.getsignal(number) is not signal.SIG_IGN
-    ]
+    numbers = ending_signals()
     for number in numbers:
         loop.add_signal_handler(number, end)
     try:

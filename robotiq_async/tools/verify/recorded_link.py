@@ -77,6 +77,22 @@ class RecordedLink:
 
     async def write(self, request: Request) -> float:
         """Write an image, once; returns when that was acknowledged, in the loop's time."""
+        await self._sent(request, self.link.send(lambda: request.registers))
+        ended = asyncio.get_running_loop().time()
+        self._keep(Frame(self.wrote, ended, "command", request.registers))
+        return ended
+
+    async def write_and_read(self, request: Request) -> bool:
+        """Write an image with function 23, or 16 where 23 is refused; whether 23 was answered."""
+        assert isinstance(self.link, CyclicLink), "only serial lines are asked"
+        answer = await self._sent(request, self.link.send_and_read(lambda: request.registers))
+        assert answer is not None, "there was an image to write"
+        ended = asyncio.get_running_loop().time()
+        self._keep(Frame(self.wrote, ended, "command", request.registers))
+        self._keep(Frame(self.wrote, ended, "status", answer.registers))
+        return answer.doubt is None and self.link.has_read_with_write
+
+    async def _sent(self, request: Request, exchange: Coroutine[Any, Any, T]) -> T:
         loop = asyncio.get_running_loop()
         began = loop.time()
         # Before it is sent: what is cut off may have arrived.
@@ -84,31 +100,10 @@ class RecordedLink:
         self.wrote = began
         self._echoes.append((began, request.echo))
         try:
-            await self._whole(self.link.send(lambda: request.registers))
+            return await self._whole(exchange)
         except RobotiqConnectionError as error:
             self._keep(Frame(began, loop.time(), "failure", request.registers, str(error)))
             raise
-        ended = loop.time()
-        self._keep(Frame(began, ended, "command", request.registers))
-        return ended
-
-    async def write_and_read(self, request: Request) -> bool:
-        """Write an image with function 23, or 16 where 23 is refused; whether 23 was answered."""
-        loop = asyncio.get_running_loop()
-        began = loop.time()
-        self.written = request
-        self.wrote = began
-        self._echoes.append((began, request.echo))
-        assert isinstance(self.link, CyclicLink), "only serial lines are asked"
-        try:
-            answer = await self._whole(self.link.send_and_read(lambda: request.registers))
-        except RobotiqConnectionError as error:
-            self._keep(Frame(began, loop.time(), "failure", request.registers, str(error)))
-            raise
-        assert answer is not None, "there was an image to write"
-        self._keep(Frame(began, loop.time(), "command", request.registers))
-        self._keep(Frame(began, loop.time(), "status", answer.registers))
-        return answer.doubt is None and self.link.has_read_with_write
 
     def expect(self, echo: Echo) -> None:
         """Take what the gripper shows for what is in force."""
