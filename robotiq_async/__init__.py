@@ -1,11 +1,11 @@
 """Asyncio-native client for the Robotiq 3-Finger gripper (S-Model) and its siblings 2F-85, 2F-140 and Hand-E.
 
-What a program needs is imported from here. Where it comes from, and what surrounds it::
+Programs import from here. The packages below it::
 
-    values      what goes in and comes out: status, request, results, errors, units
-    hand        RobotiqHand; what every hand can do
+    values      inputs and outputs: status, request, results, errors, units
+    hand        RobotiqHand; the base of every hand
     session     the task that polls, from start() to stop()
-    control     what to write next: state machine, moves, adoption
+    control     the next write: state machine, moves, adoption
     link        addresses, transports, Modbus: the bytes
     sync        blocking hands, for scripts and notebooks
     fleet       hands on other hosts: agents that serve them, remote hands

@@ -1,1 +1,1 @@
-"""What goes into a hand and what comes out of one: names, requests, status, results, errors, units. Pure."""
+"""Inputs and outputs of a hand: names, requests, status, results, errors, units. Pure."""

@@ -1,8 +1,8 @@
 """Amounts: positions, speeds and forces as people give them, turned into the counts that a gripper takes.
 
 An amount is given once: in counts, in millimetres, as a fraction, or in newtons of a label. Two at a time are
-refused, even if they agree. Each is refused in its own unit, and nothing is clamped. What is sent, in this
-process and to other hosts, are counts alone.
+refused, even if they agree. Each is refused in its own unit, and nothing is clamped. Only counts are sent,
+in this process and to other hosts.
 """
 
 from __future__ import annotations

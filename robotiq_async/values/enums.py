@@ -57,9 +57,9 @@ FORCE_MAX: Final = 255
 """Strongest: 60 N nominal (manual)."""
 
 DEFAULT_SPEED: Final = 128
-"""Used until ``set_speed()``, ``set_force()`` or an argument says otherwise."""
+"""Used until ``set_speed()``, ``set_force()`` or an argument sets another."""
 DEFAULT_FORCE: Final = 64
-"""Used until ``set_speed()``, ``set_force()`` or an argument says otherwise."""
+"""Used until ``set_speed()``, ``set_force()`` or an argument sets another."""
 
 
 class Code(IntEnum):
@@ -82,10 +82,10 @@ class Mode(Code):
 
 
 class ObjectStatus(Code):
-    """gDTA, gDTB, gDTC, gDTS: what an axis does, as reported by the gripper.
+    """gDTA, gDTB, gDTC, gDTS: the state of an axis, as reported by the gripper.
 
-    The gripper also reports IN_MOTION for an axis at rest that was never asked to go; use
-    :meth:`RobotiqStatus.axis_state` to show people what an axis does. The thesis's table swaps 1 and 2; the
+    The gripper also reports IN_MOTION for an axis at rest that has received no request; for people, use
+    :meth:`RobotiqStatus.axis_state`. The thesis's table swaps 1 and 2; the
     hardware reports 1 for a contact while opening (see docs/decisions/thesis-map.md).
     """
 
@@ -115,7 +115,7 @@ class Initialization(Code):
 
 
 class Severity(Enum):
-    """How serious a fault is: the manual's classes."""
+    """Severity of a fault: the manual's classes."""
 
     NONE = "none"
     PRIORITY = "priority"
@@ -162,13 +162,13 @@ class Fault(Code):
     MODE_CHANGE_PENDING = 0x06
     NOT_ACTIVATED = 0x07
     COMMUNICATION_NOT_READY = 0x09
-    """On a 2F or a Hand-E also: a second without a message, shown once (see passing faults)."""
+    """On a 2F or a Hand-E also: a second without a message, reported once (see passing faults)."""
     SCISSOR_INTERFERENCE = 0x0A
     AUTOMATIC_RELEASE = 0x0B
     ACTIVATION_FAULT = 0x0D
     SCISSOR_BLOCKED = 0x0E
     AUTOMATIC_RELEASE_DONE = 0x0F
-    # Of the 2F and the Hand-E alone (their manuals, fault codes).
+    # Only a 2F and a Hand-E have these (their manuals, fault codes).
     OVER_TEMPERATURE = 0x08, _ADAPTIVE
     UNDER_VOLTAGE = 0x0A, _ADAPTIVE
     INTERNAL_FAULT = 0x0C, _ADAPTIVE
@@ -231,7 +231,7 @@ class Fault(Code):
 
     @property
     def description(self) -> str:
-        """What is wrong, in one sentence."""
+        """The fault in one sentence."""
         if self._name_ in _FAULTS:
             return _FAULTS[self._name_][1]
         return f"fault code 0x{int(self):02X}, which the manual does not assign"
@@ -283,7 +283,7 @@ class State(Enum):
 class Trigger(Enum):
     """An event that can change the state of a hand.
 
-    ``ASK_`` marks a call of the user, ``SEEN_`` a condition that a status shows; the others concern the link
+    ``ASK_`` marks a call of the user, ``SEEN_`` a condition found in a status; the others concern the link
     and the delivery of a request.
     """
 
@@ -309,21 +309,21 @@ class Trigger(Enum):
 
     @property
     def is_seen(self) -> bool:
-        """Whether a status shows this."""
+        """Whether this is a condition found in a status."""
         return self.name.startswith("SEEN_")
 
 
 class StopLevel(IntEnum):
-    """How much is to stop, ordered by strength: of several stops the strongest counts."""
+    """The strength of a stop: of several stops the strongest counts."""
 
     LEAVE = 0
-    """The end of a hand that leaves the fingers as they are."""
+    """End the hand and leave the fingers as they are."""
     KEEP = 1
     """Hold axes that move, and leave rGTO set if every axis is seen at rest."""
     HALT = 2
-    """Clear rGTO, and go on."""
+    """Clear rGTO; the hand keeps running."""
     SHUTDOWN = 3
-    """Clear rGTO, and see the whole last image."""
+    """Clear rGTO, and wait for the echo of the whole last image."""
     RESET = 4
     """Clear rACT. This clears faults, releases the part and ends an activation."""
 

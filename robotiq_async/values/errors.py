@@ -6,7 +6,7 @@
     +-- RobotiqStateError                       the hand cannot do that now
     |   +-- NotStartedError                     before start(), or after stop()
     |   +-- InvalidStateError                   .state and .allowed
-    |   +-- NotActivatedError                   motion asked for while reset
+    |   +-- NotActivatedError                   motion requested while reset
     |   +-- GripperFaultError                   .fault
     |   +-- ActivationTimeoutError (TimeoutError)
     |   +-- StateTimeoutError (TimeoutError)    a state that was never reached
@@ -48,7 +48,7 @@ class RobotiqError(Exception):
 
     Attributes:
         hand: the ``name`` given to the hand's constructor, or an empty string. ``str(error)`` begins with it.
-        advice: which calls of the library help, or an empty string. ``str(error)`` ends with it.
+        advice: the calls of the library that help, or an empty string. ``str(error)`` ends with it.
     """
 
     hand: str = ""
@@ -176,7 +176,7 @@ class ConnectFailedError(RobotiqConnectionError):
 
 
 class ConnectionLostError(RobotiqConnectionError):
-    """The link went down. What was not acknowledged by then is dropped.
+    """The link went down. Requests not acknowledged by then are dropped.
 
     No motion is sent again; a hold may be.
     """
@@ -191,7 +191,7 @@ class ProtocolError(RobotiqConnectionError):
 
 
 class WrongModelError(ProtocolError):
-    """The registers show a gripper of another model. Nothing was written to it."""
+    """The registers are those of another model. Nothing was written to them."""
 
 
 class AgentError(RobotiqConnectionError):
@@ -214,7 +214,7 @@ class NotAllStoppedError(RobotiqError):
     """Not every gripper of a fleet was seen to stop: some MAY STILL MOVE.
 
     Attributes:
-        outcomes: for each gripper how its halt ended; "stopped" means seen to stop.
+        outcomes: the outcome of each gripper's halt; "stopped" means seen to stop.
         unreached: endpoints without a connection; the grippers behind them are unknown.
     """
 

@@ -16,7 +16,7 @@ class Transition:
     Attributes:
         source: the state before.
         target: the state after.
-        trigger: what caused it.
+        trigger: its cause.
         timestamp: monotonic seconds, on the clock of the statuses.
     """
 

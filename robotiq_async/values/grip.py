@@ -21,12 +21,12 @@ def check_at_least(at_least: object, fingers: Finger) -> int:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class GraspResult:
-    """How a grasp ended. True if the part is held; too few contacts are a result, not an error.
+    """The result of a grasp. True if the part is held; too few contacts are a result, not an error.
 
     Immutable; can be compared, hashed, copied and pickled.
 
     Attributes:
-        move: how the closing ended: outcome and highest current of each addressed axis, duration.
+        move: the result of the closing: outcome and highest current of each addressed axis, duration.
         at_least: the number of contacts that make a grasp.
     """
 
@@ -85,14 +85,14 @@ class GraspResult:
 
 
 class GripChange(Enum):
-    """How the grip of an axis can change."""
+    """A kind of change in the grip of an axis."""
 
     GAINED = "gained"
     """The gripper reports a contact: a new one, or again after a slip."""
     SLIPPED = "slipped"
-    """An axis in contact has moved: it went on closing, or was pushed."""
+    """An axis in contact has moved: it closed further, or was pushed."""
     LOST = "lost"
-    """The gripper stopped reporting the contact although the axis was not asked to let go. A fault, a reset
+    """The gripper stopped reporting the contact although no request released it. A fault, a reset
     and a lost activation also count as LOST: whether the part is still held is then unknown."""
     RELEASED = "released"
     """A request ended the contact: to move the other way, or to stay at the present position."""
@@ -107,7 +107,7 @@ class GripEvent:
         finger: the axis.
         moved: counts the axis has moved since its contact or its last slip; positive means closing.
         holds: the watched axes that are in contact in this status.
-        status: the status that shows the change.
+        status: the status with the change.
     """
 
     change: GripChange

@@ -1,4 +1,4 @@
-"""Model: what one gripper of the family has, as data.
+"""Model: the properties of one gripper of the family, as data.
 
 All models have the registers of one finger. A 2F or a Hand-E is finger A of a 3-Finger whose object status
 lies in byte 0 in place of byte 1 (manuals of the 2F-85/2F-140 and of the Hand-E, chapter on registers).
@@ -23,7 +23,7 @@ TOLERANCE: Final = 2
 def _masks(
     fields: tuple[Field, ...], axes: tuple[Finger, ...], wanted: set[ObjectStatus]
 ) -> tuple[Finger, ...]:
-    """For each value of the byte with the object status: the axes that show one of the wanted."""
+    """For each value of the byte with the object status: the axes in one of the wanted states."""
     return tuple(
         Finger(
             sum(
@@ -42,13 +42,13 @@ class Model:
 
     Attributes:
         name: in addresses, files and on the command line: ``3f``, ``2f85``, ``2f140``, ``hand-e``.
-        title: for people.
+        title: name for people.
         axes: its axes, in the order of their registers.
-        object_status: where the object status of each axis lies.
+        object_status: fields with the object status of each axis.
         faults: the fault of each code, 0..15.
         tcp: registers over Modbus TCP.
         rtu: registers on a serial line.
-        stroke: of the fingers.
+        stroke: openings of the fingers by position.
         open_reading_max: the most, in counts, that an open finger reads.
         closed_reading_min: the least, in counts, that a closed finger reads.
         speeds_mm_s: nominal speeds at the values 0 and 255.
@@ -152,10 +152,10 @@ class Model:
         return abs(request - position) <= TOLERANCE
 
     def contradiction(self, registers: Registers) -> str:
-        """What in the status registers only another model can show; empty for nothing.
+        """The status registers that only another model can have, as a text; empty if there are none.
 
         A sibling leaves byte 1 and bytes 6 to 14 at 0. On a 3-Finger the positions of B, C and the scissor
-        lie there, which are never 0 together. All zeros say nothing: a gateway may show them before its
+        lie there, which are never 0 together. All zeros prove nothing: a gateway may send them before its
         gripper answers.
         """
         has_one = not registers[0] & 0xFF and not any(registers[3:7]) and not registers[7] >> 8
@@ -193,7 +193,7 @@ _JAW: Final = (Finger.A,)
 _ADAPTIVE_FAULTS: Final = tuple(Fault.adaptive(code) for code in range(16))
 # No model of these speaks Modbus TCP (but for the retired universal controller): a gateway passes on the
 # registers of the serial line. The vendor's software reads with function 3, newer manuals list 4 and 23.
-# Manuals and public drivers know three registers of either block; no source tells what happens with more.
+# Manuals and public drivers know three registers of either block; no source covers more.
 _GATEWAY: Final = RegisterMap(request=0x03E8, status=0x07D0, read_function=3, device_id=9, count=3)
 
 
@@ -255,6 +255,6 @@ def model_of(value: object, name: str = "model") -> Model:
 
 
 def names_that_fit(registers: Registers) -> str:
-    """How to name a model that status registers do not contradict, for messages."""
+    """Advice to name a model that status registers do not contradict, for messages."""
     fitting = [model.name for model in MODELS.values() if not model.contradiction(registers)]
     return f"name its model: {' or '.join(f'?model={name}' for name in fitting)} at the end of the address"

@@ -1,4 +1,4 @@
-"""MoveResult: how a move ended."""
+"""MoveResult: the result of a move."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from .status import RobotiqStatus, milliampere
 
 @dataclass(frozen=True, slots=True, repr=False)
 class MoveResult:
-    """How a move ended. A contact is a result, not an error.
+    """The result of a move. A contact is a result, not an error.
 
     Immutable; can be compared, hashed, copied and pickled.
 
     Attributes:
-        outcomes: how each addressed axis ended.
+        outcomes: the outcome of each addressed axis.
         positions: final position of each addressed axis, in counts.
         contacts: the addressed axes that a contact stopped.
         reached: the addressed axes that end within 2 counts of the target, or at the end of the stroke for a
             target beyond it. An axis whose fingertips end elsewhere is at position, and not in here.
         duration: seconds from the call to the status that ended the move.
         peak_current_ma: highest motor current seen of each addressed axis, in milliamperes; None where the
-            link does not tell it.
+            link does not carry it.
         status: the status that ended the move.
     """
 
@@ -60,7 +60,7 @@ class MoveResult:
         """The result in types that JSON and pandas accept; enumerations and masks as in a status.
 
         The key of each axis holds its ``outcome``, ``position``, ``reached`` and ``peak_current_ma``. What is
-        None is left out: openings, and the current where the link does not tell it.
+        None is left out: openings, and the current where the link does not carry it.
         """
         return {
             "duration": self.duration,

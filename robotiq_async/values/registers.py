@@ -17,7 +17,7 @@ from .checks import as_int, repr_of
 REGISTER_COUNT: Final = 8  # registers in either block
 
 Registers = tuple[int, ...]  # eight registers of 16 bits
-Echo = tuple[int, ...]  # what a status repeats of a request: activation, go, and the position of each axis
+Echo = tuple[int, ...]  # repeated by a status from a request: activation, go, the position of each axis
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class Field:
     shift: int = 0
     width: int = 8
     doc: str = ""
-    # Where it is within the registers, worked out once: fields are read and written at every poll.
+    # Its place in the registers, worked out once: fields are read and written at every poll.
     _word: int = field(init=False, repr=False, compare=False)
     _offset: int = field(init=False, repr=False, compare=False)
     _mask: int = field(init=False, repr=False, compare=False)
@@ -86,7 +86,7 @@ gFLT: Final = Field(2, 0, 4, "fault code; the high nibble is not part of it")
 gPR: Final = tuple(Field(3 + 3 * n, doc=f"echo of the position of {name}") for n, name in enumerate("ABCS"))
 gPO: Final = tuple(Field(4 + 3 * n, doc=f"position of {name}") for n, name in enumerate("ABCS"))
 gCU: Final = tuple(Field(5 + 3 * n, doc=f"current of {name}, 10 mA a count") for n, name in enumerate("ABCS"))
-STATUS_RESERVED: Final = (Field(2, 4, 4), Field(15))  # what the manual gives no meaning: the bits read 0
+STATUS_RESERVED: Final = (Field(2, 4, 4), Field(15))  # bits without a meaning in the manual: they read 0
 
 MILLIAMPERE_PER_COUNT: Final = 10
 """gCU: the manual's worked example reads 0x0F as 150 mA; two editions print the relation upside down."""
@@ -94,7 +94,7 @@ MILLIAMPERE_PER_COUNT: Final = 10
 
 @dataclass(frozen=True, slots=True)
 class RegisterMap:
-    """Where the two blocks lie and how they are read on one kind of link (manual, communication chapter).
+    """Addresses and functions of the two blocks on one kind of link (manual, communication chapter).
 
     Attributes:
         request: address of the first request register.

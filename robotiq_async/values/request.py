@@ -15,7 +15,7 @@ from .model import THREE_FINGER, Model
 
 @dataclass(frozen=True, slots=True)
 class AxisRequest:
-    """What one axis is asked to do.
+    """The request for one axis.
 
     Attributes:
         position: target in counts, 0 open .. 255 closed.
@@ -40,7 +40,7 @@ class Request:
         mode: rMOD; kept as found, for it is ignored while the scissor has its own registers.
         individual_fingers: rICF.
         individual_scissor: rICS.
-        axes: what each axis is asked, in the order of the model's axes; by default all zeros.
+        axes: the request for each axis, in the order of the model's axes; by default all zeros.
         model: of the gripper. One without modes has neither the mode nor the two bits of individual control.
     """
 
@@ -98,7 +98,7 @@ class Request:
 
     @property
     def echo(self) -> reg.Echo:
-        """What a status of a gripper that follows this image repeats of it: rACT, rGTO and the positions.
+        """The echo in the status of a gripper that follows this image: rACT, rGTO and the positions.
 
         Speed and force have no echo. rMOD is left out: it means nothing while the scissor has its own
         registers.
@@ -107,7 +107,7 @@ class Request:
 
     @property
     def by_axis(self) -> Iterable[tuple[Finger, AxisRequest]]:
-        """Each axis with what it is asked."""
+        """Each axis with its request."""
         return zip(self.model.axes, self.axes, strict=True)
 
     def position(self, axis: Finger) -> int:

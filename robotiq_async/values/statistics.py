@@ -1,4 +1,4 @@
-"""Statistics: how well the polling goes, and the counters behind it."""
+"""Statistics: figures of the polling, and the counters behind them."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ class Statistics:
         period_p99: 99th percentile of that time.
         round_trip_p50: median seconds from sending a read to its reply; 0 before the first poll.
         round_trip_p99: 99th percentile of that time.
-        longest_stall: longest delay of a tick, in seconds: how long the event loop was blocked.
+        longest_stall: longest delay of a tick: seconds for which the event loop was blocked.
         reconnects: times the link was opened again.
         foreign_commands: commands of other clients that were seen.
-        tick: what times the polls: "timerfd" (Linux) or "loop timer"; empty before the first poll.
+        tick: the timer of the polls: "timerfd" (Linux) or "loop timer"; empty before the first poll.
         faults: times the gripper reported a minor or a major fault.
         moves: number of :meth:`RobotiqHand.move` calls by outcome: "reached", "contact", "cancelled", or the
             name of the error.
-        passing_faults: times fault 0x09 was shown only briefly and ignored, as some grippers show it after a
+        passing_faults: times fault 0x09 was reported only briefly and ignored: some grippers do so after a
             second without a poll.
         link_use: share of the time, 0..1, in which the hand waits for an answer; 1 for a link that is the
             limit.
-        status_age_p50: median seconds from asking for a status to the write that was decided on it; 0 before
+        status_age_p50: median seconds from a read to the write that was decided on its status; 0 before
             the first write.
         status_age_p99: 99th percentile of that time.
     """
@@ -94,7 +94,7 @@ class Counters:
     status_ages: deque[float] = field(default_factory=lambda: deque(maxlen=SAMPLES))
     _busy: float = 0.0  # seconds spent in exchanges since the last period began
     _shares: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=SAMPLES))
-    """Of each period its seconds, and those spent in exchanges."""
+    """The seconds of each period, and those spent in exchanges."""
 
     def note_poll(self, asked: float, answered: float, period: float | None) -> None:
         """Count a poll; ``period`` is the time since the one before it, None if that is not to be counted."""
@@ -113,7 +113,7 @@ class Counters:
 
     @contextmanager
     def move(self) -> Iterator[Callable[[MoveResult], None]]:
-        """Count how a move ends; call the function that this yields with its result."""
+        """Count a move by its outcome; call the function that this yields with its result."""
         outcome = "cancelled"
 
         def note(result: MoveResult) -> None:

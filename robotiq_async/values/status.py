@@ -14,7 +14,7 @@ from .model import THREE_FINGER, TOLERANCE, Model
 from .stroke import Stroke
 
 NO_REQUEST: Final = "NO_REQUEST"
-"""What :meth:`RobotiqStatus.axis_state` says of an axis whose gDT of 0 does not mean motion."""
+"""The :meth:`RobotiqStatus.axis_state` of an axis with a gDT of 0 that does not mean motion."""
 
 _set = object.__setattr__
 _OBJECT_STATUSES = tuple(ObjectStatus)
@@ -37,7 +37,7 @@ class Part:
 
 
 class RobotiqStatus:
-    """What the gripper said at one moment. Immutable and hashable; decoded when asked.
+    """One status reading. Immutable and hashable; decoded on access.
 
     Two statuses are equal when their registers, timestamp, sequence and model are.
 
@@ -46,8 +46,8 @@ class RobotiqStatus:
         timestamp: monotonic seconds at which the reply arrived.
         sequence: counts every poll of a hand, from 0.
         model: of the gripper.
-        stroke: what its positions mean as openings; by default the model's.
-        has_current: whether the link tells the motor currents.
+        stroke: openings by position; by default the model's.
+        has_current: whether the link carries the motor currents.
     """
 
     __slots__ = ("_has_current", "_model", "_registers", "_sequence", "_stroke", "_timestamp")
@@ -129,20 +129,20 @@ class RobotiqStatus:
 
     @property
     def stroke(self) -> Stroke:
-        """What positions of the gripper mean as openings: of its model, or from points measured on it."""
+        """The openings by position: of the gripper's model, or from points measured on it."""
         return self._stroke
 
     @property
     def has_current(self) -> bool:
-        """Whether the link tells the motor currents. A URCap's text port does not."""
+        """Whether the link carries the motor currents. A URCap's text port does not."""
         return self._has_current
 
     # One axis. Each takes one Finger member; several, or one that the model lacks, is a ValueError.
 
     def finger_status(self, finger: Finger | int) -> ObjectStatus:
-        """Whether the axis moves, touches something or has arrived (gDT), as the gripper says it.
+        """The object status of an axis (gDT) as reported: moving, stopped by a contact, or at position.
 
-        It says IN_MOTION of an axis that was never asked for anything, too: see :meth:`axis_state`.
+        The gripper also reports IN_MOTION for an axis that has received no request: see :meth:`axis_state`.
 
         Raises:
             TypeError: not a Finger or an int.
@@ -152,11 +152,11 @@ class RobotiqStatus:
         return _OBJECT_STATUSES[model.object_status[model.index(finger)].read(self._registers)]
 
     def axis_state(self, finger: Finger | int) -> str:
-        """What the axis does, in a word for people and files: the name of its :meth:`finger_status`.
+        """The state of an axis in one word, for people and files: the name of its :meth:`finger_status`.
 
         ``NO_REQUEST`` where that means nothing: gDT = 0 while no position request is in force (gGTO = 0, or
-        gIMC other than 3). So IN_MOTION are the axes in :attr:`moving`, and no others. In an activation and
-        in a release axes move of which the gripper says nothing.
+        gIMC other than 3). So IN_MOTION are the axes in :attr:`moving`, and no others. During an
+        activation and a release axes move without a report.
 
         Raises:
             TypeError, ValueError: as :meth:`finger_status`.
@@ -179,7 +179,7 @@ class RobotiqStatus:
         return self._stroke.openings[self._finger_position(finger)]
 
     def open_fraction(self, finger: Finger | int) -> float:
-        """How far a finger is open, as the share of its travel in counts: 1 (open) .. 0 (closed).
+        """The share of a finger's travel that is open, linear in counts: 1 (open) .. 0 (closed).
 
         Raises:
             TypeError, ValueError: as :meth:`opening_mm`.
@@ -216,12 +216,12 @@ class RobotiqStatus:
         return reg.gPR[self._model.index(finger)].read(self._registers)
 
     def current(self, finger: Finger | int) -> int | None:
-        """Motor current in counts, 0..255 (gCU); None where the link does not tell it."""
+        """Motor current in counts, 0..255 (gCU); None where the link does not carry it."""
         index = self._model.index(finger)
         return reg.gCU[index].read(self._registers) if self._has_current else None
 
     def current_ma(self, finger: Finger | int) -> int | None:
-        """Motor current in milliampere, 10 a count; None where the link does not tell it."""
+        """Motor current in milliampere, 10 a count; None where the link does not carry it."""
         counts = self.current(finger)
         return None if counts is None else counts * reg.MILLIAMPERE_PER_COUNT
 
@@ -266,7 +266,7 @@ class RobotiqStatus:
 
     @property
     def initialization(self) -> Initialization:
-        """How far activation or mode change is (gIMC)."""
+        """Progress of the activation or mode change (gIMC)."""
         return Initialization(reg.gIMC.read(self._registers))
 
     @property
@@ -294,7 +294,7 @@ class RobotiqStatus:
     def is_moving(self) -> bool:
         """Whether an axis moves: gGTO = 1, gIMC = 3 and a gDT of 0.
 
-        gSTA = 0 or gDT = 0 alone do not mean motion: a gripper that is ready and was never told to go
+        gSTA = 0 or gDT = 0 alone do not mean motion: a gripper that is ready and has received no request
         reads 0 in both.
         """
         return bool(self.moving)
@@ -312,7 +312,7 @@ class RobotiqStatus:
 
     @property
     def _states(self) -> tuple[str, ...]:
-        """What :meth:`axis_state` says for each gDT."""
+        """The :meth:`axis_state` for each gDT."""
         return _STATES if self._is_under_request else _STATES_WITHOUT_REQUEST
 
     @property
@@ -323,11 +323,11 @@ class RobotiqStatus:
 
     @property
     def part(self) -> Part | None:
-        """The part that is held, and how wide it is; None if the gripper reports none.
+        """The part that is held, with its width; None if the gripper reports none.
 
         A finger holds a part if it reports a contact while closing, under a request in force, and without a
         serious fault. It may never report one for a thin part. A contact latches: it stays when the part has
-        been taken out, until the finger is asked to move.
+        been taken out, until a request moves the finger.
         """
         holding = self._model.holding[self._registers[0] >> self._model.object_shift & 0xFF]
         if not holding or not self._is_under_request or self.fault.is_serious:
@@ -340,8 +340,8 @@ class RobotiqStatus:
 
         Enumerations become their names, masks become lists of axis names. Values of one axis are below its
         name (``A``, ``B``, ``C``, ``SCISSOR``), and ``fault_code`` is the number of the fault.
-        ``current_ma`` is left out where the link does not tell it. :meth:`from_registers` makes the status
-        again from the first three, the model, and whether there is a current.
+        ``current_ma`` is left out where the link does not carry it. :meth:`from_registers` rebuilds the
+        status from the first three, the model, and whether there is a current.
         """
         # A recorder calls this at every poll: read registers and not the many properties.
         words, fault, states, model = self._registers, self.fault, self._states, self._model

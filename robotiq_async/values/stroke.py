@@ -1,4 +1,4 @@
-"""Stroke: what a position in counts means as an opening.
+"""Stroke: the opening at a position in counts.
 
 Openings are nominal: no table that someone measured on a 2F or a Hand-E is published, and nothing here has
 run on real hardware. A gripper reads a few counts when it is open and less than 255 when it is closed. In
@@ -33,7 +33,7 @@ Points = tuple[tuple[int, float], ...]
 
 @dataclass(frozen=True, slots=True)
 class Stroke:
-    """From open to closed. Immutable.
+    """The openings of a gripper from open to closed. Immutable.
 
     Attributes:
         mm: the opening of an open gripper, in millimetres.
@@ -51,7 +51,7 @@ class Stroke:
     closed_reading: int
     arc: tuple[float, float] | None = None
     points: Points = ()
-    # Worked out once: control loops ask at every poll.
+    # Worked out once: control loops convert at every poll.
     openings: tuple[float, ...] = field(init=False, repr=False, compare=False)
     fractions: tuple[float, ...] = field(init=False, repr=False, compare=False)
 
@@ -74,12 +74,12 @@ class Stroke:
 
     @property
     def closed_mm(self) -> float:
-        """The opening of a closed gripper: 0, unless measured points say otherwise."""
+        """The opening of a closed gripper: 0 without measured points."""
         return self._knots[-1][1]
 
     @property
     def source(self) -> str:
-        """Where the openings come from, for people."""
+        """The source of the openings, for people."""
         return "measured" if self.points else "nominal"
 
     def measured(self, points: Points) -> Stroke:
@@ -88,7 +88,7 @@ class Stroke:
         return Stroke(mm, first, last, self.arc, points)
 
     def opening_mm(self, position: int) -> float:
-        """The opening at a position: all of it up to the open reading, the least from the closed reading on.
+        """The opening at a position: the widest up to the open reading, the least from the closed reading on.
 
         Raises:
             TypeError: position is not an int.

@@ -1,4 +1,4 @@
-"""What the values 0..255 mean: speeds, forces, closing times; from the thesis or your own measurements."""
+"""Speeds, forces and closing times of the values 0..255, from the thesis or your own measurements."""
 
 from .scales import ForceCalibration, SpeedCalibration
 from .units import Units

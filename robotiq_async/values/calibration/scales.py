@@ -32,7 +32,7 @@ Points = tuple[tuple[int, float], ...]
 
 @dataclass(frozen=True, slots=True)
 class SpeedCalibration:
-    """What speed values mean.
+    """The meaning of speed values: closing times.
 
     Attributes:
         source: where the figures come from, for people.
@@ -64,7 +64,7 @@ class SpeedCalibration:
 
     @classmethod
     def usual(cls, model: Model) -> SpeedCalibration:
-        """What moves are timed by: of a 3-Finger the thesis's figures, of another model its manual's."""
+        """The figures that time moves: the thesis's for a 3-Finger, the manual's for another model."""
         return cls.thesis() if model is THREE_FINGER else cls.nominal(model)
 
     @classmethod
@@ -87,7 +87,7 @@ class SpeedCalibration:
 
     @classmethod
     def from_table(cls, source: str, table: Table) -> SpeedCalibration:
-        """From a table of closing times in milliseconds."""
+        """The calibration in a table of closing times in milliseconds."""
         return cls(source, tuple((value, mean(table[value]) / 1000) for value in sorted(table)))
 
     def closing_time(self, speed: int) -> float:
@@ -131,7 +131,7 @@ class SpeedCalibration:
 
 @dataclass(frozen=True, slots=True)
 class ForceCalibration:
-    """What force values roughly mean; see the module.
+    """The rough meaning of force values in newtons; see the module.
 
     Attributes:
         source: where the figures come from, for people.
@@ -158,7 +158,7 @@ class ForceCalibration:
 
     @classmethod
     def thesis(cls, surface: str) -> ForceCalibration:
-        """What the thesis's scale showed: the mean of three runs, with foam around it or rigid.
+        """Readings of the thesis's scale: the mean of three runs, with foam around it or rigid.
 
         Args:
             surface: "foam" or "rigid".
@@ -181,7 +181,7 @@ class ForceCalibration:
 
     @classmethod
     def from_table(cls, source: str, table: Table) -> ForceCalibration:
-        """From a table of scale readings in grams."""
+        """The calibration in a table of scale readings in grams."""
         return cls(source, tuple((value, newton(mean(table[value]))) for value in sorted(table)))
 
     def newton(self, force: int) -> float:

@@ -16,7 +16,7 @@ from .scales import ForceCalibration, SpeedCalibration, covered, nearest
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Units:
-    """Converts both ways, as the calls of a hand do: ``hand.units.position(mm=80)``, ``hand.units.mm(120)``.
+    """Converts both ways: ``hand.units.position(mm=80)``, ``hand.units.mm(120)``.
 
     **Openings are nominal**, unless the hand was made with measured points: the manual's stroke, on the arc
     of its linkage for a 2F, and linear in counts for a Hand-E and for a finger of a 3-Finger, although that
@@ -26,12 +26,12 @@ class Units:
     **Fractions** are the share of the travel that is open, 1 (open) .. 0 (closed), linear in counts.
 
     **Forces are labels**: a straight line between the manual's two figures, which the manual calls not
-    linear, or the readings of one scale. They order the force values; they do not tell the force on a part.
+    linear, or the readings of one scale. They order the force values; they are not the force on a part.
 
     Attributes:
-        speeds: what speed values mean; by default the thesis's closing times.
+        speeds: closing times by speed value; by default the thesis's.
         forces: labels of the force values; by default the manual's figures.
-        stroke: what positions mean as openings; by default a 3-Finger's.
+        stroke: openings by position; by default a 3-Finger's.
     """
 
     speeds: SpeedCalibration = field(default_factory=SpeedCalibration.thesis)
@@ -177,7 +177,7 @@ class Units:
         )
 
 
-# Cached: control loops ask in every cycle, and building a table takes a millisecond.
+# Cached: control loops convert in every cycle, and building a table takes a millisecond.
 
 
 @lru_cache(maxsize=8)
@@ -200,7 +200,7 @@ def _closest(name: str, wanted: object, figures: Mapping[int, float], unit: str)
 
 
 def _limits(figures: Mapping[int, float]) -> tuple[float, float]:
-    """Rounded outwards to two digits, so that a limit copied from a message is accepted."""
+    """The limits, rounded outwards to two digits: one copied from a message is accepted."""
     return floor(min(figures.values()) * 100) / 100, ceil(max(figures.values()) * 100) / 100
 
 
