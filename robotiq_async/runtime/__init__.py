@@ -1,1 +1,1 @@
-"""What runs below everything: clocks, timers, event loops and threads, logging, optional packages."""
+"""The layer below everything: clocks, timers, event loops and threads, logging, optional packages."""

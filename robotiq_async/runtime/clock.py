@@ -1,8 +1,8 @@
 """The one clock of everything that happens to a hand.
 
-Timestamps, durations and ages are seconds of ``time.monotonic()``. asyncio's own loops go by it, and so does
-uvloop, whose ``time()`` is the same in whole milliseconds. A loop that has been given a ``time()`` of its own
-(virtual time, in tests) is believed: there it is that loop's.
+Timestamps, durations and ages are seconds of ``time.monotonic()``. asyncio's own loops use it, and so does
+uvloop: its ``time()`` is the same in whole milliseconds. A loop with another ``time()`` of its own (virtual
+time, in tests) is timed by that.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def clock_of(loop: asyncio.AbstractEventLoop) -> Callable[[], float]:
 
 
 def resolution_of(loop: asyncio.AbstractEventLoop) -> float:
-    """The step of a loop's clock in seconds: asyncio calls what is due within it. 0 if the loop tells none.
+    """The step of a loop's clock in seconds: asyncio calls what is due within it. 0 if the loop has none.
 
     15.6 ms on Windows before Python 3.13, and else a millionth of a second or less.
     """

@@ -19,9 +19,9 @@ class LateError(Exception):
 
 
 async def wait_shielded(work: asyncio.Future[Any]) -> None:
-    """Wait until the work is done, even when cancelled meanwhile; then raise the cancellation.
+    """Wait until the work is done, even when cancelled; then raise the cancellation.
 
-    Does not raise what the work raises: ask the future for its result.
+    Does not raise what the work raises: read the future's result.
     """
     cancelled: asyncio.CancelledError | None = None
     with anyio.CancelScope(shield=True):
@@ -48,7 +48,7 @@ def in_a_thread(work: Callable[[], T]) -> asyncio.Future[T]:
             if not future.done():
                 how(what)
 
-        with contextlib.suppress(RuntimeError):  # the loop was closed meanwhile
+        with contextlib.suppress(RuntimeError):  # the loop has been closed
             loop.call_soon_threadsafe(say)
 
     def run() -> None:

@@ -1,4 +1,4 @@
-"""How to install the packages of an extra, however the library was installed.
+"""The command that installs an extra, however the library was installed.
 
 ``pip install 'robotiq-async[web]'`` works only where a package index has the library. Installing the packages
 of the extra works everywhere: from a clone, a wheel or an index.

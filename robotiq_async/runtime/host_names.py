@@ -32,7 +32,7 @@ async def addresses_of(host: str, port: int) -> list[str]:
 
 
 def why_unreachable(error: OSError | None) -> str:
-    """Why a connection failed, for a person. ``error`` is that of the last attempt, or None."""
+    """Readable reason for a failed connection. ``error`` is that of the last attempt, or None."""
     match error.errno if error is not None else None:
         case errno.ECONNREFUSED:
             return "connection refused: nothing listens there"
@@ -47,7 +47,7 @@ def why_unreachable(error: OSError | None) -> str:
 
 
 def why_no_socket() -> str:
-    """Why this program cannot create a socket; empty if it can."""
+    """Readable reason why this program cannot create a socket; empty if it can."""
     try:
         socket.socket().close()
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Listening sockets, and which hosts are this machine."""
+"""Listening sockets, and the test whether a host is this machine."""
 
 from __future__ import annotations
 

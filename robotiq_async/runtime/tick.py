@@ -8,8 +8,8 @@ often.
 
 Where the clock counts in steps of 15.6 ms (Windows before Python 3.13), ticks come once a step at most.
 
-A missed tick is counted and not caught up with. The delay of a tick tells for how long the loop was held up,
-whatever the poller task was doing meanwhile.
+A missed tick is counted and not caught up with. The delay of a tick is the time for which the loop was held
+up, whatever the poller task was doing.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Tick:
 
     @property
     def source(self) -> Source | Literal[""]:
-        """What keeps the deadlines; empty before the start."""
+        """The timer that keeps the deadlines; empty before the start."""
         return "" if self._timer is None else self._timer.source
 
     def hurry(self) -> None:

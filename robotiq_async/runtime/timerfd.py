@@ -19,7 +19,7 @@ if sys.platform == "linux" and sys.version_info >= (3, 13):
             self.descriptor = os.timerfd_create(time.CLOCK_MONOTONIC, flags=os.TFD_NONBLOCK | os.TFD_CLOEXEC)
 
         def arm(self, when: float) -> None:
-            """Set it to a time of ``time.monotonic()``, in seconds; one that is over is at once."""
+            """Set it to a time of ``time.monotonic()``, in seconds; a past time fires at once."""
             os.timerfd_settime(self.descriptor, flags=os.TFD_TIMER_ABSTIME, initial=when)
 
         def close(self) -> None:
@@ -54,7 +54,7 @@ elif sys.platform == "linux":
             self._at = ctypes.byref(self._time)
 
         def arm(self, when: float) -> None:
-            """Set it to a time of ``time.monotonic()``, in seconds; one that is over is at once."""
+            """Set it to a time of ``time.monotonic()``, in seconds; a past time fires at once."""
             self._time.seconds, self._time.nanoseconds = divmod(round(when * 1e9), 1_000_000_000)
             _checked(_libc.timerfd_settime(self.descriptor, _ABSOLUTE, self._at, None))
 
@@ -71,7 +71,7 @@ elif sys.platform == "linux":
 else:
 
     class TimerFd:
-        """Not on this system: making one is an OSError."""
+        """This system has no timerfd: making one raises OSError."""
 
         descriptor = -1
 

@@ -1,4 +1,4 @@
-"""The version, for files that say what has written them."""
+"""The version, for files that name the program that wrote them."""
 
 from typing import Final
 
