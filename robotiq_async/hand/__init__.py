@@ -1,4 +1,4 @@
-"""Hand: what every hand can do. RobotiqHand: the hand that owns the link to its gripper."""
+"""Hand: the calls of every hand. RobotiqHand: the hand that owns the link to its gripper."""
 
 from .base import Hand
 

@@ -27,12 +27,12 @@ from .run import refuse_with
 
 
 class Hand(Kind):
-    """A gripper, as a program sees it.
+    """One gripper, with the calls that every hand has.
 
     Use a hand with ``async with``, or call :meth:`start` and :meth:`stop`. A hand belongs to the event loop
     in which it was started: any number of tasks of that loop may call it. No call blocks the loop, and each
-    ends in bounded time unless you ask it to wait for longer. From another thread or another loop every call
-    raises RuntimeError and asks nothing of the gripper; the properties can be read from anywhere.
+    ends in bounded time unless its arguments allow longer. From another thread or another loop every call
+    raises RuntimeError and sends nothing; the properties can be read from anywhere.
 
     Many calls take the same arguments. Any other value raises TypeError or ValueError, and nothing is sent:
 
@@ -47,7 +47,7 @@ class Hand(Kind):
       ``label_n``, newtons of a label: no measured force.
     * ``timeout``: seconds above 0; None for twice the expected time plus 2 s.
 
-    What is not in counts becomes the closest count by :attr:`units`, which says how far to trust it, and is
+    Other amounts become the closest count by :attr:`units` (see there how far to trust them), and are
     refused outside their range. One amount is given once: counts and millimetres together are a TypeError.
 
     Timestamps are monotonic seconds of this process, wherever the gripper is. No motion is ever sent twice.
@@ -56,9 +56,9 @@ class Hand(Kind):
     ``_session`` to the present :class:`~robotiq_async.hand.run.Run`, or override ``_check_running``.
 
     Args:
-        address: which gripper; no two hands of a process have the same one.
-        name: what the log, errors and metrics call the hand; empty for its address.
-        units: what positions, speeds and forces mean on a model.
+        address: of the gripper; no two hands of a process have the same one.
+        name: of the hand in the log, errors and metrics; empty for its address.
+        units: converts positions, speeds and forces of the model.
         keep_grip: whether :meth:`stop` keeps a grip by default.
         model: of the gripper.
     """
@@ -82,8 +82,8 @@ class Hand(Kind):
 
         An activation MOVES the fingers: they open and close to their stops. An active gripper is adopted:
         nothing is written. A gripper in fault is left there, so that :meth:`atr` and
-        :meth:`recover` can run. Fault 0x09, which some grippers show once after a second without a poll, is
-        passed over first.
+        :meth:`recover` can run. Fault 0x09, which some grippers report once after a second without a poll,
+        is passed over first.
 
         A failed or cancelled start leaves nothing running and takes back an activation that it began. A hand
         that was stopped can be started again.
@@ -95,13 +95,13 @@ class Hand(Kind):
 
         Raises:
             InvalidStateError: this hand is started already, or another one owns the gripper.
-            NotStartedError: stop() was called meanwhile.
+            NotStartedError: stop() was called during the start.
             ConnectFailedError: nothing answers within the connect timeout, or within ``wait``.
             RobotiqConnectionError: something answers, but not a gripper; or the link went down again.
             GripperFaultError: the activation ended in a fault.
             NotActivatedError: the gripper was reset during the activation.
-            ActivationTimeoutError: the activation was not finished in time, or showed nothing but fault 0x05
-                for 5 s, as with a pressed emergency stop.
+            ActivationTimeoutError: the activation was not finished in time, or reported nothing but fault
+                0x05 for 5 s, as with a pressed emergency stop.
         """
         check_flag("activate", activate)
         wait = check_seconds("wait", wait, 0.0, LONGEST_WAIT_S)
@@ -114,27 +114,28 @@ class Hand(Kind):
         """Stop the fingers (rGTO = 0), keep the activation, disconnect. Idempotent.
 
         The stop is final from the call on: every request is refused with NotStartedError, requests that were
-        not sent are dropped, and everything else that is being waited for ends with NotStartedError. Nothing
+        not sent are dropped, and every other wait ends with NotStartedError. Nothing
         that starts or continues a motion is sent after the call. The state is SHUTDOWN when it returns.
 
-        It ends within 2 s, even on a dead link and when cancelled meanwhile: the cancellation is raised once
-        the hand has stopped. A link that is down is tried once more. Of several calls under way the strongest
+        It ends within 2 s, even on a dead link and when cancelled: the cancellation is raised once
+        the hand has stopped. A link that is down is tried once more. Of several calls at a time the strongest
         counts, whichever comes first: without ``keep_grip``, then with it, then ``halt=False``. A call
         stronger than those before it has 2 s of its own. A halt or a hold that was not delivered turns
         ``halt=False`` into a stop with ``keep_grip``.
 
-        With ``keep_grip`` axes that move are held where they are, and rGTO stays set, so that a grip goes on
+        With ``keep_grip`` axes that move are held where they are, and rGTO stays set, so that a grip stays
         while nothing is connected. This needs every axis seen at rest. In any doubt rGTO is cleared after
-        all, and the log says why: an axis is not at rest within 0.5 s, the link is or goes down, a fault, a
-        sequence, another client that commands, or a ``halt()``. A client that starts a motion after the last
-        status and before the disconnection is not seen. What a real gripper does with a part, either way, is
-        not known. A gripper that is not polled may lose its activation, and the part: it is in RESET then.
+        all, and the log has the reason: an axis is not at rest within 0.5 s, the link is or goes down, a
+        fault, a sequence, another client that commands, or a ``halt()``. A client that starts a motion after
+        the last status and before the disconnection is not seen. What a real gripper does with a part, either
+        way, is not known. A gripper that is not polled may lose its activation, and the part: it is in RESET
+        then.
 
-        If the event loop was closed, the hand counts as stopped, and the fingers go on.
+        If the event loop was closed, the hand counts as stopped, and the fingers keep moving.
 
         Args:
-            halt: False disconnects and leaves the fingers to what they do; for programs that only look.
-            keep_grip: whether a grip stays in force; None for what the hand was made with.
+            halt: False disconnects and leaves the fingers as they are; for programs that only look.
+            keep_grip: whether a grip stays in force; None for the hand's own ``keep_grip``.
         """
         check_flag("halt", halt)
         keeps = self._keeps_grip(keep_grip)
@@ -151,7 +152,7 @@ class Hand(Kind):
         mm: float | None = None,
         open_fraction: float | None = None,
     ) -> None:
-        """Send axes somewhere; returns when the gripper has acknowledged it, not when they are there.
+        """Send axes to a position; returns when the gripper has acknowledged it, not when they are there.
 
         When cancelled, the request may still be sent: :meth:`halt` stops it.
 
@@ -171,7 +172,7 @@ class Hand(Kind):
         *,
         mm_per_s: float | None = None,
     ) -> None:
-        """Set the speed of axes, as :meth:`set_position`, also of a motion under way; never starts one."""
+        """Set the speed of axes, as :meth:`set_position`, also while they move; never starts a motion."""
         axes = self.model.mask(fingers)
         speed = speed_of(self.units, value, mm_per_s, "value")
         with self._naming:
@@ -202,10 +203,11 @@ class Hand(Kind):
         mm_per_s: float | None = None,
         label_n: float | None = None,
     ) -> None:
-        """Ask something of axes and return at once, for control loops. The last value wins; nothing queues.
+        """Send axes a command and return at once, for control loops. The last value wins; nothing queues.
 
-        What you ask between two polls is one write, dropped if the link goes down first; the log shows that.
-        :attr:`is_moving` is true until the axes rest; statuses show the old request until it is echoed.
+        Calls between two polls make one write, dropped, and logged, if the link goes down first.
+        :attr:`is_moving` is true until the axes rest; statuses have the old request until the new one is
+        echoed.
 
         Raises:
             ValueError: also if position, speed and force are all None, in any unit.
@@ -240,10 +242,10 @@ class Hand(Kind):
         label_n: float | None = None,
         timeout: float | None = None,
     ) -> MoveResult:
-        """Move axes; when all have stopped, return how each ended: at the target, or against something.
+        """Move axes; when all have stopped, return the outcome of each: at the target, or against something.
 
         A contact is a result, not an error, and so is an axis that is "at position" elsewhere:
-        ``result.reached`` has those that are where they were asked to be. When the call is cancelled (by a
+        ``result.reached`` has those at their targets. When the call is cancelled (by a
         task, ``asyncio.timeout`` or an anyio scope) or times out, those of its axes that still move are held
         where they are; an axis in contact keeps its request and its grip.
 
@@ -305,7 +307,7 @@ class Hand(Kind):
         label_n: float | None = None,
         timeout: float | None = None,
     ) -> GraspResult:
-        """Close fingers until each has met something or is closed, and say which of them hold it.
+        """Close fingers until each has met something or is closed, and return which of them hold it.
 
         A grasp takes ``at_least`` contacts, 1 .. the number of axes; None for all of them. Too few are a
         result and not an error: the result is false, and the fingers stay as they are. For the rest it is a
@@ -313,7 +315,7 @@ class Hand(Kind):
 
         An axis holds if the gripper reports a contact while closing. It may never report one for a thin
         object between fingertips. A contact latches: a finger that was in contact before still counts when
-        the part has been taken out meanwhile. Open first, or ask for more force.
+        the part has been taken out. Open first, or use more force.
         """
         axes = self.model.mask(fingers)
         contacts = check_at_least(at_least, axes)
@@ -326,7 +328,7 @@ class Hand(Kind):
         """Hold axes that move where they are; returns when the gripper has acknowledged it.
 
         An axis in contact keeps its request and its grip, and one at rest is left alone. Awaited moves and
-        pending requests of these axes end with MoveSupersededError, and their other axes go on. When
+        pending requests of these axes end with MoveSupersededError, and their other axes run on. When
         cancelled, the hold is sent all the same. If a lost link prevents the acknowledgement, the hold is
         repeated once the link is back, unless another client moves the axes then. In RESET and ATR_DONE, and
         during an activation, a release or a reset, it sends nothing; :meth:`halt` ends those.
@@ -341,9 +343,9 @@ class Hand(Kind):
             await self._hold(axes)
 
     async def halt(self) -> None:
-        """Stop every axis now (rGTO = 0). The next command goes again, and moves only the axes it names.
+        """Stop every axis now (rGTO = 0). The next command sets rGTO again, and moves only the axes it names.
 
-        Returns when the gripper shows that it has stopped, at most 1 s after the acknowledgement. Awaited
+        Returns when the gripper reports that it has stopped, at most 1 s after the acknowledgement. Awaited
         moves end with MoveSupersededError. When cancelled, the halt is sent all the same. In RESET and
         ATR_DONE nothing moves and nothing is sent. rGTO does not stop an activation or an automatic release:
         during these, halt() clears rACT, as :meth:`reset` does, and returns in RESET.
@@ -361,13 +363,13 @@ class Hand(Kind):
     async def activate(self) -> None:
         """Activate the gripper if it is not active. The fingers MOVE to their stops.
 
-        When cancelled, the activation goes on; :meth:`reset` ends it.
+        When cancelled, the activation continues; :meth:`reset` ends it.
 
         Raises:
             GripperFaultError: a fault is latched (see :meth:`recover`), or the activation ended in one.
-            NotActivatedError: the gripper was reset meanwhile.
+            NotActivatedError: the gripper was reset during the activation.
             ActivationTimeoutError: not finished within the activation timeout, or nothing but fault 0x05 for
-                5 s, as with a pressed emergency stop. The activation goes on.
+                5 s, as with a pressed emergency stop. The activation continues.
             RobotiqError: not possible now, or the link went down.
         """
         with self._naming:
@@ -376,8 +378,8 @@ class Hand(Kind):
     async def reset(self) -> None:
         """Reset the gripper (rACT = 0): this clears faults and lets go of the part. Returns in RESET.
 
-        It also ends an activation or a release under way. Awaited moves end with MoveSupersededError. When
-        cancelled, the reset goes on.
+        It also ends an activation or a release. Awaited moves end with MoveSupersededError. When
+        cancelled, the reset continues.
 
         Raises:
             StateTimeoutError: the gripper did not report the reset within 5 s.
@@ -390,7 +392,7 @@ class Hand(Kind):
         """Release automatically: all axes open slowly, whatever the fault. Only in FAULT.
 
         Returns in ATR_DONE. After that only :meth:`reset` and :meth:`activate`, or :meth:`recover`, help.
-        When cancelled, the release goes on.
+        When cancelled, the release continues.
 
         Raises:
             InvalidStateError: not in FAULT.
@@ -402,9 +404,9 @@ class Hand(Kind):
             await self._atr()
 
     async def recover(self, timeout: float | None = None) -> None:
-        """Do what the present fault needs, until the gripper is active again.
+        """Clear the present fault and make the gripper active again.
 
-        A minor or unknown fault, and an activation, reset or release under way, are waited for. After a major
+        A minor or unknown fault, and an activation, reset or release that runs, are waited for. After a major
         fault the gripper is reset and activated. So is a gripper that makes no progress for 5 s while it
         waits for its activation (0x05, as after an emergency stop) or releases, at most twice. A reset DROPS
         the part, and an activation MOVES the fingers. The ``timeout`` is for all of it; None for 90 s.
@@ -420,16 +422,16 @@ class Hand(Kind):
         with self._naming:
             await self._recover(limit)
 
-    # -- what the hand shows ---------------------------------------------------------------------------
+    # -- what can be read ------------------------------------------------------------------------------
 
     @property
     def name(self) -> str:
-        """What the log, errors and metrics call the hand: the name it was given, or else its address."""
+        """The hand's name in the log, errors and metrics: the one it was given, or else its address."""
         return self._given_name or self._address
 
     @property
     def address(self) -> str:
-        """The gripper's address in its full form; for a transport object, what messages call it."""
+        """The gripper's address in its full form; for a transport object, its name in messages."""
         return self._address
 
     @property
@@ -445,7 +447,7 @@ class Hand(Kind):
 
     @property
     def status(self) -> RobotiqStatus:
-        """The newest status, however old its timestamp says it is; NotStartedError before the first."""
+        """The newest status, however old by its timestamp; NotStartedError before the first."""
         if (status := self._newest_status) is not None:
             return status
         with self._naming:
@@ -453,7 +455,7 @@ class Hand(Kind):
 
     @property
     def part(self) -> Part | None:
-        """The part that is held, and how wide it is; None if the gripper reports none: ``status.part``.
+        """The part that is held, with its width; None if the gripper reports none: ``status.part``.
 
         Raises as :attr:`is_moving`, so that an old answer is never taken for a new one.
         """
@@ -471,7 +473,7 @@ class Hand(Kind):
 
     @property
     def is_moving(self) -> bool:
-        """Whether an axis moves, or will because of a command that does not act yet.
+        """Whether an axis moves, or will move by a command that does not act yet.
 
         Raises RobotiqError while that is not known: before the start, and when the link is down.
         """
@@ -512,11 +514,11 @@ class Hand(Kind):
         since: RobotiqStatus | None = None,
         slip: int = SLIP_COUNTS,
     ) -> Stream[GripEvent]:
-        """What happens to grips from now on: contacts gained and lost, parts that slip. None lost.
+        """Changes of grips from now on: contacts gained and lost, parts that slip. None lost.
 
-        For one reader; ends as :meth:`statuses` does. What happens while the link is down is reported when it
-        is back. The events follow what the gripper reports, and a contact latches: when a part is pulled out,
-        that shows once its finger closes further, by the manual only when you ask for more force.
+        For one reader; ends as :meth:`statuses` does. Changes while the link is down are reported when it
+        is back. The events follow the gripper's reports, and a contact latches: a part that is pulled out
+        is noticed once its finger closes further, by the manual only when the force is raised.
 
         Args:
             fingers: the axes that are watched.
@@ -536,7 +538,7 @@ class Hand(Kind):
 
         Raises:
             StateTimeoutError: not reached in time.
-            NotStartedError: the hand is not started, or was stopped meanwhile.
+            NotStartedError: the hand is not started, or was stopped.
             RobotiqConnectionError: the hand gave up on its link.
         """
         check_states(states)

@@ -1,5 +1,23 @@
 """GripWatch: derives grip events from statuses."""
 
+# Theory of operation
+#
+# Each watched axis has a grip (_Grip) or none. see() alone changes that, from one status to the next:
+#
+#   none              the axis reports a contact                                   GAINED, in contact
+#   in contact        it has moved further than a slip                             SLIPPED; slipping while it
+#                                                                                  reports no contact
+#   slipping          it reports the same contact again                            GAINED, in contact
+#   either of both    the contact is gone, and the axis does not move under        RELEASED or LOST, none;
+#                     a request beyond it                                          then perhaps GAINED
+#
+# RELEASED needs a proof: an active gripper with gGTO = 1 and no serious fault follows a request that is not
+# beyond the contact. Besides, an earlier one was, or the axis has left the part. All else is LOST.
+#
+# Three things in a status mislead. gDT may trail the echo: a released axis moves before its contact ends,
+# and that is no slip. A contact latches: a part that is taken out is noticed once its finger moves. Fault
+# 0x09 may pass in a second (PassingFault); until then the status is judged without it.
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -26,11 +44,11 @@ class _Grip:
     """The contact of one axis.
 
     Attributes:
-        contact: while closing, or while opening.
+        contact: its kind, while closing or while opening.
         touched: the position at which it was made.
-        position: the same, or where the axis has slipped to since.
+        position: the same, or the position to which the axis has slipped since.
         was_pressed: whether a request beyond it was ever echoed. Under simple control the echo of an axis may
-            say nothing, and then its contact cannot be seen to be released.
+            mean nothing, and then its contact cannot be seen to be released.
         is_slipping: whether the axis has moved on and reports no contact yet.
     """
 
@@ -52,8 +70,8 @@ class _Grip:
 class GripWatch:
     """Follows the grips of some axes from status to status.
 
-    A contact lasts until the gripper reports something else. An axis that tries again under the same request,
-    as it does for more force, moves for a moment: its contact ends only if it moves further than a slip.
+    A contact lasts until the gripper reports something else. When the force is raised, an axis in contact
+    moves briefly under the same request: its contact ends only if it moves further than a slip.
 
     Args:
         fingers: the axes.
@@ -118,7 +136,7 @@ class GripWatch:
         lets_go = not is_pressed and _follows_requests(status)
         moved = status.position(axis) - grip.position
         if is_touching or (is_pressed and _moves(axis, status)):
-            # gDT may trail the echo: an axis that was asked to let go moves before its contact ends.
+            # gDT may trail the echo: an axis that a request releases moves before its contact ends.
             is_leaving = lets_go and grip.was_pressed
             if grip.is_slipping or is_leaving or abs(moved) <= self._slip:
                 return []
@@ -145,7 +163,7 @@ def _contact(axis: Finger, status: RobotiqStatus) -> ObjectStatus | None:
 
 
 def _moves(axis: Finger, status: RobotiqStatus) -> bool:
-    """Whether an axis moves. In a fault it shows motion and is at rest."""
+    """Whether an axis moves. In a fault it reports motion and is at rest."""
     return axis in status.moving and not status.fault.is_serious
 
 

@@ -1,4 +1,4 @@
-"""Kind: what each kind of hand supplies, and what the calls of all of them share."""
+"""Kind: the parts that each kind of hand supplies, and those that all share."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ T = TypeVar("T")
 
 
 class Kind(ABC):
-    """The inside of a hand; :class:`~robotiq_async.hand.Hand` has its calls, and says how to add a kind."""
+    """The inside of a hand; :class:`~robotiq_async.hand.Hand` has its calls, and the steps for a new kind."""
 
     _session: Run | None = None
     """The present run, or the last one; None before the first start."""
@@ -63,7 +63,7 @@ class Kind(ABC):
 
     @abstractmethod
     def _is_moving(self) -> bool:
-        """Whether an axis moves or will move; only asked while that is known."""
+        """Whether an axis moves or will move; only called while that is known."""
 
     @abstractmethod
     async def _start(self, activate: bool, wait: float) -> None: ...

@@ -1,5 +1,22 @@
 """RobotiqHand: the hand that owns the link to its gripper."""
 
+# Theory of operation
+#
+# A session lives from start() to the end of stop(). The hand makes requests of its controller and waits; it
+# changes no state itself. The state machine does, from the statuses that the poller reads.
+#
+#   set_position, set_speed, set_force, hold, halt     answered(): acknowledged; a halt is seen to stop
+#   command                                            ask(): no answer
+#   move                                               moving(): a MoveResult; its end holds what still moves
+#   activate, reset, atr                               activated(), reach(): a state, in limited time
+#
+# _asked() is the gate of all of them: no request passes before start(), after stop(), or from another loop.
+# A failed or cancelled start stops the session, and writes only if it has begun to write.
+#
+# recover() is a loop of steps. RESET is activated, ATR_DONE and a known major fault are reset, and in any
+# other state the next status decides. After a step without progress (StallWatch) the gripper is reset, RESETS
+# times at most. A lost link, and an error of a step, end it.
+
 from __future__ import annotations
 
 import inspect
@@ -57,8 +74,8 @@ class RobotiqHand(Hand):
     Use it as ``async with RobotiqHand(address) as hand:``, or call :meth:`start` and :meth:`stop`. One task
     polls the gripper; every call hands its request to that task and never blocks the loop. The calls may come
     from any task of the loop in which the hand was started. From another thread or another loop every call
-    raises RuntimeError, which says what to do instead, and asks nothing of the gripper. See
-    :class:`~robotiq_async.hand.Hand` for what all hands promise.
+    raises RuntimeError, which has the remedy, and sends nothing. See
+    :class:`~robotiq_async.hand.Hand` for the promises of all hands.
 
     Making a hand checks every option; it opens nothing and needs no running loop.
 
@@ -71,16 +88,16 @@ class RobotiqHand(Hand):
     Args:
         address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``rtu+tcp://HOST:PORT``
             (a serial line behind a socket), ``urcap://HOST[:63352]`` (a UR with Robotiq's URCap, for a jaw:
-            it tells no currents), ``sim://`` (or ``sim://?speedup=10&object=150``), or a transport object.
-            Without one the gripper is simulated, and the first start logs a warning that says so. A serial
-            port sends at 115200 baud, 8N1, unless the address ends in
-            ``?baud=500000``, ``&parity=E`` or ``&stopbits=2``.
-        name: what to call this hand, in 1..64 printable characters: errors and the log begin with it, and
+            it carries no currents), ``sim://`` (or ``sim://?speedup=10&object=150``), or a transport object.
+            Without one the gripper is simulated, and the first start logs a warning of that. A serial port
+            sends at 115200 baud, 8N1, unless the address ends in ``?baud=500000``, ``&parity=E`` or
+            ``&stopbits=2``.
+        name: name of this hand, 1..64 printable characters: errors and the log begin with it, and
             metrics and recordings carry it. None calls it by its address.
         device_id: Modbus unit id, 0..255 over TCP and 1..247 over RTU; by default 2 over TCP and 9 over
             RTU, of a jaw 9 on either. Two hands on one TCP address need one each: that of their gripper
-            behind the gateway. Over ``urcap://`` which of several grippers it is (SID), 1..247; by default
-            the one that the URCap has. The other options of Modbus are refused there.
+            behind the gateway. Over ``urcap://`` the number of one of several grippers (SID), 1..247; by
+            default the one that the URCap has. The other options of Modbus are refused there.
         read_function: Modbus function that reads the status, 3 or 4; by default 4 over TCP and 3 over
             RTU, of a jaw 3 on either.
         write_function: Modbus function that writes the request, 16 or 23; by default 16, and over RTU to a
@@ -90,34 +107,34 @@ class RobotiqHand(Hand):
             write may take longer than the default; the next poll follows at once then, and no poll counts as
             missed.
         write_spacing: seconds from sending a write to the next one, 0..0.1; 0.005 unless given for a jaw.
-            Requests made meanwhile are merged. A gripper may lose writes that come sooner (3-Finger manual of
-            2014: 10 ms; manual of the 2F-85: 5 ms); pass 0 for one that does not. A stop and a halt do not
-            wait.
+            Requests made in that time are merged. A gripper may lose writes that come sooner (3-Finger
+            manual of 2014: 10 ms; manual of the 2F-85: 5 ms); pass 0 for one that does not. A stop and a
+            halt do not wait.
         connect_timeout: seconds for opening the link, 0.01..5.
         response_timeout: seconds for one answer, 0.005..5. A write fails within twice that, and over RTU,
-            where a read may be asked again, within 0.15 s more (three times that if it is above 0.4).
+            where a read may be sent again, within 0.15 s more (three times that if it is above 0.4).
             :meth:`stop` ends within 2 s whatever it is; but a gripper that takes longer than 0.4 s to
             answer may not have confirmed by then that the fingers were stopped, and the log says so.
         activation_timeout: seconds for an activation, 0.01..120.
         reconnect: whether a lost link is opened again, or a :class:`ReconnectPolicy`.
-        speed: what the axes get until set otherwise, 0..255.
-        force: what the axes get until set otherwise, 0..255.
+        speed: speed of the axes until another is set, 0..255.
+        force: force of the axes until another is set, 0..255.
         request_address: first request register; by default 0 over TCP and 0x03E8 over RTU and of a jaw.
         status_address: first status register; by default 0 over TCP and 0x07D0 over RTU and of a jaw.
-        calibration: how fast this gripper is: default timeouts of moves come from it, and the speeds of
-            :attr:`units`. None for the thesis's gripper.
-        force_calibration: what :attr:`units` labels force values with. None for the manual's figures.
+        calibration: speeds of this gripper, for default timeouts of moves and for :attr:`units`. None for the
+            thesis's gripper.
+        force_calibration: labels of force values in :attr:`units`. None for the manual's figures.
         stroke: points that were measured on this gripper, from open to closed: two or more pairs of a
             position in counts and an opening in millimetres, or the path of a file that
             ``robotiq-async measure stroke`` wrote, which is read when the hand is made. Millimetres and
             fractions of this hand, and of its statuses and results, follow them. None for the nominal
             openings of the model.
-        keep_grip: what :meth:`stop` does by default, and leaving the block does always: False stops the
+        keep_grip: default of :meth:`stop`, and always in force when the block is left: False stops the
             fingers for certain (rGTO = 0), True holds axes that move and keeps a grip in force. A gripper
             that is not polled afterwards may lose its activation, and with it the grip.
         model: a :class:`Model`, or its name: ``3f``, ``2f85``, ``2f140``, ``hand-e``. None for the model that
-            the address names (``rtu:///dev/ttyUSB0?model=2f85``), and else the 3-Finger. A gripper whose
-            registers show another one is refused.
+            the address names (``rtu:///dev/ttyUSB0?model=2f85``), and else the 3-Finger. A gripper with
+            the registers of another model is refused.
 
     Raises:
         TypeError: an option of the wrong type.
@@ -196,7 +213,7 @@ class RobotiqHand(Hand):
             if activate:
                 await session.activated()
         except NotStartedError:
-            await session.ended()  # stop() was called meanwhile, and with its own arguments
+            await session.ended()  # stop() was called, and with its own arguments
             raise
         except BaseException:
             await self.stop(halt=session.counters.has_begun_to_write)  # else another client moves the fingers
@@ -316,7 +333,7 @@ class RobotiqHand(Hand):
         self._options.log.warning("%s for %g s; it is reset and activated", what, STALLED_S)
 
     async def _reset_until_shown(self, resets: int = 0) -> int:
-        """Reset, and again if the gripper does not show it; return the number of resets so far.
+        """Reset, and again if the gripper does not report it; return the number of resets so far.
 
         After an emergency stop a reset helps only sometimes (one report, of a two-finger gripper).
         """
@@ -339,7 +356,7 @@ class RobotiqHand(Hand):
         elif state is State.DISCONNECTED:
             raise session.link_lost()
         else:
-            # A minor or unknown fault, or a sequence under way: the next status may tell more.
+            # A minor or unknown fault, or a sequence that runs: the next status may decide.
             await session.next_status()
 
     @property
@@ -348,7 +365,7 @@ class RobotiqHand(Hand):
         fault = self.status.fault
         return fault.severity is Severity.MAJOR and fault.is_known
 
-    # -- what the hand shows ---------------------------------------------------------------------------
+    # -- what can be read ------------------------------------------------------------------------------
 
     @property
     def state(self) -> State:
@@ -385,11 +402,11 @@ class RobotiqHand(Hand):
         """Call a plain function with every status, change of state and request written, as it happens.
 
         It is called in the hand's event loop, in the turn in which it happens: before any reader of a stream
-        and any awaiting caller goes on. Every poll waits for it, so it must be quick and must not block.
+        and any awaiting caller continues. Every poll waits for it, so it must be quick and must not block.
         Calls come in order: a change of state before the status or the request that leads to it, and what the
-        callback itself brings about after the present item.
+        callback itself causes after the present item.
 
-        A callback that raises is logged with its traceback and not called again; the hand goes on. One that
+        A callback that raises is logged with its traceback and not called again; the hand runs on. One that
         is added before the start waits for it, and it outlasts :meth:`stop`, until you remove it.
 
         Args:

@@ -1,4 +1,4 @@
-"""What hands of any kind use: a run, from a start to the next stop, and a name for the errors of calls."""
+"""Parts of any kind of hand: a run, from a start to the next stop, and a name for the errors of calls."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..values.errors import RobotiqError
 
 
 class Run(Protocol):
-    """What the hand needs of its present run, from a start to the next stop."""
+    """The present run of a hand, from a start to the next stop."""
 
     is_over: bool
 
@@ -17,7 +17,7 @@ class Run(Protocol):
         """Whether the event loop was closed before the stop."""
 
     def check_running(self) -> None:
-        """Raise NotStartedError, or why the link was given up, if the run has ended."""
+        """Raise NotStartedError, or the error that ended the link, if the run has ended."""
 
     def check_loop(self, what: str) -> None:
         """Raise RuntimeError if called outside the event loop of the run."""
@@ -44,7 +44,7 @@ class NamesErrors:
 
 
 def refuse_copy(hand: object) -> NoReturn:
-    """Say why a hand is neither pickled nor copied.
+    """Refuse to pickle or copy a hand.
 
     Raises:
         TypeError: always.
@@ -56,7 +56,7 @@ def refuse_copy(hand: object) -> NoReturn:
 
 
 def refuse_with(hand: object) -> None:
-    """Say what to use in place of ``with`` on an async hand.
+    """Refuse ``with`` on an async hand, and name its replacement.
 
     Raises:
         TypeError: always.
