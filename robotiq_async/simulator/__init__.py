@@ -1,17 +1,17 @@
 """A simulated gripper, and servers that put it on a wire.
 
 ==============  ===========================================================================
-room            what it holds
+room            contents
 ==============  ===========================================================================
 ``physics``     :class:`SimulatedGripper`: axes, contacts, faults, power, and the words it reports;
-                :class:`Habits`: how it does what the manual leaves open
+                :class:`Habits`: choices that the manual leaves open
 ``mechanics``   :class:`Physics`: bodies and contacts that move the axes in its place (extra ``physics``)
 ``server``      :class:`SimulatorServer` (Modbus TCP), :class:`SerialSimulatorServer` (Modbus RTU),
                 :class:`RtuOverTcpSimulatorServer` (Modbus RTU behind a serial server),
                 :class:`UrcapSimulatorServer` (the text port of a UR's URCap)
-``troubles``    what can go wrong, as data and as words: :class:`Trouble`, :func:`parse_troubles`;
+``troubles``    failures, as data and as text: :class:`Trouble`, :func:`parse_troubles`;
                 :class:`FaultInjector`, ``server.fault_injector``, makes it happen;
-                :func:`own_habits` and :func:`like_hardware`: what real grippers do
+                :func:`own_habits` and :func:`like_hardware`: those of real grippers
 ``functions``   the Modbus functions that are served
 ==============  ===========================================================================
 

@@ -1,1 +1,1 @@
-"""Bodies, contacts and motors: what :class:`Physics` computes with MuJoCo (extra ``physics``)."""
+"""Bodies, contacts and motors: :class:`Physics` computes them with MuJoCo (extra ``physics``)."""

@@ -1,4 +1,4 @@
-"""The gripper alone: how far it reaches, and what its pads move when a motor does. No forces, no time."""
+"""The gripper alone: its reach, and the motion of its pads by each motor. No forces, no time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from robotiq_async.values.enums import Finger
 
 _GRID: Final = 48
-"""Places from open to closed at which a motion is looked at."""
+"""Positions from open to closed at which a motion is sampled."""
 
 
 def pads(model: Any) -> list[int]:
@@ -21,7 +21,7 @@ def pads(model: Any) -> list[int]:
 
 @cache
 def reach(text: str) -> float:
-    """The farthest that a fingertip comes from the mounting face, in metres."""
+    """The greatest distance of a fingertip from the mounting face, in metres."""
     model = mujoco.MjModel.from_xml_string(text)
     data, most = mujoco.MjData(model), 0.0
     for share in np.linspace(0, 1, _GRID):
@@ -43,9 +43,9 @@ def _half(model: Any, geom: int) -> Any:
 
 @cache
 def levers_of(text: str, axis: Finger) -> tuple[Any, Any]:
-    """Values of an axis, and for each what all pads move by a small motion of it.
+    """Values of an axis, and for each the motion of all pads by a small motion of it.
 
-    By this newtons at the pads become the force of the motor.
+    They convert newtons at the pads to the force of the motor.
     """
     model = mujoco.MjModel.from_xml_string(text)
     data, index = mujoco.MjData(model), model.actuator(str(axis.name)).id
@@ -66,7 +66,7 @@ def levers_of(text: str, axis: Finger) -> tuple[Any, Any]:
 
 
 def put_at(model: Any, data: Any, drives: Iterable[int], share: float) -> None:
-    """Put the joints where free drives have them at a share of their ranges."""
+    """Move the joints to their places with free drives at a share of their ranges."""
     for index in drives:
         low, high = model.actuator_ctrlrange[index]
         value, target = low + (high - low) * share, model.actuator_trnid[index][0]

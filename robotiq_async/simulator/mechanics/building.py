@@ -1,4 +1,4 @@
-"""Makes what MuJoCo compiles: the packaged gripper above a table, or in a world of the user's own."""
+"""Makes the model that MuJoCo compiles: the packaged gripper above a table, or in a user's world."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _TIMESTEP: Final = 0.002
 _CLEARANCE: Final = 0.006
-"""Between the table and the lowest point that the fingertips reach, in metres."""
+"""Distance in metres between the table and the lowest point that the fingertips reach."""
 _FRICTION: Final = (0.6, 0.005, 0.0001)
 _MOUNT: Final = (30_000.0, 1500.0)
 """Stiffness and damping of the mount."""
@@ -107,6 +107,6 @@ def _add_part(spec: Any, part: Part, height: float) -> None:
     if part.at is not None:
         weld = spec.add_equality(type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY)
         weld.name1, weld.name2 = "part", "world"
-        weld.data = np.array([0] * 10 + [1, 0], dtype=float)  # where it is now
+        weld.data = np.array([0] * 10 + [1, 0], dtype=float)  # at its present place
         # A hand gives way: the fingers may push the part into their middle.
         weld.solref = [-5000.0, -150.0]

@@ -1,12 +1,12 @@
-"""One motor: follows a reference with the speed and the force that registers ask for, and judges what it met.
+"""One motor: follows a reference with the speed and the force of the registers, and judges contacts.
 
 A motor is a position servo whose reference moves at the speed of the request, never farther ahead of the axis
 than its force reaches. So a blocked axis pushes with its force and no more, and does not jump when the part
 goes. Its gears lock themselves: what pushes an axis back meets more than the force of the request.
 
 It reports a contact when it has rested for 50 ms before its target (``axis.PRESSING``). A jaw that moves on
-after that, because the part slips or is taken away, is in motion again: the manual of the 2F says that its
-object status tells a lost part. A finger of the 3-Finger locks where it met the part, and its status stays.
+after that, because the part slips or is taken away, is in motion again: by the manual of the 2F its object
+status reports a lost part. A finger of the 3-Finger locks where it met the part, and its status stays.
 """
 
 from __future__ import annotations
@@ -47,9 +47,9 @@ class MotorDrive:
 
     Attributes:
         index: of its actuator in the world.
-        position: where the axis is.
+        position: of the axis.
         travel: the distance that it has travelled.
-        outcome: what became of the last goal.
+        outcome: of the last goal.
         clears: parts are out of the way while it goes to its goal.
     """
 
@@ -84,7 +84,7 @@ class MotorDrive:
 
     @property
     def share(self) -> float:
-        """Where it is between the ends of its actuator, 0..1."""
+        """Its place between the ends of its actuator, 0..1."""
         low, high = float(self._values[0]), float(self._values[-1])
         return (self._zero + self._scale * self.position - low) / (high - low)
 
@@ -94,7 +94,7 @@ class MotorDrive:
 
     @property
     def is_still(self) -> bool:
-        """Whether it has rested for a while, and nothing is asked of it."""
+        """Whether it has rested for a while, and has no goal."""
         return not self._is_going and self._rested > _STILL_S
 
     @property
@@ -137,7 +137,7 @@ class MotorDrive:
         moved = min(max(way, -self._rate * step_s), self._rate * step_s)
         lead = _LEAD * limit / self._stiffness + back + 2 * self._rate * step_s
         self._reference = min(max(self._reference + moved, self.position - lead), self.position + lead)
-        # What damping would cost of the speed.
+        # Makes up for the speed that damping costs.
         ahead = self._damping * self._scale * moved / step_s / self._gain
         return self._value(self._reference) + ahead, limit + self._stiffness * back
 
@@ -166,7 +166,7 @@ class MotorDrive:
 
     @property
     def _stiffness(self) -> float:
-        """Force of the servo by a count."""
+        """Force of the servo for each count."""
         return self._gain * abs(self._scale)
 
     def _lock(self, *, presses: bool) -> None:
@@ -177,7 +177,7 @@ class MotorDrive:
         self._is_locked = True
 
     def see(self, value: float, step_s: float) -> None:
-        """Take where the axis is after a step, and judge."""
+        """Take the position of the axis after a step, and judge it."""
         position = (value - self._zero) / self._scale
         if abs(position - self._counted_at) >= _TREMBLING:
             self.travel += abs(position - self._counted_at)

@@ -23,12 +23,12 @@ _SLACK: Final = 1e-9
 
 
 class Physics:
-    """What a gripper and the parts before it do, by MuJoCo (extra ``physics``).
+    """Motion of a gripper and of the parts before it, by MuJoCo (extra ``physics``).
 
     Hand it to one :class:`SimulatedGripper`. Registers, habits, troubles and timing are the gripper's own;
-    motions and contacts come from bodies. Without ``threaded`` every look at the gripper makes the steps that
+    motions and contacts come from bodies. Without ``threaded`` every read of the gripper makes the steps that
     are due: the same clock gives the same result to the last bit. With it a thread steps in real time, and a
-    look only takes what is there: for servers, whose event loop must not wait.
+    read only takes the present state: for servers, as their event loop must not wait.
 
     Nothing of the bodies was measured on a gripper: ``tools/description`` has the source of each dimension.
     """
@@ -39,12 +39,12 @@ class Physics:
         *,
         threaded: bool = False,
     ) -> None:
-        """A world that is made when it gets its gripper.
+        """Describe a world, which is made when it gets its gripper.
 
         Args:
             scene: ``table``; a part on it, ``box:40x60x80,0.3``, ``cylinder:50x90,0.2``, ``rod:40x120,0.2``
-                or ``sphere:60,0.1`` in millimetres and kilograms; with ``@100`` somebody holds the part 100
-                mm from the mounting face until the gripper does; or the path of an MJCF with a site
+                or ``sphere:60,0.1`` in millimetres and kilograms; with ``@100`` the part is held 100 mm
+                from the mounting face until the gripper holds it; or the path of an MJCF with a site
                 ``gripper``.
             threaded: whether a thread steps it. It keeps to the gripper's speedup where the machine can.
 
@@ -83,7 +83,7 @@ class Physics:
 
     @property
     def time(self) -> float:
-        """How far it has come, in simulated seconds."""
+        """The time it has reached, in simulated seconds."""
         return self._made.time if self._run is None else self._until
 
     def drive(self, axis: Finger) -> LockedDrive:
@@ -100,10 +100,10 @@ class Physics:
         self._made.step()
         return True
 
-    # -- what a person does to the scene -----------------------------------------------------------------
+    # -- changes to the scene ----------------------------------------------------------------------------
 
     def lift(self, millimetres: float) -> None:
-        """Raise the gripper so far above where it began, at 100 mm/s; not in a scene of your own."""
+        """Raise the gripper to a height above its first place, at 100 mm/s; not in a scene of your own."""
         with self._lock:
             self._made.lift(millimetres)
 
@@ -113,7 +113,7 @@ class Physics:
             self._made.take_away()
 
     def put_back(self) -> None:
-        """Put the parts where they were at first."""
+        """Put the parts back to their first places."""
         with self._lock:
             self._made.put_back()
 
@@ -125,13 +125,13 @@ class Physics:
 
     @property
     def grip_force(self) -> float:
-        """The largest force between a pad and what it touches, in newtons."""
+        """The largest force of a pad on its contacts, in newtons."""
         with self._lock:
             return self._made.grip_force()
 
     @property
     def opening_mm(self) -> float:
-        """Between the faces of the first two pads, in millimetres."""
+        """Distance between the faces of the first two pads, in millimetres."""
         with self._lock:
             return self._made.opening_mm()
 
@@ -182,7 +182,7 @@ class _Run:
     """Steps a world in real time, in a thread.
 
     Attributes:
-        steps: how many it has made.
+        steps: number of steps it has made.
     """
 
     def __init__(
@@ -195,14 +195,14 @@ class _Run:
         self._speedup = speedup
 
     def while_wanted(self, owner: weakref.ref[Physics]) -> None:
-        """Until nobody has the physics any more."""
+        """Run until the physics has no owner any more."""
         began, let_go = self._clock(), 0.0
         while owner() is not None:
             let_go += self._catch_up((self._clock() - began) * self._speedup - let_go)
             time.sleep(_WAKES_S)
 
     def _catch_up(self, due: float) -> float:
-        """Make the steps that are due; returns how many seconds were let go."""
+        """Make the steps that are due; return the seconds that were let go."""
         late = max(due - self._world.time - _LATE_S * self._speedup, 0.0)
         due -= late
         while self._world.time + self._world.step_s <= due:

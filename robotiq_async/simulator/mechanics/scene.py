@@ -1,4 +1,4 @@
-"""What stands before the gripper, in words: ``box:40x60x80,0.3``, ``table`` or the path of an MJCF."""
+"""The scene before the gripper, as text: ``box:40x60x80,0.3``, ``table`` or the path of an MJCF."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Part:
             "rod" (diameter, length; it lies across the fingers) or "sphere" (diameter).
         size: its lengths in millimetres.
         mass: in kilograms.
-        at: None for a part that stands on the table. Else somebody holds it, with its middle so many
-            millimetres from the mounting face of the gripper, until the gripper holds it.
+        at: None for a part that stands on the table. Else it is held, with its middle so many millimetres
+            from the mounting face of the gripper, until the gripper holds it.
     """
 
     kind: str
@@ -37,7 +37,7 @@ class Part:
 
     @property
     def height(self) -> float:
-        """Of the part as it lies, in millimetres."""
+        """The height of the part as it lies, in millimetres."""
         return self.size[0] if self.kind == "rod" else self.size[-1]
 
 

@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 _LIFTING: Final = 0.1
 """Speed of the mount, in m/s: slow for an arm."""
 _FAR: Final = 100.0
-"""Where a part is that was taken away, in metres above."""
+"""Height in metres of a part that was taken away."""
 
 
 class World:
-    """A gripper and what is around it.
+    """A gripper and its surroundings.
 
     Attributes:
         drives: the motor of each axis.
@@ -70,11 +70,11 @@ class World:
             if self._model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
         ]
         self._sleeps = is_ours and not self._parts
-        """Nothing moves while the motors rest: no part, and no world of others."""
+        """Whether nothing moves while the motors rest: no part, and not a user's world."""
         self._collides = self._model.geom_contype.copy(), self._model.geom_conaffinity.copy()
         welds = np.flatnonzero(self._model.eq_type == mujoco.mjtEq.mjEQ_WELD)
         self._hands: list[int] = [int(each) for each in welds] if is_ours else []
-        """The hands that hold a part: constraints that end when the gripper holds it."""
+        """Supports that hold a part: constraints that end when the gripper holds it."""
         self.step_s: float = self._model.opt.timestep
 
     @property
@@ -104,7 +104,7 @@ class World:
             self._let_go()
 
     def lift(self, millimetres: float) -> None:
-        """Raise the gripper to so many millimetres above where it began; it takes its time."""
+        """Begin to raise the gripper to so many millimetres above its first place."""
         self._height = millimetres / 1000
 
     def take_away(self) -> None:
@@ -112,7 +112,7 @@ class World:
         self._is_taken = True
 
     def put_back(self) -> None:
-        """Put the parts where they were at first."""
+        """Put the parts back to their first places."""
         self._is_taken = False
         self._put()
 
@@ -125,7 +125,7 @@ class World:
         return x, y, z
 
     def grip_force(self) -> float:
-        """The force between the pads and whatever they touch, in newtons: of the pad with the largest."""
+        """The force of the pads on their contacts, in newtons: of the pad with the largest."""
         forces: dict[int, float] = {}
         found = np.zeros(6)
         for number in range(self._data.ncon):
@@ -137,7 +137,7 @@ class World:
         return max(forces.values(), default=0.0)
 
     def opening_mm(self) -> float:
-        """Between the faces of the two pads of a jaw, or the first two of a 3-Finger, in millimetres."""
+        """Distance between the pads of a jaw, or the first two of a 3-Finger, in millimetres."""
         one, other = pads(self._model)[:2]
         apart = np.linalg.norm(self._data.geom_xpos[one] - self._data.geom_xpos[other])
         thick = min(self._model.geom_size[one]) + min(self._model.geom_size[other])

@@ -1,7 +1,7 @@
 """One motorised axis: straight lines in time, mechanical stops and obstacles.
 
-An axis never integrates in steps. It keeps where and when its present motion began, how fast it is and where
-it ends; everything else is computed. So the result does not depend on how often it is read.
+An axis never integrates in steps. It keeps the place and time at which its present motion began, its speed
+and its end; everything else is computed. So the result does not depend on how often it is read.
 """
 
 from __future__ import annotations
@@ -20,16 +20,15 @@ PRESSING: Final = 0.05
 """Seconds for which an axis presses, still reported as motion, before it reports the contact. No source gives
 this time; it is ten polls."""
 
-# What the motor of an axis draws, in counts of 10 mA.
+# The current of an axis's motor, in counts of 10 mA.
 #
 # Published are the frames of the manual's worked grasp: at full speed A, B and C close with 0x0F, 0x10 and
 # 0x0F and open with 0x0B, 0x0E and 0x0B; at rest they draw nothing, be they open or holding something with
 # full force, for they lock themselves.
 #
-# The rest is made up to fit: what a slower motion draws, the scissor (taken for finger A), and the peak of a
-# contact. Of the peak the manual says that the force fixes the highest current of a motion, and the thesis
-# (figures 13 to 15, without numbers) that it grows with the force, at once on something rigid and bit by bit
-# in foam.
+# The rest is made up to fit: the current of a slower motion, the scissor (taken for finger A), and the peak
+# of a contact. By the manual the force fixes the highest current of a motion; by the thesis (figures 13 to
+# 15, without numbers) the peak grows with the force, at once on something rigid and bit by bit in foam.
 _SHARE_OF_FRICTION: Final = 0.5
 # Above what the fastest motion draws, or it would stop itself; three fingers at once stay within the 1.5 A
 # that the manual lets the whole gripper take.
@@ -55,19 +54,19 @@ class Motor(NamedTuple):
 
 
 MOTORS: Final = (Motor(15, 11), Motor(16, 14), Motor(15, 11), Motor(15, 11))
-"""Of A, B, C and the scissor."""
+"""The motors of A, B, C and the scissor."""
 
 
 def peak(force: int) -> float:
-    """What a motor draws when its axis stops at something: the most that the force, 0..255, lets it draw."""
+    """Current when the axis stops at something: the most that the force, 0..255, allows."""
     return _WEAKEST_PEAK + (_STRONGEST_PEAK - _WEAKEST_PEAK) * force / 255
 
 
 class Goal(NamedTuple):
-    """Where an axis goes, how fast and with what force, in counts.
+    """The target of an axis with its speed and force, in counts.
 
     Attributes:
-        position: where to.
+        position: the target.
         speed: 0..255.
         force: 0..255.
         is_reading: the axis ends exactly at the position, without the spread of a request.
@@ -116,10 +115,10 @@ class Axis:
     not decrease and never skip :attr:`ends_at`; call :meth:`arrive` at that time.
 
     Attributes:
-        low: where the opening motion ends, in counts.
-        high: where the closing motion ends, in counts; :meth:`confine` changes it.
-        status: what gDT says about the axis while gGTO = 1.
-        ends_at: when the present motion ends; infinite at rest.
+        low: the end of the opening motion, in counts.
+        high: the end of the closing motion, in counts; :meth:`confine` changes it.
+        status: gDT of the axis while gGTO = 1.
+        ends_at: the time at which the present motion ends; infinite at rest.
         in_closing: the obstacle met while closing, if there is one.
         in_opening: the obstacle met while opening, if there is one.
     """
@@ -163,7 +162,7 @@ class Axis:
 
     @property
     def target(self) -> int:
-        """Where the axis is driven to, in counts within its stops; at rest without a goal, where it is."""
+        """The target of the axis in counts, within its stops; at rest without a goal, its position."""
         return round(self._origin) if self._goal is None else self.within_stops(self._goal.position)
 
     def position(self, time: float) -> float:
@@ -221,7 +220,7 @@ class Axis:
             self._plan(time)
 
     def look_again(self, time: float) -> None:
-        """Plan anew because obstacles have changed. An axis at rest ignores that: a contact latches."""
+        """Plan the motion again after obstacles have changed. An axis at rest does not: a contact latches."""
         if self.is_moving:
             self._plan(time)
 
@@ -286,7 +285,7 @@ class Axis:
         )
 
     def _pressed(self, time: float) -> float:
-        """How far the axis has been pressed into what stops it, from 0 to 1."""
+        """The share of its way into the obstacle that the axis has been pressed, 0..1."""
         _, outcome, surface = path = self._path
         if not outcome.is_contact:
             return 0.0

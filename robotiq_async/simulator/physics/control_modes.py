@@ -1,6 +1,6 @@
-"""What a request asks of the axes, and the fixed sequences: activation, mode change, automatic release.
+"""The goals of the axes under a request, and the fixed sequences: activation, mode change, automatic release.
 
-All of it is data: a :data:`Goals` tuple says where each axis goes, a sequence is a tuple of them.
+All of it is data: a :data:`Goals` tuple has the target of each axis, a sequence is a tuple of them.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ if TYPE_CHECKING:
 
 
 Goals = tuple[Goal | None, ...]
-"""Where A, B, C and the scissor go; None for an axis at rest."""
+"""Goals of A, B, C and the scissor; None for an axis at rest."""
 
 SCISSOR_LOW: Final = 15
 """Scissor reading when it is open: two drivers use 15..232."""
 SCISSOR_HIGH: Final = 232
 """Scissor reading when the scissor mode has closed it, its closing stop (manual)."""
 PINCH_CLOSED_READING: Final = 113
-"""Where a finger of the pinch mode is fully closed (manual)."""
+"""Reading of a fully closed finger in the pinch mode (manual)."""
 MODE_POSITION: Final = {Mode.BASIC: 137, Mode.PINCH: 219, Mode.WIDE: 24, Mode.SCISSOR: SCISSOR_LOW}
 """Scissor reading of each mode (manual). The scissor mode begins with the open scissor (TAMS)."""
 
-# No source says how fast or strong the gripper moves on its own; full speed keeps the waits short.
+# No source gives the speed and force of the gripper's own motions; full speed keeps the waits short.
 _SEQUENCE_SPEED: Final = SPEED_MAX
 _SEQUENCE_FORCE: Final = 128
 _RELEASE_SPEED: Final = SPEED_MIN
@@ -52,12 +52,12 @@ def check_scissor_limit(limit: tuple[int, int]) -> tuple[int, int]:
 
 
 def finger_limit(mode: Mode | None) -> int | None:
-    """Where a mode stops the fingers, None for nowhere; no mode while the scissor has its own registers."""
+    """The reading at which a mode stops the fingers, or None; no mode while the scissor has registers."""
     return PINCH_CLOSED_READING if mode is Mode.PINCH else None
 
 
 def requested(request: Request, readings: Sequence[int]) -> Goals:
-    """What a request asks of the axes while rGTO = 1.
+    """The goals of the axes under a request while rGTO = 1.
 
     Simple control (rICF = 0, rICS = 0) lets A's registers drive all fingers, or in the scissor mode the
     scissor alone while the fingers stay at their readings, rICF = 1 or not (manual).
@@ -98,7 +98,7 @@ def mode_change(mode: Mode) -> tuple[Goals, ...]:
 
 
 def release(request: Request) -> tuple[Goals, ...]:
-    """Every axis opens slowly; a jaw closes if it is asked to."""
+    """Every axis opens slowly; a jaw closes if the request has that direction."""
     finger = Goal(OPEN if request.release_opens else CLOSED, _RELEASE_SPEED, _SEQUENCE_FORCE)
     return ((finger, finger, finger, Goal(WIDTH_WIDE, _RELEASE_SPEED, _SEQUENCE_FORCE)),)
 

@@ -4,6 +4,24 @@ It knows no clock. Its caller must call :meth:`Controller.update` at exactly :at
 before doing anything later; all times are simulated seconds.
 """
 
+# Theory of operation
+#
+# The state is the image in force, gIMC (progress) and the steps that are left of a sequence:
+#
+#   RESET           no steps: reset; with steps: the automatic release, whose fault is _release
+#   ACTIVATING      the steps of an activation; none: it failed (fault 0x0D), or an emergency stop ended it
+#   CHANGING_MODE   the steps of a mode change
+#   COMPLETE        no steps: the axes follow the image while rGTO = 1
+#
+# apply() takes an image, update() a due time; power, release and emergency stop have methods of their own.
+# Only _begin() and _finish() change progress. rACT = 0 resets from every state and clears the faults, but the
+# emergency stop outlasts it.
+#
+# _drive() then sends each axis the goal of the present step or of the image, and holds it without a goal or
+# in a fault. A step ends when every axis has arrived or touched something, in an activation not before half
+# of its time. A contact in an activation fails it. _note() keeps each change of gDT, because a status may
+# report it later than the rest (Habits.status_lag).
+
 from __future__ import annotations
 
 import math
@@ -84,9 +102,9 @@ class Controller:
         model: of the gripper.
         axes: in the order of the model.
         driven: the same if a mechanism moves them, and none otherwise.
-        habits: how it does what the manual leaves open.
+        habits: its choices that the manual leaves open.
         request: the image in force.
-        progress: what gIMC says.
+        progress: gIMC.
         faults: the faults that are present, apart from those that follow from the request and the progress.
         fail_activation: the next activation ends in fault 0x0D; reset to False when it does.
         is_asleep: the next image with rACT = 1 wakes the gripper, and moves nothing.
@@ -116,7 +134,7 @@ class Controller:
                 self._driven(mechanism, axis, motor, scissor_limit) for axis, motor in named
             )
         self._nothing = (ObjectStatus.IN_MOTION,) * len(model.axes)
-        """What gDT says when it says nothing: zeros."""
+        """gDT without a meaning: zeros."""
         self._nowhere: control.Goals = (None,) * len(model.axes)
         self.habits = habits
         self._at_rest = Request.from_registers(ZEROS, model)
@@ -128,7 +146,8 @@ class Controller:
         self._is_stopped = False
         """Whether the emergency stop is pressed."""
         self._resets_needed = 0
-        """After its end: one person reports, of a two-finger gripper, that a reset helps only sometimes."""
+        """Resets needed after an emergency stop: by one report, of a two-finger gripper, a reset helps only
+        sometimes."""
         self._release = Fault.NONE
         self._mode: Mode | None = None
         self._steps: deque[control.Goals] = deque()
@@ -142,7 +161,7 @@ class Controller:
         return min(self.faults.changes_at, step_ends, *(axis.ends_at for axis in self.axes))
 
     def update(self, time: float) -> None:
-        """Let happen what happens at this time, and drive the axes accordingly."""
+        """Apply the events of this time, and drive the axes accordingly."""
         for axis in self.axes:
             if axis.ends_at <= time:
                 axis.arrive()
@@ -167,7 +186,7 @@ class Controller:
         self._drive(time)
 
     def power_off(self, time: float) -> None:
-        """Forget the request and everything that came of it; the axes stay where they are."""
+        """Forget the request and its effects; the axes stay where they are."""
         self.request = self._obeyed = self._at_rest
         self.is_asleep = False
         self._resets_needed = 0
@@ -203,7 +222,7 @@ class Controller:
 
     @property
     def echoes(self) -> tuple[int, ...]:
-        """What gPR says of each axis: its own register, even where simple control drives it by another."""
+        """The gPR of each axis: its own register, even where simple control drives it by another."""
         positions = tuple(axis.position for axis in self.request.axes)
         if not self.model.has_modes:
             return positions
@@ -221,7 +240,7 @@ class Controller:
         return self._trail.at(time - self.habits.status_lag)
 
     def status_registers(self, time: float, fault: Fault) -> reg.Registers:
-        """What the gripper reports at a time, with a fault code.
+        """The status registers at a time, with a fault code.
 
         gDT and gSTA are 0 unless gIMC = 3. Without rGTO an axis in a contact or at its request keeps its gDT,
         unless the gripper has another habit; one that was stopped on its way reads 0. So gSTA = 0 then does
@@ -245,7 +264,7 @@ class Controller:
 
     @property
     def fault(self) -> Fault:
-        """What gFLT says: the release above all, then the worst fault, then a request that has to wait."""
+        """gFLT: the release above all, then the worst fault, then a request that has to wait."""
         if self._release is not Fault.NONE:
             return self._release
         if self._waiting is Fault.NONE:
@@ -311,7 +330,7 @@ class Controller:
             axis.clear(time)
 
     def _drive(self, time: float) -> None:
-        """Send every axis where it has to go now; steps of a sequence follow one another."""
+        """Send every axis to its present goal; steps of a sequence follow one another."""
         self._command(time, self._goals(time))
         while self._steps and self._is_done(self._steps[0]) and time >= self._step_lasts_until:
             self._end_step(time)
@@ -319,12 +338,12 @@ class Controller:
         self._note(time)
 
     def _begin_step(self, time: float) -> None:
-        """A step of an activation lasts as long wherever it begins."""
+        """Begin a step. One of an activation lasts as long wherever it begins."""
         half = self.habits.activation_time / 2 if self.progress is Initialization.ACTIVATING else 0.0
         self._step_lasts_until = time + half
 
     def _end_step(self, time: float) -> None:
-        """Go on to the next step; an activation that has met something ends in a fault."""
+        """Begin the next step; an activation that has met something ends in a fault."""
         self._steps.popleft()
         if self.progress is Initialization.ACTIVATING and any(axis.status.is_contact for axis in self.axes):
             self._steps.clear()
@@ -357,7 +376,7 @@ class Controller:
         return self.faults.stops_scissor if name is Finger.SCISSOR else self.faults.stops_fingers
 
     def _is_done(self, step: control.Goals) -> bool:
-        """Whether every axis of the step has arrived or touched something, and may go on."""
+        """Whether every axis of the step has arrived or touched something."""
         return all(
             goal is None or (axis.status is not ObjectStatus.IN_MOTION and not self._is_blocked(name))
             for name, axis, goal in zip(self.model.axes, self.axes, step, strict=True)

@@ -1,7 +1,7 @@
-"""An axis that a mechanism moves: where it is and what stops it comes from a simulation of bodies.
+"""An axis that a mechanism moves: its position and contacts come from a simulation of bodies.
 
 The registers, the firmware and their timing are as without one. A mechanism moves drives; an axis gives its
-drive goals, and reports what becomes of them.
+drive goals, and reports their outcomes.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ class Drive(Protocol):
     """One motor of a mechanism, in counts.
 
     Attributes:
-        position: where it is.
+        position: its present place.
         travel: the distance it has travelled, in both directions.
-        outcome: what became of the last goal: IN_MOTION until it rests.
+        outcome: of the last goal: IN_MOTION until it rests.
         is_pressing: whether it presses against something that it has not reported yet.
     """
 
@@ -49,7 +49,7 @@ class Drive(Protocol):
 
         Args:
             target: the position.
-            rate: how fast.
+            rate: the speed.
             force: of the register, 0..255.
             clears: parts are out of the way until it arrives.
         """
@@ -58,14 +58,14 @@ class Drive(Protocol):
         """Stop and stay, with the force it has."""
 
     def release(self) -> None:
-        """Stop, and let go of what is gripped."""
+        """Stop, and let go of the part."""
 
 
 class Mechanism(Protocol):
-    """What moves the axes of a gripper.
+    """The bodies that move the axes of a gripper.
 
     Attributes:
-        time: how far it has moved, in simulated seconds.
+        time: the time it has reached, in simulated seconds.
     """
 
     @property
@@ -77,13 +77,13 @@ class Mechanism(Protocol):
     def drive(self, axis: Finger) -> Drive: ...
 
     def step(self, until: float) -> bool:
-        """Make one step if that does not lead beyond a time, in simulated seconds; whether it did."""
+        """Make one step if that does not lead beyond a time, in simulated seconds; return whether it did."""
 
 
 class DrivenAxis(Axis):
-    """An axis without a plan: it waits for what its drive reports.
+    """An axis without a plan: it waits for the reports of its drive.
 
-    It is exact: its stops are those of the mechanism, and what it meets is where it is.
+    It is exact: its stops and contacts are those of the mechanism.
     """
 
     def __init__(
@@ -128,7 +128,7 @@ class DrivenAxis(Axis):
         self.status = self._drive.outcome
 
     def observe(self, time: float) -> None:
-        """See what has become of the goal: the end of a motion is due at once, and so is a slipping part."""
+        """Take the outcome of the goal: the end of a motion is due at once, and so is a slipping part."""
         if self._goal is not None and self._drive.outcome is not self.status:
             self.ends_at = time
 

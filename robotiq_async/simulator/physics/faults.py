@@ -1,4 +1,4 @@
-"""The faults that are present, and when they end."""
+"""The faults that are present, with their end times."""
 
 from __future__ import annotations
 

@@ -34,16 +34,16 @@ _ROUNDING: Final = 1e-9
 
 
 class SimulatedGripper(Surroundings):
-    """A gripper that behaves like the real one as far as public sources tell: a 3-Finger, or a sibling.
+    """A gripper that behaves like the real one, as far as public sources go: a 3-Finger, or a sibling.
 
     Nothing runs in the background: the gripper catches up with its clock whenever it is read, written or
     changed. Motions, contacts, faults and delayed requests happen at their exact times, so a result does not
-    depend on how often anybody looks. Use one from one thread only.
+    depend on how often it is read. Use one from one thread only.
 
     A write takes effect one device cycle later, as on the device. Speeds are the measured ones of
     :func:`robotiq_async.values.calibration.scales.closing_time`; the scissor moves the same counts a second,
-    as none are published. What the motors draw is in :mod:`.axis`; how much axes miss what they are asked
-    in :mod:`.spread`: as with a real gripper, a program that waits for gPO = rPR may wait for ever.
+    as none are published. Motor currents are in :mod:`.axis`; how far axes miss their requests, in
+    :mod:`.spread`: as with a real gripper, a program that waits for gPO = rPR may wait for ever.
 
     Choices where no source settles the behaviour; those that can be changed are in :class:`Habits`:
 
@@ -76,15 +76,15 @@ class SimulatedGripper(Surroundings):
         Args:
             clock: gives the time in seconds; must not go backwards.
             device_cycle: simulated seconds between a write and its effect, 0 for none.
-            speedup: simulated seconds in one second of the clock. Everything the gripper does becomes faster.
+            speedup: simulated seconds in one second of the clock. All motions and sequences become faster.
             scissor_limit: a software limit of the scissor in counts. A request beyond it is replaced by the
                 limit and reported as reached while the echo keeps the request.
             powered: whether the gripper is switched on; :meth:`power_on` does it later.
-            spread: whether axes stop a count or two beside what was asked, and feel an object some counts
+            spread: whether axes stop a count or two beside their requests, and feel an object some counts
                 early or late. Without it they are exact: an open finger reads 6, a closed one 241.
-            seed: which gripper it is, 0 or more: another seed, other counts; the same seed, the same.
-            habits: how it does what the manual leaves open; None for the usual ones.
-            model: which gripper it is, a :class:`Model` or its name; None for a 3-Finger.
+            seed: number of this gripper, 0 or more: another seed, other counts; the same seed, the same.
+            habits: its choices that the manual leaves open; None for the usual ones.
+            model: of the gripper, a :class:`Model` or its name; None for a 3-Finger.
             physics: a :class:`Physics` of its own, which moves the axes and has the parts they meet; None for
                 straight lines in time and the obstacles of :meth:`place_object`. There is no spread with it.
 
@@ -133,7 +133,7 @@ class SimulatedGripper(Surroundings):
             self._catch_up()
 
     def carry_out_writes(self) -> None:
-        """Let what was written take effect now, and not a device cycle later."""
+        """Let pending writes take effect now, and not a device cycle later."""
         self._catch_up()
         self._inbox.hasten(self._time)
         self._catch_up()
@@ -184,12 +184,12 @@ class SimulatedGripper(Surroundings):
 
     @property
     def model(self) -> Model:
-        """What it is a gripper of."""
+        """The model of the gripper."""
         return self._controller.model
 
     @property
     def habits(self) -> Habits:
-        """How it does what the manual leaves open; may be replaced at any time."""
+        """Its choices that the manual leaves open; may be replaced at any time."""
         return self._controller.habits
 
     @habits.setter
@@ -252,7 +252,7 @@ class SimulatedGripper(Surroundings):
         return reduce(or_, (name for name, axis in named if wanted(axis)), NO_AXES)
 
     def position(self, finger: Finger | int) -> int:
-        """Where one axis is, in counts, as gPO reads.
+        """The position of one axis in counts, as gPO reads.
 
         Raises:
             TypeError: finger is not an int.
@@ -261,7 +261,7 @@ class SimulatedGripper(Surroundings):
         return round(self._axis(finger).position(self._time))
 
     def target(self, finger: Finger | int) -> int:
-        """Where one axis is driven to, in counts within its limits; without a go, where it is.
+        """The target of one axis in counts, within its limits; without a go, its position.
 
         Raises:
             TypeError: finger is not an int.
@@ -333,7 +333,7 @@ class Inbox:
 
     Attributes:
         image: the registers as written, in effect or not yet.
-        pending: what takes effect, and when, oldest first.
+        pending: writes that will take effect, with their times, oldest first.
         writes: the last writes that were kept, oldest first.
     """
 
@@ -361,12 +361,12 @@ class Inbox:
         self._kept_at = time
         self.image = write.registers
         self.writes.append(write)
-        # Keep their order, even if the device cycle was shortened meanwhile.
+        # Keep their order, even if the device cycle has been shortened.
         due = max(time + cycle, self.pending[-1][0] if self.pending else 0.0)
         self.pending.append((due, Request.from_registers(write.registers, self._model)))
 
     def hasten(self, time: float) -> None:
-        """All that is pending takes effect now."""
+        """Let all that is pending take effect now."""
         self.pending = deque((min(due, time), request) for due, request in self.pending)
 
     def clear(self) -> None:

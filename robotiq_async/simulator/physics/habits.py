@@ -1,4 +1,4 @@
-"""Habits: what grippers are seen to do beside the manual, and what no source settles, each with a name."""
+"""Habits: behaviour of grippers beside the manual, or that no source settles, each with a name."""
 
 from __future__ import annotations
 
@@ -18,32 +18,32 @@ REAL_ACTIVATION: Final = 12.0
 
 @dataclass(frozen=True, slots=True)
 class Habits:
-    """How one gripper does what the manual leaves open or others saw it do otherwise. Times are simulated.
+    """Choices of one gripper that the manual leaves open or others saw it make. Times are simulated.
 
-    Nothing of it has been measured on a 3-Finger by us. What is as it is by default follows the manual, and
-    where that says nothing the source named here.
+    Nothing of it has been measured on a 3-Finger by us. The defaults follow the manual, and where that is
+    silent the source named here.
 
     Attributes:
         activation_time: seconds that an activation takes at least, wherever it begins; half of them to close
             the fingers, half to open them.
-        status_lag: seconds by which gDT and gSTA trail the rest of the status. The manual says that they are
+        status_lag: seconds by which gDT and gSTA trail the rest of the status. By the manual they are
             valid with the echo; the vendor's own software for the two-finger grippers waits up to 0.2 s.
         silence_fault: after so many seconds without a message gFLT is 0x09 in the first status that is read,
             and in no other (siblings: 1 s). A write that comes first takes it away.
         write_spacing: a write that comes less than so many seconds after the last one that was kept is
             acknowledged and forgotten (manual 2014: leave 10 ms, or some are lost).
-        echoes_limits: a request beyond a software limit is echoed as the limit. The manual says that it is
-            replaced by the limit, and not which of the two gPR shows.
+        echoes_limits: a request beyond a software limit is echoed as the limit. By the manual it is
+            replaced by the limit; which of the two gPR has is open.
         lets_go_on_halt: clearing rGTO, or a fault, releases the part. By the vendor's article on
             protective stops it stays held, and by the manual fingers lock themselves; no one has measured it.
         keeps_status_on_halt: with rGTO = 0 an axis in a contact or at its request keeps its gDT;
-            otherwise gDT and gSTA are 0 then. The manual says only that their 0 means nothing while gGTO = 0.
+            otherwise gDT and gSTA are 0 then. By the manual their 0 means nothing while gGTO = 0.
         opens_without_rics: clearing rICS is a mode change: it opens the fingers, rGTO or not, and drops the
-            part. Otherwise the scissor alone goes to its mode, as soon as rGTO is set. No source says.
-        answers_with_echo: the reply to function 23 shows the request that came with it. By the 2F's manual
+            part. Otherwise the scissor alone goes to its mode, as soon as rGTO is set. No source settles it.
+        answers_with_echo: the reply to function 23 reflects the request that came with it. By the 2F's manual
             the gripper executes the command, and one cycle of motion, before it answers; the vendor's own
-            loop lives on that. Otherwise it shows the state before, as a read soon after a write does. No
-            source tells it of a 3-Finger.
+            loop lives on that. Otherwise it has the state before, as a read soon after a write does. No
+            source covers a 3-Finger.
     """
 
     activation_time: float = QUICK_ACTIVATION
@@ -57,7 +57,7 @@ class Habits:
     answers_with_echo: bool = True
 
     def __post_init__(self) -> None:
-        """Check that they are what a gripper can have.
+        """Check the values.
 
         Raises:
             TypeError: a time is not a number, or another one not a bool.

@@ -1,4 +1,4 @@
-"""A scale between the simulated fingers: it shows what the thesis's showed, scatter and all."""
+"""A scale between the simulated fingers: readings as in the thesis, with their scatter."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""What makes one gripper differ from another, and each of them from the ideal one.
+"""Differences of one gripper from another, and of each from the ideal one.
 
-What the sources print: an open hand reads 7, 6, 6, and one object is held at 188, 193 and 189 (manual, worked
+Figures in the sources: an open hand reads 7, 6, 6, and one object is held at 188, 193 and 189 (manual, worked
 grasp); a closed finger reads 240 or more, and others stop within 1 to 2 counts (manual); 111 and 208 were
-asked and 112 and 210 reached (poses that TAMS recorded); a contact is precise to some millimetres only
+requested and 112 and 210 reached (poses that TAMS recorded); a contact is precise to some millimetres only
 (manual), of which a count is 0.66.
 
 No random numbers are drawn in passing: a figure follows from the seed, the axis and its request. So it does
@@ -17,7 +17,7 @@ from typing import Final
 from robotiq_async.values.enums import Finger
 
 SEED: Final = 4
-"""Of this gripper an open hand reads 7, 6, 6, as the manual prints it."""
+"""Seed with which an open hand reads 7, 6, 6, as the manual prints it."""
 _TOLERANCE: Final = 2
 
 
@@ -44,15 +44,15 @@ class Spread:
         return self._figure("closed", -1, 1)
 
     def overshoot(self, position: int) -> int:
-        """Counts, or none, by which the axis goes too far when it is asked for a place between its stops."""
+        """Counts, or none, by which the axis overshoots a request between its stops."""
         return self._figure(f"goes past {position}", 0, _TOLERANCE)
 
     def contact(self, position: int) -> int:
-        """Counts from where an object is to where the axis feels it."""
+        """Counts from the position of an object to that of the contact."""
         return self._figure(f"contact at {position}", -2, 3)
 
     def _figure(self, what: str, low: int, high: int) -> int:
-        """A whole number in low..high for something; 0 without a spread."""
+        """A whole number in low..high for one purpose; 0 without a spread."""
         if self._seed is None:
             return 0
         return low + int(Random(f"{self._seed} {self._axis.value} {what}").random() * (high - low + 1))

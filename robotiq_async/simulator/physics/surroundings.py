@@ -1,4 +1,4 @@
-"""What happens to a simulated gripper from outside: objects, faults, an emergency stop."""
+"""Influences on a simulated gripper from outside: objects, faults, an emergency stop."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Surroundings(ABC):
             opening: it is met when opening (gDT = 1) instead of closing (gDT = 2).
             soft: counts by which a force of 255 presses the axis into it, 0..255.
             thin: it is a thin object between fingertips, which the gripper may hold without ever reporting a
-                contact (manual). Here it never does: the axes go on to their request or their stops.
+                contact (manual). Here it never does: the axes continue to their request or their stops.
             fixed: it stays there in an activation, which then fails with fault 0x0D (manual: see that nothing
                 interferes). Anything else is taken out for an activation, and put back after it.
 
@@ -116,10 +116,10 @@ class Surroundings(ABC):
         self.inject_fault(Fault.SCISSOR_INTERFERENCE, duration)
 
     def emergency_stop(self, resets: int = 1) -> None:
-        """Press the emergency stop: an active gripper stops, shows fault 0x05, and stays at gIMC = 1.
+        """Press the emergency stop: an active gripper stops, reports fault 0x05, and stays at gIMC = 1.
 
         Args:
-            resets: how many resets are needed after :meth:`end_emergency_stop`; before it none helps.
+            resets: number of resets needed after :meth:`end_emergency_stop`; before it none helps.
 
         Raises:
             TypeError: resets is not an int.
@@ -137,7 +137,7 @@ class Surroundings(ABC):
     def is_asleep(self) -> bool:
         """Whether the next image with rACT = 1 only wakes the gripper: it is echoed, and moves nothing.
 
-        Axes that move go on, and rGTO = 0 stops them. One driver found that a gripper ignores motions on a
+        Axes that move run on, and rGTO = 0 stops them. One driver found that a gripper ignores motions on a
         new connection until rACT = 1 has been written.
         """
         self._catch_up()

@@ -1,4 +1,4 @@
-"""One client of a simulator: its requests are answered one by one, and its replies sent as a policy says."""
+"""One client of a simulator: answers its requests one by one, and sends replies by a policy."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LINGER_NOT: Final = struct.pack("ii", 1, 0)
 
 
 class Connection(asyncio.Protocol):
-    """Has one request answered in a turn of the loop, and sends the reply as the endpoint's policy says.
+    """Answers one request in a turn of the loop, and sends the reply by the endpoint's policy.
 
     Attributes:
         transport: to the client; None before it has come, and once it is gone.
@@ -108,8 +108,8 @@ class Connection(asyncio.Protocol):
     def _answer_next(self) -> None:
         """Answer one request, unless none is complete or the client has to wait.
 
-        Who sends a thousand at once does not keep the loop: each turn has one. A gripper without power does
-        not even hear them.
+        A thousand requests at once do not hold up the loop: each turn answers one. A gripper without power
+        does not even receive them.
         """
         if not self._endpoint.gripper.is_powered:
             self._inbox.clear()
@@ -134,7 +134,7 @@ class Connection(asyncio.Protocol):
         return self._is_clogged or len(self._outbox) >= MOST_WAITING
 
     def _regulate(self) -> None:
-        """Read only from a client that does not ask faster than it is answered; TCP makes it wait."""
+        """Read only from a client whose requests can be answered in time; TCP makes it wait."""
         hold = len(self._inbox) > MOST_UNREAD
         if hold != self._is_held and self.is_active():
             self._is_held = hold

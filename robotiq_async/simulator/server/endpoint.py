@@ -1,4 +1,4 @@
-"""What the servers on either kind of link have in common: life, gripper and misbehaviour."""
+"""The common part of servers on either kind of link: lifetime, gripper and misbehaviour."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ class SimulatorEndpoint(ABC):
     """A simulated gripper on a link.
 
     Attributes:
-        gripper: what answers. It keeps its state when the server is stopped and started again. One that is
-            not given takes 12 s for an activation.
+        gripper: the device that answers. It keeps its state when the server is stopped and started again. One
+            that is not given takes 12 s for an activation.
         policy: changes, delays or drops each reply that no trouble concerns.
         fault_injector: makes troubles happen, and decides on requests and replies.
         connections: to the clients that are there, oldest first.
@@ -69,7 +69,7 @@ class SimulatorEndpoint(ABC):
     @property
     @abstractmethod
     def address(self) -> str:
-        """What a client is given to find this gripper."""
+        """The address by which a client finds this gripper."""
 
     @property
     def _query(self) -> str:
@@ -137,10 +137,10 @@ class SimulatorEndpoint(ABC):
         for connection in tuple(self.connections):
             connection.hang_up(reset=reset)
 
-    # What connections ask.
+    # Called by connections.
 
     def lets_in(self, client: Connection) -> bool:
-        """Take note of a client that has come; whether it may stay."""
+        """Take note of a client that has come; return whether it may stay."""
         self.connections.append(client)
         return self.fault_injector.lets_in(len(self.connections) - 1)
 
@@ -158,20 +158,20 @@ class SimulatorEndpoint(ABC):
         return self._is_meant(frame.unit) and self.fault_injector.hears()
 
     def answer(self, frame: Frame) -> bytes:
-        """Carry out a request; the frame of the reply."""
+        """Carry out a request; return the frame of the reply."""
         served = set(self.functions) - self.fault_injector.refused_functions
         return self._reply(frame, self._bank.answer(frame.pdu, served))
 
     def as_reply(self, frame: bytes) -> Reply:
-        """A reply as troubles look at it."""
+        """A reply in the form for troubles."""
         return Reply(frame, serial=self.link != "tcp")
 
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
-        """What to send for a reply."""
+        """The parts to send for a reply."""
         return self.fault_injector.deliver(reply)
 
     def undelivered(self, part: bytes) -> None:
-        """Lose what a client that is gone was to be sent; a multiplexer has it for the newest or the next."""
+        """Drop bytes for a client that is gone; a multiplexer keeps them for the newest or the next."""
         if not (self._is_running and self.fault_injector.is_multiplexed):
             return
         if self.connections:
@@ -180,7 +180,7 @@ class SimulatorEndpoint(ABC):
             self._left_over.append(part)
 
     def left_over(self) -> Iterable[bytes]:
-        """What a new client is sent before it has asked for anything."""
+        """Bytes that a new client gets before its first request."""
         parts = tuple(self._left_over) if self.fault_injector.is_multiplexed else ()
         self._left_over.clear()
         return parts

@@ -1,4 +1,4 @@
-"""Requests and replies as bytes: how they are cut out of a stream, and what is put around them."""
+"""Requests and replies as bytes: cuts them out of a stream, and frames them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _LONGEST_TCP_FRAME: Final = 260
 _LONGEST_RTU_FRAME: Final = 256
 _CRC: Final = 2
 _COUNT_AT: Final = {WRITE_MULTIPLE: 6, READ_WRITE: 10}
-"""Where an RTU frame says how many bytes of data follow."""
+"""Index of the count of data bytes in an RTU frame."""
 
 
 class BadFrameError(Exception):
@@ -25,7 +25,7 @@ class Frame(NamedTuple):
     """One request.
 
     Attributes:
-        unit: the unit id asked for.
+        unit: the unit id addressed.
         transaction: the transaction id, 0 on a serial line.
         pdu: function code and data.
     """

@@ -1,4 +1,4 @@
-"""The gripper's registers as a Modbus device has them: requests in, replies out, without what frames them."""
+"""The gripper's registers as a Modbus device has them: requests in, replies out, without their frames."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class _RefusedError(Exception):
 
 
 class RegisterBank:
-    """Where the registers of a gripper are found, on either kind of link.
+    """The addresses of a gripper's registers, on either kind of link.
 
     ======  ======================  ======================  =================
     start   FC03, FC23 read         FC04 reads              FC06, FC16, FC23
@@ -89,7 +89,7 @@ class RegisterBank:
         self._gripper.write(address - block, struct.unpack(f">{count}H", content))
 
     def _block_of(self, address: int, count: int, blocks: tuple[int, ...]) -> int:
-        """Where the block begins that has all of the registers."""
+        """The start of the block that has all of the registers."""
         for block in blocks:
             if block <= address and address + count <= block + self._troubles.served_registers:
                 return block

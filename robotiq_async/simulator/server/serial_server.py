@@ -1,4 +1,20 @@
-"""A simulated gripper behind Modbus RTU, on a serial line or behind a serial server; how long bytes take."""
+"""A simulated gripper behind Modbus RTU, on a serial line or behind a serial server; the time of bytes."""
+
+# Theory of operation
+#
+# A pseudo terminal or a socket carries bytes at once; a line at 115200 baud does not. SerialConnection delays
+# them in both directions, each byte behind those before it, by the times of WireTime:
+#
+#   in    data_received -> time of the last byte and the silence after it -> _hear -> a request is answered
+#   out   pass_on -> time of the last byte at the client -> _put
+#
+# A line cannot make a client wait. So too many bytes are lost: of requests beyond MOST_UNREAD, of replies
+# beyond MOST_UNSENT.
+#
+# A frame has no mark at its end but the pause. Bytes after more than LONGEST_PAUSE_S begin a frame, and so
+# does a whole request after more than FRAME_GAP_S; an incomplete frame before them is dropped. So a frame
+# that is cut off costs itself and at most one request. Without pacing (reply_silence None) only the delays
+# are left out.
 
 from __future__ import annotations
 
@@ -29,27 +45,27 @@ BAUD: Final = 115200
 BYTE_S: Final = 10 / BAUD
 """8N1: a start bit, eight data bits and a stop bit, 86.8 us."""
 REPLY_SILENCE_S: Final = 3.5 * BYTE_S + 0.0005
-"""From the last byte of a request to the first of the reply: the 3.5 characters that end a frame in Modbus
-RTU (Modbus over Serial Line, 2.5.1.1) and half a millisecond for the reply. No gripper was measured: the
-vendor names 4 ms, at best 250 exchanges a second, for a function 23 whose bytes take 2.6 ms. The 1.75 ms that
-the standard recommends above 19200 baud would not fit into that."""
+"""Seconds from the last byte of a request to the first of the reply: the 3.5 characters that end a frame in
+Modbus RTU (Modbus over Serial Line, 2.5.1.1) and half a millisecond for the reply. No gripper was measured:
+the vendor names 4 ms, at best 250 exchanges a second, for a function 23 whose bytes take 2.6 ms. The 1.75 ms
+that the standard recommends above 19200 baud would not fit into that."""
 FRAME_GAP_S: Final = 0.00175
 """A pause of this length may be the end of a frame: the longest that the standard knows at this rate."""
 TIMER_S: Final = 0.0015
 """A timer of the loop comes up to a millisecond late, for epoll rounds its time-outs up."""
 
 LONGEST_PAUSE_S: Final = 0.02
-"""Longer than this no frame pauses on its way to this program, which does not see the wire: a USB adapter
-keeps what it has for up to 16 ms (the usual latency timer), and who writes half a frame to a pseudo terminal
-was kept from the other half for 1.9 ms (4000 frames on a busy machine). A client that waits in vain for an
-answer waits longer before it asks again, so no more than one request is lost with what was cut off."""
+"""Longest pause of a frame on its way to this program, which does not see the wire: a USB adapter keeps bytes
+for up to 16 ms (the usual latency timer), and a writer of half a frame to a pseudo terminal was kept from the
+other half for 1.9 ms (4000 frames on a busy machine). A client that waits in vain for an answer waits longer
+before its next request, so no more than one request is lost with a frame that was cut off."""
 
 MOST_UNSENT: Final = 4096
 """The most unread bytes on the line; further replies are lost."""
 
 
 class _RtuEndpoint(SimulatorEndpoint):
-    """What is the same for RTU frames, whatever carries them.
+    """The common part of servers for RTU frames, over any carrier.
 
     Attributes:
         paced: whether bytes take their time, of connections to come.
@@ -65,7 +81,7 @@ class _RtuEndpoint(SimulatorEndpoint):
         return take_rtu(inbox)
 
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
-        """What to send for a reply; nothing for an exception (manual), and nothing to a broadcast."""
+        """The parts to send for a reply; none for an exception (manual), and none to a broadcast."""
         is_exception = bool(reply[1] & 0x80)
         return () if is_exception or reply[0] == _BROADCAST else super().deliver(reply)
 
@@ -86,7 +102,7 @@ class SerialSimulatorServer(_RtuEndpoint):
     Serves what :class:`~robotiq_async.simulator.SimulatorServer` serves, and FC23, which writes before it
     reads. The RTU gripper has no exception replies (manual), so a bad request gets no answer. Broadcasts
     (unit 0) are carried out and not answered, requests to other units are left to them, as Modbus has it;
-    no source says what a real gripper does with a broadcast.
+    no source covers a real gripper's answer to a broadcast.
     """
 
     link = "rtu"
@@ -103,10 +119,10 @@ class SerialSimulatorServer(_RtuEndpoint):
 
         Args:
             port: the serial port, such as ``/dev/ttyUSB0``, or one end of a pseudo terminal.
-            gripper: what answers; None for a new one.
+            gripper: the device that answers; None for a new one.
             device_id: the unit id of the gripper.
             paced: whether bytes take their time. False for a real serial port, which takes it itself, and for
-                programs that have no time.
+                programs that cannot wait.
 
         Raises:
             TypeError: device_id is not an int, or paced is not a bool.
@@ -145,12 +161,12 @@ class SerialSimulatorServer(_RtuEndpoint):
         return unit in (_BROADCAST, self._device_id)
 
     def _close(self) -> None:
-        """There is nothing but the one connection."""
+        """Nothing to close but the one connection."""
 
     async def _open(self) -> None:
         loop, line = asyncio.get_running_loop(), {"bytesize": 8, "parity": "N", "stopbits": 1}
         await create_serial_connection(loop, self._connection, self._port, baudrate=BAUD, **line)
-        # The transport watches the line from the next turn of the loop on and tells the connection in the
+        # The transport watches the line from the next turn of the loop on and calls the connection in the
         # one after that; closing it earlier would fail.
         await asyncio.sleep(0)
         await asyncio.sleep(0)
@@ -160,7 +176,7 @@ class RtuOverTcpSimulatorServer(_RtuEndpoint, SimulatorServer):
     """Serves a simulated gripper as a serial server does, or an arm's tool port: RTU frames in a TCP socket.
 
     It serves what :class:`~robotiq_async.simulator.SerialSimulatorServer` serves, at the speed of the
-    line behind. Who sends one request after the other without waiting loses those that the line cannot take.
+    line behind. Requests sent without waiting are lost if the line cannot take them.
     """
 
     link = "rtu+tcp"
@@ -177,7 +193,7 @@ class RtuOverTcpSimulatorServer(_RtuEndpoint, SimulatorServer):
         """A server that is not started; needs no running loop.
 
         Args:
-            gripper: what answers; None for a new one.
+            gripper: the device that answers; None for a new one.
             host: address to listen on.
             port: TCP port, 0 for any free one.
             device_id: the unit id of the gripper.
@@ -200,10 +216,10 @@ class RtuOverTcpSimulatorServer(_RtuEndpoint, SimulatorServer):
 
 
 class WireTime:
-    """Says when bytes have arrived, in each direction. Keeps no clock.
+    """Times of arrival of bytes, in each direction. Keeps no clock.
 
     A request is whole once its last byte has come and the silence after it has passed; then the reply
-    begins. What it is counted from is that moment and not the timer that stood for it, which is late by a
+    begins. Times are counted from that moment and not from the timer that stood for it, which is late by a
     bit: such delays would add up, exchange after exchange.
     """
 
@@ -222,7 +238,7 @@ class WireTime:
         return (self._sent_until - now) / BYTE_S
 
     def hears(self, now: float, size: int) -> tuple[float, float]:
-        """When bytes for the gripper have come and the silence has passed; and the pause before them."""
+        """The time when bytes for the gripper have come and the silence has passed; the pause before them."""
         pause = max(0.0, now - self._heard_until)
         self._heard_until = max(now, self._heard_until) + size * BYTE_S
         return self._heard_until + self._reply_silence, pause
@@ -231,7 +247,7 @@ class WireTime:
         self._answers_from = when
 
     def sends(self, now: float, size: int) -> float:
-        """When bytes that the gripper sends now have arrived at the client."""
+        """The time at which bytes that the gripper sends now arrive at the client."""
         begins = self._answers_from if now - self._answers_from < TIMER_S else now
         self._sent_until = max(begins, self._sent_until) + size * BYTE_S
         return self._sent_until
@@ -241,12 +257,12 @@ class SerialConnection(Connection):
     """The other end of a serial line, which has no connections, no packets and no flow control."""
 
     def __init__(self, endpoint: SimulatorEndpoint, reply_silence: float | None) -> None:
-        """A connection whose bytes take their time; None for one where they take none."""
+        """Make a connection with the time of its bytes; None for one where they take none."""
         super().__init__(endpoint)
         self._wire = None if reply_silence is None else WireTime(reply_silence)
         self._heard_at = 0.0
         self._sent_at = -math.inf
-        """When the last bytes of a reply were put on the line."""
+        """The time at which the last bytes of a reply were put on the line."""
         self._unsent = 0
         """Bytes sent since the line had taken all of them."""
 
@@ -272,7 +288,7 @@ class SerialConnection(Connection):
             self._hear(data, pause)
 
     def _hear(self, data: bytes, pause: float) -> None:
-        """Bytes have come; those of a frame that was cut off before them are dropped."""
+        """Take bytes that have come; those of a frame that was cut off before them are dropped."""
         self._answer_next()  # complete frames are answered, even if their turn has not come
         if not self._goes_on and _begins_anew(pause, data):
             self._inbox.clear()

@@ -45,7 +45,7 @@ class SimulatorServer(SimulatorEndpoint):
         """A server that is not started; needs no running loop.
 
         Args:
-            gripper: what answers; None for a new one.
+            gripper: the device that answers; None for a new one.
             host: address to listen on.
             port: TCP port, 0 for any free one.
             device_id: the only unit id that is answered; None for all, as units in the field do.
@@ -82,7 +82,7 @@ class SimulatorServer(SimulatorEndpoint):
         self._hang_up(reset=reset)
 
     def refuse(self) -> None:
-        """Refuse new connections until :meth:`accept`; those that exist go on.
+        """Refuse new connections until :meth:`accept`; those that exist stay.
 
         Raises:
             RuntimeError: the server is not running.
@@ -104,7 +104,7 @@ class SimulatorServer(SimulatorEndpoint):
     async def power_cycle(self, off_time: float = 0.0) -> None:
         """Cut the gripper's power and come back after it.
 
-        Connections are dropped, new ones refused meanwhile, the gripper comes back reset.
+        Connections are dropped, new ones are refused until then, and the gripper comes back reset.
 
         Args:
             off_time: simulated seconds without power.
@@ -146,6 +146,6 @@ class SimulatorServer(SimulatorEndpoint):
         if not self._listener.sockets:
             # asyncio takes every socket that cannot be made for one of a family that is not known here.
             self._listener.close()
-            socket.socket().close()  # raises why
+            socket.socket().close()  # raises the reason
             raise OSError(f"there is no socket for {self._host}")
         self._port = self._listener.sockets[0].getsockname()[1]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from robotiq_async.values.registers import Field
 
 REFUSED: Final = b"?"
-"""The answer to a line that is not understood. Made up: no source shows what the URCap says."""
+"""The answer to a line that is not understood. Made up: no source has the URCap's."""
 LONGEST_LINE: Final = 256
 
 _STATUS: Final = {
@@ -31,7 +31,7 @@ _STATUS: Final = {
     "PRE": reg.gPR[0],
     "POS": reg.gPO[0],
 }
-"""What is read of the status; two names are those of a request, too."""
+"""Names that a GET reads from the status; two are those of a request, too."""
 _REQUEST: Final = {
     "ACT": reg.rACT,
     "GTO": reg.rGTO,
@@ -41,7 +41,7 @@ _REQUEST: Final = {
     "SPE": reg.rSP[0],
     "FOR": reg.rFR[0],
 }
-"""What can be set."""
+"""Names that a SET writes."""
 _REGISTERS: Final = 3
 _FAULT_DIGITS: Final = 2
 """The URScript that the URCap adds to programs reads two digits of FLT."""
@@ -56,7 +56,7 @@ class UrcapSimulatorServer(SimulatorServer):
 
     A line is ``GET NAME`` or ``SET NAME VALUE NAME VALUE ...``. The answer to a GET ends with an end of line,
     the ``ack`` of a SET without one, as clients want it that ran on hardware. All variables of a SET take
-    effect at once. What is not understood is answered by a question mark.
+    effect at once. Other lines are answered by a question mark.
     """
 
     link = "urcap"
@@ -72,7 +72,7 @@ class UrcapSimulatorServer(SimulatorServer):
         """A server that is not started; needs no running loop.
 
         Args:
-            gripper: what answers; None for a new 2F-85.
+            gripper: the device that answers; None for a new 2F-85.
             host: address to listen on.
             port: TCP port, 0 for any free one; the URCap's is 63352.
             device_id: the only gripper that can be chosen (SID).
@@ -103,7 +103,7 @@ class UrcapSimulatorServer(SimulatorServer):
         return Frame(0, 0, line)
 
     def answer(self, frame: Frame) -> bytes:
-        """Carry out a line; the answer."""
+        """Carry out a line; return the answer."""
         match frame.pdu.decode("ascii", "replace").split():
             case ["GET", name]:
                 return self._get(name)
@@ -112,7 +112,7 @@ class UrcapSimulatorServer(SimulatorServer):
         return REFUSED
 
     def as_reply(self, frame: bytes) -> Reply:
-        """An answer as troubles look at it."""
+        """An answer in the form for troubles."""
         return TextReply(frame, serial=False)
 
     def _is_meant(self, unit: int) -> bool:  # noqa: ARG002  # lines have none

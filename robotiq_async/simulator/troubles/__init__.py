@@ -1,1 +1,1 @@
-"""What can go wrong between a client and a gripper, as data."""
+"""Failures between a client and a gripper, as data."""

@@ -1,7 +1,7 @@
-"""What can be done to the bytes of one reply, on any kind of link. No I/O: a reply in, bytes out.
+"""Corruptions of the bytes of one reply, on any kind of link. No I/O: a reply in, bytes out.
 
-Apart from what a function is named after, the frame it makes is in order: length and checksum are made
-anew, so that a client which finds it out has looked at the right thing.
+Except for the error in its name, a function makes an orderly frame: length and checksum are computed again,
+so that a client that notices has looked at the right thing.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pymodbus.framer import FramerRTU
 from ..functions import READ_HOLDING, READ_INPUT, READ_WRITE, WRITE_MULTIPLE, WRITE_SINGLE
 
 Parts = Sequence[tuple[float, bytes]]
-"""What to send, in order: (delay in seconds, bytes)."""
+"""Parts to send, in order: (delay in seconds, bytes)."""
 
 _ANOTHER = {
     READ_HOLDING: READ_INPUT,
@@ -86,7 +86,7 @@ Corruption = Callable[[Reply, float], Parts]
 """Makes the bytes to send out of a reply and the value of the trouble (see trouble.py)."""
 
 ReplyPolicy = Callable[[bytes], Iterable[tuple[float, bytes]] | None]
-"""Takes the frame of one reply; gives what to send instead, as (delay in seconds, bytes), or None to hang up.
+"""Takes the frame of one reply; gives the parts to send, as (delay in seconds, bytes), or None to hang up.
 
 An empty answer loses the reply. The request behind the reply has been carried out already.
 """
@@ -129,7 +129,7 @@ def wrong_function(reply: Reply, value: float) -> Parts:
 
 
 def wrong_length(reply: Reply, value: float) -> Parts:
-    """The reply has one register less and says so, as if less had been asked; one to a write lacks a byte."""
+    """The reply has one register less, and a count that fits; one to a write lacks a byte."""
     pdu = reply.pdu
     return reply.changed(pdu=bytes((pdu[0], pdu[1] - 2)) + pdu[2:-2] if reply.has_registers else pdu[:-1])
 
@@ -177,7 +177,7 @@ def byte_before(reply: Reply, value: float) -> Parts:
 
 
 def byte_after(reply: Reply, value: float) -> Parts:
-    """A byte comes last, as from a line that nobody drives when the device stops sending."""
+    """A byte comes last, as from a line that is not driven when the device stops sending."""
     return ((0.0, reply.frame + bytes((int(value),))),)
 
 

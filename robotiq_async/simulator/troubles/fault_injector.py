@@ -47,11 +47,11 @@ class FaultInjector:
         self._target = target
         self._ongoing: list[Ongoing] = []
         self._device_cycle = target.gripper.device_cycle
-        """What the gripper has when nothing makes it slow."""
+        """The gripper's own device cycle, without a trouble."""
         self._habits = target.gripper.habits
-        """Those it has without any trouble."""
+        """The gripper's own habits, without a trouble."""
         self._idle: asyncio.TimerHandle | None = None
-        """When the gripper loses its activation unless a request comes before."""
+        """The timer after which the gripper loses its activation, unless a request comes first."""
 
     @property
     def ongoing(self) -> tuple[Ongoing, ...]:
@@ -59,7 +59,7 @@ class FaultInjector:
         return tuple(self._ongoing)
 
     def check(self, troubles: Iterable[Trouble]) -> None:
-        """See whether troubles fit this kind of link, and this gripper.
+        """Check that troubles fit this kind of link, and this gripper.
 
         Raises:
             ValueError: one of them does not.
@@ -130,7 +130,7 @@ class FaultInjector:
             raise errors.exceptions[0] from None
 
     async def _play(self, trouble: Trouble, tell: Callable[[Trouble], object]) -> None:
-        """One trouble of a plan, from its beginning to its end, again and again if it comes again."""
+        """Carry out one trouble of a plan, from its beginning to its end, again and again if it repeats."""
         loop, lasts = asyncio.get_running_loop(), trouble.duration or trouble.every
         await asyncio.sleep(trouble.at)
         while True:
@@ -147,7 +147,7 @@ class FaultInjector:
                 return
             await asyncio.sleep(began + trouble.every - loop.time())
 
-    # What the simulator asks.
+    # Called by the simulator.
 
     @property
     def is_multiplexed(self) -> bool:
@@ -167,7 +167,7 @@ class FaultInjector:
 
     @property
     def echoes(self) -> bool:
-        """Whether the line brings back what is sent."""
+        """Whether the line echoes the bytes that are sent."""
         return bool(self._lasting("echo"))
 
     @property
@@ -177,7 +177,7 @@ class FaultInjector:
 
     @property
     def served_registers(self) -> int:
-        """How many registers of each block are served."""
+        """The number of registers of each block that are served."""
         return min((int(trouble.amount) for trouble in self._lasting("registers")), default=REGISTER_COUNT)
 
     def lets_in(self, present: int) -> bool:
@@ -198,7 +198,7 @@ class FaultInjector:
         return True
 
     def deliver(self, frame: bytes) -> Iterable[tuple[float, bytes]] | None:
-        """What to send for a reply; None to hang up."""
+        """The parts to send for a reply; None to hang up."""
         reply = self._target.as_reply(frame)
         for ongoing in self._ongoing:
             parts = ongoing.trouble.corrupt(reply)
@@ -208,7 +208,7 @@ class FaultInjector:
         return self._target.policy(frame)
 
     def _hit(self, ongoing: Ongoing) -> None:
-        """A trouble has met one more; it is over if it was for once."""
+        """Count a hit of a trouble; it is over if it was for once."""
         ongoing.hits += 1
         if ongoing.trouble.duration == 0:
             self._forget(ongoing)
@@ -217,10 +217,10 @@ class FaultInjector:
         self._ongoing.remove(ongoing)
         ongoing.over.set()
 
-    # What begins and ends.
+    # Effects that begin and end.
 
     def _do(self, trouble: Trouble) -> None:
-        """What happens at the beginning."""
+        """Begin the effect of a trouble."""
         target, gripper, amount = self._target, self._target.gripper, trouble.amount
         match trouble.kind:
             case "close":
@@ -255,7 +255,7 @@ class FaultInjector:
             self._change_habit(trouble)
 
     async def _undo(self, trouble: Trouble) -> None:
-        """What happens at the end; the troubles that go on keep their effect."""
+        """End the effect of a trouble; the troubles that last keep theirs."""
         target, gripper = self._target, self._target.gripper
         match trouble.kind:
             case "refuse" | "power-cut":
@@ -293,14 +293,14 @@ class FaultInjector:
         return self._lasting(*(name for name, kind in KINDS.items() if kind.habit is not None))
 
     def _await_request(self) -> None:
-        """Begin to wait for the next request, as long as the least patient trouble says."""
+        """Begin to wait for the next request, for as long as the least patient trouble allows."""
         if self._idle is not None:
             self._idle.cancel()
         waits = [each.amount for each in self._lasting("idle-reset")]
         self._idle = asyncio.get_running_loop().call_later(min(waits), self._reset) if waits else None
 
     def _reset(self) -> None:
-        """The gripper loses its activation, and keeps its power."""
+        """Take the activation from the gripper, which keeps its power."""
         if self._target.gripper.is_powered:
             self._target.gripper.power_cycle()
 

@@ -8,13 +8,13 @@ activation of 4.2 s     2F, Hand-E     pyRobotiqGripper gives up after 5 s, and 
 ``status-lag``          3-Finger       none of its own: no driver looks soon enough to have seen one. The
                                        vendor's SDK for the 2F waits up to 0.2 s
 no ``status-lag``       2F, Hand-E     pyRobotiqGripper's and the vendor's example loop end with the first
-                                       gOBJ after a write; only the SDK's text says that gOBJ trails
+                                       gOBJ after a write; only by the SDK's text gOBJ trails
 ``silence-fault``       all            the manual of a sibling, two recordings of 2F in normal operation
 ``write-spacing``       3-Finger       the manual of 2014, in its chapters on TCP and on RTU
 no ``write-spacing``    2F, Hand-E     the vendor's loop writes 100 times a second, and up to 250 times
 ======================  =============  ====================================================================
 
-Left out is what one source tells or none: ``echoed-limits``, ``e-stop``, ``wake-needed``, ``idle-reset``,
+Left out are those with one source or none: ``echoed-limits``, ``e-stop``, ``wake-needed``, ``idle-reset``,
 ``function-3-only``, ``one-connection-only``. Nothing of it has been measured by us.
 """
 
@@ -35,7 +35,7 @@ def own_habits(model: Model) -> Habits:
 
 
 def like_hardware(model: Model) -> tuple[Trouble, ...]:
-    """What a real gripper of this model does on its link, as troubles for :class:`FaultInjector`.
+    """Misbehaviour of a real gripper of this model on its link, as troubles for :class:`FaultInjector`.
 
     They go by real time, as the clients do that meet them.
     """

@@ -1,4 +1,4 @@
-"""What can go wrong, as data: one table of kinds, and troubles written as words or as values.
+"""Troubles as data: one table of kinds, and troubles written as text or as values.
 
 A trouble is an event (a reply is lost, another client writes) or a condition that lasts (the gripper is
 silent, the device is slow). As text it is
@@ -34,15 +34,15 @@ class Kind(NamedTuple):
 
     Attributes:
         meaning: one line about it.
-        lasts: how long it lasts when nothing is said: 0 for an event, infinity for a condition.
+        lasts: its duration by default: 0 for an event, infinity for a condition.
         value: its default value; None if it has none.
         low: the least value.
         high: the greatest value.
-        corruption: how it changes a reply, if it does.
+        corruption: its change of a reply, if it has one.
         on: the requests whose replies it can be about.
         link: the only kind of link it fits, if there is only one.
         habit: the habit of the gripper that it changes, if it does.
-        is_modbus: whether it is about what only Modbus has: functions, registers, checksums.
+        is_modbus: whether it concerns functions, registers or checksums, which only Modbus has.
     """
 
     meaning: str
@@ -168,7 +168,7 @@ KINDS: Final[dict[str, Kind]] = {
         "the emergency stop is pressed: fault 0x05; after its end VALUE resets are needed",
         *(_CONDITION, 1, 1, 9),
     ),
-    # Habits that grippers are said to have.
+    # Habits of grippers, by one source or more.
     "status-lag": Kind(
         "gDT and gSTA lag the rest of the status by VALUE seconds",
         *(_CONDITION, 0.05, 0, 1),
@@ -215,11 +215,11 @@ class Trouble:
 
     Attributes:
         kind: one of :data:`KINDS`.
-        value: what the kind says; None for its usual value.
+        value: its meaning is that of the kind; None for its usual value.
         on: the requests whose replies it is about.
         at: seconds after the beginning of the plan.
-        lasts: seconds, infinity for ever, 0 for once (one reply, one request, one cut); None for what is
-            usual for the kind.
+        lasts: seconds, infinity for ever, 0 for once (one reply, one request, one cut); None for the
+            usual duration of the kind.
         every: seconds after which it comes again, if it does.
     """
 
@@ -261,7 +261,7 @@ class Trouble:
 
     @property
     def duration(self) -> float:
-        """How long it lasts, in seconds: 0 for once, infinity for ever."""
+        """Its duration in seconds: 0 for once, infinity for ever."""
         return KINDS[self.kind].lasts if self.lasts is None else self.lasts
 
     @property
@@ -331,7 +331,7 @@ def _parse_one(line: str) -> Trouble:
     kind = words.pop(0)
     value = None
     if kind not in KINDS:
-        Trouble(kind)  # says so
+        Trouble(kind)  # raises for it
     if words and words[0] not in _WORDS:
         value = _number(kind, words.pop(0))
     options: dict[str, str] = {}
