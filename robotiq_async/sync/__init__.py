@@ -1,10 +1,10 @@
 """Blocking hands, for scripts and notebooks: the same names, without ``await``.
 
 ======================  ===================================================================
-module                  what it holds
+module                  contents
 ======================  ===================================================================
 ``robotiq_hand``        the hand, one line for each call of the async one, and the iterators it returns
-``caller``              how a call gets to the event loop; Ctrl-C, a fork, the end of the program
+``caller``              passes calls to the event loop; Ctrl-C, a fork, the end of the program
 ``loop_thread``         the event loop of all blocking hands, in a thread that lives while it is needed
 ======================  ===================================================================
 """

@@ -1,4 +1,19 @@
-"""How calls get to the event loop of a hand; what Ctrl-C, a fork and the end of the program do."""
+"""Passes calls to the event loop of a hand, through Ctrl-C, a fork and the end of the program."""
+
+# Theory of operation
+#
+# A hand lives in the event loop of LOOP_THREAD. Each call runs there, while the caller's thread waits. A
+# caller is in _IN_USE while a call or its hand runs: this set, and not the program's references, decides
+# which hands the end of the program stops. Three events may come between:
+#
+#   Ctrl-C   cancels the call and waits for its end. Then _hold() stops motion: by halt() in an activation,
+#            else by hold(). The exception is raised after that.
+#   exit     refuses further starts, then stops every hand in _IN_USE, for at most EXIT_S. Starts are checked
+#            in the loop, so none comes between the two.
+#   fork     leaves hands that run to the parent, which has the link and the thread. In the child each of
+#            their calls raises RuntimeError; hands that did not run may start there.
+#
+# A hand that has written nothing since its start is stopped without a write: another client may command.
 
 from __future__ import annotations
 
@@ -27,7 +42,7 @@ class Caller:
 
     def __init__(self, hand: AsyncRobotiqHand) -> None:
         self.hand: Final = hand  # in its event loop
-        self._calls: set[object] = set()  # those under way: the hand may be about to run
+        self._calls: set[object] = set()  # those that run: the hand may be about to start
         self._is_left_behind = False
         self._has_warned = False
 
@@ -89,7 +104,7 @@ class Caller:
         return self.hand._has_commanded  # noqa: SLF001  # both are the hand
 
     def _warn_of_a_running_loop(self) -> None:
-        """Warn once that each call blocks a loop which runs in this thread, and everything in that loop."""
+        """Warn once that each call blocks a loop that runs in this thread, and everything in that loop."""
         if self._has_warned or LOOP_THREAD.is_here or "ipykernel" in sys.modules:
             return  # the cells of a notebook run in its kernel's loop, and may block it
         with contextlib.suppress(RuntimeError):
@@ -127,7 +142,7 @@ class Caller:
         self._calls.clear()
 
     async def _hold(self) -> None:
-        """Stop motion after Ctrl-C. A grip stays; a release goes on, because something may be trapped."""
+        """Stop motion after Ctrl-C. A grip stays; a release continues, because something may be trapped."""
         if not self.has_commanded:
             return
         with contextlib.suppress(RobotiqError):

@@ -75,7 +75,7 @@ class LoopThread:
         Raises:
             RuntimeError: called in the loop's own thread, which would wait for itself; or the thread cannot
                 start, or the program ends.
-            LateError: not done within the limit; the call goes on.
+            LateError: not done within the limit; the call continues.
             BaseException: raised by the call.
         """
         if self.is_here:

@@ -101,7 +101,7 @@ class RobotiqHand:
     calls, their arguments, results and errors are those of :class:`robotiq_async.RobotiqHand`, and each call
     returns when the async one has ended. All blocking hands share one event loop in a thread of its own,
     which polls while your code runs. Calls may come from any thread, also from one in which another event
-    loop runs: that loop waits meanwhile.
+    loop runs: that loop waits for them.
 
     Ctrl-C does to a call what cancelling does to the async one, and then holds every axis that moves. A hand
     that was not stopped is stopped when the program ends. After a fork it stays with the parent. Listeners
@@ -358,7 +358,7 @@ class RobotiqHand:
     def recover(self, timeout: float | None = None) -> None:
         self._caller.wait(lambda: self._inner.recover(timeout))
 
-    # -- what the hand shows ---------------------------------------------------------------------------
+    # -- what can be read ------------------------------------------------------------------------------
 
     @property
     def name(self) -> str:
