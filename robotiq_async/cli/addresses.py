@@ -18,7 +18,7 @@ def full_address(address: str) -> str:
 
 
 def gripper_words(address: str) -> str:
-    """The first line of a command: which gripper it uses."""
+    """The first line of a command: the gripper that it uses."""
     kind = "Simulated gripper" if is_simulated(address) else "Gripper"
     return f"{kind} {full_address(address)}"
 

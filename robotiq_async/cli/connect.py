@@ -24,7 +24,7 @@ def make_hand(
     force: int = DEFAULT_FORCE,
     control: bool | None = True,
 ) -> Hand:
-    """A hand that is not started. On the command line only this function knows which class an address needs.
+    """A hand that is not started. Only this function knows the class for each address.
 
     On another host it takes control, or not, or with the first command (None).
     """

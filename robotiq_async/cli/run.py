@@ -36,7 +36,7 @@ def run(arguments: Sequence[str]) -> int:
     warnings: list[str] = []
 
     def keep(warning: str) -> None:
-        # A command that ends soon imports while it polls: that a poll was late tells its user nothing.
+        # A command that ends soon imports while it polls: a late poll there is no news for its user.
         if LATE_POLLS not in warning:
             warnings.append(warning)
 
@@ -132,7 +132,7 @@ class _Signals:
         assert task is not None
 
         def cancel() -> None:
-            with suppress(RuntimeError):  # the loop has been closed meanwhile
+            with suppress(RuntimeError):  # the loop has been closed
                 loop.call_soon_threadsafe(task.cancel)
 
         self._end = cancel

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ...fleet.network.zenoh_bus import ZenohBus
 
 WAITING_S = 2.0
-"""After this time it reports that it waits for a router; otherwise opening a session takes a tenth of it."""
+"""Seconds until it reports that it waits for a router; else opening a session takes a tenth of that."""
 
 
 async def agent(

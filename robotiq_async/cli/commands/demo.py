@@ -16,9 +16,9 @@ from ..browser import opened
 from ..consent import consent
 
 PATIENCE_S: Final = 60.0
-"""How long the demo waits for a browser."""
+"""Seconds for which the demo waits for a browser."""
 LOOK_S: Final = 2.0
-"""Time for the user to find the window."""
+"""Seconds for the user to find the window."""
 
 
 def demo(

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ...fleet.keys.access import Role
 
 SETTLE_S = 1.5
-"""Time to collect: agents publish a summary of each gripper once a second."""
+"""Seconds to collect: agents publish a summary of each gripper once a second."""
 _ROW = "{:<40} {:<14} {:<10} {:<28} {}"
 
 Site = Annotated[str | None, Parameter(help="The site's name; all sites without it.")]
@@ -167,7 +167,7 @@ def keys(
         read: A client that watches.
         halt: A client that watches and halts.
         operate: A client that watches, halts and commands.
-        days: How long the certificates are valid (default: 825; the authority: ten years).
+        days: Validity of the certificates (default: 825; the authority: ten years).
     """
     need("cryptography", "fleet")
     from ...fleet.keys.access import Role
@@ -221,7 +221,7 @@ def _check(folder: Path, subjects: list[Subject], days: int) -> None:
 
 
 def _make(folder: Path, subjects: list[Subject], days: int) -> None:
-    """Make the missing files, and print for each folder where it goes."""
+    """Make the missing files, and print the destination of each folder."""
     from ...fleet.keys.access import Role
     from ...fleet.keys.certificates import AUTHORITY_KEY, access_lists, has_authority, issue, make_authority
 

@@ -1,4 +1,4 @@
-"""``robotiq-async measure speed``, and what it shares with the others of ``measure``."""
+"""``robotiq-async measure speed``, and the parts that all of ``measure`` share."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ...tools.measure.campaigns import Campaign
 
 SPEEDUP = 15.0
-"""How much faster than real time the simulated gripper of sim:// runs by default."""
+"""Speedup of the simulated gripper of sim:// over real time, by default."""
 POLL_S = 0.001
 """Poll interval with a simulated gripper that is faster than real time: to keep the resolution."""
 
@@ -190,7 +190,7 @@ def speed(
     no_plot: NoPlot = False,
     yes: Yes = False,
 ) -> Coroutine[None, None, None]:
-    """Measure how long a full closing takes at each speed value. THE FINGERS MOVE.
+    """Measure the time of a full closing at each speed value. THE FINGERS MOVE.
 
     As the thesis did (Pekonen 2012, table A1.1): every 4th value from 0, and 255, slowest first,
     three runs, from the command until nothing moves. It takes 20 minutes. The file is
@@ -208,7 +208,7 @@ def speed(
         step: Distance between speed values.
         runs: Closings at each speed value.
         fingers: The axes that move: ABC, A,B, all.
-        speedup: How much faster than real time sim:// runs (default: 15); times are simulated ones.
+        speedup: Speed of sim:// over real time (default: 15); times are simulated ones.
         no_plot: Draw no plot.
         yes: Do not ask.
     """

@@ -48,7 +48,7 @@ def force(
 
     As the thesis did (Pekonen 2012, chapter 6): a scale lies between the fingers, every 25th
     value is set, up by 50 and down by 50, and its reading in grams is typed in, or
-    taken from a table. At sim:// a simulated scale shows the thesis's readings. The
+    taken from a table. At sim:// a simulated scale gives the thesis's readings. The
     currents of the fingers are recorded at every poll. Both files are written after every
     row; started again, it continues there. Unless the gripper is that of sim:// it asks
     first; without a terminal it needs --yes.
@@ -65,7 +65,7 @@ def force(
         step: Distance between force values.
         runs: Grasps at each force value.
         speed: Speed of the closing.
-        speedup: How much faster than real time sim:// runs (default: 15); times are simulated ones.
+        speedup: Speed of sim:// over real time (default: 15); times are simulated ones.
         no_plot: Draw no plots.
         yes: Do not ask.
     """

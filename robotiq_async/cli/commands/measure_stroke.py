@@ -43,8 +43,8 @@ def stroke(
 ) -> Coroutine[None, None, None]:
     """Measure the opening of a jaw at some positions, with a calliper. THE FINGERS MOVE.
 
-    It goes to each position, from open to closed, and asks what a calliper shows
-    between the fingertips. The file has the reading of each position and the figure,
+    It goes to each position, from open to closed, and asks for the reading of a
+    calliper between the fingertips. The file has the reading of each position and the figure,
     and is the option stroke of a hand: millimetres then follow this gripper and its
     fingertips. Between two points the nominal shape is stretched, so that two points,
     open and closed, will do for fingertips of your own. At sim:// a simulated calliper

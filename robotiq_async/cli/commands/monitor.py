@@ -38,7 +38,7 @@ async def monitor(
     """Show a gripper while it works, and move it by keys. Nothing moves until a key is pressed.
 
     The screen shows the state, the fault, and for each axis position, requested position,
-    what it does and its current; polling statistics; and a log. A lost gripper is shown as
+    object status and current; polling statistics; and a log. A lost gripper is shown as
     lost until the monitor has reconnected.
 
     Keys:
@@ -94,7 +94,7 @@ async def _look(address: str, link: Link, *, as_json: bool) -> None:
 
 @asynccontextmanager
 async def _named(address: str, link: Link, *, as_json: bool) -> AsyncIterator[Hand]:
-    """A hand to look at; the line that names the gripper is not among the JSON."""
+    """A hand that is only watched; the line that names the gripper is not among the JSON."""
     from ..connect import connected
 
     if not as_json:

@@ -42,7 +42,7 @@ def move(
 
     A gripper that is not active yet is activated first: its fingers then open and
     close to their stops. An axis that meets an object stops there; that is a
-    success, and the table says so. Unless the gripper is that of sim:// it asks
+    success, and is in the table. Unless the gripper is that of sim:// it asks
     first; without a terminal it needs --yes.
 
     At the end it stops every axis (rGTO = 0), also those that hold something. According
@@ -64,7 +64,7 @@ def move(
         fingers: The axes that move: ABC, A,B, scissor, all.
         speed: 0 is the slowest (a full stroke in 10 s, of a jaw in 2.5 to 5 s), 255 the fastest; or 80mm/s.
         force: 0 is the weakest, 255 the strongest; or 60N, a label and no measured force.
-        timeout: Give up after so many seconds (default: from distance and speed).
+        timeout: Seconds until it gives up (default: from distance and speed).
         keep: Let a grip stay in force when the command ends.
         yes: Do not ask.
     """

@@ -170,8 +170,8 @@ def plot(
     Args:
         file: The recording.
         picture: Name of the plot without suffix (default: that of the recording).
-        begin: Draw what came after this time; the time axis begins with the recording.
-        end: Draw what came before this time.
+        begin: Draw from this time on; the time axis begins with the recording.
+        end: Draw up to this time.
     """
     if not 0 <= begin < end:
         raise UsageError(f"--from must be 0 or more and less than --to, got {begin:g} and {end:g}")

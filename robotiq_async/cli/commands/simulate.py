@@ -54,8 +54,8 @@ async def simulate(
     measured by us. A 3-Finger takes 12 s for an activation, its gDT and gSTA trail
     the echo by 0.05 s (status-lag), and a write within 10 ms of the one before is
     acknowledged and forgotten (write-spacing); a jaw has none of these. The first
-    status after a second without a message shows fault 0x09 (silence-fault).
-    With --plain it does what the manual says, and activates in 4.2 s. Other habits
+    status after a second without a message has fault 0x09 (silence-fault).
+    With --plain it follows the manual, and activates in 4.2 s. Other habits
     are troubles: see --troubles.
 
     A trouble is
@@ -82,8 +82,8 @@ async def simulate(
     Args:
         port: TCP port; 0 takes a free one.
         host: Interface to listen on. Modbus has no password: all who reach the port can command.
-        model: Which gripper: a 3-Finger, 2F-85, 2F-140 or Hand-E.
-        speedup: How many times faster than the clock the simulated time runs.
+        model: The gripper: a 3-Finger, 2F-85, 2F-140 or Hand-E.
+        speedup: Factor by which simulated time is faster than the clock.
         like_hardware: Have the habits of real grippers (the default), or with --plain none.
         exact: Stop exactly at the requested position, which no real gripper does.
         object_: Count at which the fingers A, B and C meet something when they close.
@@ -94,8 +94,8 @@ async def simulate(
         urcap: Serve the text port of Robotiq's URCap, as a UR controller does; for a 2F or a Hand-E.
         unpaced: Do not simulate the transmission time of bytes; for a real serial port, which takes it.
         device_id: The only Modbus unit id that is answered (default: 9 for RTU and a URCap, any on TCP).
-        trouble: What goes wrong, and when; may be given again.
-        troubles: List what can go wrong, and end.
+        trouble: A trouble, as above; may be given again.
+        troubles: List the kinds of trouble, and end.
     """
     from ...simulator import (
         RtuOverTcpSimulatorServer,
@@ -142,7 +142,7 @@ async def simulate(
     try:
         with normal_end():
             async with server:
-                # A URCap asks its gripper all the time, so there is no silence to show.
+                # A URCap reads its gripper all the time, so there is no silence to simulate.
                 for habit in habits_like_hardware(kind) if like_hardware and not urcap else ():
                     await server.fault_injector.begin(habit)
                 print(server.address, flush=True)

@@ -43,12 +43,12 @@ async def verify(
     label: Annotated[str, Parameter(metavar="TEXT", show_default=False)] = "",
     model: Literal["3f", "2f85", "2f140", "hand-e"] | None = None,
 ) -> None:
-    """Check a real gripper against what this library assumes. FROM STAGE 3 ON THE FINGERS MOVE.
+    """Check a real gripper against the assumptions of this library. FROM STAGE 3 ON THE FINGERS MOVE.
 
     Ten stages: this computer; reading only; writing with rGTO = 0; activation; one
     axis at a time, slowly; stopping; full strokes; something soft; loss of client,
-    cable, emergency stop and power; soak. Each says what moves, how far, how fast and
-    what must be clear. Enter begins it; any other key ends with the report so far.
+    cable, emergency stop and power; soak. Each announces what moves, how far, how fast
+    and what must be clear. Enter begins it; any other key ends with the report so far.
 
     Stages 0 to 2 move nothing, take four minutes, and make a report that is worth sending.
     While a stage runs any key and Ctrl-C write rGTO = 0 first. No stage beyond 2 runs
@@ -71,7 +71,7 @@ async def verify(
         report: Folder for the report; it must not contain one yet.
         yes_to: Do not ask for the stages up to this one, at most 2.
         label: Title of the report; it appears there as you write it.
-        model: Which gripper it is (default: that of the address, or 3f).
+        model: The gripper (default: that of the address, or 3f).
     """
     if is_remote(address):
         raise UsageError("verify does not use an agent: run it on the host that is connected to the gripper")
@@ -148,7 +148,7 @@ def _print_summary(report: Report, where: str) -> None:
 
 
 class Unattended:
-    """In place of a person, for stages that were agreed to beforehand and move nothing."""
+    """Takes the place of a person, for stages that were agreed to beforehand and move nothing."""
 
     has_stopped = False
 

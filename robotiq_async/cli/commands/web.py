@@ -162,7 +162,7 @@ async def _cancelled(task: asyncio.Task[None]) -> None:
 
 
 async def _leave_all(operators: Sequence[Operator], page: PageServer) -> None:
-    """Stop all hands at once: a dead link takes 2 s, and the others would move on meanwhile."""
+    """Stop all hands at once: a dead link takes 2 s, in which the others would move on."""
     page.refuse_commands()
     await wait_shielded(asyncio.gather(*map(_leave, operators, page.updates)))
 

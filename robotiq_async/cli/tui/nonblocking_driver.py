@@ -19,7 +19,7 @@ from ...runtime.concurrency import write_all
 BACKLOG: Final = 30
 """Writes queued for the terminal; further ones are dropped."""
 CLOSING_S: Final = 0.5
-"""How long closing waits for the terminal."""
+"""Seconds for which closing waits for the terminal."""
 
 
 class NonblockingDriver(LinuxDriver):

@@ -36,9 +36,9 @@ else:
     DRIVER, NONBLOCKING = NonblockingDriver, NonblockingDriver
 
 FRAMES: Final = 12
-"""How often the screen is painted, per second."""
+"""Paints of the screen a second."""
 FIGURES_S: Final = 0.5
-"""Between two updates of the polling statistics."""
+"""Seconds between two updates of the polling statistics."""
 BUFFER: Final = 400
 """Statuses kept for the next paint: two seconds."""
 HALTING: Final = frozenset({"space", "h"})
@@ -89,7 +89,7 @@ class Monitor(App[None]):
         self._operator = operator
         self._hand = operator.hand
         self._lines: deque[tuple[float, str, str]] = deque(maxlen=LOG_LINES)
-        """For the log, at the next paint: time, text, style."""
+        """Lines for the log at the next paint: time, text, style."""
         self._timeline = Timeline(operator.hand, BUFFER)
         self._newest = operator.hand.status
         # Kept here and not looked up: a paint may come while the screen is closing.
@@ -220,6 +220,6 @@ class Monitor(App[None]):
 
 
 def _milliampere(status: RobotiqStatus, axis: Finger) -> int:
-    """The current of an axis; -1 where the link does not tell it."""
+    """The current of an axis; -1 where the link does not carry it."""
     current = status.current_ma(axis)
     return -1 if current is None else current

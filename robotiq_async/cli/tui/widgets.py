@@ -38,7 +38,7 @@ LEVELS: Final = "▁▂▃▄▅▆▇█"
 FIXED: Final = 47
 """Columns of a line that are neither bar nor sparkline."""
 OPENING: Final = 9
-"""And those of the opening of a jaw."""
+"""Columns of the opening of a jaw."""
 _STYLES: Final = {
     NO_REQUEST: "dim",
     ObjectStatus.IN_MOTION.name: "cyan",
@@ -188,7 +188,7 @@ def _doing(state: State, status: RobotiqStatus) -> str:
 def link_text(figures: Statistics, rate: float, held_up: bool, speed: int, force: int) -> Text:
     """Two lines: polling statistics, and the speed and force of the next motion.
 
-    ``rate`` is in polls a second; ``held_up`` tells of overruns since the last update.
+    ``rate`` is in polls a second; ``held_up`` is true after overruns since the last update.
     """
     jitter = 1000 * (figures.period_p99 - figures.period_p50)
     text = Text(f"{rate:.1f} Hz  jitter {jitter:.2f} ms  ", "dim")
