@@ -1,4 +1,4 @@
-"""How long a server and a hand live: as long as the test that they are for."""
+"""Contexts for a server and a hand: they live as long as their test."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 @asynccontextmanager
 async def served(gripper: SimulatedGripper) -> AsyncIterator[SimulatorServer]:
     """A gripper behind Modbus TCP."""
-    running_loop()  # says what is needed where it is another framework's
+    running_loop()  # raises with the remedy in another framework's loop
     async with SimulatorServer(gripper) as server:
         yield server
 

@@ -1,4 +1,4 @@
-"""The plugin for pytest: a gripper, its server, a hand, and what goes wrong.
+"""The plugin for pytest: a gripper, its server, a hand, and troubles.
 
 The fixtures that need an event loop have that of the test. It is run by pytest-asyncio, in either mode, or by
 anyio's own plugin, which comes with the library. Each has its own way to mark a fixture, and must not see
@@ -26,7 +26,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.fixture
 def robotiq_speedup() -> float:
-    """How many times faster than the clock the simulated gripper is: 20. To be overridden."""
+    """Speedup of the simulated gripper over the clock: 20. To be overridden."""
     return 20.0
 
 
@@ -65,7 +65,7 @@ def robotiq_hand(request: pytest.FixtureRequest, robotiq_server: SimulatorServer
 
 
 def _driver(request: pytest.FixtureRequest) -> str:
-    """Which plugin runs the test, by its name: "anyio" or "asyncio".
+    """The plugin that runs the test, by its name: "anyio" or "asyncio".
 
     Raises:
         pytest.UsageError: not one of these two does; the test is no coroutine, or is trio's.
