@@ -30,7 +30,7 @@ from .goals import GoalRunner, Outcome
 
 COMMANDS: Final = ("activate", "reset", "halt", "recover", "release")
 """Names of the services, and of the actions that they carry out."""
-MOST_CALLS: Final = 16  # commands under way at a time, without halts, which are always accepted
+MOST_CALLS: Final = 16  # commands that run at a time, without halts, which are always accepted
 
 
 class RefusedError(RobotiqError):
@@ -96,7 +96,7 @@ class Connection:
         return True
 
     def refuse(self, reason: str) -> None:
-        """Refuse commands from now on, and end those under way: :meth:`close` follows."""
+        """Refuse commands from now on, and end those that run: :meth:`close` follows."""
         self.takes_commands, self._is_closed = False, True
         self._end_all(reason)
 
@@ -114,7 +114,7 @@ class Connection:
         """Carry out one of :data:`COMMANDS`; returns its outcome as a text.
 
         Raises:
-            RefusedError: the node is not active, too many commands are under way, or a stop took over.
+            RefusedError: the node is not active, too many commands run, or a stop took over.
             RobotiqError: the command failed.
         """
         if name == "halt":

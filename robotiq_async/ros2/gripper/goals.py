@@ -28,7 +28,7 @@ class Ending(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a goal ended."""
+    """The outcome of a goal."""
 
     ending: Ending  # the final state of the goal
     stalled: bool  # whether a contact stopped at least one addressed axis

@@ -33,7 +33,7 @@ class Bridge:
         self._under_way: set[concurrent.futures.Future[Any]] = set()
 
     def close(self) -> None:
-        """Accept no more work; work under way ends normally."""
+        """Accept no more work; work that has begun ends normally."""
         self._is_closed = True
 
     async def drained(self, timeout: float) -> None:
@@ -53,7 +53,7 @@ class Bridge:
         await passed.wait()
 
     async def ask(self, work: Coroutine[Any, Any, T]) -> T:
-        """Run work in the loop, from a callback of ROS; other callbacks run meanwhile."""
+        """Run work in the loop, from a callback of ROS; other callbacks continue to run."""
         # Awaiting an asyncio future would end the executor. A future of ROS wakes it only with a callback.
         answer = Future(executor=self._executor)
         answer.add_done_callback(lambda _: None)

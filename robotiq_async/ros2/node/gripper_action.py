@@ -41,7 +41,7 @@ class GripperAction:
         self._configured = configured
         self._warned = False
         self._accepted: dict[bytes, tuple[Configured, int]] = {}
-        """By the key of the goal: what it was accepted for, and the number of stops at that time."""
+        """The configuration for each accepted goal by its key, and the number of stops at that time."""
         self._server = ActionServer(
             node,
             ParallelGripperCommand,
@@ -122,7 +122,7 @@ class GripperAction:
         return await self._bridge.ask(work())
 
     def _finish(self, handle: ServerGoalHandle, outcome: Outcome) -> None:
-        # ROS permits the state canceled only if the client asked for it.
+        # ROS permits the state canceled only if the client requested it.
         if outcome.ending is Ending.SUCCEEDED:
             self._log.info(f"goal succeeded: {outcome.reason}")
             handle.succeed()

@@ -134,7 +134,7 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
         if self._current is None:
             return "not connected"
         self._bridge.wait(self._disconnect(self._current[0], "the node was cleaned up"))
-        # Not earlier: if the process ends meanwhile, close() must stop the hand.
+        # Not earlier: if the process ends before, close() must stop the hand.
         self._current = None
         return "disconnected"
 
@@ -147,7 +147,7 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
             raise
 
     async def _disconnect(self, connection: Connection, reason: str) -> None:
-        connection.refuse(reason)  # first: nothing must begin meanwhile
+        connection.refuse(reason)  # first: nothing must begin during the stop
         await self._publishing.stop()
         await connection.close(reason)
         self._publishing.publish_status(connection)  # the last message is kept for late subscribers

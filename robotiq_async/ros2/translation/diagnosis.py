@@ -1,4 +1,4 @@
-"""Diagnoses of a hand, its state as JSON, and why it takes no goals. What is unknown is left out."""
+"""Diagnoses of a hand, its state as JSON, and the reason if it takes no goals. Unknowns are left out."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Diagnosis:
     """The condition of one part."""
 
     what: str  # the part
-    level: Level  # how serious the condition is
+    level: Level  # severity of the condition
     message: str  # the condition as a text
     values: Mapping[str, str] = field(default_factory=dict)  # figures
 
@@ -111,7 +111,7 @@ def is_connected(hand: Hand) -> bool:
 
 
 def why_not(hand: Hand) -> str | None:
-    """Why the hand accepts no goal now; None if it does."""
+    """The reason why the hand accepts no goal now; None if it does."""
     state = hand.state
     if state in RUNNING:
         return None

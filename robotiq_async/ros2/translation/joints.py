@@ -62,7 +62,7 @@ of its joint in public descriptions."""
 _STOP_TOLERANCE: Final = 0.1
 """Radians that the base joint of a goal may be off its stop while the middle one bends."""
 
-LONGEST_NAME: Final = 80  # characters of an unknown name that an error shows
+LONGEST_NAME: Final = 80  # characters of an unknown name in an error
 
 VELOCITY_S: Final = 0.04  # seconds over which a velocity is computed, at least: one count is half a degree
 
