@@ -5,7 +5,7 @@ Programs import from here. That works without zenoh, which is imported when a se
 
     remote, fleet    RemoteHand, and Fleet with its members
     agent            Agent: owns the hands of a host; FLEET.toml
-    control          the lease, and which requests are admitted
+    control          the lease, and the admission of requests
     network          sessions over zenoh, endpoints, routes
     keys             certificates, roles and their rights
     wire             names, requests, answers, statuses

@@ -161,7 +161,7 @@ class Fleet:
 
         It is no safety function: a network may be down when it is needed. A gripper that does not answer is
         tried for 2 s. For 2 s after the fleet was entered, it waits for agents whose links come up late. If
-        cancelled, halts under way are given up.
+        cancelled, halts that have not ended are given up.
 
         Raises:
             NotAllStoppedError: a gripper was not seen to stop; no gripper was found; or an endpoint of the
@@ -170,7 +170,7 @@ class Fleet:
         """
         bus = self._entered()
         halting: dict[tuple[GripperName, int], asyncio.Task[str]] = {}
-        """By gripper and number of its agents: if another agent appears, the gripper is halted again."""
+        """Halts by gripper and number of its agents: if another one appears, the gripper is halted again."""
         try:
             # Links come up one after the other: each gripper is halted as soon as it is found.
             while True:

@@ -61,8 +61,8 @@ class Agent:
             window: of the leases, in seconds; see :class:`~robotiq_async.fleet.control.lease.Lease`.
             records: keeps, for the next run of the agent, which clients may reacquire the lease
                 automatically. With None no client may after a restart.
-            asleep: returns the seconds for which this machine has been suspended so far; None asks the
-                system.
+            asleep: returns the seconds for which this machine has been suspended so far; None reads it
+                from the system.
         """
         self._suspended = asleep or _suspended
         self._suspended_s = self._suspended()
@@ -73,7 +73,7 @@ class Agent:
         self._running: asyncio.Task[Any] | None = None
         self._invalid_tokens = LimitedLog()
         self._conflicts: dict[str, LimitedLog] = {}
-        """By gripper; limited, because a token of another agent may come and go thousands of times."""
+        """Warnings by gripper, limited: a token of another agent may come and go thousands of times."""
         self._prefix = f"{ROOT}/{site}/{host}"
         self.hands = {
             name: ServedHand(
@@ -153,7 +153,7 @@ class Agent:
         )
 
     async def _others(self) -> list[tuple[int, GripperName]]:
-        """What other agents of this site and host serve, each with the epoch of that agent."""
+        """The grippers that other agents of this site and host serve, each with the epoch of that agent."""
         keys = await self._bus.announced(f"{self._prefix}/*/alive/*", timeout=LOOK_S)
         return [other for other in map(self._other, keys) if other is not None]
 
@@ -214,7 +214,7 @@ class Agent:
 
 
 def _suspended() -> float:
-    """Seconds for which this machine has been suspended since its start; 0 where the system does not say."""
+    """Seconds for which this machine has been suspended since its start; 0 where the system has no figure."""
     if not hasattr(time, "CLOCK_BOOTTIME"):
         return 0.0
     return time.clock_gettime(time.CLOCK_BOOTTIME) - time.clock_gettime(time.CLOCK_MONOTONIC)

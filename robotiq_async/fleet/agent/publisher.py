@@ -2,7 +2,7 @@
 
 Statuses and events share one key, which keeps their order. Both may be dropped on a full link. The next
 status replaces a lost one; events are numbered and every status has the newest number, so a client notices a
-lost event and asks for it.
+lost event and requests it.
 """
 
 from __future__ import annotations

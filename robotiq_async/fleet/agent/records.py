@@ -129,7 +129,7 @@ def file_records() -> Records:
 
 
 def _boot() -> Any:  # noqa: ANN401  # only compared
-    # Identifies this run of the machine; None where the system does not say. Records are then not used.
+    # Identifies this run of the machine; None where the system has no such figure. Records are then not used.
     try:
         return _BOOT.read_text(encoding="ascii").strip() or None
     except OSError:

@@ -18,17 +18,17 @@ from .publisher import HandPublisher
 
 REMEMBERED: Final = 256  # requests whose answers are kept for repetitions
 END_S: Final = 0.5
-"""Seconds for requests under way to end after the hand has been stopped, before they are cancelled."""
+"""Seconds for requests to end after the hand has been stopped, before they are cancelled."""
 T = TypeVar("T")
 Work = Coroutine[Any, Any, MoveResult | None]
 LABEL_MAX: Final = 200  # characters of a label that are shown
 
 
 class Request:
-    """A request under way, or answered: repetitions get the same answer.
+    """A request that runs, or is answered: repetitions get the same answer.
 
     Attributes:
-        reason: why the agent cancelled it; empty if it was not cancelled, or by its client.
+        reason: of its cancellation by the agent; empty if it was not cancelled, or by its client.
     """
 
     def __init__(self, name: str, call: Call, query: Query) -> None:
@@ -124,14 +124,14 @@ class Requests:
         request.queries.clear()
 
     def _forget(self) -> None:
-        # Only answered ones: a repetition of one under way must not be carried out twice.
+        # Only answered ones: a repetition of one that runs must not be carried out twice.
         for number in sorted(self._known)[: REMEMBERED // 2]:
             if self._known[number].answer is not None:
                 del self._known[number]
 
 
 def label_of(call: Call) -> str:
-    """What a client calls itself, safe to show to others."""
+    """The label a client gives itself, made printable."""
     return printable(str(call.arguments.get("label", "unknown client"))[:LABEL_MAX])
 
 

@@ -1,5 +1,23 @@
 """ServedHand: one hand of an agent. Answers requests, and holds what moves when a lease ends."""
 
+# Theory of operation
+#
+# receive() decides on each message at once, in the event loop: is it meant for this gripper and this run of
+# the agent, has the lease expired by now, and may its sender do that?
+#
+#   info, halt   any client; the halt also while the agent ends
+#   lease        acquire a free one, take it from its holder, renew or release one's own
+#   cmd/NAME     the holder alone, in order, with a fresh stamp of the agent (Admission)
+#
+# Work that takes time is a task in Requests, which gives each repetition of its message the same answer.
+#
+# The lease ends in end_lease() alone: released, expired, taken, halted by another client, or closed. That
+# cancels the holder's requests, drops those that were not sent, and holds the axes in _commanded. If the link
+# is down then, they wait in _to_hold until the gripper is reached, unless the next holder moves them first.
+#
+# run() starts the hand again every RETRY_S while the gripper cannot be reached. Fingers that move at a start
+# are held: no client is there for them. At its end the hand is stopped, whoever holds the lease.
+
 from __future__ import annotations
 
 import asyncio
@@ -199,7 +217,7 @@ class ServedHand:
         if take:
             self._lease.intervene(call.client, "taken")
         if holder is not None and (take or holder.client == call.client):
-            # The holder itself acquires again: it lost track, so what it asked before must not continue.
+            # The holder itself acquires again: it lost track, so its earlier requests must not continue.
             self.end_lease("expired" if holder.client == call.client else "taken", label)
         number = self._admission.acquire(call, label)
         self._settings.restore(settings)
@@ -377,10 +395,10 @@ class ServedHand:
 
 
 class RestoredSettings:
-    """Merged into each command, so that both are written in one image, until such an image is acknowledged.
+    """Speeds and forces merged into each command, to be written in one image, until one is acknowledged.
 
     A restarted agent has its own speeds and forces: the next motion could be faster and stronger than the
-    client asked for.
+    client requested.
     """
 
     def __init__(self, hand: RobotiqHand) -> None:

@@ -1,1 +1,1 @@
-"""The lease, and which requests are admitted. Pure."""
+"""The lease, and the admission of requests. Pure."""

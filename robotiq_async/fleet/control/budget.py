@@ -1,6 +1,6 @@
 """Budget: limits the rate of questions. Pure: the caller passes the time.
 
-Questions need no lease, and answering one takes as long as a poll. A client that asks thousands a second
+Questions need no lease, and answering one takes as long as a poll. A client that sends thousands a second
 would slow the polling of the gripper, and with it the statuses of all clients. Halts have no budget.
 """
 

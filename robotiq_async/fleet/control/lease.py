@@ -1,4 +1,4 @@
-"""Lease: which client may command a gripper, and until when. Pure: the caller passes the time.
+"""Lease: the right of one client to command a gripper, until a time. Pure: the caller passes the time.
 
 All times are the agent's own, and the arrival of a message never counts: each message proves which stamp of
 the agent its sender has received, and the lease lasts until ``window`` seconds after that stamp. So a message
@@ -25,7 +25,7 @@ class Holder:
     """The client that commands."""
 
     client: str  # random, chosen by the client
-    label: str  # what the client calls itself: user, host, process
+    label: str  # the client's own: user, host, process
 
 
 class Lease:
@@ -108,7 +108,7 @@ class Lease:
 
     @property
     def record(self) -> dict[str, object]:
-        """What the next run of the agent needs to know."""
+        """The state for the next run of the agent."""
         return {"runs": self.runs, "number": self.number, "barred": self._barred}
 
     def resume(self, record: Mapping[str, Any]) -> None:
@@ -120,7 +120,7 @@ class Lease:
         self.number, self._barred = number + 1, (int(barred), str(reason))
 
     def why_not_again(self, number: int) -> str:
-        """Why the lease of a number may not be reacquired automatically; empty if it may."""
+        """The reason why the lease of a number may not be reacquired automatically; empty if it may."""
         barred, reason = self._barred
         return reason if number <= barred else ""
 

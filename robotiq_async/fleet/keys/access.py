@@ -5,8 +5,8 @@ patterns, so the list contains every client. A client that is removed from it ha
 certificate, after the agents have been restarted with the new list. Do not give its name to another client:
 the old certificate would be valid again.
 
-Access control is the part of an agent's configuration that says which messages zenoh passes between it and
-its clients. All others are denied.
+Access control is the part of an agent's configuration with the messages that zenoh passes between it and its
+clients. All others are denied.
 
 A rule of zenoh covers an expression only if it includes all of it: zenoh silently drops a subscription that
 is wider than the rule, and a message under a key without a rule. The common names in the certificates of both

@@ -60,7 +60,7 @@ class Bus(Protocol):
     """One open session. Calls, and callbacks unless noted, belong to the event loop it was opened in."""
 
     def publisher(self, key: str, urgency: Urgency) -> Callable[[bytes], None]:
-        """Returns a function that publishes a payload under a key. It never blocks."""
+        """Return a function that publishes a payload under a key. It never blocks."""
 
     def subscribe(self, expression: str, listener: Callable[[str, bytes], None]) -> Undo:
         """Call a listener with key and payload of each message under matching keys. Returns what ends it."""
@@ -106,7 +106,7 @@ class Bus(Protocol):
         """
 
     def announce(self, key: str) -> Undo:
-        """Show a key to others for as long as this process lives and can be reached. Returns what ends it."""
+        """Announce a key for as long as this process lives and can be reached. Returns what ends it."""
 
     async def announced(self, expression: str, *, timeout: float) -> list[str]:
         """The matching keys that are announced now; ``timeout`` is in seconds."""

@@ -19,7 +19,7 @@ _OPTIONS: Final = frozenset({"connect", "keys", "insecure"})
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """How to reach agents.
+    """The way to agents.
 
     Attributes:
         connect: zenoh endpoints of agents or routers; empty for an agent on this machine.
@@ -57,7 +57,7 @@ def parse_remote_address(address: object) -> tuple[GripperName, Route]:
 
     Raises:
         TypeError: not a string.
-        ValueError: malformed; the message shows the form.
+        ValueError: malformed; the message has the form.
     """
     if not isinstance(address, str):
         raise TypeError(f"address must be a string, got {address!r}; accepted: {FORM}")

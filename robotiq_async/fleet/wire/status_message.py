@@ -35,12 +35,12 @@ class StatusMessage(NamedTuple):
         lease: number of the lease.
         is_held: whether a client holds the lease.
         events: number of the newest event; a client that has received fewer has missed some.
-        is_moving: whether an axis moves, or will because of a command that has no effect yet.
+        is_moving: whether an axis moves, or will move by a command that has no effect yet.
         sequence: of the status, counted by the agent's hand; meaningless without registers.
         age: seconds from the gripper's reply to ``stamp``.
         registers: the status; None if none has been read yet.
         model: of the gripper.
-        has_current: whether the registers tell the motor currents.
+        has_current: whether the registers carry the motor currents.
     """
 
     mark: int

@@ -1,7 +1,7 @@
-"""What crosses the network as JSON: the fields of ``as_dict()``, less those that the receiver works out.
+"""Values as JSON on the network: the fields of ``as_dict()``, less those that the receiver works out.
 
-Enumerations are names, but a fault is its code, because a gripper may show one that has no name. A status or
-a request is its registers and its model.
+Enumerations are names, but a fault is its code, because a gripper may report one that has no name. A status
+or a request is its registers and its model.
 """
 
 from __future__ import annotations
