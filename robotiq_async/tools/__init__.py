@@ -1,1 +1,1 @@
-"""What a program does with a hand: operate, record, view, measure, diagnose it; a page in the browser."""
+"""Tools around a hand: operate, record, view, measure, diagnose it; a page in the browser."""

@@ -57,8 +57,8 @@ class Operator:
 
         Args:
             hand: started before or after.
-            speed: what the hand was constructed with.
-            force: what the hand was constructed with.
+            speed: of the hand's constructor.
+            force: of the hand's constructor.
 
         Raises:
             TypeError: speed or force is not an int.
@@ -69,7 +69,7 @@ class Operator:
         self.force = check_byte("force", force)
         self._requests = hand.requests(1)
         self._asking = 0
-        """Number of motions under way that this person has asked for."""
+        """Number of unfinished motions that this person has requested."""
         self._moved = False
         self._changing = asyncio.Lock()
         self._recoveries: set[asyncio.Future[str]] = set()
@@ -84,7 +84,7 @@ class Operator:
     async def act(self, action: Action) -> str:
         """Carry out an action; returns a short description of the outcome.
 
-        Cancelling holds a move; a sequence under way (activation, release, reset) continues.
+        Cancelling holds a move; a sequence that runs (activation, release, reset) continues.
 
         Raises:
             RobotiqError: it could not be carried out.
@@ -122,7 +122,7 @@ class Operator:
             return describe(await self.hand.move(position, fingers, speed=speed, force=force))
 
     async def leave(self) -> str:
-        """Stop the hand, and the fingers if this person has moved them; returns what happened to the fingers.
+        """Stop the hand, and the fingers if this person has moved them; returns what became of the fingers.
 
         It takes no longer than :meth:`Hand.stop`.
         """
@@ -136,7 +136,7 @@ class Operator:
         return "A command from here moved the fingers. They may STILL MOVE: no status confirmed the stop."
 
     async def set_speed(self, value: int) -> str:
-        """Set the speed of all axes, also of a motion under way; returns it as text.
+        """Set the speed of all axes, also while they move; returns it as text.
 
         Raises:
             TypeError, ValueError, RobotiqError: as :meth:`Hand.set_speed`.
@@ -193,7 +193,7 @@ class Operator:
             self._moved |= self._asking > 0
 
     def _stands_still(self, since: float) -> bool:
-        """Whether a status since then shows no go, activation or release bit."""
+        """Whether a status since then has no go, activation or release bit."""
         try:
             status = self.hand.status
         except NotStartedError:

@@ -31,7 +31,7 @@ from ..values.statistics import Statistics
 
 LOOPBACK: Final = "127.0.0.1"
 TIMEOUT_S: Final = 5.0
-"""How long a scrape waits for an event loop that is blocked."""
+"""Seconds for which a scrape waits for an event loop that is blocked."""
 
 _COUNTERS: Final = {
     "polls": "Statuses read.",

@@ -1,4 +1,4 @@
-"""What a program around hands needs to run as a service: signals, health, systemd's watchdog.
+"""Parts for a program that runs as a service around hands: signals, health, systemd's watchdog.
 
 ::
 
@@ -39,7 +39,7 @@ from ..values.errors import NotStartedError
 from ..values.status import RobotiqStatus
 
 FRESH_S: Final = 1.0
-"""A status that is older says nothing about the gripper: two hundred polls have brought none."""
+"""A status that is older proves nothing about the gripper: two hundred polls have brought none."""
 INSIST_S: Final = 3.0
 """Seconds after a signal in which further ones are ignored. A stop takes 2 s at most."""
 
@@ -54,7 +54,7 @@ class Health:
         status_age: seconds since the newest status was read; None if there is none.
         fault: the gripper's fault in the newest status.
         holds: the axes that report a contact while closing, in the newest status.
-        problem: why the hand takes no motion commands now, in a sentence; empty if it does.
+        problem: the reason why the hand takes no motion commands now, in a sentence; empty if it does.
     """
 
     name: str
@@ -84,7 +84,7 @@ class Health:
 
 
 def health(hand: Hand) -> Health:
-    """The health of a hand, at once and whatever its state: nothing is asked of the gripper."""
+    """The health of a hand, at once and whatever its state: nothing is sent to the gripper."""
     try:
         status = hand.status
     except NotStartedError:
@@ -121,7 +121,7 @@ def _problem(state: State, age: float | None, status: RobotiqStatus | None) -> s
 
 
 class Signals:
-    """What has come.
+    """The signals that have come.
 
     Attributes:
         received: the number of the first signal; 0 if there was none.
@@ -135,13 +135,13 @@ class Signals:
 async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator[Signals]:
     """Stop hands on SIGINT, SIGTERM and SIGHUP, and leave the block after that.
 
-    All stops begin at once, in the next turn of the event loop. When they have ended, what is inside the
+    All stops begin at once, in the next turn of the event loop. When they have ended, the
     block is cancelled, and the program continues after it. The NotStartedError of a call that a stop has
-    ended does not leave the block. Further signals are ignored for 3 s; later ones do what they did before
+    ended does not leave the block. Further signals are ignored for 3 s; later ones act as before
     the block. An ignored signal stays ignored. SIGKILL stops nothing.
 
     Args:
-        hands: what is stopped; one that does not run is left alone.
+        hands: to stop; one that does not run is left alone.
         forward: for servers that end themselves in order: pass the signal on to the handler that was there
             before the block, in place of cancelling.
 
@@ -198,11 +198,11 @@ def _pass_on(handler: object, number: int, frame: FrameType | None) -> None:
 
 @asynccontextmanager
 async def watched_by_systemd(*hands: Hand) -> AsyncIterator[None]:
-    """Tell systemd that the service is ready, that it lives, and how it is; without systemd, do nothing.
+    """Notify systemd of readiness, life and health of the service; without systemd, do nothing.
 
-    For a unit with ``Type=notify``. With ``WatchdogSec=`` the event loop tells it twice in that time that the
-    program lives. When the loop hangs, or a hand has ended by itself, it is told no more, and restarts the
-    service. A gripper that is off or in fault is no reason to: ``systemctl status`` shows it.
+    For a unit with ``Type=notify``. With ``WatchdogSec=`` the event loop notifies it twice in that time. When
+    the loop hangs, or a hand has ended by itself, it gets no more notifications, and restarts the service. A
+    gripper that is off or in fault is no reason to: ``systemctl status`` shows it.
     """
     tell = _Systemd()
     if not tell.is_there:

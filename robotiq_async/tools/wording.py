@@ -42,21 +42,21 @@ TRIGGER_WORDS: Final = {each: each.value.removesuffix("()") for each in Trigger}
     Trigger.ASK_START: "the start",
     Trigger.ASK_STOP: "the end",
 }
-"""A description of what changes a state."""
+"""A description of each trigger."""
 
 JAW_NAME: Final = "jaw"
-"""What people call the one axis of a 2F or a Hand-E; in programs and files it is A."""
+"""The name for people of the one axis of a 2F or a Hand-E; in programs and files it is A."""
 
 
 def axis_name(axis: Finger, model: Model) -> str:
-    """What people call axes of a model."""
+    """The names for people of axes of a model."""
     return JAW_NAME if len(model.axes) == 1 else str(axis.name)
 
 
 def refusal_words(error: RobotiqError, hints: Mapping[State, str]) -> str:
-    """Why a command was refused, and which key or button helps: of the hints, that of the state.
+    """The reason for a refusal, and the key or button that helps: of the hints, that of the state.
 
-    What the error advises is for programs, and left out.
+    The advice of the error is for programs, and left out.
     """
     if isinstance(error, NotActivatedError):
         return f"{error.message}; {hints[State.RESET]}"

@@ -36,7 +36,7 @@ def _note(model: Model) -> str:
 
 
 def main() -> None:
-    """All of them."""
+    """Write all of them."""
     for model in MODELS.values():
         for name, text in written(model).items():
             (DATA / name).write_text(text, encoding="utf-8")

@@ -4,7 +4,7 @@ Frames. base: z points out of the gripper, x to the left finger, the origin is i
 slides outwards with positive values, 0 is closed, as in the public ROS description (AGH-CEAI,
 robotiq_hande_description), which has the names.
 
-Where the dimensions are from: the stroke, 50 mm, from the manual; each finger travels half of it (ROS). All
+Sources of the dimensions: the stroke, 50 mm, from the manual; each finger travels half of it (ROS). All
 others are ESTIMATES from pictures: a body of 75 mm across and 99 mm high, fingers of 22 mm, 1.07 kg in all.
 """
 

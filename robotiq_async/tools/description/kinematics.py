@@ -7,11 +7,11 @@ parallel to itself, to 140 the base turns alone, from there to 240 the middle on
 (Indiana University, technical report 711). The scissor turns the bases of B and C against each other.
 
 The slopes and limits below are those of the joint state publisher for ROS 1 (robotiq_3f_gripper_joint_states
-of ros-industrial), which cites that report for the fingers and says of the scissor that its author measured
-it. They are one formula, and no second source confirms them: public recordings of real hands, that of TAMS
-among them, have joint angles which that same publisher computed from the positions.
+of ros-industrial), which cites that report for the fingers; its author measured the scissor. They are one
+formula, and no second source confirms them: public recordings of real hands, that of TAMS among them, have
+joint angles which that same publisher computed from the positions.
 
-Angles are what a mechanism without load and play would have: a finger that closes around something bends
+Angles are those of a mechanism without load and play: a finger that closes around something bends
 earlier. Nothing here has been checked on a real hand.
 """
 
@@ -40,15 +40,15 @@ TIP: Final[Points] = ((0, 0.0), (110, -55.0))
 """joint_3: against the base, for the tip stays parallel, until its stop."""
 PALM: Final[Points] = ((15, 11.0), (240, -11.0))
 """The palm joint of finger_1 against the scissor; that of finger_2 is its negative. The publisher's author
-measured about 11 degrees to each side, where the manual says 32 in all; where 15 and 240 are from is not
-said."""
+measured about 11 degrees to each side, where the manual has 32 in all; the source of 15 and 240 is not
+given."""
 
 FINGER_NAMES: Final = MappingProxyType(
     {Finger.C: "finger_1", Finger.B: "finger_2", Finger.A: "finger_middle"}
 )
-"""What the public ROS description of the hand calls the fingers, in the order of its joints.
+"""The names of the fingers in the public ROS description of the hand, in the order of its joints.
 
-The one place that says so: joint states, goals, the URDF and every drawing follow it. Sources disagree about
+Joint states, goals, the URDF and every drawing take them from here. Sources disagree about
 B and C, and a person has not looked yet: docs/decisions/finger-names.md.
 """
 

@@ -1,8 +1,8 @@
-"""Writes a description as MJCF: what MuJoCo reads, with the couplings and springs that a URDF cannot say.
+"""Writes a description as MJCF for MuJoCo, with the couplings and springs that a URDF has no form for.
 
 Coupled joints are equality constraints; a motor that drives several joints pulls a tendon. Every drive is a
-position actuator whose force is limited to that of full force; the simulator lowers the limit to what a force
-register asks for. The gripper collides with everything but itself.
+position actuator whose force is limited to that of full force; the simulator lowers the limit to that of the
+force register. The gripper collides with everything but itself.
 
 Frictions, dampings and the gains of the drives are estimates: stiff enough to stop within a count, and soft
 enough for steps of 2 ms.
@@ -26,9 +26,9 @@ _PAD_FRICTION: Final = (0.9, 0.02, 0.0005)
 silicone on oiled steel."""
 _BODY_FRICTION: Final = (0.4, 0.005, 0.0001)
 _GAINS: Final = {False: (500.0, 7.0, 0.02), True: (30_000.0, 500.0, 2.0)}
-"""Of a drive that turns and of one that slides: stiffness, damping, inertia of the geared motor."""
+"""Stiffness, damping and inertia of the geared motor of a drive that turns, and of one that slides."""
 _SHARED_GAINS: Final = (150.0, 2.5, 0.006)
-"""Of a drive that pulls a tendon."""
+"""The same of a drive that pulls a tendon."""
 _DAMPING: Final = {False: 0.02, True: 5.0}
 _HARD: Final = {"solref": "0.004 1", "solimp": "0.95 0.999 0.001"}
 

@@ -1,7 +1,7 @@
 """Rigid links, the joints between them and what drives these: the form of every description.
 
-A description is data. The drawing, the URDF and the MJCF are made from it, so none of them can say what
-another does not. Metres, radians, kilograms.
+A description is data. The drawing, the URDF and the MJCF are made from it, so they cannot disagree. Metres,
+radians, kilograms.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ MATERIALS: Final[Mapping[str, Color]] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A box, a cylinder (along z) or a sphere of a link: drawn, and what a contact is computed with.
+    """A box, a cylinder (along z) or a sphere of a link: drawn, and used for contacts.
 
     Attributes:
         kind: ``box``, ``cylinder`` or ``sphere``.
@@ -63,7 +63,7 @@ class Link:
     Attributes:
         name: of the link, which is the name of its frame.
         mass: in kilograms, spread evenly over its shapes.
-        shapes: what it consists of.
+        shapes: its parts.
     """
 
     name: str
@@ -89,7 +89,7 @@ class Joint:
     """A joint between two links.
 
     Attributes:
-        name: as joint states name it.
+        name: as in joint states.
         parent: name of the parent link.
         child: name of the child link.
         origin: the frame of the child at 0, in the frame of the parent.
@@ -99,7 +99,7 @@ class Joint:
         slides: it moves along its axis, and does not turn about it.
         effort: the most its drive gives, in N m, or N of one that slides.
         velocity: the fastest it moves, in rad/s, or m/s.
-        mimic: what it follows; None if it is free.
+        mimic: the joint it follows; None if it is free.
     """
 
     name: str
@@ -145,7 +145,7 @@ class Tendon:
 
 @dataclass(frozen=True, slots=True)
 class HandModel:
-    """A tree of links, with what moves them.
+    """A tree of links, with their drives.
 
     Attributes:
         name: of the robot in a URDF.
@@ -153,8 +153,8 @@ class HandModel:
         links: by name.
         joints: every parent before its children.
         stand: the root where the gripper stands on its mounting face and opens upwards.
-        fingers: by axis, the links at which what it moves begins.
-        touching: by axis, the links that touch what it grips.
+        fingers: by axis, the first of the links that it moves.
+        touching: by axis, the links that touch a part.
         drives: by axis, the joint or the tendon that its motor drives.
         tendons: joints that one motor shares, and springs.
         springs: stiffness and rest angle of joints with a spring, in N m/rad and rad.
@@ -180,7 +180,7 @@ class HandModel:
 
     @property
     def mass(self) -> float:
-        """Of all links, in kilograms."""
+        """The mass of all links, in kilograms."""
         return sum(link.mass for link in self.links.values())
 
     def completed(self, values: Mapping[str, float]) -> dict[str, float]:

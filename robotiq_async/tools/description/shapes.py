@@ -27,7 +27,7 @@ def sphere(radius: float, at: Vector, material: str) -> Shape:
 
 
 class Inertia(NamedTuple):
-    """Of a link about its centre of mass, along the axes of its frame.
+    """The inertia of a link about its centre of mass, along the axes of its frame.
 
     Attributes:
         centre: of mass, in metres.
@@ -41,7 +41,7 @@ class Inertia(NamedTuple):
 
 
 def inertia(link: Link) -> Inertia:
-    """That of its mass, spread evenly over its shapes; where they overlap it counts twice."""
+    """The inertia of a link's mass, spread evenly over its shapes; where they overlap it counts twice."""
     volumes = [_volume(shape) for shape in link.shapes]
     masses = [link.mass * volume / sum(volumes) for volume in volumes]
     places = [shape.origin.position for shape in link.shapes]
@@ -76,7 +76,7 @@ def _volume(shape: Shape) -> float:
 
 
 def _own_moments(shape: Shape) -> Vector:
-    """Of one kilogram, about the axes of the shape."""
+    """The moments of one kilogram, about the axes of the shape."""
     if shape.kind == "box":
         x, y, z = (each * each / 12 for each in shape.size)
         return y + z, x + z, x + y

@@ -5,7 +5,7 @@ side. link_0 of a finger: x out of the palm, y to the other side of the hand; a 
 angles about z. The joints have the names, the frames and the order that ROS users of the hand know;
 ``kinematics`` turns positions into their angles. Which finger has which name: docs/decisions/finger-names.md.
 
-Where the lengths are from:
+Sources of the lengths:
 
 (ROS)    the joint origins of the public ROS description of the hand (robotiq_3f_gripper_visualization of
          ros-industrial, BSD): where the fingers stand on the palm (45.5, 21.4 and 36 mm), link_0 20 mm,
@@ -22,7 +22,7 @@ Where the lengths are from:
 
 One motor drives a finger. The sum that it moves, in degrees of the base joint, is base + 5/9 middle: 140
 counts turn the base by 70 degrees and 100 counts the middle joint by 90. A spring holds the middle joint back
-until the base is at its stop or meets something; then the middle joint goes on, and the finger wraps around
+until the base is at its stop or meets something; then the middle joint turns, and the finger wraps around
 the part. A spring keeps the tip parallel to itself, and a stop keeps it from bending backwards from there.
 """
 
@@ -40,7 +40,7 @@ from .shapes import box, cylinder, pad, sphere
 
 _MASS: Final = 2.3
 _LINK_MASSES: Final = (0.06, 0.10, 0.06, 0.05)
-"""Of link_0 to link_3 of a finger; the palm has the rest (ESTIMATE)."""
+"""Masses of link_0 to link_3 of a finger; the palm has the rest (ESTIMATE)."""
 _OUT: Final = (pi / 2, 0.0, 0.0)
 """A cylinder that stands along y, out of the palm."""
 _BENT: Final = pi / 6
@@ -161,7 +161,7 @@ def _phalanges(name: str) -> list[Joint]:
 
 
 def _limit(degrees: float) -> float:
-    """In radians, with five digits and outwards: no angle is beyond it by a rounding."""
+    """A limit in radians, rounded outwards to five digits: no angle is beyond it by a rounding."""
     return copysign(ceil(abs(radians(degrees)) * 1e5) / 1e5, degrees)
 
 

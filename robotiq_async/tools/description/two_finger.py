@@ -6,7 +6,7 @@ which so stays parallel to itself. The joint of the left crank has the name that
 it, and positive angles close; the others follow it. A simulator drives the four-bar by these couplings. The
 real fingers also bend around a part that touches them low (the encompassing grip): these do not.
 
-Where the lengths are from:
+Sources of the lengths:
 
 (ROS)   the pivots of the cranks, 30.6 and 12.7 mm from the middle, 54.9 and 61.4 mm high, and the angles at
         which the joints are closed (``kinematics``): public descriptions of the 2F-85 (PickNik,
@@ -34,7 +34,7 @@ from .shapes import box, cylinder, pad
 
 _PIVOT: Final = (0.0306, 0.0549)
 _INNER_PIVOT: Final = (0.0127, 0.0614)
-"""From the middle, and above the mounting face."""
+"""Distances from the middle, and above the mounting face."""
 _ALONG_Y: Final = (pi / 2, 0.0, 0.0)
 _SIDES: Final = {"left": 1.0, "right": -1.0}
 
@@ -57,12 +57,12 @@ class Linkage(NamedTuple):
     names: tuple[str, str, str, str]
 
     def open_angle(self, model: Model) -> float:
-        """Between an open crank and the axis of the gripper: closing to the end then moves half a stroke."""
+        """The angle of an open crank to the gripper's axis: closing to the end then moves half a stroke."""
         half = JAW_JOINTS[model].closed / 2
         return half + acos(model.stroke.mm / 1000 / 4 / self.crank / sin(half))
 
     def depth(self, model: Model) -> float:
-        """From the pivot of a fingertip inwards to the face of its pad."""
+        """The distance from the pivot of a fingertip inwards to the face of its pad."""
         return _PIVOT[0] + self.crank * sin(self.open_angle(model)) - model.stroke.mm / 2000
 
 
@@ -88,7 +88,7 @@ LINKAGES: Final = {
     ),
 }
 _SHARES: Final = (0.05, 0.02, 0.05)
-"""Of the mass in a crank, an inner crank and a fingertip (ESTIMATE)."""
+"""Shares of the mass in a crank, an inner crank and a fingertip (ESTIMATE)."""
 
 
 @cache
@@ -169,12 +169,12 @@ def _joints(model: Model, side: str, root: str, links: tuple[str, str, str]) -> 
 
 
 def _torque(model: Model) -> float:
-    """Of the driver at full force: both pads move, and a crank across the axis has its full length."""
+    """The driver's torque at full force: both pads move, and a crank across the axis has its full length."""
     return 2 * model.forces_n[1] * LINKAGES[model].crank
 
 
 def _rate(model: Model) -> float:
-    """Of the driver at full speed, by the nominal speed of the stroke."""
+    """The rate of the driver at full speed, by the nominal speed of the stroke."""
     return JAW_JOINTS[model].closed * model.speeds_mm_s[1] / model.stroke.mm
 
 

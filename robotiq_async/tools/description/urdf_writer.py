@@ -1,4 +1,4 @@
-"""Writes a description as URDF: what RViz, MoveIt, check_urdf and simulators read.
+"""Writes a description as URDF, for RViz, MoveIt, check_urdf and simulators.
 
 Joints that share a motor but not a ratio (the phalanges of the 3-Finger) have no form in a URDF: each is free
 there.
@@ -94,7 +94,7 @@ def _origin(element: ET.Element, pose: Pose) -> None:
 
 
 def _rpy(rotation: Matrix) -> tuple[float, float, float]:
-    """Roll, pitch and yaw. Where roll and yaw cannot be told apart, roll is 0."""
+    """Roll, pitch and yaw. Where roll and yaw cannot be distinguished, roll is 0."""
     (a, b, _), (d, e, _), (g, h, i) = rotation
     across = hypot(a, d)
     if across < 1e-9:

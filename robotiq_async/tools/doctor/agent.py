@@ -1,4 +1,4 @@
-"""What an agent says about a gripper: its description, its statuses, its troubles."""
+"""An agent's messages about a gripper: its description, its statuses, its troubles."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .gripper import report_state
 ANSWER_S: Final = 1.0
 TRIES: Final = 3  # attempts: just after a connection was made the first answers may be empty
 PROBES: Final = 100  # requests for measuring the round trip
-WATCH_S: Final = 2.0  # how long to listen to statuses
+WATCH_S: Final = 2.0  # seconds of listening to statuses
 _READ: Final = frozenset({"version", "window", "statistics", "problem", "state", "address", "holder"})
 LOST: Final = 0.01  # accepted share of lost statuses
 
@@ -53,7 +53,7 @@ async def examine_agent(name: GripperName, bus: Bus, report: Report) -> None:
 
 
 class _Asker:
-    """Asks an agent to describe its gripper. A RemoteHand would not report why there is no answer."""
+    """Requests the description of a gripper from its agent. A RemoteHand would not report why none comes."""
 
     def __init__(self, name: GripperName, bus: Bus) -> None:
         self._name = name
@@ -62,7 +62,7 @@ class _Asker:
         self._number = 0
 
     async def info(self) -> Fields:
-        """What the agent says about the gripper."""
+        """The agent's description of the gripper."""
         self._number += 1
         call = Call(self._name.base, self._client, number=self._number)
         asked, key = now(), self._name.key("info")

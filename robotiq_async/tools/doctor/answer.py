@@ -94,10 +94,10 @@ async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> 
 async def _ask_again(
     address: Address, usual: RegisterMap, other: Link
 ) -> tuple[Link, RobotiqStatus, float] | None:
-    """Ask with the usual unit id and registers once more; None if only ``other`` answers, which is open then.
+    """Read with the usual unit id and registers again; None if only ``other`` answers, which is open then.
 
-    Some lines lose the first requests of a connection, or of a client. What answered after them would else be
-    taken for what the gripper needs.
+    Some lines lose the first requests of a connection, or of a client. Settings that answered after them
+    would else be taken for those of the gripper.
     """
     await other.close()
     for _ in range(TRIES):
@@ -193,7 +193,7 @@ def _report_no_connection(
 
 
 def no_connection(address: Address, error: ConnectFailedError) -> Finding:
-    """Why nothing could be connected to the port of a host."""
+    """The finding for a port of a host that could not be connected."""
     cause = error.__cause__
     if isinstance(cause, ConnectionRefusedError):
         advice = "The host is up, but nothing listens on this port: is it the right address and port?"
@@ -249,7 +249,7 @@ def _advice_for_silence(address: Address, error: RobotiqConnectionError, echoes:
 
 
 def _advice_for_a_line(error: RobotiqConnectionError, echoes: bool) -> str:
-    """Advice for a serial line on which no gripper answers. A line tells no more than its bytes."""
+    """Advice for a serial line on which no gripper answers. A line has nothing but its bytes."""
     if isinstance(error, ResponseTimeoutError):
         heard = "The line echoes what is sent, and nothing else answers" if echoes else "Nothing answers"
         return (

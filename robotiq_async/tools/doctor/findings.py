@@ -20,9 +20,9 @@ class Finding:
     """The result of one check."""
 
     level: Level  # severity
-    what: str  # what was checked
+    what: str  # the subject of the check
     found: str  # the result
-    advice: str = ""  # what to do about it; empty if there is nothing to do
+    advice: str = ""  # the remedy; empty if there is none
 
 
 Report = Callable[[Finding], None]

@@ -23,7 +23,7 @@ from ...values.errors import ConnectFailedError
 from .agent import examine_agent
 from .findings import Finding, GiveUpError, Level, Report
 
-LOOK_S: Final = 3.0  # how long to look for the agent
+LOOK_S: Final = 3.0  # seconds of looking for the agent
 ROUND_S: Final = 0.3  # duration of one look
 
 

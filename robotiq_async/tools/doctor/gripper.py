@@ -28,7 +28,7 @@ from .findings import Finding, GiveUpError, Level, Report
 from .urcap import find_urcap
 
 PROBES: Final = 300  # reads for measuring round trip and rate
-WATCH_S: Final = 2.0  # how long to watch for another client
+WATCH_S: Final = 2.0  # seconds of watching for another client
 LONGEST_PERIOD_S: Final = 0.1  # the longest poll_interval of a hand
 
 
@@ -67,9 +67,9 @@ async def examine(address: Address, report: Report, *, device_id: int | None = N
 
 
 def _check_model(model: Model, registers: Registers, report: Report) -> None:
-    """Report registers that only another model can show."""
+    """Report registers that only another model can have."""
     if not (why := model.contradiction(registers)):
-        if any(registers):  # a gateway may show zeros before its gripper answers
+        if any(registers):  # a gateway may send zeros before its gripper answers
             alike = [each.title for each in MODELS.values() if not each.contradiction(registers)]
             rest = f"; the registers do not say which: taken as a {model.title}" if len(alike) > 1 else ""
             report(Finding(Level.GOOD, "model", f"a {' or a '.join(alike)}{rest}"))

@@ -1,4 +1,4 @@
-"""Opens the text port of a URCap, and says what may be wrong when it does not answer."""
+"""Opens the text port of a URCap, and reports the likely cause when it does not answer."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """A gripper in LeRobot's units: the part that an arm's robot class embeds, and the robot around it.
 
 ================  =================================================================================
-module            what it holds
+module            contents
 ================  =================================================================================
 ``gripper_part``  the part: connect, observe, act, disconnect; imports nothing of LeRobot
 ``robot``         the robot, which ``--robot.discover_packages_path=robotiq_async.tools.lerobot`` finds

@@ -1,8 +1,8 @@
-"""GripperPart: a gripper as a robot of LeRobot sees it, to be embedded in the class of an arm.
+"""GripperPart: a gripper in LeRobot's units, to be embedded in the class of an arm.
 
-The loop around it asks 30 to 100 times a second. So nothing here waits for the gripper: an observation is the
-newest status, an action is one ``command()``. A loop that is not told about a dead link would record a still
-gripper as a demonstration; so each call first looks at the age of the status.
+The loop around it calls 30 to 100 times a second. So nothing here waits for the gripper: an observation is
+the newest status, an action is one ``command()``. A loop that does not notice a dead link would record a
+still gripper as a demonstration; so each call first looks at the age of the status.
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ class GripperPart:
         Raises:
             NotActivatedError: the gripper is not active, and ``activate`` is False. Nothing was written.
             GripperFaultError: the gripper reports a fault.
-            InvalidStateError: connected already; the hand goes on.
-            RobotiqError: what :meth:`RobotiqHand.start` raises besides.
+            InvalidStateError: connected already; the hand runs on.
+            RobotiqError: as :meth:`RobotiqHand.start`.
         """
         hand = self._hand
         if check_flag("activate", activate):
@@ -81,7 +81,7 @@ class GripperPart:
                     f"the gripper at {hand.address} is not active ({hand.state.name}): connect with "
                     "activate=True (--robot.activate=true), which MOVES the fingers to their stops"
                 )
-        except InvalidStateError:  # it runs already, and goes on
+        except InvalidStateError:  # it runs already, and is not ours to stop
             raise
         except BaseException:  # Ctrl-C, too, perhaps after it had started
             hand.stop(halt=False)  # nothing was commanded; a start that fails takes its activation back
@@ -89,11 +89,11 @@ class GripperPart:
         self._is_connected = True
 
     def observe(self) -> dict[str, float]:
-        """What the newest status says; does not wait.
+        """The observation in the newest status; does not wait.
 
         * ``gripper.pos``: 0 (closed) .. 100 (open); of a 3-Finger the mean of its fingers.
         * ``gripper.current``: of the motor, in milliampere; of a 3-Finger the highest of its fingers. It is
-          NaN where the link does not tell it.
+          NaN where the link does not carry it.
         * ``gripper.contact``: the share of the fingers that hold a part, 0..1; of a jaw 0 or 1. A contact
           latches, and a thin part may never be reported.
 
@@ -113,7 +113,7 @@ class GripperPart:
         }
 
     def act(self, pos: object, force: object = None) -> None:
-        """Send the fingers somewhere; does not wait for them. The last value wins, and nothing queues.
+        """Send the fingers to a position; does not wait for them. The last value wins, and nothing queues.
 
         An array or a tensor of one value counts as its number. Anything outside its range is refused.
 

@@ -36,8 +36,8 @@ class RobotiqGripperConfig(RobotConfig):  # type: ignore[misc]  # LeRobot is not
         activate: whether a gripper that is reset is activated: **its fingers MOVE**.
         speed: of the fingers, in counts 0..255.
         force: in counts 0..255, until an action sets another.
-        action_force: whether an action has ``gripper.force``; False for a leader that gives none. What is
-            recorded then cannot be replayed with ``lerobot-replay``.
+        action_force: whether an action has ``gripper.force``; False for a leader that gives none. Recordings
+            then cannot be replayed with ``lerobot-replay``.
         lost_after: age of the newest status, in 0.05..60 s, from which the robot raises ConnectionLostError.
     """
 
@@ -116,7 +116,7 @@ class RobotiqGripper(Robot):  # type: ignore[misc]  # LeRobot is not here
         ``gripper.force`` may be missing. A value beyond 0..100 is refused: clamp what a policy overshoots.
 
         Returns:
-            What was sent.
+            The action that was sent.
 
         Raises:
             KeyError: ``gripper.pos`` is missing.

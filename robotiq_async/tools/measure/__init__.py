@@ -1,1 +1,1 @@
-"""What the values 0..255 mean on your own gripper: measurements and plots of them."""
+"""The meaning of the values 0..255 on your own gripper: measurements and plots of them."""

@@ -38,7 +38,7 @@ REST_S: Final = 0.3
 ATTEMPTS: Final = 20  # attempts at a run: one in which the event loop was blocked is repeated
 TOLERATED: Final = 0.01  # share of a run for which the event loop may be blocked, apart from two polls
 SLACK: Final = 5  # counts by which the readings of a full closing may miss those that the manual gives
-GRASP_S: Final = 1.0  # how long a grasp is recorded after the fingers have stopped, in the gripper's time
+GRASP_S: Final = 1.0  # seconds of the gripper's time that are recorded after the fingers have stopped
 CURRENT_MA: Final = 2550  # the highest current that a status can report
 FINGERS: Final = (Finger.A, Finger.B, Finger.C)
 _CURRENTS_HEADER: Final = ["force_value", "run", "time_ms", "a_ma", "b_ma", "c_ma"]
@@ -168,7 +168,7 @@ class Campaign:
     values: list[int]  # the rows, in the order of measurement
     runs: int  # number of columns
     origin: dict[str, str] = field(default_factory=dict)
-    """What was measured, and how; kept beside the table. Only the same origin can resume it."""
+    """The subject and conditions of the measurement, kept beside the table. Only the same can resume it."""
     table: Table = field(default_factory=dict)  # the measurements so far
 
     def __post_init__(self) -> None:

@@ -43,13 +43,13 @@ ROW: Final = 0.17  # height of a row of labels, where that of the positions is 3
 ROWS: Final = 6  # of labels, at most; where they do not suffice, labels are cut
 SHOWN_FORCES: Final = (0, 125, 250)  # force values whose currents are drawn over time, or the nearest to them
 
-Event = tuple[float, str, bool]  # when, what, and whether it is about a fault
+Event = tuple[float, str, bool]  # time, text, and whether it is about a fault
 
 
 def plot_speed(path: Path, table: Table, label: str) -> list[Path]:
     """Plot closing time against speed value beside the thesis's curve, and the difference between the two.
 
-    The path has no suffix; the label says what the table is. Returns the files written, as all plots do.
+    The path has no suffix; the label is that of the table. Returns the files written, as all plots do.
     """
     thesis = SpeedCalibration.thesis()
     values = sorted(table)
@@ -143,7 +143,7 @@ def plot_recording(
     Args:
         path: of the pictures, without suffix.
         entries: of the recording.
-        begin: seconds from the first message on; what came before is not drawn.
+        begin: seconds from the first message on; earlier ones are not drawn.
         end: in the same seconds.
     """
     seconds = array("d")
@@ -210,7 +210,7 @@ class Label(NamedTuple):
     """A label in the strip above the curves.
 
     Attributes:
-        at: when it happened, in seconds.
+        at: its time in seconds.
         left: where the words begin, as a share of the width.
         row: from the bottom, from 0.
     """

@@ -1,7 +1,7 @@
 """Everything about a hand as messages on four topics, for recordings and for viewers.
 
 ``/gripper/status`` (every poll), ``/gripper/command`` (every request that was written) and ``/gripper/event``
-(transitions and faults) are JSON with a JSON Schema; ``/joint_states`` is what ROS 2 encodes.
+(transitions and faults) are JSON with a JSON Schema; ``/joint_states`` is as ROS 2 encodes it.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Message:
 
     topic: Topic
     nanoseconds: int  # since 1970
-    data: bytes  # encoded as the topic says
+    data: bytes  # in the encoding of the topic
     sequence: int = 0  # the number of its status; commands and events are counted from 1
 
 
@@ -202,7 +202,7 @@ class Feed:
 
 
 class Timeline:
-    """Collects what happens to a hand between two looks, in its order. It only listens."""
+    """Collects the statuses and events of a hand between two looks, in order. It only listens."""
 
     def __init__(self, hand: Hand, buffer: int) -> None:
         self._hand, self._buffer = hand, buffer

@@ -208,7 +208,7 @@ def state_fields(hand: Hand, now: float) -> Fields:
 def efforts(status: RobotiqStatus) -> list[float]:
     """Motor currents in ampere, each at the first joint of its motor; torques are not known.
 
-    NaN where the link does not tell the current.
+    NaN where the link does not carry the current.
     """
 
     def ampere(axis: Finger) -> float:

@@ -39,7 +39,7 @@ except ImportError as error:
 FLUSH_S: Final = 0.5
 """Seconds between two writes to the disk."""
 DISK_S: Final = 10.0
-"""How long the last write may take."""
+"""Seconds that the last write may take."""
 
 
 class _Outbox:
@@ -166,7 +166,7 @@ class Recorder:
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Write the rest and close the file, also when cancelled meanwhile.
+        """Write the rest and close the file, also when cancelled.
 
         Raises:
             RecordingError: a write failed; it never replaces another exception.
@@ -176,7 +176,7 @@ class Recorder:
             raise self._failed.result()
 
     def mark(self, label: str, **values: str | float | bool) -> None:
-        """Write a mark: what happens from now on has this label, until the next mark. Never blocks.
+        """Write a mark: everything from now on has this label, until the next mark. Never blocks.
 
         Every row of a table has the label as of its poll; the values are with the events. ``mark("")`` ends
         the last one.

@@ -99,7 +99,7 @@ class Entry:
     nanoseconds: int  # since 1970
     sequence: int  # the number of the status; commands and events are counted from 1
     data: bytes
-    is_json: bool  # whether the channel says that it is JSON
+    is_json: bool  # whether the channel is declared as JSON
     path: str = field(default="", compare=False)  # the file
 
     @property

@@ -29,9 +29,9 @@ _FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
 _MAY_LACK: Final = ("B", "C", "SCISSOR")
 """The axes that a sibling of the 3-Finger does not have."""
 _NEW: Final = ("opening_mm", "open_fraction")
-"""What recordings of earlier versions do not have."""
+"""Columns that recordings of earlier versions do not have."""
 CURRENT: Final = "current_ma"
-"""A URCap does not tell it."""
+"""The column that recordings over a URCap do not have."""
 STATE: Final = "state"
 """The column with the state of the hand as of the last event; the JSON of a status does not have it."""
 LABEL: Final = "label"

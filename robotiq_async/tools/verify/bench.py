@@ -1,4 +1,4 @@
-"""What a stage works with: the gripper, the person, and the results."""
+"""The surroundings of a stage: the gripper, the person, and the results."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .recorded_link import Frame, RecordedLink
 from .watch import Person, Watch
 
 CONNECT_S: Final = 2.0  # for a connection; short, so that a stop over a lost link is soon tried again
-SPACING_S: Final = 0.02  # twice the time between two writes that the manual asks for
+SPACING_S: Final = 0.02  # twice the time between two writes in the manual
 
 
 @dataclass(frozen=True, slots=True)
 class Lengths:
-    """How long the long checks last; a rehearsal has shorter ones."""
+    """Durations of the long checks; a rehearsal has shorter ones."""
 
     reads: int = 300  # round trips at each of three rates
     idle: tuple[float, ...] = (0.5, 1.0, 1.5, 2.0, 5.0, 30.0, 60.0)  # seconds of silence in stage 1
@@ -35,15 +35,15 @@ class Lengths:
 
 @dataclass
 class Bench:
-    """The gripper under test and what surrounds it."""
+    """The gripper under test and its surroundings."""
 
-    address: Address  # where it is; tcp, rtu or rtu+tcp
+    address: Address  # of the gripper; tcp, rtu or rtu+tcp
     person: Person  # beside it
     keep: Callable[[Frame], None]  # takes every frame
     lengths: Lengths = field(default_factory=Lengths)  # of the long checks
     checks: dict[str, Check] = field(default_factory=dict)  # the results so far, by name
     link: RecordedLink = field(init=False)  # to the gripper, once it has been found
-    registers: RegisterMap | None = None  # where its registers are, once it has been found
+    registers: RegisterMap | None = None  # of the gripper, once it has been found
     found: RobotiqStatus | None = None  # the first status
     spacing: float = SPACING_S  # seconds from one write to the next; stage 2 may raise it
     is_active: bool = False  # whether it was active at the end of the last stage
@@ -58,7 +58,7 @@ class Bench:
 
     @property
     def first(self) -> str:
-        """The name, for messages, of what moves in stages that move one finger."""
+        """The name, for messages, of the moving part in stages that move one finger."""
         return "finger A" if len(self.fingers) > 1 else "the jaw"
 
     def another_link(
@@ -86,7 +86,7 @@ class Bench:
         /,
         **figures: Figure,
     ) -> None:
-        """Add the result of a check: as assumed if it holds, else what follows for the user.
+        """Add the result of a check: as assumed if it holds, else with the consequence for the user.
 
         Raises:
             EndError: it does not hold, and is about safety.

@@ -1,4 +1,4 @@
-"""What is checked, and how checks and runs end."""
+"""The checks, their results, and the endings of a run."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from ...values.model import Model
 
 
 class Assumption(NamedTuple):
-    """One thing that the library assumes of every gripper."""
+    """One assumption of the library about every gripper."""
 
     stage: int  # the stage that checks it
-    assumed: str  # what is assumed, in a sentence
+    assumed: str  # the assumption, in a sentence
     is_safety: bool = False  # whether the run ends when it does not hold
     of_several: bool = False  # whether it is about several axes, and so not about a jaw
     of_lines: bool = False  # whether it is about serial lines alone
@@ -69,7 +69,7 @@ CATALOGUE: Final[dict[str, Assumption]] = {
     "soak.reads": Assumption(9, "Fewer than one read in 10,000 fails."),
     "soak.commands": Assumption(9, "The last of many commands at 10 to 100 Hz is followed."),
 }
-"""By name, in the order in which they are checked."""
+"""The assumptions by name, in the order in which they are checked."""
 
 
 def checks_of(model: Model, link: str) -> dict[str, Assumption]:
@@ -84,17 +84,17 @@ def checks_of(model: Model, link: str) -> dict[str, Assumption]:
 
 LAST: Final = 9  # the last stage
 HARMLESS: Final = 2  # the last stage in which nothing moves
-STAGE: Final = "verify stage "  # before the number, in the event that tells that a stage begins
+STAGE: Final = "verify stage "  # before the number, in the event at the beginning of a stage
 
 
-Figure = int | float | str | bool | None | list[Any]  # what JSON takes, for the figures of a check
+Figure = int | float | str | bool | None | list[Any]  # types of JSON, for the figures of a check
 Options = Mapping[str, int | float]  # options of a hand, by the names of its constructor
 
 NO_OPTIONS: Final[Options] = MappingProxyType({})
 
 
 class Verdict(Enum):
-    """How a check ended."""
+    """The verdict of a check."""
 
     AS_ASSUMED = "as assumed"
     DIFFERS = "differs"
@@ -106,9 +106,9 @@ class Check:
     """One check that was made, or could not be."""
 
     name: str  # of the assumption, see catalogue
-    verdict: Verdict  # how it ended
-    found: str  # what was found, in a sentence
-    follows: str = ""  # what follows for the user, where it differs
+    verdict: Verdict  # its verdict
+    found: str  # the finding, in a sentence
+    follows: str = ""  # the consequence for the user, where it differs
     options: Options = field(default_factory=lambda: NO_OPTIONS)  # make the library right, where it differs
     figures: Mapping[str, Figure] = field(default_factory=dict)  # the unit ends each name
 
@@ -139,7 +139,7 @@ ENDINGS: Final = {
     "unstopped": "rGTO = 0 was not confirmed: the fingers may still move",
     "disk": "the report cannot be written",
 }
-"""By the word in the report."""
+"""Endings of a run by their words in the report."""
 
 
 class EndError(Exception):
@@ -149,7 +149,7 @@ class EndError(Exception):
         assert why in ENDINGS
         super().__init__(why, words)
         self.why = why  # one of ENDINGS
-        self.words = words  # what happened, in a sentence
+        self.words = words  # the event, in a sentence
 
     def __str__(self) -> str:
         return f"{self.why}: {self.words}"

@@ -1,7 +1,7 @@
 """The folder of a report: recording.mcap, report.json, report.md and pictures. Needs the extra ``record``.
 
-Statuses and commands are those of a recorded hand. An event of the kind "state" tells that a stage has begun
-(``verify stage 4``), one of the kind "log" that an exchange has failed, or what was found in another place.
+Statuses and commands are those of a recorded hand. An event of the kind "state" marks the beginning of a
+stage (``verify stage 4``), one of the kind "log" a failed exchange, or a finding in another place.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ NAME: Final = "recording.mcap"
 
 
 class Recording:
-    """Takes frames, and cleans what they say; a task writes them to the disk in threads."""
+    """Takes frames, and cleans their texts; a task writes them to the disk in threads."""
 
     def __init__(self, folder: Path, clean: Callable[[str], str], model: Model) -> None:
-        self.failure = ""  # why writing has ended; empty while it goes on
+        self.failure = ""  # why writing has ended; empty while it runs
         self._file = FileIO(folder / NAME, "x")
         self._waiting: list[bytes] = []
         self._count = 0
@@ -49,7 +49,7 @@ class Recording:
         self._over = asyncio.Event()
         self._saving = asyncio.ensure_future(self._keep_saving())
 
-    # What the MCAP writer needs of a file.
+    # The file, for the MCAP writer.
 
     def write(self, data: bytes) -> int:
         self._waiting.append(bytes(data))
@@ -61,7 +61,7 @@ class Recording:
 
     def flush(self) -> None: ...
 
-    # What a run adds.
+    # The frames of a run.
 
     def keep(self, frame: Frame) -> None:
         """Take a frame. Never blocks and never fails."""
@@ -128,7 +128,7 @@ PAGE: Final = "report.md"
 
 
 class Scrubber:
-    """Takes out of texts what tells where a gripper is: addresses, ports of this machine, users, hosts."""
+    """Removes from texts the place of a gripper: addresses, ports of this machine, users, hosts."""
 
     def __init__(self, address: Address) -> None:
         names = [str(address), f"{address.host}:{address.port}" if address.port else "", address.host]
@@ -136,7 +136,7 @@ class Scrubber:
         self._secrets = sorted({name for name in names if len(name) > 1}, key=len, reverse=True)
 
     def clean(self, what: T) -> T:
-        """The same without; looks into lists and objects."""
+        """The same without these; looks into lists and objects."""
         cleaned: object = what
         if isinstance(what, str):
             text: str = what
@@ -151,7 +151,7 @@ class Scrubber:
 
 
 class Folder:
-    """Where the report of a run goes. Made in a running loop; OSError if the path has a report already."""
+    """The folder for the report of a run. Made in a running loop; OSError if it has a report already."""
 
     def __init__(self, path: Path, address: Address) -> None:
         self.path = path  # the folder
@@ -181,7 +181,7 @@ class Folder:
             raise
 
     async def end(self, report: Report) -> str:
-        """Write all that is left; why that failed, or nothing."""
+        """Write all that is left; return why that failed, or nothing."""
         await self.recording.end()
         try:
             await in_a_thread(lambda: self.save(report))

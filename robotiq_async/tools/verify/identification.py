@@ -17,7 +17,7 @@ from .bench import Bench
 from .catalogue import EndError
 from .watch import LASTING, describe
 
-WATCH_S: Final = 2.0  # how long to watch for another client, and for motion
+WATCH_S: Final = 2.0  # seconds of watching for another client, and for motion
 STILL_COUNTS: Final = 1
 
 
@@ -43,7 +43,7 @@ async def find(bench: Bench) -> None:
 
 
 def why_no_gripper(status: RobotiqStatus) -> str:
-    """What in a status shows that this is no gripper of the model; empty if nothing does."""
+    """The reason why this status is not from a gripper of the model; empty if there is none."""
     words = " ".join(f"{word:04X}" for word in status.registers)
     if not any(status.registers):
         return "all registers read 0; the gripper behind the fieldbus may have no power"

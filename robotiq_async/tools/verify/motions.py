@@ -1,4 +1,4 @@
-"""Motions that several stages make, and how the fingers are stopped."""
+"""Motions that several stages make, and the stop of the fingers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def in_place(status: RobotiqStatus, *, speed: int = 0, force: int = 0, go: bool 
 
 
 def as_found(status: RobotiqStatus) -> Request:
-    """The image nearest to what is in force, with rGTO = 0: speeds and forces cannot be read back."""
+    """The image nearest to the one in force, with rGTO = 0: speeds and forces cannot be read back."""
     axes = tuple(AxisRequest(status.requested_position(axis)) for axis in status.model.axes)
     return Request(activate=status.activation_echo, mode=status.mode, axes=axes, model=status.model)
 
@@ -53,12 +53,12 @@ def resting_envelope(status: RobotiqStatus, moving: Sequence[Finger]) -> dict[Fi
 
 
 def are_near(status: RobotiqStatus, targets: Mapping[Finger, int], counts: int) -> bool:
-    """Whether axes are within so many counts of where they should be."""
+    """Whether axes are within so many counts of their targets."""
     return all(abs(status.position(axis) - target) <= counts for axis, target in targets.items())
 
 
 async def reset(watch: Watch) -> None:
-    """Take rACT back and wait for it to show. The fingers stay where they are."""
+    """Clear rACT and wait for its echo. The fingers stay where they are."""
     watch.needs_active = False
     await watch.write(Request(model=watch.model))
     if await watch.until(lambda status: not status.activation_echo and status.is_reset, 2.0) is None:
@@ -66,7 +66,7 @@ async def reset(watch: Watch) -> None:
 
 
 async def activate(watch: Watch) -> float:
-    """Reset and activate: all fingers move. Returns how many seconds the activation took."""
+    """Reset and activate: all fingers move. Returns the seconds that the activation took."""
     watch.envelope = ANYWHERE
     await reset(watch)
     began = await watch.write(Request(activate=True, model=watch.model))
@@ -90,7 +90,7 @@ async def go(
 
 
 APART_S: Final = (0.02, 0.05, 0.1, 0.25, 0.5)
-"""Seconds between tries: at first twice what the manual asks for between writes, in case one was forgotten;
+"""Seconds between tries: at first twice the manual's time between writes, in case one was forgotten;
 at last more than the slowest known device takes to follow."""
 UNREACHED: Final = "THE FINGERS MAY STILL MOVE: {}. Press the emergency stop, or cut the power."
 REACHED: Final = "The gripper answers again, and shows rGTO = 0."
@@ -104,11 +104,11 @@ async def stop_fingers(
     Args:
         link: to the gripper; opened again if it was lost.
         image: the one that was written last; rATR is cleared as well.
-        alarm: takes words for the person when the gripper cannot be reached, and when it is after all; must
+        alarm: takes a text for the person when the gripper cannot be reached, and when it is after all; must
             not block.
 
     Returns:
-        The status that shows it; None if there was none.
+        The status with the echo; None if there was none.
     """
     stop = replace(image, go=False, release=False)
     has_alarmed = False

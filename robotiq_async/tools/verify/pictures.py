@@ -1,4 +1,4 @@
-"""Pictures of what was measured, from the recording and the figures of a report. Needs the extra ``plot``."""
+"""Pictures of the measurements, from the recording and the figures of a report. Needs the extra ``plot``."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ if TYPE_CHECKING:
 FAR: Final = 10  # counts that make a motion: more than an axis ends beside its request
 BEFORE_S: Final = 0.05
 AFTER_S: Final = 0.4
-"""What is shown around the request of one axis: longer than a hand waits for an object status (0.25 s)."""
+"""Seconds drawn after the request of one axis: longer than a hand waits for an object status (0.25 s)."""
 
 
 @dataclass
 class Segment:
-    """What was recorded in a stage, each with its time in seconds."""
+    """The recording of a stage, each entry with its time in seconds."""
 
     stage: int
     began: float
@@ -71,7 +71,7 @@ Draw = Callable[[tuple["Axes", ...], Segment], bool]
 
 
 def draw(folder: Path, recording: Path, report: Report) -> tuple[str, ...]:
-    """Draw what the run has measured; the names of the files."""
+    """Draw the measurements of the run; return the names of the files."""
     drawn: list[str] = []
     for segment in segments(recording, tuple(PICTURES)):
         name, title, rows, curve = PICTURES[segment.stage]
@@ -155,9 +155,9 @@ def _echo(axes: tuple[Axes, ...], segment: Segment) -> bool:
 
 
 def _motion_from_rest(segment: Segment) -> tuple[float, Finger] | None:
-    """When a motion was written, and of which axis: the first whose gDT said before that it is at rest.
+    """The time at which a motion was written, and its axis: the first with a gDT of rest before.
 
-    Only such a motion shows how late gDT is. After an activation every gDT is 0, as in a motion.
+    Only such a motion shows the lag of gDT. After an activation every gDT is 0, as in a motion.
     """
     fallback = None
     for sent, request in segment.commands:
@@ -203,4 +203,4 @@ PICTURES: Final[dict[int, tuple[str, str, int, Draw]]] = {
     4: ("echo.png", "Echo, position and object status of one motion (stage 4)", 2, _echo),
     6: ("strokes.png", "Closing at three speeds (stage 6)", 1, _strokes),
 }
-"""By stage: file, title, rows, and what draws."""
+"""File, title, rows and drawing function by stage."""

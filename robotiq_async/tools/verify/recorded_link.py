@@ -20,24 +20,24 @@ from ...values.status import RobotiqStatus
 T = TypeVar("T")
 
 RECENT_S: Final = 2.0
-"""How long an image may take to act: ten times what a slow gripper takes."""
+"""Seconds that an image may take to act: ten times those of a slow gripper."""
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
     """One exchange."""
 
-    began: float  # when it was asked for, in the loop's time
+    began: float  # when it was sent, in the loop's time
     ended: float  # when it was answered, or failed
     kind: str  # "status", "command", "failure", or "probe" for a read in another place
-    registers: Registers = ()  # what was read or written; empty for a probe and for a failure of a read
-    words: str = ""  # why it failed, or what the probe found
+    registers: Registers = ()  # those read or written; empty for a probe and for a failure of a read
+    words: str = ""  # the failure, or the finding of a probe
 
 
 class RecordedLink:
     """Reads and writes on one transport.
 
-    A cancellation waits for the exchange under way. One that was cut off would cost the connection, and the
+    A cancellation waits for the end of an exchange. One that was cut off would cost the connection, and the
     stop that follows would have to make a new one first.
     """
 
@@ -46,7 +46,7 @@ class RecordedLink:
         self.link = link
         self.written: Request | None = None  # the last image that was written; None before the first
         self.shown: RobotiqStatus | None = None  # the last status that was read; None before the first
-        self.asked = 0.0  # when that was asked for, in the loop's time
+        self.asked = 0.0  # when that read was sent, in the loop's time
         self.wrote = -math.inf  # when the last write was sent, in the loop's time
         self._keep = keep
         self._echoes: deque[tuple[float, Echo]] = deque(maxlen=2000)
@@ -76,14 +76,14 @@ class RecordedLink:
         return self.shown
 
     async def write(self, request: Request) -> float:
-        """Write an image, once; returns when that was acknowledged, in the loop's time."""
+        """Write an image, once; returns the loop's time of its acknowledgement."""
         await self._sent(request, self.link.send(lambda: request.registers))
         ended = asyncio.get_running_loop().time()
         self._keep(Frame(self.wrote, ended, "command", request.registers))
         return ended
 
     async def write_and_read(self, request: Request) -> bool:
-        """Write an image with function 23, or 16 where 23 is refused; whether 23 was answered."""
+        """Write an image with function 23, or 16 where 23 is refused; return whether 23 was answered."""
         assert isinstance(self.link, CyclicLink), "only serial lines are asked"
         answer = await self._sent(request, self.link.send_and_read(lambda: request.registers))
         assert answer is not None, "there was an image to write"
@@ -95,7 +95,7 @@ class RecordedLink:
     async def _sent(self, request: Request, exchange: Coroutine[Any, Any, T]) -> T:
         loop = asyncio.get_running_loop()
         began = loop.time()
-        # Before it is sent: what is cut off may have arrived.
+        # Before it is sent: a write that is cut off may have arrived.
         self.written = request
         self.wrote = began
         self._echoes.append((began, request.echo))
@@ -106,12 +106,12 @@ class RecordedLink:
             raise
 
     def expect(self, echo: Echo) -> None:
-        """Take what the gripper shows for what is in force."""
+        """Take this echo for the image in force."""
         self._echoes.clear()
         self._echoes.append((asyncio.get_running_loop().time(), echo))
 
     def expected(self) -> list[Echo]:
-        """What the gripper may echo now: the last image, and those that were in force in the last seconds."""
+        """The echoes that the gripper may have now: of the last image, and of those in the last seconds."""
         since = asyncio.get_running_loop().time() - RECENT_S
         while len(self._echoes) > 1 and self._echoes[1][0] < since:
             self._echoes.popleft()
@@ -124,6 +124,6 @@ class RecordedLink:
             await wait_shielded(task)
         except BaseException:
             if task.done() and not task.cancelled():
-                task.exception()  # asked for, or the loop complains
+                task.exception()  # retrieved, or the loop complains
             raise
         return task.result()

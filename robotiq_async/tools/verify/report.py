@@ -1,4 +1,4 @@
-"""What a run has found: ``report.json``, and the page ``report.md`` for people."""
+"""The findings of a run: ``report.json``, and the page ``report.md`` for people."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ SCHEMA: Final = 1  # version of the fields in report.json; docs/hardware.md desc
 
 @dataclass
 class Report:
-    """A run, while it goes on and after it."""
+    """A run, during it and after it."""
 
     link: str  # "tcp", "rtu" or "rtu+tcp"
     model: Model = THREE_FINGER  # of the gripper
     stages: list[int] = field(default_factory=list)  # those that have come to their end
     entered: list[int] = field(default_factory=list)  # those that have begun
     checks: dict[str, Check] = field(default_factory=dict)  # by name
-    why: str = ""  # how it ended, see endings; empty while it goes on
+    why: str = ""  # its ending, see endings; empty while it runs
     words: str = ""  # the same in a sentence
-    registers: RegisterMap | None = None  # how the gripper is asked; None if it was not found
+    registers: RegisterMap | None = None  # of the gripper; None if it was not found
     found: RobotiqStatus | None = None  # the first status; None if there was none
     last: RobotiqStatus | None = None  # the newest after the fingers were stopped; None if none came
-    label: str = ""  # what the user wants it to be called
+    label: str = ""  # the user's title
 
     @property
     def is_unstopped(self) -> bool:
@@ -105,12 +105,12 @@ WITHOUT_ROS: Final = ("activation_timeout", "request_address", "status_address")
 
 
 def sentences(report: Report) -> tuple[str, str, str]:
-    """Whether the gripper can be used as it is; what is known and what not; what to report."""
+    """Three sentences: on the use of the gripper as it is, on what is known, and on what to report."""
     return _usable(report), _known(report), _to_report(report)
 
 
 def is_unusable(report: Report) -> bool:
-    """Whether the gripper must not be used: lines to paste would say that it can be."""
+    """Whether the gripper must not be used: lines to paste would suggest that it can be."""
     return not report.why or report.is_unstopped or report.why in UNUSABLE
 
 
@@ -140,7 +140,7 @@ def _usable(report: Report) -> str:
 
 
 def _unended(report: Report) -> str:
-    """While the run lasts, and for ever if it was killed."""
+    """The sentence while the run lasts, and for ever if it was killed."""
     begun = [number for number in report.entered if number not in report.stages]
     if begun and begun[-1] >= HARMLESS:
         why = f"stage {begun[-1]} has begun, and the run has not ended, or was killed"
@@ -176,7 +176,7 @@ def _to_report(report: Report) -> str:
 
 
 def lines(report: Report) -> dict[str, str]:
-    """Lines to paste, by what they are for; the address is left to the user."""
+    """Lines to paste, by their purpose; the address is left to the user."""
     options = report.options
     model = None if report.model is THREE_FINGER else report.model.name
     hand = f', model="{model}"' if model else ""

@@ -1,4 +1,17 @@
-"""Goes through the stages: asks, runs, stops the fingers, and goes on only if all is well."""
+"""Goes through the stages: asks, runs, stops the fingers, and continues only if all is well."""
+
+# Theory of operation
+#
+# A run is a row of stages. _do() takes each through the same steps: look, consent, run, stop, save. A stage
+# begins only if the one before it ended well; EndError with its reason, a lost link or a signal ends the run.
+#
+#   stages 0 and 1       read only, and write nothing at their end
+#   from HARMLESS on     first the status: no other client commands, rGTO is 0 or is cleared with consent, and
+#                        the gripper is active if the stage needs it
+#
+# However a stage from HARMLESS on ends, _stop() writes rGTO = 0 until the gripper echoes it, shielded from
+# Ctrl-C. Without the echo the run ends as "unstopped". The report is saved before such a stage as well: it
+# must not call the gripper usable if the program is killed.
 
 from __future__ import annotations
 
@@ -30,7 +43,7 @@ LEFT_SET: Final = (
 
 
 class Tape(Protocol):
-    """Where frames go. It never blocks or fails; ``failure`` says why nothing more is kept, or is empty."""
+    """Takes frames. It never blocks or fails; ``failure`` is why nothing more is kept, or empty."""
 
     @property
     def failure(self) -> str: ...
@@ -42,13 +55,13 @@ class Tape(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What is to be done."""
+    """Parameters of a run."""
 
     address: Address  # the gripper; tcp, rtu or rtu+tcp
     first: int = 0  # the stage to begin with
     last: int = LAST  # the last stage
     agreed: int = -1  # the last stage that runs without asking; -1 for none, at most 2
-    label: str = ""  # what the report is called
+    label: str = ""  # title of the report
     lengths: Lengths = field(default_factory=Lengths)  # of the long checks
 
     def __post_init__(self) -> None:
@@ -73,7 +86,7 @@ class Runner:
         """Prepare; nothing is opened.
 
         Args:
-            plan: what is to be done.
+            plan: parameters of the run.
             person: answers and watches.
             tape: takes every frame.
             save: is called with the report after each stage, and before each that writes; nothing moves then.
@@ -91,7 +104,7 @@ class Runner:
         """Go through the stages. Whatever happens, the fingers of a stage that moves are stopped first.
 
         Raises:
-            asyncio.CancelledError: it was interrupted; the report says so.
+            asyncio.CancelledError: it was interrupted, as is in the report.
         """
         report = self.report
         try:
@@ -188,7 +201,7 @@ class Runner:
     # -- after it --------------------------------------------------------------------------------------------
 
     async def _stop(self, image: Request) -> None:
-        """RGTO = 0, whatever has happened; an activation that is under way is taken back."""
+        """Write rGTO = 0, whatever has happened; an activation that runs is taken back."""
         link = self._bench.link
         written, shown = link.written or image, link.shown
         if written.activate and shown is not None and not shown.is_activated:

@@ -1,6 +1,6 @@
 """Watches over a stage that moves: the person, the fingers' range, the time, faults and other clients.
 
-Every look can end the stage. What ends it raises; the runner then stops the fingers.
+Every look can end the stage by an exception; the runner then stops the fingers.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ ENTER: Final = "\n"
 
 
 class Person(Protocol):
-    """Answers, watches, and stops."""
+    """The operator at the terminal: answers, watches, and stops."""
 
     @property
     def has_stopped(self) -> bool:
         """Whether a key was pressed since the last answer, or the terminal has closed."""
 
     def tell(self, words: str) -> None:
-        """Say something; never while fingers move, because a terminal may block."""
+        """Print something; never while fingers move, because a terminal may block."""
 
     def alarm(self, words: str) -> None:
         """Warn at once, even while fingers move; never blocks."""
@@ -35,15 +35,15 @@ class Person(Protocol):
         """Ask; only Enter agrees. Keys pressed before the question do not count."""
 
     async def chooses(self, question: str, answers: Mapping[str, str]) -> str | None:
-        """Ask for one of the keys of ``answers``, which say what they mean; None ends the run."""
+        """Ask for one of the keys of ``answers``, which has their meanings; None ends the run."""
 
 
 Envelope = Mapping[Finger, tuple[int, int]]  # the lowest and the highest position that each axis may have
 
 ANYWHERE: Final[Envelope] = dict.fromkeys(Finger.ALL, (0, 255))
 LASTING: Final = 3
-"""Reads in a row that make 0x09 a fault: siblings show it once after a second of silence."""
-SLICE_S: Final = 0.05  # how often the person is checked while nothing is sent
+"""Reads in a row that make 0x09 a fault: siblings report it once after a second of silence."""
+SLICE_S: Final = 0.05  # seconds between two checks of the person while nothing is sent
 STILL_S: Final = 0.15
 """An axis rests once it has not moved for this long: the slowest takes 43 ms for a count (thesis, A1.1)."""
 LIMITS: Final = 20, 225
@@ -54,8 +54,8 @@ class Rest:
     """Follows some axes, all unless they are named.
 
     Attributes:
-        positions: where they were last.
-        moved_at: when a position changed last, in the loop's time.
+        positions: the last ones.
+        moved_at: the loop's time of the last change of a position.
     """
 
     def __init__(self, axes: Sequence[Finger] = ()) -> None:
@@ -79,7 +79,7 @@ class Watch:
         self, link: RecordedLink, person: Person, *, seconds: float, interval: float, spacing: float
     ) -> None:
         """Begin. The times are the seconds of the whole stage, between two reads, and between two writes."""
-        self.envelope = ANYWHERE  # where each axis may be; changed by the stage before each motion
+        self.envelope = ANYWHERE  # of each axis; changed by the stage before each motion
         self.needs_active = True  # whether the gripper must be active
         self.allows_faults = False  # whether the stage expects faults
         self.last: RobotiqStatus | None = None  # the newest status
@@ -102,7 +102,7 @@ class Watch:
         return status
 
     async def write(self, request: Request, *, spaced: bool = True) -> float:
-        """Write an image unless the person has stopped; returns when it was acknowledged."""
+        """Write an image unless the person has stopped; returns the time of its acknowledgement."""
         self.check_stop()
         due = self._link.wrote + self._spacing if spaced else 0.0
         if (left := due - self._loop.time()) > 0:
@@ -110,7 +110,7 @@ class Watch:
         return await self._link.write(request)
 
     async def write_and_read(self, request: Request) -> bool:
-        """Write an image with function 23, if the device takes it; whether that was answered."""
+        """Write an image with function 23, if the device takes it; return whether that was answered."""
         self.check_stop()
         await self.pause(max(0.0, self._link.wrote + self._spacing - self._loop.time()))
         return await self._link.write_and_read(request)
@@ -155,7 +155,7 @@ class Watch:
         if self._loop.time() > self._until:
             raise EndError("time", f"the stage did not finish within {self._seconds:g} s")
 
-    # -- what a status shows ---------------------------------------------------------------------------------
+    # -- checks of a status ----------------------------------------------------------------------------------
 
     def _check(self, status: RobotiqStatus) -> None:
         if not self.allows_faults:
@@ -178,7 +178,7 @@ class Watch:
 
     def _check_echo(self, status: RobotiqStatus) -> None:
         expected = self._link.expected()
-        # Whether a gripper that is not active echoes positions, no source says.
+        # No source settles whether a gripper that is not active echoes positions.
         size = len(status.echo) if status.is_activated else 2
         if expected and not any(_may_echo(each[:size], status.echo[:size]) for each in expected):
             found = (
@@ -189,7 +189,7 @@ class Watch:
 
 
 def _may_echo(asked: tuple[int, ...], shown: tuple[int, ...]) -> bool:
-    """Whether an echo is that of a request; one beyond a limit may be shown as the limit."""
+    """Whether an echo is that of a request; one beyond a limit may be echoed as the limit."""
     return asked[:2] == shown[:2] and all(
         wanted == got or wanted <= got <= LIMITS[0] or LIMITS[1] <= got <= wanted
         for wanted, got in zip(asked[2:], shown[2:], strict=True)
@@ -201,7 +201,7 @@ def show_echo(echo: tuple[int, ...]) -> str:
 
 
 def describe(status: RobotiqStatus) -> str:
-    """A status in words."""
+    """A status as text."""
     if status.is_activated:
         words = "active"
     else:

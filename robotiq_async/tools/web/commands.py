@@ -133,7 +133,7 @@ SERVICES: Final = MappingProxyType({service.name: service for service in _ALL})
 
 
 class PageCommands:
-    """Carries out commands, and keeps those under way by page.
+    """Carries out commands, and keeps those that run by page.
 
     When a page has gone, its commands are cancelled, which holds the axes that still move. An activation, a
     release and a reset continue, as they do whenever they are cancelled.
@@ -188,7 +188,7 @@ class PageCommands:
         self.is_ending = True
 
     async def close(self) -> None:
-        """Hold what is under way, refuse new commands, and wait until all have ended."""
+        """Hold the axes of commands that run, refuse new commands, and wait until all have ended."""
         self.refuse()
         tasks = [task for tasks in self._tasks.values() for task in tasks]
         self.all_gone()

@@ -54,7 +54,7 @@ STATISTICS_S: Final = 1.0
 
 
 class HandUpdates:
-    """Collects what happens to a hand, which may be started later. It only listens."""
+    """Collects the statuses and events of a hand, which may be started later. It only listens."""
 
     def __init__(self, hand: Hand) -> None:
         self.hand = hand
@@ -69,7 +69,7 @@ class HandUpdates:
         self._timeline.open()
 
     def gather(self) -> None:
-        """Collect what is new; call it often."""
+        """Collect new statuses and events; call it often."""
         for at, each in self._timeline.new():
             if isinstance(each, RobotiqStatus):
                 currents = (each.current_ma(axis) or 0 for axis in each.model.axes)
@@ -130,7 +130,7 @@ class PageServer:
 
         Args:
             hands: started before or while they are shown.
-            settings: how the page is served.
+            settings: of the page.
             operators: carry out the commands, one for each hand; without them the page only watches.
 
         Raises:

@@ -21,7 +21,7 @@ PORT: Final = 8766
 
 @dataclass(frozen=True, slots=True)
 class PageSettings:
-    """How the page is served, and to whom.
+    """Settings of the page: its address, and the protection of it.
 
     Attributes:
         host: the interface to listen on.

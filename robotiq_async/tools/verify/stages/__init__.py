@@ -1,4 +1,4 @@
-"""The ten stages, and what the person reads before each."""
+"""The ten stages, with the text for the person before each."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ class Stage(NamedTuple):
 
     number: int  # 0..9
     title: str  # a few words
-    run: Callable[[Bench], Awaitable[None]]  # does it; what must end the run raises
+    run: Callable[[Bench], Awaitable[None]]  # runs it; raises to end the run
     moves: str  # what moves
     how_far: str  # how far
     how_fast: str  # how fast
     clear: str  # what must be clear
     lasts: str  # how long it takes
-    jaw_moves: str = ""  # what moves of a gripper with a jaw, if that is something else
+    jaw_moves: str = ""  # the same of a gripper with a jaw, if that is something else
 
     @property
     def is_moving(self) -> bool:
@@ -35,7 +35,7 @@ class Stage(NamedTuple):
         return self.number > ACTIVATION
 
     def as_text(self, model: Model = THREE_FINGER) -> str:
-        """What a person reads before it."""
+        """The text for a person before it."""
         moves = self.moves if len(model.axes) > 1 else self.jaw_moves or self.moves
         lines = [f"Stage {self.number}: {self.title}", f"  moves:    {moves}"]
         if self.is_moving:
@@ -114,4 +114,4 @@ STAGES: Final = (
         jaw_moves="nothing for 10 minutes, then the jaw back and forth",
     ),
 )
-"""In their order."""
+"""The stages in their order."""

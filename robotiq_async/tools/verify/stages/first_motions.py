@@ -21,7 +21,7 @@ ROOM: Final = 1.5  # activation_timeout is this many times the duration of the a
 
 
 async def activation(bench: Bench) -> None:
-    """Reset and activate, and look at what is shown after it."""
+    """Reset and activate, and check the status after it."""
     watch = bench.watch(SECONDS)
     took = await activate(watch)
     status = await watch.watch_for(1.0)
@@ -40,10 +40,10 @@ async def activation(bench: Bench) -> None:
 
 STEP: Final = 30
 STEP_S: Final = 6.0
-"""For one way: 1.3 s at the slowest speed (thesis, table A1.1), and the time before a gripper begins."""
+"""Seconds for one way: 1.3 s at the slowest speed (thesis, table A1.1), and the time before it begins."""
 LAG_WINDOW_S: Final = 0.5
 LAG_READ_S: Final = 0.002
-LAG_S: Final = 0.25  # how long a hand ignores an object status that nothing else confirms
+LAG_S: Final = 0.25  # seconds for which a hand ignores an object status that nothing else confirms
 END_COUNTS: Final = 2
 
 QUESTION: Final = (
@@ -60,13 +60,13 @@ ANSWERS: Final = {
 JAW_QUESTION: Final = "What has moved, there and back?"
 JAW_ANSWERS: Final = {"a": "the jaw", "n": "nothing, or something else"}
 EXPECTED: Final = {Finger.A: "a", Finger.B: "lr", Finger.C: "lr", Finger.SCISSOR: "s"}
-"""Answers for each axis. No source says on which side B is; C must be on the other."""
+"""Answers for each axis. No source has the side of B; C must be on the other."""
 SURE: Final = "Commanded was {axis}, and your answer is: {answer}. Is this what you saw?"
 
 
 @dataclass
 class _Found:
-    """What the motions have shown so far."""
+    """The findings of the motions so far."""
 
     lags: list[float] = field(default_factory=list)
     errors: list[int] = field(default_factory=list)
@@ -74,7 +74,7 @@ class _Found:
 
 
 async def single_axis(bench: Bench) -> None:
-    """Each axis there and back; the person says which finger it was."""
+    """Move each axis there and back; the person names the finger that moved."""
     found = _Found()
     has_several = len(bench.model.axes) > 1
     for axis in bench.model.axes:
@@ -144,7 +144,7 @@ def _rests(status: RobotiqStatus, axis: Finger, goal: int) -> bool:
 
 
 async def _lag(watch: Watch, axis: Finger, goal: int) -> float | None:
-    """Seconds from the first read that shows the echo to the first in which gDT says that the axis moves."""
+    """Seconds from the first read with the echo to the first with a gDT of motion."""
     loop, echoed = asyncio.get_running_loop(), 0.0
 
     def shows_motion(status: RobotiqStatus) -> bool:

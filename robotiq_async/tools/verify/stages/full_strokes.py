@@ -16,7 +16,7 @@ from ..watch import Rest, Watch
 
 SECONDS: Final = 180.0
 SPEEDS: Final = (0, 64, 255)
-STROKE_S: Final = 20.0  # twice what the slowest one takes
+STROKE_S: Final = 20.0  # twice the time of the slowest one
 SCISSOR_SPEED: Final = 64
 SHARE: Final = 0.2
 CLOSED_AT_LEAST: Final = 240
@@ -24,7 +24,7 @@ PART_OF_STROKE: Final = 0.9
 
 
 async def full_strokes(bench: Bench) -> None:
-    """The scissor with open fingers, then the fingers, slow ones first."""
+    """Move the scissor with open fingers, then the fingers, slowly at first."""
     watch = bench.watch(SECONDS)
     start = await watch.look()
     await watch.write(in_place(start))
@@ -46,7 +46,7 @@ async def full_strokes(bench: Bench) -> None:
 async def _fingers_to(
     bench: Bench, watch: Watch, start: RobotiqStatus, goal: int, speed: int
 ) -> tuple[RobotiqStatus, float]:
-    """Where they end, and for how many seconds a finger was seen to move."""
+    """Move fingers; return the status at the end, and the seconds for which one was seen to move."""
     watch.envelope = resting_envelope(start, bench.fingers)
     image = replace(in_place(start, speed=speed), go=True).with_positions(dict.fromkeys(bench.fingers, goal))
     return await _stroke(watch, image, bench.fingers)
@@ -57,7 +57,7 @@ async def _stroke(watch: Watch, image: Request, axes: tuple[Finger, ...]) -> tup
     rest = Rest(axes)
 
     def is_over(status: RobotiqStatus) -> bool:
-        # Where limits are echoed, the scissor's echo does not show the end: two seconds of rest do.
+        # Where limits are echoed, the scissor's echo does not reveal the end: two seconds of rest do.
         if rest.lasts(status, 2.0):
             return True
         stands = all(status.finger_status(axis) is not ObjectStatus.IN_MOTION for axis in axes)

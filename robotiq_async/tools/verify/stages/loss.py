@@ -1,4 +1,4 @@
-"""Stage 8: what remains after a loss of the client, the cable or the power, and after an emergency stop."""
+"""Stage 8: the state after a loss of the client, the cable or the power, and after an emergency stop."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ AGAIN: Final = (
 
 
 async def loss(bench: Bench) -> None:
-    """One after the other; the person may skip what has to be done by hand."""
+    """Check one after the other; the person may skip those done by hand."""
     await _client(bench)
     await _alone(bench)
     for words, name, part in (
@@ -58,7 +58,7 @@ async def loss(bench: Bench) -> None:
 
 
 async def _client(bench: Bench) -> None:
-    """Finger A, slowly; the client goes away half way, and comes back."""
+    """Move finger A slowly; the client goes away half way, and comes back."""
     watch = bench.watch(60.0)
     start = await watch.look()
     image, home = in_place(start), {Finger.A: start.position(Finger.A)}
@@ -82,7 +82,7 @@ async def _client(bench: Bench) -> None:
 
 
 async def _first_motion(bench: Bench, watch: Watch, image: Request, home: dict[Finger, int]) -> None:
-    """The first image on the new connection is a motion."""
+    """Write a motion as the first image on a new connection."""
     assert watch.last is not None
     here = {Finger.A: watch.last.position(Finger.A)}
     watch.envelope = motion_envelope(watch.last, home)
@@ -108,7 +108,7 @@ async def _first_motion(bench: Bench, watch: Watch, image: Request, home: dict[F
 
 
 async def _alone(bench: Bench) -> None:
-    """No client at all for a while, longer and longer."""
+    """Leave the gripper without a client for a while, longer and longer."""
     alone = 0.0
     watch = bench.watch(SECONDS)
     for seconds in bench.lengths.alone:
@@ -130,7 +130,7 @@ def report_lost_activation(bench: Bench, when: str) -> None:
 
 
 async def _back(bench: Bench) -> tuple[list[RobotiqStatus], float]:
-    """Read until the gripper answers, and then for some seconds; the statuses, and when the first came."""
+    """Read until the gripper answers, and then for some seconds; the statuses, and the time of the first."""
     loop = asyncio.get_running_loop()
     began = loop.time()
     watch = bench.watch(BACK_S + AFTER_S)
@@ -172,7 +172,7 @@ async def _cable(bench: Bench) -> None:
 
 
 async def _estop(bench: Bench) -> None:
-    """What is shown after it, and how many resets it takes."""
+    """Check the status after an emergency stop, and the number of resets it takes."""
     statuses, answered = await _back(bench)
     figures: dict[str, Figure] = {"seconds": answered, "faults": _faults(statuses)}
     last = statuses[-1]
@@ -203,7 +203,7 @@ async def _power(bench: Bench) -> None:
 
 
 async def _activated_again(bench: Bench) -> bool:
-    """Ask, reset and activate; whether it is active then."""
+    """Ask the person, reset and activate; return whether it is active then."""
     if not await bench.person.consents(AGAIN):
         raise EndError("declined", "the new activation was not confirmed")
     watch = bench.watch(SECONDS)

@@ -82,7 +82,7 @@ async def reading(bench: Bench) -> None:
 
 
 async def _unchanged(bench: Bench) -> None:
-    """Nothing was written, so the requests must be unchanged."""
+    """Check that the requests are unchanged: nothing was written."""
     assert bench.found is not None
     statuses = [await bench.link.read() for _ in range(LASTING)]
     if statuses[-1].echo != bench.found.echo:
@@ -112,7 +112,7 @@ def _registers(bench: Bench) -> None:
 
 
 async def _others(bench: Bench) -> None:
-    """Which unit ids, functions and places answer beside the one that is used."""
+    """Find unit ids, functions and places that answer beside the one that is used."""
     found = bench.registers
     assert found is not None
     await bench.link.close()
@@ -204,7 +204,7 @@ async def _round_trip(bench: Bench) -> None:
 
 
 def _histogram(seconds: list[float]) -> list[Figure]:
-    """[milliseconds, count] for each tenth of a millisecond that occurs."""
+    """Pairs of [milliseconds, count] for each tenth of a millisecond that occurs."""
     counts = Counter(round(1000 * each, 1) for each in seconds)
     return [[tenth, counts[tenth]] for tenth in sorted(counts)]
 
@@ -249,7 +249,7 @@ async def _connections(bench: Bench) -> None:
 
 
 async def _silence(bench: Bench) -> None:
-    """What the first two reads show after a silence, and whether the activation is still there."""
+    """Check the first two reads after a silence, and whether the activation is still there."""
     link, first = bench.link, await bench.link.read()
     shown: list[Figure] = []
     lasting, lost = "", ""

@@ -70,7 +70,7 @@ def _repeats(bench: Bench) -> int:
 
 
 async def _command(bench: Bench) -> None:
-    """Finger A back and forth a little; at each rate the last command must be followed."""
+    """Move finger A back and forth a little; at each rate the last command must be followed."""
     watch = bench.watch(len(RATES) * (bench.lengths.commands + 20))
     start = await watch.look()
     image = in_place(start, speed=SPEED)
@@ -99,7 +99,7 @@ async def _command(bench: Bench) -> None:
 async def _burst(
     bench: Bench, watch: Watch, image: Request, home: int, step: int, rate: int
 ) -> tuple[int, float, bool]:
-    """Commands at a rate; how many there were, in how many seconds, and whether the last was followed."""
+    """Send commands at a rate; return their number, the seconds, and whether the last was followed."""
     loop = asyncio.get_running_loop()
     began, sent = loop.time(), 0
     moving = replace(image, go=True)

@@ -54,7 +54,7 @@ async def _close(bench: Bench, watch: Watch, start: RobotiqStatus) -> RobotiqSta
     """Close, and wait until every finger rests; the status in which all of them have for a while."""
     await watch.write(in_place(start))
     await watch.write(replace(in_place(start), go=True).with_positions(dict.fromkeys(bench.fingers, CLOSED)))
-    # What gDT shows just after a write may be from before it.
+    # gDT just after a write may be from before it.
     await watch.watch_for(0.3)
 
     def rest(status: RobotiqStatus) -> bool:

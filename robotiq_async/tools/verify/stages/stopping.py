@@ -22,7 +22,7 @@ COUNTS: Final = 10
 
 
 async def stopping(bench: Bench) -> None:
-    """RGTO = 0, rGTO = 1 again, a new request, and a hold, each half way."""
+    """Write rGTO = 0, rGTO = 1 again, a new request, and a hold, each half way."""
     watch = bench.watch(SECONDS)
     start = await watch.look()
     if any(start.position(finger) > 100 for finger in bench.fingers):
@@ -61,7 +61,7 @@ async def _halt(bench: Bench, watch: Watch, away: Request, home: dict[Finger, in
 
 
 async def _stop(bench: Bench, watch: Watch, image: Request, status: RobotiqStatus) -> tuple[int, float]:
-    """Write an image that stops; counts that a finger still goes, and seconds until the last moves."""
+    """Write an image that stops; return the counts that a finger still moves, and the seconds until rest."""
     rest = Rest(bench.fingers)
     rest.lasts(status, 0.3)  # from here on
     began, before = rest.moved_at, rest.positions
@@ -92,7 +92,7 @@ async def _half_way_home(
 
 
 async def _new_target(bench: Bench, watch: Watch, image: Request, home: dict[Finger, int]) -> None:
-    """Towards home; half way back out a little."""
+    """Move towards home; half way back out a little."""
     await _half_way_home(bench, watch, image, home)
     turned = {finger: home[finger] + STROKE - 10 for finger in bench.fingers}
     await watch.write(replace(image, go=True).with_positions(turned))

@@ -23,7 +23,7 @@ ECHO_S: Final = 0.02
 LONGEST_ECHO_S: Final = 1.0
 APART_S: Final = 0.1  # between two probes, so that none is forgotten
 GAPS_S: Final = (0.002, 0.005, 0.011, 0.021)
-"""Between two writes; 1 ms more than the time in question where an early timer would decide."""
+"""Seconds between two writes; 1 ms more than the time in question where an early timer would decide."""
 PAIRS: Final = 5
 MOST_PAIRS: Final = 25  # tried at one distance until PAIRS of them count
 LATE: Final = 1.5
@@ -32,7 +32,7 @@ LATE_S: Final = 0.0005  # a first image was late if it took LATE times the usual
 
 
 async def writing(bench: Bench) -> None:
-    """Write what changes nothing, then positions without rGTO, then pairs of images close together."""
+    """Write the same image, then positions without rGTO, then pairs of images close together."""
     watch = bench.watch(SECONDS)
     watch.needs_active = False
     before = await watch.look()
@@ -55,7 +55,7 @@ async def writing(bench: Bench) -> None:
 
 
 async def _same(bench: Bench, watch: Watch, image: Request) -> None:
-    """The image as found, twice; the first clears rGTO if it was left set."""
+    """Write the image as found, twice; the first clears rGTO if it was left set."""
     await watch.write(image)
     before = await watch.watch_for(0.2)
     await watch.write(image)
@@ -68,7 +68,7 @@ async def _same(bench: Bench, watch: Watch, image: Request) -> None:
 
 
 def _lasting(status: RobotiqStatus) -> tuple[object, ...]:
-    """What must not change; a position may waver by a count, and 0x09 is shown in passing."""
+    """The part that must not change; a position may waver by a count, and 0x09 may be there in passing."""
     return status.activation_echo, status.initialization, status.mode, status.echo
 
 
@@ -94,10 +94,10 @@ async def _motion(bench: Bench, watch: Watch, image: Request) -> None:
 
 
 async def _echo(bench: Bench, watch: Watch, image: Request) -> float:
-    """From the acknowledgement to the asking of the first read that shows the echo.
+    """Measure the time from the acknowledgement to the start of the first read with the echo.
 
     Returns:
-        How many seconds a write usually takes to be acknowledged.
+        The usual seconds until a write is acknowledged.
     """
     times, lost, writes = list[float](), 0, list[float]()
     for number in range(PROBES):
@@ -132,7 +132,7 @@ async def _echoed(watch: Watch, image: Request, interval: float | None = None) -
 
 
 async def _spacing(bench: Bench, watch: Watch, image: Request, usual: float) -> None:
-    """Pairs of images, closer and closer: does the second act?
+    """Write pairs of images, closer and closer, and check whether the second acts.
 
     A pair whose first image was late on its way reached the gripper closer together than it was sent: it does
     not count, or a busy computer would be taken for a slow gripper.
@@ -160,7 +160,7 @@ async def _spacing(bench: Bench, watch: Watch, image: Request, usual: float) -> 
 
 
 async def _pair(bench: Bench, watch: Watch, image: Request, gap: float, number: int) -> tuple[float, bool]:
-    """Two writes so far apart; seconds until the first was acknowledged, and whether the second acts."""
+    """Write twice, so far apart; the seconds to the first acknowledgement, and whether the second acts."""
     loop = asyncio.get_running_loop()
     await watch.pause(APART_S)
     acknowledged = await watch.write(_marked(image, 2 * number))

@@ -1,4 +1,4 @@
-"""Whether a page and its browser are in touch, in both directions.
+"""The contact between a page and its browser, in both directions.
 
 The server sends its time four times a second. The browser sends the last time it received back: with its
 heartbeat, and with every press of a button. So a stale press (delayed on its way, or made on a page that

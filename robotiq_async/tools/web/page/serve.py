@@ -109,7 +109,7 @@ async def _beat(mirror: Mirror, server: _Server, pipes: Pipes, port: int) -> Non
 
 def _hear(pipes: Pipes, mirror: Mirror, loop: asyncio.AbstractEventLoop, server: _Server) -> None:
     # In a thread: not every system can wait for a pipe in an event loop.
-    with suppress(RuntimeError):  # the loop has been closed meanwhile
+    with suppress(RuntimeError):  # the loop has been closed
         for line in pipes.lines():
             loop.call_soon_threadsafe(mirror.hear, line)
         loop.call_soon_threadsafe(server.end)

@@ -18,7 +18,7 @@ from .words import COLORS, NAMES
 ARMED_S: Final = 0.3
 """A yes counts only after this time: an earlier one was clicked before the question could be read."""
 WIDTHS: Final = ("wide", "normal", "pinch")
-"""Of the scissor."""
+"""Widths of the scissor."""
 DIRECT: Final = ("open", "close", *WIDTHS)
 ASKED: Final = tuple(name for name, action in ACTIONS.items() if action.warning)
 

@@ -4,8 +4,8 @@ Only the positions are known, so this is an approximation. A jaw holds a round b
 
 Fingertips that meet an object before they meet each other are drawn at their positions, with the object
 between them. Beyond that, a real finger has bent around the object: its base has stopped earlier than the
-position alone would say. How the counts are shared between base and middle joint depends on the object. Here
-it is a round bar. The further the fingers have closed, the deeper it lies, and beyond the palm the thinner it
+position alone would suggest. The share of the counts of base and middle joint depends on the object. Here it
+is a round bar. The further the fingers have closed, the deeper it lies, and beyond the palm the thinner it
 is.
 """
 
@@ -30,7 +30,7 @@ ALONE_M: Final = 0.02
 THIN_M: Final = 0.004
 """Minimum radius of an object between fingertips; with less, the fingers have bent around it."""
 HALF_TIP_M: Final = 0.011
-"""From the middle of a fingertip to its side."""
+"""Distance from the middle of a fingertip to its side."""
 THICK_M: Final = 0.033
 """Radius of the bar: a thicker one does not fit between the bases of the fingers on the palm."""
 LEAST_M: Final = 0.025
@@ -45,13 +45,13 @@ _BASE_JOINT: Final = 0.020 + 0j
 _BASE_LINK: Final = 0.050 - 0.028j
 _MIDDLE_M: Final = 0.039
 _BENT: Final = radians(30)
-"""Between base and middle link, and back at the tip, when all angles are 0."""
+"""Angle between base and middle link, and back at the tip, when all angles are 0."""
 _HALF_BASE_M: Final = 0.0095
 _HALF_MIDDLE_M: Final = 0.0085
 _PAD_M: Final = 0.010
-"""From the axis of the last joint to the face of the pad."""
+"""Distance from the axis of the last joint to the face of the pad."""
 _INWARDS_M: Final = 0.0455
-"""From the foot to the middle of the hand."""
+"""Distance from the foot to the middle of the hand."""
 _PALM_M: Final = -0.0054
 """Height of the palm's face."""
 _HIGHEST_M: Final = 0.075

@@ -45,7 +45,7 @@ class StatePanel:
 
 
 class AxesPanel:
-    """For each axis its position, its requested position, what it does, and its current.
+    """For each axis its position, its requested position, its object status, and its current.
 
     If wide, it has one line for each axis where there is room, instead of two.
     """

@@ -1,6 +1,6 @@
 """The gripper in three dimensions.
 
-What is drawn follows from the description of the model. A scene is made before the model is known: until the
+The drawing follows from the description of the model. A scene is made before the model is known: until the
 first status it is a 3-Finger.
 """
 
@@ -30,10 +30,10 @@ GHOST: Final = "#0ea5e9"
 STAGE: Final = "#b9c3cf"
 """Background of the hand, which is grey and black, on a light and on a dark page."""
 HALO: Final = "text-shadow:0 0 2px #fff,0 0 2px #fff,0 0 4px #fff"
-"""Around a letter, for any background."""
+"""Style around a letter, for any background."""
 LETTER: Final = "font:bold 17px sans-serif"
 NAME: Final = "font:11px sans-serif;font-size:clamp(0px,(100vw - 640px) * 9,11px);padding-top:2.2em"
-"""Below the letter, at the same point; a phone has no room for it."""
+"""Style of the name below the letter, at the same point; a phone has no room for it."""
 HELD: Final = "#f2c230"
 STALE: Final = 0.25
 APART: Final = 3
@@ -124,7 +124,7 @@ class Figure:
 
 
 class Drawing:
-    """A gripper, its request, and what it holds."""
+    """A gripper, its request, and the object that it holds."""
 
     def __init__(self, kind: Model, *, compact: bool) -> None:
         model = hand_model(kind)
@@ -226,7 +226,7 @@ def _away(status: RobotiqStatus) -> Finger:
 
 
 def _reach(model: HandModel) -> float:
-    """From the mounting face about to the ends of the fingers, in metres."""
+    """The distance from the mounting face about to the ends of the fingers, in metres."""
     ends = ({joint.name: end for joint in model.moving} for end in (0.0, 0.4))
     poses = (pose for values in ends for pose in model.link_poses(values).values())
     return max((model.stand @ pose).position[2] for pose in poses) + 0.05

@@ -22,7 +22,7 @@ def axis_title(hand: HandMirror, index: int) -> str:
 
 
 def opening_words(hand: HandMirror) -> str:
-    """The opening of a jaw, and where the figure comes from; empty for a 3-Finger."""
+    """The opening of a jaw, and the source of the figure; empty for a 3-Finger."""
     status = hand.status
     if status is None or len(status.model.axes) > 1:
         return ""
@@ -62,7 +62,7 @@ def fault_words(hand: HandMirror) -> tuple[str, bool]:
 
 
 def axis_words(hand: HandMirror, axis: Finger) -> str:
-    """What an axis does."""
+    """The state of an axis."""
     status = hand.status
     if hand.is_lost or status is None or hand.state is State.RESET:
         return AXIS_WORDS[NO_REQUEST]
