@@ -43,7 +43,7 @@ class Amount(NamedTuple):
     value: float
 
     def __str__(self) -> str:
-        """As a person reads it."""
+        """The amount as text for a person."""
         return f"{self.value:g} mm" if self.argument == "mm" else f"{self.value:g}"
 
 

@@ -52,7 +52,7 @@ async def connected(
 ) -> AsyncIterator[Hand]:
     """A started hand; nothing has been written to the gripper.
 
-    ``halt`` tells whether leaving stops the fingers (False for a command that only reads), ``keep_grip``
+    ``halt`` is whether leaving stops the fingers (False for a command that only reads), ``keep_grip``
     whether a grip stays in force then.
     """
     hand = make_hand(address, link, control=halt)

@@ -37,5 +37,5 @@ def file_errors(file: Path) -> Iterator[None]:
 
 
 def normal_end() -> suppress:
-    """For commands that run until Ctrl-C, which cancels them."""
+    """Ignore the cancellation of commands that run until Ctrl-C."""
     return suppress(asyncio.CancelledError)

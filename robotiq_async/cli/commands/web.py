@@ -128,7 +128,7 @@ async def _show(
 async def _start(
     page: PageServer, index: int, operator: Operator, *, alone: bool, stack: AsyncExitStack
 ) -> None:
-    """Start a hand. One of several that cannot be reached is tried again and shown as such."""
+    """Start a hand. One of several that cannot be reached is tried again, and marked on the page."""
     updates = page.updates[index]
     try:
         await operator.hand.start(activate=False)

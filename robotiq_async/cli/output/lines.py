@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ...hand import Hand
 
 NOTHING: Final = "-"
-"""In place of a state without a meaning."""
+"""The text for a state without a meaning."""
 _NAMES: Final = [str(axis.name) for axis in Finger.ALL]
 
 

@@ -92,7 +92,7 @@ class DrivenAxis(Axis):
         super().__init__(round(drive.position), low, high, motor, Spread(None, axis), speeds)
         self._drive = drive
         self._stays = False
-        """Whether the drive was told to stay, and nothing since."""
+        """Whether the last command to the drive was to stay."""
 
     @property
     def is_moving(self) -> bool:

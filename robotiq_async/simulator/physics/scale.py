@@ -29,7 +29,7 @@ _RESOLUTION_G = 10
 
 
 class SimulatedScale:
-    """Shows grams: at a force value that the thesis measured, one between its lowest and highest reading."""
+    """Reads grams: at a force value that the thesis measured, one between its lowest and highest reading."""
 
     def __init__(self, surface: Surface = "foam", seed: int = 0) -> None:
         """A scale with foam around it, or a rigid one.

@@ -157,7 +157,7 @@ def _echo(axes: tuple[Axes, ...], segment: Segment) -> bool:
 def _motion_from_rest(segment: Segment) -> tuple[float, Finger] | None:
     """The time at which a motion was written, and its axis: the first with a gDT of rest before.
 
-    Only such a motion shows the lag of gDT. After an activation every gDT is 0, as in a motion.
+    Only in such a motion the lag of gDT is visible. After an activation every gDT is 0, as in a motion.
     """
     fallback = None
     for sent, request in segment.commands:

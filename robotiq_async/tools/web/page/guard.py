@@ -48,7 +48,7 @@ class Guard:
         self.app = app
         self._access = access
         self._trying: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
-        """By address: many attempts from one do not delay those from others."""
+        """Locks by address: many attempts from one do not delay those from others."""
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
         if scope["type"] == "lifespan":

@@ -15,9 +15,9 @@ from typing import Final
 
 BEAT_MS: Final = 250
 CUT_MS: Final = 1500
-"""After this silence a page warns that its values are old."""
+"""Silence in ms after which a page warns that its values are old."""
 LOST_S: Final = 2.0
-"""After this silence a browser counts as lost. It wakes up a background tab once a second."""
+"""Silence in seconds after which a browser counts as lost. It wakes up a background tab once a second."""
 SCRIPT: Final = f"""
 <script>
 window.robotiqTime = 0;

@@ -21,7 +21,7 @@ SAMPLE_S: Final = 0.2
 """Interval of the points of a curve: 150 points."""
 EVENTS: Final = 100
 QUIET_S: Final = 1.5
-"""After this time without updates the other process counts as silent."""
+"""Seconds without updates after which the other process counts as silent."""
 
 
 @dataclass(frozen=True, slots=True)
