@@ -1,4 +1,4 @@
-"""What the library does, call by call: movements, speeds, forces, status and faults.
+"""The library, call by call: movements, speeds, forces, status and faults.
 
     python demo/demo.py [ADDRESS] [--yes]
 
@@ -47,7 +47,7 @@ fingers and scissor, or the jaw, open and close for about half a minute, at full
 What the hand holds will drop. Keep hands and cables away; Ctrl-C stops the fingers."""
 
 COLUMN = 54
-"""Where results begin."""
+"""The column at which results begin."""
 
 T = TypeVar("T")
 
@@ -142,14 +142,14 @@ async def forces(hand: Hand, simulated: SimulatedGripper | None) -> None:
 
 
 def grasp(result: MoveResult) -> None:
-    """What a move felt."""
+    """Print the contacts and the currents of a move."""
     read("result.contacts", literal(result.contacts) if result.object_detected else "none")
     peaks = "  ".join(f"{axis.name} {current}" for axis, current in result.peak_current_ma.items())
     read("result.peak_current_ma", peaks)
 
 
 async def status(hand: Hand) -> None:
-    """Part 4, first half: what the gripper says, once and as a stream."""
+    """Part 4, first half: the status, once and as a stream."""
     title("4. Status and faults")
     read("hand.state", hand.state)
     read("hand.is_activated, hand.is_moving", (hand.is_activated, hand.is_moving))
@@ -241,7 +241,7 @@ def literal(value: object) -> str:
 
 
 def words(result: object) -> str:
-    """What came back, in a few words."""
+    """The result of a call in a few words."""
     if not isinstance(result, MoveResult):
         return "done" if result is None else str(result)
     axes = (

@@ -1,4 +1,4 @@
-"""A loop of 50 Hz with the blocking hand: close step by step, stop at the part, say how wide it is.
+"""A loop of 50 Hz with the blocking hand: close step by step, stop at the part, print its width.
 
     python demo/grasp_loop.py "sim://?model=2f85&physics=box:30x40x60,0.3"
     python demo/grasp_loop.py "rtu:///dev/ttyUSB0?model=2f85"
