@@ -23,21 +23,21 @@ from tests.docs.pages import table
 LINE_PULLED = "line pulled"
 """A trouble that is not the simulator's: the serial port is gone."""
 PATIENCE_S = 2.0
-"""So long a trouble goes on when the call does not end because of it; then it ends, and the call may."""
+"""Seconds that a trouble lasts when the call does not end because of it; then it ends, and the call may."""
 IDLE_S = 1.0
-"""So long a trouble goes on when there is no call."""
+"""Seconds that a trouble lasts when there is no call."""
 ESCALATION_S = 5.0
 """Interference is a major fault after this time (20 s of the gripper, which is five times as fast)."""
 STOP_S = 2.0
-"""What a stop has promised to take at most: the phases that end so are stops."""
+"""Seconds that a stop takes at most, as promised: the phases that end so are stops."""
 STUCK = (State.WF_ACTIVATION, State.WF_ATR)
-"""Where an emergency stop leaves the hand: what it waits for does not go on until a reset."""
+"""States in which an emergency stop leaves the hand: its sequence does not continue until a reset."""
 MOVES_EVERYTHING = ("foreign", "release")
 SETTLED = (*RUNNING, State.RESET, State.FAULT, State.ATR_DONE, State.SHUTDOWN)
 
 
 async def outcome(world: World, phase: Phase, words: str) -> str:
-    """Let it happen and say how the call ended, and where the hand came to rest; as in the table.
+    """Let it happen; return the outcome of the call and the hand's last state, as in the table.
 
     Raises:
         AssertionError: a promise was broken.
@@ -71,7 +71,7 @@ async def outcome(world: World, phase: Phase, words: str) -> str:
 
 
 class Before(NamedTuple):
-    """What the world was like when the trouble began."""
+    """The world when the trouble began."""
 
     time: float
     travels: dict[Finger, float]
@@ -122,7 +122,7 @@ async def _begun(world: World, call: Call) -> Call:
 
 
 async def _ending_of(task: asyncio.Future[object], deadline: float) -> str:
-    """What the caller got."""
+    """The result of the caller."""
     try:
         async with asyncio.timeout_at(deadline):
             await task
@@ -132,7 +132,7 @@ async def _ending_of(task: asyncio.Future[object], deadline: float) -> str:
 
 
 def _noticed(world: World) -> str:
-    """What the user of an idle hand could notice."""
+    """The signs that the user of an idle hand could notice."""
     for state, words in (
         (State.DISCONNECTED, "link lost"),
         (State.FAULT, "fault"),
@@ -226,7 +226,7 @@ def cells() -> Iterator[Cell]:
 
 
 def is_of_lines(troubles: str) -> bool:
-    """Whether a row is about serial lines; what it lists is not meant by the others there."""
+    """Whether a row is about serial lines; those in it are not meant by the other rows."""
     return troubles.startswith("on a serial line:")
 
 

@@ -1,4 +1,4 @@
-"""What the tests under fault rely on."""
+"""Fixtures of the tests under fault."""
 
 from __future__ import annotations
 

@@ -147,14 +147,14 @@ def _verdict(rng: random.Random, request: bytes, reply: bytes, serial: bool) -> 
     try:
         for part in (reply[:cut], reply):
             if part and expected.is_complete(part):
-                return "accepted" if part == reply else "refused"  # what follows is more than was asked for
+                return "accepted" if part == reply else "refused"  # the rest is more than was requested
     except ProtocolError:
         return "refused"
     return "incomplete"
 
 
 def check_possible(payload: bytes) -> None:
-    """A status made of these sixteen bytes says what they say."""
+    """A status made of these sixteen bytes has their values."""
     registers = tuple(int.from_bytes(payload[i : i + 2], "big") for i in range(0, 16, 2))
     for model in MODELS.values():
         status = RobotiqStatus.from_registers(registers, model=model)
@@ -169,7 +169,7 @@ def check_possible(payload: bytes) -> None:
 
 @dataclass
 class Line:
-    """What passes between a hand and a simulator, one reply in so many mutated."""
+    """The line between a hand and a simulator, with one reply in so many mutated."""
 
     rng: random.Random
     serial: bool
@@ -198,7 +198,7 @@ class Line:
             yield 0.0, frame
 
     def check(self, status: RobotiqStatus) -> None:
-        """A status that was published is what a whole reply said, just before."""
+        """Check that a published status is that of a whole reply just before."""
         self.statuses += 1
         said = [payload(frame, self.serial, self.model) for frame in self.given]
         read = status.registers[: self.model.tcp.count]  # on either link

@@ -1,4 +1,4 @@
-"""What the hand can be doing when something goes wrong: how it gets there, and what is promised then."""
+"""Phases of a hand in which something may go wrong: the way there, and the promises for it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.adversity.world import World
 A = Finger.A
 TARGET = 200
 SHORT = 14
-"""A first move of some counts: where the object status is late, it ends before that shows it."""
+"""A first move of some counts: where the object status is late, it ends before that has it."""
 
 Call = Callable[[], Awaitable[Any]]
 
@@ -65,7 +65,7 @@ async def command_pending(world: World) -> Call:
 async def moving(world: World) -> Call:
     await idle(world)
     await world.hand.move(SHORT, A)
-    await world.until(lambda: not world.gripper.is_moving)  # what is late shows it for longer
+    await world.until(lambda: not world.gripper.is_moving)  # a late status has it for longer
     call = asyncio.create_task(world.hand.move(TARGET, A, speed=0))
     await world.until_moving()
     return lambda: call

@@ -127,7 +127,7 @@ class Soak:
         return self.hand.move(self.random_target(axes), axes, speed=speed, force=force)
 
     def random_target(self, axes: Finger) -> int:
-        """Anywhere, or some counts from where an axis is: short moves end before a late status shows them."""
+        """Anywhere, or some counts from where an axis is: short moves end before a late status has them."""
         if self.rng.random() < 0.5:
             return self.rng.randrange(256)
         here = self.world.gripper.position(next(iter(axes)))

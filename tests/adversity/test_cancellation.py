@@ -37,7 +37,7 @@ AXIS_STOPS_WITHIN = 48
 Way = Literal["task.cancel", "asyncio.timeout", "anyio"]
 WAYS: dict[Way, int] = {"task.cancel": 1, "anyio": 1, "asyncio.timeout": 6}
 """With the turns from one cancellation to the next. A time-out calls ``task.cancel()`` once, and what else it
-does it does outside the call: nothing in here can tell the two apart. A scope of anyio cancels until it is
+does it does outside the call: nothing in here distinguishes the two. A scope of anyio cancels until it is
 left."""
 Call = Callable[[World], Awaitable[Any]]
 
@@ -137,7 +137,7 @@ def test_cancelled_in_every_turn(name: str, way: Way) -> None:
 
 
 async def cancelled(walk: Walk, way: Way, turn: int) -> str:
-    """Cancel the call after so many turns of the loop, look at what is left, and say how it ended."""
+    """Cancel the call after so many turns of the loop, check the remains, and return its outcome."""
     async with world(speedup=walk.speedup) as here:
         await walk.ready(here)
         how = await call_cancelled(here, walk.call, way, turn)
@@ -153,7 +153,7 @@ async def cancelled(walk: Walk, way: Way, turn: int) -> str:
 
 
 async def call_cancelled(world: World, call: Call, way: Way, turn: int) -> str:
-    """Make the call and cancel it; says whether it was cancelled, ended all the same, or ended before."""
+    """Make the call and cancel it; return whether it was cancelled, ended all the same, or ended before."""
     asked: list[float] = []
     scope, limit = anyio.CancelScope(), asyncio.timeout(None)
 

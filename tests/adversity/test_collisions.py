@@ -1,4 +1,4 @@
-"""Two calls at once: the second comes in every turn of the loop while the first is under way."""
+"""Two calls at once: the second comes in every turn of the loop while the first runs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FAST = 2000.0
 """The gripper does everything within a poll or two: all there is to walk through is what the hand does."""
 MOST_TURNS = 60
 POLL_S = 0.02
-"""What is walked through are turns of the loop, and of those a poll has as many however often it comes."""
+"""The steps are turns of the loop, of which a poll has as many however often it comes."""
 
 Call = Callable[[World], Awaitable[Any]]
 CALLS: dict[str, Call] = {
@@ -82,7 +82,7 @@ async def collide(ready: str, first: str, second: str, turn: int) -> bool:
 
 
 async def ending(call: Awaitable[Any]) -> str:
-    """How a call ended; anything but a result or an error of the contract fails the test."""
+    """The outcome of a call; anything but a result or an error of the contract fails the test."""
     try:
         await call
     except RobotiqError as error:

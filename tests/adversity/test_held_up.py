@@ -65,7 +65,7 @@ async def test_a_move_survives(here: World, held_s: float) -> None:
     moving = asyncio.create_task(here.hand.move(200, Finger.A, speed=0))
     for _ in range(3):
         # Between two exchanges: the simulator shares the loop, and would be held up with a request
-        # that a real gripper answers meanwhile.
+        # that a real gripper answers in that time.
         await anext(here.hand.statuses())
         here.loop.hold_up(held_s)
     result = await moving
@@ -96,7 +96,7 @@ async def test_a_silent_gripper_is_given_up_on_also_in_a_loop_that_is_held_up_ag
             assert here.loop.time() - began < 1.0
 
 
-# -- what happened meanwhile is seen before anything is written --------------------------------------------
+# -- events in that time are seen before anything is written -----------------------------------------------
 
 
 @inside(started)
@@ -193,7 +193,7 @@ def test_a_loop_that_was_not_running_is_late_and_goes_on(kind: str, caplog: pyte
         assert "robotiq_async.sync" not in warning, "a hint for IPython alone"
         stall = hand.statistics.longest_stall
         assert 0.15 < stall < 0.6
-        # It goes on as if nothing had been.
+        # It continues as if nothing had been.
         assert hand.state is State.RUNNING_IDLE
         assert runner.run(hand.move(200, A)).positions[A] == pytest.approx(200, abs=3)
         assert hand.statistics.reconnects == 0

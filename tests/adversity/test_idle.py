@@ -1,4 +1,4 @@
-"""A gripper that loses its activation without requests for a while, as one source says."""
+"""A gripper that loses its activation without requests for a while, as by one source."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LINKS = ["tcp", "rtu"]
 
 
 async def nothing_is_activated(world: World, since: int) -> None:
-    """Neither at once nor later; and asked for it, the gripper is."""
+    """Neither at once nor later; on request the gripper is."""
     travels = world.travels()
     for ask in (lambda: world.hand.move(60, B), lambda: world.hand.set_position(60, B)):
         with pytest.raises(NotActivatedError):

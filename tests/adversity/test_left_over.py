@@ -27,7 +27,7 @@ async def send(world: World, fingers: int, scissor: int) -> None:
 
 
 async def ask_and_go(world: World) -> None:
-    """Ask for the status, as the first request of a connection, and do not wait for the answer."""
+    """Request the status, first on a connection, and do not wait for the answer."""
     async with raw_client(world.server) as client:  # type: ignore[arg-type]
         client.writer.write(client.frame(READ_STATUS))
         heard = len(world.server.heard)
@@ -74,7 +74,7 @@ async def test_after_what_was_left_over_the_next_start_finds_the_gripper(here: W
 @inside(started)
 @pytest.mark.parametrize("late", [0.03, 0.2, 0.39])
 async def test_a_hand_comes_back_through_a_multiplexer(here: World, late: float) -> None:
-    """A connection that asked before it knew what was left over would leave its own reply to the next one."""
+    """With a request before it knew of a reply left over, a connection would leave its own to the next."""
     async with here.server.fault_injector.making(Trouble("multiplexer", late)):
         await asyncio.sleep(1)
         for _ in range(5):
@@ -88,7 +88,7 @@ async def test_a_hand_comes_back_through_a_multiplexer(here: World, late: float)
 @inside(started)
 @pytest.mark.parametrize("late", [0.46, 0.5, 0.55, 0.7])
 async def test_no_status_is_older_than_a_reply_may_be(here: World, late: float) -> None:
-    """Each reply comes to the connection after the one that asked, which has given up by then."""
+    """Each reply comes to the connection after the one that sent the request, which has given up by then."""
     async with here.server.fault_injector.making(Trouble("multiplexer", late)):
         for position in range(20):
             with contextlib.suppress(RobotiqConnectionError):

@@ -19,13 +19,13 @@ OF_A_JAW = [
     *("drop once", "silence for 60", "line pulled", "power-cut for 60", "foreign 128"),
     *("fault 14 for ever", "release", "e-stop for 60", "status-lag 0.2 for 60"),
 ]
-"""What a sibling is tried with here. ``MODEL=2f85`` in the environment tries the whole table."""
+"""The troubles for a sibling here. ``MODEL=2f85`` in the environment tries the whole table."""
 LETS_GO = ("power-cut", "foreign", "fault", "release", "e-stop")
-"""What ends a grip if no other axis can move. Else a stop writes nothing that could fail."""
+"""Troubles that end a grip if no other axis can move. Else a stop writes nothing that could fail."""
 CONNECTION_LOST = [("tcp", "silence once"), ("tcp", "reset"), ("tcp", "close"), ("rtu", "echo for 60")]
-"""What does so too, as it would with a 3-Finger: what came of the grip cannot be seen in time."""
+"""Troubles of links that do so too, as with a 3-Finger: the fate of the grip cannot be seen in time."""
 WITH_FUNCTION_23 = {
-    # The status that is read after the damage shows that the write was carried out.
+    # By the status read after the damage the write was carried out.
     ("command pending", f"{trouble} {lasts}"): "done → RUNNING_IDLE"
     for trouble in (
         *("drop", "half", "wrong-checksum", "wrong-function", "wrong-length", "wrong-count", "wrong-unit"),
@@ -33,13 +33,13 @@ WITH_FUNCTION_23 = {
     )
     for lasts in ("once", "for 60")
 }
-"""What comes of a cell on a serial line to a jaw, which is written with function 23."""
+"""Outcomes of cells on a serial line to a jaw, which is written with function 23."""
 FORGETTING = {
     # The other client's write comes too soon after ours, and is the one that is forgotten.
     ("tcp", "moving", "foreign 128"): "done → RUNNING_IDLE",
     ("rtu", "moving", "foreign 128"): "done → RUNNING_IDLE",
 }
-"""What comes of a cell on a gripper that forgets writes (``make habits``), where that is something else."""
+"""Outcomes of cells on a gripper that forgets writes (``make habits``), where they differ."""
 
 
 def kind_of(cell: Cell) -> str:
@@ -49,7 +49,7 @@ def kind_of(cell: Cell) -> str:
 def expected(cell: Cell, model: Model) -> str:
     if len(model.axes) == 1 and cell.phase.name == "keeping a grip":
         lets_go = kind_of(cell) in LETS_GO or (cell.link, cell.trouble) in CONNECTION_LOST
-        # A lag that grows shows the closing once more: an axis that moves is held where it is.
+        # With a lag that grows the closing is seen once more: an axis that moves is held where it is.
         lets_go = lets_go or kind_of(cell) == "status-lag" in {habit.kind for habit in HABITS}
         return f"done, {'let go' if lets_go else 'kept'} → SHUTDOWN"
     if len(model.axes) == 1 and cell.link == "rtu" and (cell.phase.name, cell.trouble) in WITH_FUNCTION_23:

@@ -66,7 +66,7 @@ async def test_a_gateway_that_is_a_little_slow_has_confirmed_the_stop_by_then(
 async def test_a_slower_gateway_still_gets_the_stop(
     here: World, late: float, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """It is not waited for; the log says that it is unknown."""
+    """It is not waited for; in the log it is unknown."""
     caplog.set_level(logging.WARNING, "robotiq_async")
     async with here.server.fault_injector.making(Trouble("delay", late)):
         await here.hand.set_position(255, A)

@@ -1,4 +1,4 @@
-"""What the soak run keeps an eye on: the loop, the statuses, and the writes."""
+"""Watches of the soak run: the loop, the statuses, and the writes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.virtual import HoldWatch
 
 
 class _WatchedSelector(selectors.DefaultSelector):
-    """Tells a watch how long the loop was held between two waits."""
+    """Reports to a watch the time between two waits of the loop."""
 
     def __init__(self, hold: HoldWatch) -> None:
         super().__init__()
@@ -54,7 +54,7 @@ class LoopWatch:
 class WriteWatch:
     """Knows a replay when it sees one.
 
-    Every command of the soak carries speeds and forces of its own, so what an axis is asked (position,
+    Every command of the soak carries speeds and forces of its own, so the request for an axis (position,
     speed, force) never comes back once it was followed by something else.
     """
 
@@ -70,23 +70,23 @@ class WriteWatch:
         return self._number % 256, self._number // 256 % 256
 
     def forget(self) -> None:
-        """Another client has written, or everything is at rest: begin anew."""
+        """Another client has written, or everything is at rest: begin again."""
         self._past = [set() for _ in self._model.axes]
         self._last: list[AxisRequest | None] = [None] * len(self._model.axes)
 
     def check(self, world: World) -> Iterator[str]:
-        """What was wrong with the writes since the last look."""
+        """The errors of the writes since the last look."""
         images, world.gripper.images = world.gripper.images, []
         for registers, positions in images:
             image = Request.from_registers(registers, self._model)
             if not image.go:
-                # No axis is asked to move; and what comes after must not be what was halted.
+                # No request moves an axis; and the next one must not be the one that was halted.
                 self._last = [None] * len(self._model.axes)
                 continue
             for at, (request, position) in enumerate(zip(image.axes, positions, strict=True)):
                 if request == self._last[at]:
                     continue
-                # To be asked to stay is no motion, however often.
+                # A request to stay is no motion, however often.
                 stays = self._model.has_reached(request.position, position)
                 if request in self._past[at] and not stays:
                     axis = self._model.axes[at]

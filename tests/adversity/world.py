@@ -1,4 +1,4 @@
-"""A gripper, its server and a hand in one virtual loop, with an eye on everything that is said and done."""
+"""A gripper, its server and a hand in one virtual loop, with an eye on every message and motion."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from tests.virtual_line import VirtualLine
 
 LONGEST_HOLD_S = 0.020
 HABITS = parse_troubles(os.environ.get("HABITS", ""))
-"""Troubles that every gripper here has besides, as the environment says. The promises stay the same."""
+"""Troubles that every gripper here has besides, by the environment. The promises stay the same."""
 MODEL = model_of(os.environ.get("MODEL"))
-"""The gripper of every world that names no other, as the environment says. Some scenes need three fingers."""
+"""The gripper of every world that names no other, by the environment. Some scenes need three fingers."""
 SPEEDUP = 5.0
 """Of the gripper only: the link and the hand keep to their own times."""
 
@@ -72,7 +72,7 @@ def stamp_of(status: RobotiqStatus) -> int:
 
 
 class Heard:
-    """Notes when each request came in, understood or not; has the habits that are asked for."""
+    """Notes when each request came in, understood or not; has the habits that are given."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -137,7 +137,7 @@ class World:
 
     @property
     def holds(self) -> Finger:
-        """What holds the part while the rest moves: two fingers beside A, or the jaw that there is."""
+        """The axes that hold the part while the rest moves: two fingers beside A, or the one jaw."""
         return self.gripper.model.all_axes & (Finger.B | Finger.C) or JAW
 
     def travels(self) -> dict[Finger, float]:
@@ -150,7 +150,7 @@ class World:
         assert all(after[axis] - before[axis] <= tolerance for axis in after), (before, after)
 
     def motions(self, since: int = 0) -> list[tuple[int, ...]]:
-        """The positions asked by each write that set the axes going, from a number of writes on."""
+        """The positions in each write that set the axes going, from a number of writes on."""
         model = self.gripper.model
         images = [Request.from_registers(write.registers, model) for write in self.gripper.writes[since:]]
         return [tuple(axis.position for axis in image.axes) for image in images if image.go]
@@ -218,7 +218,7 @@ async def world(
     else:
         server, address = TcpServer(gripper), ""
     async with server:
-        # Every phase and every trouble lasts for many polls; more of them show no more and take longer.
+        # Every phase and every trouble lasts for many polls; more of them reveal no more and take longer.
         options = {"poll_interval": 0.03, "model": model} | options
         if any(habit.kind == "function-3-only" for habit in HABITS):
             options = {"read_function": 3} | options
