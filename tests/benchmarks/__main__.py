@@ -1,9 +1,9 @@
-"""How steady, how cheap, how many: the hand beside bare pymodbus and a C thread, in one run.
+"""Jitter, cost and number of hands beside bare pymodbus and a C thread, in one run.
 
     python -m tests.benchmarks --json FILE
 
 Every contender runs in a process of its own against grippers in another one (gripper.c). What is compared
-takes turns, round after round, and medians of the rounds are shown. Needs gcc; the C thread also needs
+takes turns, round after round, and medians of the rounds are printed. Needs gcc; the C thread also needs
 libmodbus (Debian: libmodbus-dev).
 """
 
@@ -37,7 +37,7 @@ HANDS = {"asyncio": (64, 96, 128), "uvloop": (96, 128, 160, 192)}
 
 
 def jitter(measured: list[float]) -> dict[str, float]:
-    """How far periods are from the interval, in microseconds."""
+    """Deviation of periods from the interval, in microseconds."""
     off = sorted(abs(period - INTERVAL_S) * 1e6 for period in measured)
     return {
         **{f"p{100 * share:g}": percentile(off, share) for share in (0.5, 0.99, 0.999)},
@@ -46,7 +46,7 @@ def jitter(measured: list[float]) -> dict[str, float]:
 
 
 class Benchmarks(program.Benchmarks):
-    """One run of all that is asked for."""
+    """One run of the parts that are given."""
 
     def __init__(self, folder: Path, rounds: int, seconds: float) -> None:
         super().__init__(folder, rounds, seconds)
@@ -99,7 +99,7 @@ class Benchmarks(program.Benchmarks):
             }
 
     def many(self) -> Iterator[Row]:
-        """How many grippers one loop polls at 200 Hz: the share of polls that come in time."""
+        """Grippers that one loop polls at 200 Hz: the share of polls that come in time."""
         seconds = min(self.seconds, 6.0)
         for loop in LOOPS:
             for count in HANDS[loop]:
@@ -113,7 +113,7 @@ class Benchmarks(program.Benchmarks):
                 yield row
 
     def latency(self) -> Iterator[Row]:
-        """From command() to the wire, from a reply to its reader, from the last reply to move()'s return."""
+        """Times from command() to the wire, from a reply to its reader, from the last one to a move's end."""
         for loop in LOOPS:
             figures = self.contender("latency", loop, self.seconds)
             self.results.setdefault("latency", {})[loop] = figures
@@ -123,7 +123,7 @@ class Benchmarks(program.Benchmarks):
                 yield {"what": name.replace("_", " "), "loop": loop, **shown}
 
     def readers(self) -> Iterator[Row]:
-        """What readers of statuses() cost."""
+        """The cost of readers of statuses()."""
         names = {"1": "hand", "10": "readers_10", "100": "readers_100"}
         turns = {count: partial(self.contender, name, "asyncio", 5.0) for count, name in names.items()}
         for count, rounds in self.in_turns("readers", turns).items():
@@ -131,7 +131,7 @@ class Benchmarks(program.Benchmarks):
             yield {"readers": count, "CPU a poll, us": f"{cost:.0f}"}
 
     def import_(self) -> Iterator[Row]:
-        """How long the import takes."""
+        """The time of the import."""
         code = "import time; t = time.perf_counter(); import {}; print(time.perf_counter() - t)"
         for module in ("pymodbus.client", "robotiq_async"):
             command = [sys.executable, "-c", code.format(module)]
@@ -143,7 +143,7 @@ class Benchmarks(program.Benchmarks):
             yield {"module": module, "import, ms": f"{1000 * median(times):.0f}"}
 
     def memory(self) -> Iterator[Row]:
-        """What a hand takes, and what an hour adds (measured at 1000 polls a second)."""
+        """The memory of a hand, and the growth in an hour (measured at 1000 polls a second)."""
         figures = self.contender("memory", "asyncio", 2 * self.seconds, 50)
         self.results["memory"] = figures
         yield {

@@ -1,4 +1,4 @@
-"""What is measured: each function here runs alone in a process of its own, and returns plain figures.
+"""The contenders: each function here runs alone in a process of its own, and returns plain figures.
 
     python -m tests.benchmarks.contenders NAME LOOP SECONDS PORT...
 
@@ -107,7 +107,7 @@ async def hand(seconds: float, ports: list[int], count: int = 1) -> Figures:
 
 
 async def latency(seconds: float, ports: list[int]) -> Figures:
-    """From command() to the write, from a reply to its reader, from the last reply to move()'s return.
+    """Times from command() to the write, from a reply to its reader, from the last one to a move's end.
 
     Commands follow each other closely here; what the distance between two writes adds is not measured.
     """
@@ -156,7 +156,7 @@ async def latency(seconds: float, ports: list[int]) -> Figures:
 
 
 async def memory(seconds: float, ports: list[int]) -> Figures:
-    """What a hand takes, and what an hour of polling adds to that; at a poll each millisecond."""
+    """The memory of a hand, and the growth in an hour of polling; at a poll each millisecond."""
     hands = [RobotiqHand(f"127.0.0.1:{port}") for port in ports]
     async with hands[0]:
         await asyncio.sleep(SETTLE_S)
@@ -183,7 +183,7 @@ async def memory(seconds: float, ports: list[int]) -> Figures:
 
 
 async def many_bare(seconds: float, ports: list[int]) -> Figures:
-    """So many bare pymodbus loops in one event loop, their phases spread over the interval."""
+    """Run so many bare pymodbus loops in one event loop, their phases spread over the interval."""
     loop = asyncio.get_running_loop()
     clients = [await connected(port) for port in ports]
     begin = loop.time() + SETTLE_S
@@ -209,7 +209,7 @@ async def many_bare(seconds: float, ports: list[int]) -> Figures:
 
 
 async def many_hands(seconds: float, ports: list[int]) -> Figures:
-    """So many hands in one event loop, each with a reader."""
+    """Run so many hands in one event loop, each with a reader."""
     hands = [RobotiqHand(f"127.0.0.1:{port}") for port in ports]
     await asyncio.gather(*(each.start() for each in hands))
     readers = [asyncio.create_task(read(each)) for each in hands]

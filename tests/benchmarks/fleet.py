@@ -3,7 +3,7 @@
     python -m tests.benchmarks.fleet --json FILE
 
 Agent, clients and grippers (gripper.c) run in processes of their own on one machine, over zenoh on loopback.
-What is compared takes turns, round after round, and medians of the rounds are shown. Needs gcc.
+The contenders take turns, round after round, and medians of the rounds are printed. Needs gcc.
 """
 
 from __future__ import annotations
@@ -78,19 +78,19 @@ def role(*arguments: object) -> Iterator[Role]:
 
 
 def endpoint() -> str:
-    """Where no server listens yet."""
+    """An endpoint at which no server listens yet."""
     return f"tcp/127.0.0.1:{free_port()}"
 
 
 class Benchmarks(program.Benchmarks):
-    """One run of all that is asked for."""
+    """One run of the parts that are given."""
 
     def __init__(self, folder: Path, rounds: int, seconds: float) -> None:
         super().__init__(folder, rounds, seconds)
         self.gripper = build("gripper", folder)
 
     def commands(self) -> Iterator[Row]:
-        """From a command to its acknowledgement, and from a halt to the status that shows it."""
+        """Seconds from a command to its acknowledgement, and from a halt to the status that confirms it."""
         who = ("local", "remote", f"remote, beside {WATCHED} streams of 200 Hz")
         turns = {each: partial(self._commands, kind) for kind, each in enumerate(who)}
         rounds = self.in_turns("commands", turns)
@@ -119,7 +119,7 @@ class Benchmarks(program.Benchmarks):
             return stack.enter_context(role("busy_commander", where, other)).end(self.seconds)
 
     def agents(self) -> Iterator[Row]:
-        """What serving costs, and what it does to the polls; each hand is polled 200 times a second."""
+        """The cost of serving, and its effect on the polls; each hand is polled 200 times a second."""
         cases = [(count, readers) for count in HANDS for readers in (None, *READERS)]
         turns = {f"{count} {readers}": partial(self._agent, count, readers) for count, readers in cases}
         rounds = self.in_turns("agents", turns)
@@ -168,7 +168,7 @@ class Benchmarks(program.Benchmarks):
 
 
 def reader_cells(rounds: list[list[Figures]], count: int) -> Row:
-    """What readers saw, and what it cost them."""
+    """The statuses that readers got, and their cost."""
     every = [each for readers in rounds for each in readers]
     names = ("reader: CPU a hand", "statuses a second", "late p50, ms", "late p99, ms")
     if not every:

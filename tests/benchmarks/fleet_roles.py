@@ -1,4 +1,4 @@
-"""Who takes part in the benchmarks of the fleet: each function here runs alone in a process of its own.
+"""Roles in the benchmarks of the fleet: each function here runs alone in a process of its own.
 
     python -m tests.benchmarks.fleet_roles NAME ENDPOINT ARGUMENT...
 
@@ -41,7 +41,7 @@ def name(number: int, host: str = "host") -> GripperName:
 
 
 async def measured(begin: Callable[[], object], more: Callable[[float], Figures]) -> None:
-    """Measure from each "begin" on; at each "end" tell the figures, with more about so many seconds."""
+    """Measure from each "begin" on; at each "end" print the figures, with more about so many seconds."""
     meter = Meter()
     async for order in orders():
         if order == "begin":
@@ -53,7 +53,7 @@ async def measured(begin: Callable[[], object], more: Callable[[float], Figures]
 
 
 async def orders() -> AsyncIterator[str]:
-    """What the main process says, a line each."""
+    """The lines of the main process."""
     print("ready", flush=True)  # noqa: T201
     while line := await asyncio.to_thread(sys.stdin.readline):
         yield line.strip()
@@ -113,7 +113,7 @@ async def active(hands: dict[str, RobotiqHand]) -> None:
 
 
 async def measured_polls(hands: dict[str, RobotiqHand]) -> None:
-    """How many polls came in time, and how evenly; of the last ten seconds at most."""
+    """The number of polls in time, and their jitter; of the last ten seconds at most."""
     before: list[int] = []
 
     def polls() -> list[int]:
@@ -169,7 +169,7 @@ async def watched(bus: ZenohBus, names: list[GripperName]) -> AsyncIterator[list
 
 
 async def read(hand: RemoteHand, late: list[float]) -> None:
-    """How late statuses are at their reader: the agent's clock is ours, for it is on this machine."""
+    """The delay of statuses at their reader: the agent's clock is ours, for it is on this machine."""
     async for _ in hand.statuses():
         session = hand._session
         assert session is not None
@@ -204,7 +204,7 @@ async def busy_commander(endpoint: str, other: str) -> None:
 
 
 async def commands(hand: Hand, more: Callable[[], Figures] = dict) -> None:
-    """How long set_speed and halt take, at any time between two polls."""
+    """The time of set_speed and halt, at any moment between two polls."""
     async for order in orders():
         if order == "begin":
             continue

@@ -1,4 +1,4 @@
-"""What the programs that measure have in common: rounds, processes, tables, a file of figures."""
+"""The common part of the programs that measure: rounds, processes, tables, a file of figures."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class MissingToolError(RuntimeError):
 
 
 class Benchmarks:
-    """One run of all that is asked for; each part is a method of that name."""
+    """One run of the parts that are given; each part is a method of that name."""
 
     def __init__(self, folder: Path, rounds: int, seconds: float) -> None:
         """Programs are built in the folder; each takes a turn of so many seconds in each round."""
@@ -37,7 +37,7 @@ class Benchmarks:
         self.results: dict[str, Any] = {}
 
     def in_turns(self, what: str, turns: Mapping[str, Callable[[], T]]) -> dict[str, list[T]]:
-        """What each gives, round after round: the machine may be noisy, and then it is so for all."""
+        """The figures of each, round after round: the machine may be noisy, and then it is so for all."""
         rounds: dict[str, list[T]] = {each: [] for each in turns}
         for number in range(self.rounds):
             for each, turn in turns.items():
@@ -53,7 +53,7 @@ def median_of(rounds: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 
 def figures_of(module: str, *arguments: object) -> Figures:
-    """What a module of this folder prints, in a process of its own."""
+    """The output of a module of this folder, run in a process of its own."""
     command = [sys.executable, "-m", f"tests.benchmarks.{module}", *map(str, arguments)]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, cwd=ROOT)
     figures: Figures = json.loads(done.stdout)
@@ -83,7 +83,7 @@ def build(name: str, folder: Path, *libraries: str) -> Path:
 
 @contextlib.contextmanager
 def grippers(program: Path, count: int) -> Iterator[list[int]]:
-    """So many cheap grippers in a process of their own; gives the ports they listen on."""
+    """Run so many cheap grippers in a process of their own; yield the ports they listen on."""
     with subprocess.Popen([program, str(count)], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         assert process.stdin is not None
         assert process.stdout is not None

@@ -34,9 +34,9 @@ from tests.serial_line import SerialLine
 PARTS = ("idle", "stream", "beside")
 INTERVALS = (0.005, 0.01, 0.02)
 STREAM_S = 0.002
-"""From one command of a stream to the next: more than any line can carry."""
+"""Seconds from one command of a stream to the next: more commands than any line can carry."""
 TARGET_S = 0.01
-"""From one target to the next of the control loop that is compared with others."""
+"""Seconds from one target to the next of the control loop that is compared with others."""
 LINE_MS = ("0.3", "0.5")
 """Silence and turnaround of the line that is not ours."""
 
@@ -45,7 +45,7 @@ LINE_MS = ("0.3", "0.5")
 
 
 async def gripper(folder: str) -> None:
-    """Serve until told to end; prints the port once it does."""
+    """Serve until the end is requested; print the port once it serves."""
     with SerialLine(Path(folder)) as line:
         async with SerialSimulatorServer(line.far, SimulatedGripper(speedup=4.0)):
             print(line.near, flush=True)  # noqa: T201
@@ -69,7 +69,7 @@ def served() -> Iterator[str]:
 
 
 async def measured(port: str, interval: float, seconds: float, *, streams: bool) -> dict[str, float]:
-    """What a hand does in so many seconds, with a stream of commands or without."""
+    """Figures of a hand in so many seconds, with a stream of commands or without."""
     async with RobotiqHand(f"rtu://{port}", poll_interval=interval, write_spacing=0.0) as hand:
         await asyncio.sleep(0.3)
         before, used, began = hand.statistics, time.process_time(), time.monotonic()
@@ -163,7 +163,7 @@ async def compared(port: str, seconds: float, options: dict[str, int]) -> dict[s
 
 
 async def followed(hand: RobotiqHand, seconds: float) -> list[float]:
-    """Seconds from each target until a status shows it, or a later one."""
+    """Seconds from each target until a status has it, or a later one."""
     pending: dict[int, float] = {}
     took: list[float] = []
 
@@ -188,7 +188,7 @@ async def followed(hand: RobotiqHand, seconds: float) -> list[float]:
 
 
 class Benchmarks(program.Benchmarks):
-    """One run of all that is asked for."""
+    """One run of the parts that are given."""
 
     def idle(self) -> Iterator[Row]:
         """A hand that polls, with a command now and then."""

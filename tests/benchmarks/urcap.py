@@ -33,7 +33,7 @@ WHO = {"Modbus TCP": SimulatorServer, "text port": UrcapSimulatorServer}
 
 
 async def gripper(who: str, delay: float) -> None:
-    """Serve until told to end; prints the address once it does."""
+    """Serve until the end is requested; print the address once it serves."""
     async with WHO[who](SimulatedGripper(model=TWO_FINGER_85)) as server:
         if delay:
             await server.fault_injector.begin(Trouble("delay", delay))
@@ -54,7 +54,7 @@ def served(who: str, delay: float) -> Iterator[str]:
 
 
 async def measured(address: str, seconds: float, *, streams: bool) -> dict[str, float]:
-    """What a hand does in so many seconds, with 50 commands a second or without."""
+    """Figures of a hand in so many seconds, with 50 commands a second or without."""
     async with RobotiqHand(address) as hand:
         await hand.open()
         before, used, began = hand.statistics, time.process_time(), time.monotonic()
@@ -108,7 +108,7 @@ def bare(address: str, seconds: float) -> dict[str, float]:
 
 
 class Benchmarks(program.Benchmarks):
-    """One run of all that is asked for."""
+    """One run of the parts that are given."""
 
     def idle(self) -> Iterator[Row]:
         """A hand that polls."""
