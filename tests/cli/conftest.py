@@ -49,7 +49,7 @@ PATIENCE = 30.0
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a command ended."""
+    """The end of a command."""
 
     code: int
     out: str
@@ -73,7 +73,7 @@ class Outcome:
 
 
 def _environs() -> dict[str, object]:
-    """What a command may change in its process while it runs, and no longer."""
+    """The environment that a command may change in its process while it runs, and no longer."""
     loggers = [logging.getLogger(name) for name in ("", "robotiq_async", "foxglove", "asyncio", "pymodbus")]
     return {
         "signal handlers": {number: signal.getsignal(number) for number in signal.valid_signals()},
@@ -142,7 +142,7 @@ def without(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
 
 @pytest.fixture
 def refusing() -> Iterator[str]:
-    """Where connections are refused: bound and not listening, so that no other program gets the port."""
+    """An address that refuses connections: bound, not listening, so that no other program gets the port."""
     with socket.socket() as reserved:
         reserved.bind(("127.0.0.1", 0))
         yield f"127.0.0.1:{reserved.getsockname()[1]}"
@@ -198,7 +198,7 @@ def _run_virtually(work: Coroutine[Any, Any, object]) -> None:
 
 @pytest.fixture
 def virtually(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is called, and its own gripper, live in virtual time: minutes take none, and nothing is late."""
+    """Run the call and its own gripper in virtual time: minutes take none, and nothing is late."""
     monkeypatch.setattr(asyncio, "run", _run_virtually)
     defaults = (lambda: asyncio.get_running_loop().time(),)
     assert SimulatedGripper.__init__.__defaults__ == (time.monotonic,)

@@ -34,7 +34,7 @@ ACTIVATE = (0x0100, 0, 0, 0, 0, 0, 0, 0)
 
 
 class WatchedGripper(SimulatedGripper):
-    """Notes when it is asked to go, and can be made older at once."""
+    """Notes the time of each request to go, and can be made older at once."""
 
     def __init__(self) -> None:
         self.age = 0.0
@@ -178,7 +178,7 @@ def test_a_grip_is_kept_from_one_move_to_the_next(call: Call, there: SimulatorSe
 
 
 class InterruptingGripper(SimulatedGripper):
-    """Ctrl-C comes when an axis is asked to go to a position."""
+    """Sends Ctrl-C when an axis gets a request for a position."""
 
     at = -1
 

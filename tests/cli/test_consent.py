@@ -1,4 +1,4 @@
-"""What moves a gripper asks at a terminal, and without one needs --yes."""
+"""Commands that move a gripper ask at a terminal, and without one need --yes."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ sys.exit(main(["move", "30", {!r}]))
 
 @pytest.fixture
 def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """For what a command would write, in the folder that it runs in."""
+    """The name of a file that a command would write, in the folder that it runs in."""
     monkeypatch.chdir(tmp_path)
     return tmp_path / "out.txt"
 
@@ -129,7 +129,7 @@ async def test_the_question_names_the_axes_of_the_model(
 async def test_only_a_yes_to_the_question_moves(
     server: SimulatorServer, before: str, answer: str, code: int
 ) -> None:
-    """What was typed before it is no answer, and Ctrl-C is no yes."""
+    """Keys typed before it are no answer, and Ctrl-C is no yes."""
     terminal = Terminal(*COMMAND_LINE, "move", "30", server.address)
     terminal.press(before)
     await terminal.shows(b"Continue? [y/N]")

@@ -1,4 +1,4 @@
-"""Ctrl-C, whenever it comes: the fingers stop, the command says so in one line and ends with 130."""
+"""Ctrl-C, whenever it comes: the fingers stop, the command prints that in one line and ends with 130."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from tests.cli.conftest import Shell
 
 LINES = (1, 6, 12, 20, 30, 40)
-"""After so many lines of the demo's output Ctrl-C comes; they lie in all of its parts."""
+"""Lines of the demo's output after which Ctrl-C comes; they lie in all of its parts."""
 
 
 def assert_fingers_stopped(server: SimulatorServer) -> None:
@@ -36,7 +36,7 @@ def assert_fingers_stopped(server: SimulatorServer) -> None:
 
 @pytest.fixture
 def ignored() -> Iterator[None]:
-    """As under nohup, and in a job in the background."""
+    """Ignore Ctrl-C, as under nohup and in a job in the background."""
     before = [(number, signal.signal(number, signal.SIG_IGN)) for number in (signal.SIGHUP, signal.SIGINT)]
     yield
     for number, handler in before:
@@ -102,7 +102,7 @@ async def test_a_move_in_its_activation(shell: Shell) -> None:
 
 
 async def test_further_signals_do_not_keep_the_first_from_stopping_the_fingers(shell: Shell) -> None:
-    """A third Ctrl-C within half a second broke the event loop, and the fingers went on."""
+    """A third Ctrl-C within half a second broke the event loop, and the fingers moved on."""
     async with SimulatorServer(active_gripper(speedup=1)) as server:
         await server.fault_injector.begin(Trouble("delay", 0.3))
         process = await shell.start("move", "255", "--speed", "0", "--yes", server.address)

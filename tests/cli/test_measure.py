@@ -36,7 +36,7 @@ def test_speed_writes_table_and_pictures(call: Call, tmp_path: Path) -> None:
     assert sorted(read_table(table, SPEED)) == [0, 128, 255]
     for line in ("speed 0: ", "speed 128: ", "speed 255: "):
         assert line in outcome.out
-    # Complete: nothing is measured again, the pictures are made anew, byte for byte.
+    # Complete: nothing is measured again, the pictures are made again, byte for byte.
     before = {file: file.read_bytes() for file in written}
     outcome = call("measure", "speed", "sim://", *options)
     outcome.assert_succeeded()

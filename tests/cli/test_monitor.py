@@ -96,7 +96,7 @@ def axes(pilot: Screen) -> list[str]:
     return pilot.app.query_one(Axes).render().plain.split("\n")[1:]
 
 
-# -- what is shown -----------------------------------------------------------------------------------------
+# -- the screen --------------------------------------------------------------------------------------------
 
 
 async def test_it_shows_the_gripper_before_anything_happens(operator: Operator) -> None:
@@ -258,7 +258,7 @@ async def test_dangerous_keys_ask_first(
         await pilot.press(key)
         await until(pilot, lambda: asked(pilot) is not None)
         assert warning in text(pilot, "#question")
-        await pilot.press("o", "r")  # nothing else works meanwhile
+        await pilot.press("o", "r")  # nothing else works until then
         assert asked(pilot) is not None
         await pilot.press(answer)
         await until(pilot, lambda: asked(pilot) is None)

@@ -20,7 +20,7 @@ from tests.grippers import active_gripper, until
 async def closing(
     gripper: SimulatedGripper, *options: str
 ) -> AsyncIterator[tuple[Terminal, SimulatedGripper]]:
-    """A monitor that has told an active gripper to close."""
+    """A monitor that has sent an active gripper to close."""
     async with SimulatorServer(gripper) as server:
         terminal = Terminal("-m", "robotiq_async", "monitor", *options, server.address)
         await terminal.shows(b"READY")

@@ -23,7 +23,7 @@ PROJECT, HATCH = SETTINGS["project"], SETTINGS["tool"]["hatch"]
 
 
 def test_one_version() -> None:
-    """In version.py; what cannot take it from there is compared."""
+    """It is in version.py; files that cannot take it from there are compared."""
     version, settings = robotiq_async.__version__, HATCH["version"]
     found = re.search(settings["pattern"], (ROOT / settings["path"]).read_text())
     assert found is not None
@@ -60,7 +60,7 @@ def test_every_dependency_is_pinned() -> None:
 
 EXTRAS: dict[str, list[str]] = PROJECT["optional-dependencies"]
 NEED = re.compile(r'need\("(\w+)", "(\w+)"')
-"""A command refuses to go on without a module of an extra."""
+"""A command refuses to run without a module of an extra."""
 ADVICE = re.compile(r"needs? ([a-z-]+): \{install\('(\w+)'\)\}")
 """A module of the package does."""
 

@@ -100,7 +100,7 @@ def test_a_recording_named_csv_is_a_table_and_needs_no_mcap(
 
 
 async def test_a_recorder_makes_the_same_table(call: Call, tmp_path: Path) -> None:
-    """As an export of what was recorded at the same time; but for where a state begins."""
+    """The table equals an export of the same recording, except for the rows at which a state begins."""
     table, file, exported = tmp_path / "it.csv", tmp_path / "it.mcap", tmp_path / "exported.csv"
     hand = RobotiqHand("sim://?speedup=20")
     async with Recorder(hand, table), Recorder(hand, file), hand:
@@ -288,13 +288,13 @@ HOSTILE: dict[str, bytes] = {
 AXIS = {"position": 6, "requested": 0, "current_ma": 0, "status": "AT_POSITION"}
 OLD_STATUS = event(moving=False, **dict.fromkeys(("A", "B", "C", "SCISSOR"), AXIS))
 OLD_FAULT = event(kind="fault", code=9, name="N", description="D")
-"""As they were recorded before."""
+"""Messages as they were recorded before."""
 SHOWS = {
     "replay": ("/gripper/event", "/gripper/status", "/gripper/command"),
     "plot": ("/gripper/event", "/gripper/status"),
     "export": ("/gripper/status",),
 }
-"""What each command looks at."""
+"""The topics that each command reads."""
 
 
 @pytest.mark.parametrize("command", ["replay", "recover", "plot", "export"])
@@ -406,7 +406,7 @@ resource.setrlimit(resource.RLIMIT_AS, (1_500_000_000, 1_500_000_000))
 from robotiq_async.cli import main
 print(*(main([command, {!r}]) for command in ("replay", "recover", "plot")))
 """
-"""Of addresses; matplotlib takes most of them."""
+"""Runs commands with 1.5 GB of addresses; matplotlib takes most of them."""
 
 
 async def test_two_gigabytes_in_a_small_chunk_are_one_line(shell: Shell, tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ def free_endpoint() -> str:
 
 @pytest.fixture
 def endpoint(monkeypatch: pytest.MonkeyPatch) -> str:
-    """Where the agent listens; the commands find it in their environment."""
+    """The endpoint of the agent; the commands find it in their environment."""
     endpoint = free_endpoint()
     monkeypatch.setitem(os.environ, "ROBOTIQ_ASYNC_CONNECT", endpoint)
     return endpoint

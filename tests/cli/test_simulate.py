@@ -95,7 +95,7 @@ async def test_the_habits_of_real_grippers_unless_it_is_plain(
         assert faults == second_status
         began = asyncio.get_running_loop().time()
         await ask("10 0000 0001 02 0100")
-        while (await ask("04 0000 0001"))[2] & 0x30 != 0x30:  # noqa: ASYNC110  # a client can only ask
+        while (await ask("04 0000 0001"))[2] & 0x30 != 0x30:  # noqa: ASYNC110  # a client can only poll
             await asyncio.sleep(0.02)
         took = 4 * (asyncio.get_running_loop().time() - began)
     assert seconds - 0.1 <= took <= seconds + 2

@@ -1,4 +1,4 @@
-"""``robotiq-async verify``: who may be asked, and what keys do while fingers move."""
+"""``robotiq-async verify``: its questions, and the effect of keys while fingers move."""
 
 from __future__ import annotations
 
@@ -192,7 +192,7 @@ async def test_every_key_that_interrupts_stops_the_fingers(
 async def test_a_terminal_that_shows_nothing_does_not_keep_the_fingers_moving(
     served: SimulatorServer, tmp_path: Path
 ) -> None:
-    """As after Ctrl-S somewhere on the way, or over a network that stands still."""
+    """It happens after Ctrl-S somewhere on the way, or over a network that stands still."""
     terminal = await moves(served, tmp_path)
     terminal.stop_reading()
     terminal.press("x")

@@ -1,4 +1,4 @@
-"""``robotiq-async web``, and the demo that shows itself."""
+"""``robotiq-async web``, and the demo with its own page."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SETTINGS = PageSettings(control=True, addresses=("one", "two"))
 
 
 def status(url: str) -> int:
-    """What the page answers to a browser with this address."""
+    """The page's answer to a browser with this address."""
     parts = urlsplit(url)
     connection = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=20)
     try:
