@@ -25,18 +25,18 @@ T = TypeVar("T")
 LOCAL, REMOTE = "local", "remote"
 A, B, C, S = THREE_FINGER.axes
 HABIT: ContextVar[tuple[Trouble | None, Mapping[str, Any]]] = ContextVar("habit", default=(None, {}))
-"""What is otherwise with the gripper of a hand of this process, and the options of that hand."""
+"""A habit of the gripper of a hand of this process, and the options of that hand."""
 MODEL: ContextVar[Model] = ContextVar("model", default=THREE_FINGER)
-"""What the gripper is."""
+"""The model of the gripper."""
 SERVER: ContextVar[type[SimulatorServer]] = ContextVar("server", default=SimulatorServer)
-"""What its link is, for a hand of this process and for that of an agent."""
+"""Its server, and so the kind of link, for a hand of this process and for that of an agent."""
 PHYSICS: ContextVar[bool] = ContextVar("physics", default=False)
 """Whether bodies move the axes of the gripper of a hand of this process."""
 
 
 @dataclass
 class Bench:
-    """What a test of the contract needs.
+    """The surroundings of a test of the contract.
 
     Attributes:
         make: a hand that is not started; each call makes another one on the same gripper.
@@ -81,7 +81,7 @@ class Bench:
         return task
 
     async def unplug(self, hand: Hand) -> None:
-        """Take away the link between hand, or agent, and gripper, and wait until the hand shows it."""
+        """Take away the link between hand, or agent, and gripper, and wait until the hand notices."""
         await lose_link(self.server, hand)
 
     async def plug(self, hand: Hand) -> None:
@@ -164,6 +164,6 @@ async def statuses(hand: Hand, count: int) -> list[int]:
 
 
 async def ended(task: asyncio.Task[Any]) -> BaseException | None:
-    """How a task ends."""
+    """The end of a task."""
     await asyncio.wait({task})
     return asyncio.CancelledError() if task.cancelled() else task.exception()

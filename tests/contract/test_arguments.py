@@ -1,4 +1,4 @@
-"""What is no argument is refused by name, value and range, and nothing is sent."""
+"""Bad arguments are refused by name, value and range, and nothing is sent."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ OTHERS: dict[str, Bad] = {
         (ValueError, [0, -1, float("nan"), float("inf"), 10**400]),
     ],
 }
-"""What is refused for arguments that are no bytes."""
+"""Values refused for arguments that are no bytes."""
 NAMES = {call: [name for name in arguments if name != "states"] for call, arguments in CALLS.items()}
 
 

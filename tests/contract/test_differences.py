@@ -1,4 +1,4 @@
-"""What differs on another host: each row of the table in docs/how-to/fleet.md, on both hands."""
+"""Differences on another host: each row of the table in docs/how-to/fleet.md, on both hands."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def rows() -> dict[str, Row]:
 
 
 def only_reads(here: Bench) -> Hand:
-    """A second hand: of this process it cannot be told to only read."""
+    """A second hand: one of this process cannot be made to only read."""
     return here.make() if here.lab is None else here.lab.client("reader", control=False)
 
 
@@ -43,7 +43,7 @@ async def outcome(work: Awaitable[object], word: str) -> str:
 
 
 async def network_down(here: Bench, seconds: float) -> None:
-    """Nothing gets through for a while; what was sent meanwhile comes late."""
+    """Nothing gets through for a while; messages sent in that time come late."""
     streams = [] if here.lab is None else here.lab.network.both("client 0", "agent")
     for stream in streams:
         stream.is_cut = True

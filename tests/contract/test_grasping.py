@@ -35,7 +35,7 @@ async def heard(events: Stream[GripEvent], count: int) -> list[GripEvent]:
 
 
 async def next_changes(events: Stream[GripEvent], count: int) -> list[tuple[GripChange, Finger]]:
-    """What the next events tell."""
+    """The changes in the next events."""
     return [(event.change, event.finger) for event in await heard(events, count)]
 
 

@@ -1,4 +1,4 @@
-"""From start() to stop(), and again."""
+"""The life of a hand from start() to stop(), and again."""
 
 from __future__ import annotations
 

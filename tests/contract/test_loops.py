@@ -1,4 +1,4 @@
-"""A hand belongs to one event loop; a call from anywhere else asks for nothing."""
+"""A hand belongs to one event loop; a call from anywhere else sends nothing."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.virtual import VirtualLoop
 
 
 def elsewhere(work: Coroutine[Any, Any, object]) -> BaseException | None:
-    """What a coroutine raises in the event loop of another thread."""
+    """The exception of a coroutine in the event loop of another thread."""
     with ThreadPoolExecutor() as threads:
         return threads.submit(asyncio.run, work).exception()
 

@@ -1,4 +1,4 @@
-"""How a move ends."""
+"""The outcomes of a move."""
 
 from __future__ import annotations
 

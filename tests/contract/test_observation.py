@@ -1,4 +1,4 @@
-"""What a hand shows: state, status, statistics, and what moves."""
+"""Observations of a hand: state, status, statistics, and its motion."""
 
 from __future__ import annotations
 
