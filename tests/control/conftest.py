@@ -1,4 +1,4 @@
-"""What most tests begin with."""
+"""Fixtures that most tests begin with."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Images, and the statuses that show them, in few words."""
+"""Images, and the statuses that echo them, in few words."""
 
 from __future__ import annotations
 

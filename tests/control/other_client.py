@@ -1,4 +1,4 @@
-"""What another client does with the gripper, before the hand comes and beside it."""
+"""Another client of the gripper, before the hand comes and beside it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.control.scan import Scan
 def image(
     positions: Mapping[Finger, int], *, go: bool = True, individual: bool = True, speed: int = 255
 ) -> tuple[int, ...]:
-    """What another client writes."""
+    """An image of another client."""
     return Request(
         activate=True,
         go=go,
@@ -28,7 +28,7 @@ def asked(position: int, speed: int = 128) -> tuple[AxisRequest, ...]:
 
 
 def going_to(position: int, speed: int = 128) -> tuple[int, ...]:
-    """What another client writes to move the fingers."""
+    """The image with which another client moves the fingers."""
     return Request(activate=True, go=True, axes=asked(position, speed)).registers
 
 

@@ -90,7 +90,7 @@ class Scan:
         )
         self.written: list[Registers] = []
         self.forgets = 0
-        """How many of the next writes the gripper acknowledges and forgets."""
+        """Number of the next writes that the gripper acknowledges and forgets."""
         self.polls = 0
 
     @property

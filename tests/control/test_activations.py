@@ -31,7 +31,7 @@ def test_an_activation_is_called_off_when_others_have_activated_meanwhile() -> N
     scan.gripper.write(0, going_to(255))
     scan.now += 3
     scan.controller.activate()
-    scan.step()  # what is begun is decided on what the gripper shows now
+    scan.step()  # a beginning is decided on the gripper's present status
     assert scan.state is State.RUNNING_IDLE
     scan.run(1)
     assert not scan.written

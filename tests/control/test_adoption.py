@@ -1,4 +1,4 @@
-"""What an adopted axis was asked to do, derived from what it does."""
+"""The requests of adopted axes, derived from their statuses."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def gripper(
 
 
 def adopted(*statuses: RobotiqStatus) -> Request:
-    """The request that statuses tell, the first one first."""
+    """The request that follows from statuses, the first one first."""
     adoption = Adoption(statuses[0])
     for status in statuses[1:]:
         adoption.update(status)
@@ -59,7 +59,7 @@ def positions(request: Request) -> list[int]:
         # The scissor never follows A.
         ((THERE, THERE, THERE, THERE), (137, 0, 0, 0), (137, 137, 137, 137), (137, 137, 137, 137)),
         ((CLOSING, CLOSING, CLOSING, CLOSING), (220, 0, 0, 0), (100, 100, 100, 100), (220, 220, 220, 255)),
-        # A contact without a request that agrees goes on as it is.
+        # A contact without a request that agrees stays as it is.
         ((CLOSING, CLOSING, CLOSING, CLOSING), (0, 0, 0, 0), (150, 151, 152, 100), (255, 255, 255, 255)),
         ((OPENING, OPENING, OPENING, OPENING), (255, 255, 255, 255), (150, 151, 152, 100), (0, 0, 0, 0)),
         # A software limit is reported as reached, while the echo keeps the request beyond it.
@@ -81,7 +81,7 @@ def test_the_request_of_an_adopted_gripper_at_rest(
         ),
         # Against every echo: it stays where it is.
         ((THERE, MOVING, THERE, THERE), (0, 0, 0, 0), (6, 100, 6, 6), (6, 110, 6, 6), (0, 110, 0)),
-        # The direction of B tells its own echo from that of A.
+        # The direction of B distinguishes its own echo from that of A.
         *(
             ((MOVING, MOVING, THERE, THERE), (220, 0, 0, 0), (100, 100, 6, 6), (120, b, 6, 6), (220, to, 0))
             for b, to in ((101, 220), (120, 220), (99, 0), (80, 0))

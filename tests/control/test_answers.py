@@ -1,4 +1,4 @@
-"""What becomes of requests that cross: a halt among commands, a fault, a lost link."""
+"""Answers to requests that cross: a halt among commands, a fault, a lost link."""
 
 from __future__ import annotations
 

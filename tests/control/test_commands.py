@@ -47,7 +47,7 @@ def test_the_default_timeout_follows_from_distance_and_speed(scan: Scan) -> None
 
 
 def test_a_command_does_not_activate_a_gripper_that_was_reset_since_the_last_poll(scan: Scan) -> None:
-    """Every image repeats rACT = 1. Written on what the poll before had shown, it activated the gripper."""
+    """Every image repeats rACT = 1. Written on the status of the poll before, it activated the gripper."""
     scan.run(0.1)
     writes = len(scan.written)
     scan.gripper.power_cycle()

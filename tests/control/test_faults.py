@@ -116,7 +116,7 @@ def test_an_axis_that_the_fault_keeps_from_starting_is_held() -> None:
 @pytest.mark.parametrize("device_cycle", [0.0, 0.005, 0.03, 0.2])
 @pytest.mark.parametrize("by", [-2, -1, 1, 2])
 def test_an_axis_that_the_fault_keeps_from_its_last_two_counts_is_held(device_cycle: float, by: int) -> None:
-    """So close to its request an axis counts as there; one that had not begun yet went on afterwards."""
+    """So close to its request an axis counts as there; one that had not begun yet moved afterwards."""
     for steps in range(8):
         scan = started(device_cycle)
         scan.moved(112, A)

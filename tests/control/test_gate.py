@@ -1,4 +1,4 @@
-"""No image activates or releases by accident, whatever was asked and whatever the gripper shows."""
+"""No image activates or releases by accident, whatever was requested and whatever the gripper reports."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def test_a_halted_grip_survives_a_blink_of_the_link(scan: Scan) -> None:
 
 
 def test_a_grip_of_another_program_is_not_taken_up_again_and_held_in_place() -> None:
-    """The first program let go of rGTO; who comes next cannot know what its fingers were asked."""
+    """The first program let go of rGTO; the next one cannot know the requests of its fingers."""
     first = started()
     first.gripper.place_object(A | B | C, 150)
     first.moved(255)

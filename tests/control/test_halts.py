@@ -1,4 +1,4 @@
-"""Halts: they go at once, stop everything, and end when the gripper shows it."""
+"""Halts: they go at once, stop everything, and end when the gripper reports it."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def test_halt_in_fault_ends_while_the_fault_lasts(scan: Scan, code: int, moving:
 
 
 def test_a_forgotten_halt_is_written_again_if_the_motion_before_it_had_not_begun() -> None:
-    """Until that motion acts, rGTO shows clear: no status tells whether the halt has arrived."""
+    """Until that motion acts, gGTO is 0: no status reveals whether the halt has arrived."""
     scan = started(device_cycle=0.2)
     scan.command(A, position=255, speed=0)
     scan.step()

@@ -1,4 +1,4 @@
-"""Holds that a caller asks for: what moves stays where it is, what grips keeps its grip."""
+"""Holds that a caller requests: moving axes stay where they are, gripping axes keep their grip."""
 
 from __future__ import annotations
 

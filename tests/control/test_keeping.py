@@ -27,7 +27,7 @@ def holding(device_cycle: float = 0.005) -> Scan:
 
 
 def stopped(scan: Scan) -> float:
-    """Stop it, keeping the grip; returns the seconds that took. Whatever happens, nothing goes on."""
+    """Stop it, keeping the grip; returns the seconds that took. Whatever happens, nothing moves on."""
     began = scan.now
     scan.stop(keep_grip=True)
     took = scan.now - began

@@ -22,7 +22,7 @@ FEW_POLLS_S = 6 * POLL_S
 
 
 def ended(scan: Scan, outcome: Outcome) -> MoveResult:
-    """The result of a move, and what it says is so: the hand is not moving, and stays where it is."""
+    """The result of a move, checked: the hand is not moving, and stays where it is."""
     scan.until(lambda: outcome.is_answered)
     result, status = outcome.result, scan.controller.status
     assert status is not None
@@ -38,7 +38,7 @@ def ended(scan: Scan, outcome: Outcome) -> MoveResult:
 
 
 def ready(lag: int, device_cycle: float = 0.005) -> Scan:
-    """A hand that is open, and says so: after an activation alone gDT is 0, as in a motion."""
+    """A hand that is open, and reports it: after an activation alone gDT is 0, as in a motion."""
     scan = started(device_cycle, lag=lag)
     scan.moved(0)
     scan.run(2 * LAG_S)
@@ -95,7 +95,7 @@ def test_a_move_of_nothing_ends_within_a_few_polls(lag: int, what: str) -> None:
 @LAGS
 @CYCLES
 def test_a_move_that_supersedes_another_ends_where_it_was_sent(lag: int, device_cycle: float) -> None:
-    """At every moment of the first one: at its start, under way, at its end, and after it."""
+    """It comes at every moment of the first one: at its start, in between, at its end, and after it."""
     for seconds in (0.005, 0.02, 0.05, 0.85, 0.9, 1.2):
         scan = ready(lag, device_cycle)
         _, first = scan.move(100, speed=255)
@@ -123,7 +123,7 @@ def test_a_part_that_is_let_go_of_is_no_contact(lag: int, device_cycle: float) -
 def test_a_part_that_is_let_go_of_and_gripped_again_at_once(
     lag: int, device_cycle: float, polls: int
 ) -> None:
-    """The part is gone by then: what is shown of the grip before is no grip now."""
+    """The part is gone by then: the status of the grip before is no grip now."""
     scan = holding(lag, device_cycle)
     scan.move(0)
     scan.run(polls * POLL_S)
@@ -212,7 +212,7 @@ def test_two_moves_at_once_end_each_in_its_time(lag: int, device_cycle: float) -
 @CYCLES
 @pytest.mark.parametrize("after", ["more force", "a halt"])
 def test_a_second_try_sees_that_the_part_is_gone(lag: int, device_cycle: float, after: str) -> None:
-    """It is how a program asks whether a part is still there: the contact of before must not answer."""
+    """This is a program's test whether a part is still there: the contact of before must not answer."""
     scan = holding(lag, device_cycle)
     if after == "a halt":
         scan.halt()
@@ -340,7 +340,7 @@ def test_a_short_motion_of_another_client_does_not_end_ours(lag: int, pause: flo
 
 @LAGS
 def test_an_axis_at_a_software_limit_ends_when_the_lag_is_over(lag: int) -> None:
-    """It says "reached" far from its request, and nothing has moved: it may be late, and it may be so."""
+    """It is "reached" far from its request, and nothing has moved: the status may be late, or right."""
     scan = ready(lag)
     scan.moved(255, S)
     scan.run(1.0)
@@ -420,7 +420,7 @@ OLD = Moment(NOW.time - LAG_S, NOW.reads - LAG_READS)
 
 
 def rest(what: ObjectStatus, position: int, *asked: Asked) -> Rest:
-    """What is known of an axis with these requests, the oldest first."""
+    """The known rest of an axis with these requests, the oldest first."""
     return rest_of(reversed(asked), THREE_FINGER, what, position)
 
 
@@ -457,7 +457,7 @@ def test_nothing_is_known_under_what_does_not_act() -> None:
 
 
 def asked_of(scan: Scan, axis: Finger) -> int:
-    """How many requests of an axis a status may show."""
+    """The number of requests of an axis that a status may be from."""
     return len([*scan.controller._ledger._asked(axis)])
 
 
@@ -472,7 +472,7 @@ def test_every_request_but_the_last_is_forgotten_when_the_lag_is_over(lag: int) 
 
 
 def test_a_status_after_a_motion_is_not_from_before_it() -> None:
-    """What is shown comes in its order; but a motion may be that of a request before, if there was one."""
+    """Statuses come in their order; but a motion may be that of a request before, if there was one."""
     scan = started()
     scan.moved(20, A)
     scan.run(1.0)

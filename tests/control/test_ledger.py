@@ -1,4 +1,4 @@
-"""Which image a gripper shows, from when on it acts, what is another client's, and which axes rest."""
+"""The image that a status echoes, the time at which it acts, images of other clients, and axes at rest."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ A, B, C, S = THREE_FINGER.axes
 
 
 class History(Ledger):
-    """Of a gripper that shows a position at first; it answers and acknowledges at once."""
+    """The history of a gripper that reports a position at first; it answers and acknowledges at once."""
 
     def __init__(self, position: int = 0) -> None:
         super().__init__(100, 50)
@@ -37,7 +37,7 @@ class History(Ledger):
         self.restart(self.latest)
 
     def look(self, status: RobotiqStatus, asked: float | None = None) -> Entry | None:
-        """Take in a status; return the entry that it shows."""
+        """Take in a status; return the entry that it echoes."""
         self.latest = status
         self.update(status, status.timestamp if asked is None else asked)
         return self.match
@@ -81,12 +81,12 @@ def link_lost(history: History, _: float) -> None:
 
 
 def time_passes(history: History, at: float) -> None:
-    """Nothing shows that was not shown before."""
+    """Take in nothing but the status of before."""
     history.look(shows(history.latest.requested_position(A), at, go=history.latest.go_echo))
 
 
 def ours(position: int, *, go: bool = True, **options: Any) -> Event:
-    """A status that shows an image of ours."""
+    """An event: a status that echoes an image of ours."""
 
     def look(history: History, at: float) -> None:
         entry = history.look(shows(position, at, go=go))
@@ -97,7 +97,7 @@ def ours(position: int, *, go: bool = True, **options: Any) -> Event:
 
 
 def foreign(position: int) -> Event:
-    """A status that shows what another client wrote."""
+    """An event: a status that echoes an image of another client."""
 
     def look(history: History, at: float) -> None:
         assert history.look(shows(position, at)) is None, at
@@ -114,7 +114,7 @@ def restarts(position: int) -> Event:
 
 
 class At(NamedTuple):
-    """What happens at a time, how many of the last images do not act yet, and whether one may never act."""
+    """Event at a time, number of the last images that do not act yet, and whether one may never act."""
 
     time: float
     event: Event
@@ -267,7 +267,7 @@ STORIES: dict[str, tuple[int, list[At]]] = {
             At(1.02, ours(200)),
         ],
     ),
-    # A write that was lost with the link is in doubt until it shows, or as long as the window.
+    # A write that was lost with the link is in doubt until its echo, or as long as the window.
     "an acknowledged write is not lost": (100, [At(1.0, writes(200), 1), At(1.0, link_lost, 1)]),
     "a lost write had arrived": (100, [*LOST, At(1.0 + WINDOW_S, ours(200))]),
     "a lost write arrives": (
@@ -330,7 +330,7 @@ def test_a_long_life_does_not_make_the_history_remember_more() -> None:
 
 
 def test_an_adopted_image_may_differ_from_its_echo() -> None:
-    """Simple control: B, C and the scissor echo 0 and are asked for something else."""
+    """Simple control: B, C and the scissor echo 0 and have other requests."""
     ledger, status = Ledger(100, 50), status_of(0x39, 0xFF, echo=(80, 0, 0, 0), position=(80, 80, 80, 60))
     ledger.update(status, 0.0)
     assert ledger.match is None
@@ -341,7 +341,7 @@ def test_an_adopted_image_may_differ_from_its_echo() -> None:
 
 
 def test_an_old_status_that_is_looked_at_late_is_compared_with_what_was_written_then() -> None:
-    """What it shows is as old as its request, however late the reply was looked at."""
+    """It is as old as its request, however late the reply was looked at."""
     history = History(100)
     entry = history.deliver(image(200), 1.0)
     shown = history.look(shows(100, 1.7), 1.0)
@@ -366,12 +366,12 @@ def test_after_a_silence_no_echo_of_long_ago_is_ours() -> None:
     assert history.look(shows(100, 60.0)) is None
 
 
-# -- what cannot be told apart -----------------------------------------------------------------------------
+# -- images that cannot be distinguished -------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("arrives", [True, False])
 def test_of_images_that_show_alike_the_newest_that_has_arrived_is_the_one_in_force(arrives: bool) -> None:
-    """The speed and force of one that may not have arrived have no echo that could tell."""
+    """The speed and force of one that may not have arrived have no echo that could decide."""
     history = History(100)
     history.send(image(100, speed=7), 1.0)
     if arrives:
@@ -390,7 +390,7 @@ def test_before_anything_is_known_every_axis_has_the_settings_of_the_hand() -> N
 
 
 def found(status: RobotiqStatus) -> Ledger:
-    """Of a gripper that another client has commanded, and that the hand has found."""
+    """The ledger of a gripper that another client has commanded, and that the hand has found."""
     ledger = Ledger(100, 50)
     ledger.update(status, status.timestamp)
     ledger.adopt(status)
@@ -529,7 +529,7 @@ HALTED = status_of(0x31, 0b10_11_10_10, echo=200, position=(150, 150, 200, 150))
 
 @pytest.fixture
 def later() -> History:
-    """Of a gripper that we have sent from 100 to 200, when no status can be from before that."""
+    """The ledger of a gripper sent from 100 to 200, when no status can be from before that."""
     history = History(100)
     history.deliver(image(200), 1.0, Finger.ALL)
     for n in range(LAG_READS + 2):
@@ -593,7 +593,7 @@ def test_no_axis_arrives_under_what_does_not_act_yet_nor_while_rgto_is_clear() -
 
 
 def test_a_short_move_before_another_client_wrote_does_not_end_the_next_one() -> None:
-    """The late status of the short move shows motion, and rest far from what is asked by then."""
+    """The late status of the short move is motion, and rest far from the request by then."""
     history = History(100)
 
     def shown(a: int, b: int, at: float, what: int = 0xFF) -> None:
@@ -612,7 +612,7 @@ def test_a_short_move_before_another_client_wrote_does_not_end_the_next_one() ->
 
 
 def test_a_contact_that_shows_as_rgto_rises_may_be_from_before() -> None:
-    """With rGTO clear gDT says nothing, so nothing contradicts it."""
+    """With rGTO clear gDT means nothing, so nothing contradicts it."""
     history = History(100)
     history.deliver(image(100, go=False), 1.0)
     history.look(shows(100, 1.01, go=False))
@@ -703,7 +703,7 @@ def test_a_position_that_was_never_written_is_foreign_at_any_time(
 
 
 def calls(what: Callable[[], object]) -> int:
-    """How many functions of Python are called."""
+    """The number of Python functions that are called."""
     count = 0
 
     def see(_frame: FrameType, event: str, _argument: object) -> None:
@@ -721,7 +721,7 @@ def calls(what: Callable[[], object]) -> int:
 
 
 def cost_of_a_look(writes: int) -> int:
-    """That of the status after so many writes, none of which shows."""
+    """The calls for the status after so many writes, none of which is echoed."""
     history, now = History(255), 0.0
     for number in range(writes):
         now += 0.005

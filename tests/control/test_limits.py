@@ -23,7 +23,7 @@ LAGS = pytest.mark.parametrize("lag", [0, 2, 8])
 
 
 def echoing(device_cycle: float = 0.005, lag: int = 0) -> Scan:
-    """Of a gripper whose scissor goes to 20..220, and that shows that in place of requests beyond."""
+    """A gripper whose scissor has a range of 20..220, and that echoes a limit for requests beyond."""
     habits = Habits(echoes_limits=True)
     scan = Scan(device_cycle=device_cycle, lag=lag, scissor_limit=(LOW, HIGH), habits=habits)
     scan.start()
@@ -59,7 +59,7 @@ def test_a_limit_is_learned_and_logged_once(caplog: pytest.LogCaptureFixture) ->
 
 
 def test_a_limit_that_no_axis_has_proven_is_dropped_when_another_client_is_seen() -> None:
-    """What looked like a limit may have been that client's request: it explains no later echo."""
+    """The apparent limit may have been that client's request: it explains no later echo."""
     scan = echoing()
     scan.move(255, S)
     scan.run(0.05)
@@ -134,7 +134,7 @@ def test_after_a_reconnect_it_goes_on() -> None:
 
 
 def beside(scan: Scan, **positions: int) -> Registers:
-    """What another client writes that knows all the rest."""
+    """The image of another client that knows all the rest."""
     image = Request.from_registers(scan.gripper.request_registers)
     return image.with_positions({Finger[name]: at for name, at in positions.items()}).registers
 
@@ -214,7 +214,7 @@ def test_a_client_that_is_taken_for_a_limit_is_not_undone() -> None:
     travel = scan.gripper.travel(S)
     scan.moved(100, A)
     assert scan.gripper.travel(S) == travel
-    # Next time the request is shown as it is: it was no limit.
+    # Next time the request is echoed as it is: it was no limit.
     assert scan.moved(225, S).positions == {S: 225}
     assert scan.controller.foreign_commands == 0
 
@@ -231,7 +231,7 @@ BEFORE = Request(activate=True, go=True, axes=(AxisRequest(0),) * 3 + (AxisReque
         ((0, 0, 0, 120), 130, {S: 255}, False),  # behind it
         ((0, 0, 0, 15), 130, {S: 0}, True),
         ((0, 0, 0, 140), 130, {S: 0}, False),
-        ((0, 0, 0, 220), 130, {}, False),  # an axis that was not asked
+        ((0, 0, 0, 220), 130, {}, False),  # an axis without a request
         ((113, 113, 113, 130), 130, {A: 255, B: 255, C: 255}, False),  # the scissor is not near pinch
         ((113, 113, 113, 130), 219, {A: 255, B: 255, C: 255}, True),
         ((113, 255, 113, 130), 219, {A: 255, B: 255, C: 255}, True),
@@ -277,7 +277,7 @@ def test_a_request_at_a_limit_does_not_refute_it_and_one_beyond_does(asked: int,
 
 
 def test_a_limit_that_may_not_count_yet_is_no_endless_question(scan: Scan) -> None:
-    """Two writes are forgotten, and what shows could be a limit of the second: the ledger called itself."""
+    """Two writes are forgotten, and the echo could be a limit of the second: the ledger called itself."""
     scan.command(C, position=1)
     scan.run(0.01)
     scan.forgets = 2

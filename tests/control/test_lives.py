@@ -99,7 +99,7 @@ class Life:
         self.asked: Counter[tuple[Finger, int]] = Counter()
         """Number of requests for an axis to go to a position."""
         self.stays: dict[Finger, float] = {}
-        """The axes that nobody has asked to move, with the travel of each."""
+        """The axes without any request to move, with the travel of each."""
 
     def begin(self) -> None:
         self.scan.motions = Counter()
@@ -225,7 +225,7 @@ def test_whatever_happens_the_hand_does_what_was_asked_and_nothing_else(
     scan = Watched(device_cycle=device_cycle, lag=lag, spacing=spacing)
     lived = Life(scan)
     lived.live(KINDS[kind], life)
-    if "foreign" not in KINDS[kind]:  # what another client asked is repeated with our own
+    if "foreign" not in KINDS[kind]:  # another client's request is repeated with our own
         assert all(
             count <= lived.asked[motion] for motion, count in scan.motions.items() if lived.asked[motion]
         )

@@ -48,7 +48,7 @@ def test_a_write_that_arrived_unacknowledged_is_ours_when_it_shows(scan: Scan) -
 
 
 def test_a_second_lost_link_brings_back_nothing_that_was_replaced(scan: Scan) -> None:
-    """A write that showed after the first loss was taken for lost at the second: B went back to 200."""
+    """A write echoed after the first loss was taken for lost at the second: B went back to 200."""
     scan.move(200, B)
     scan.run(0.5)
     scan.command(B, position=10)
@@ -218,7 +218,7 @@ def test_a_lost_hold_does_not_outlive_an_activation(scan: Scan) -> None:
     scan.controller.lost(None)
     scan.gripper.power_cycle()
     scan.now += 0.1
-    scan.connect(activate=True)  # as a policy may say
+    scan.connect(activate=True)  # as a policy may have it
     scan.until(lambda: scan.state is State.RUNNING_IDLE)
     scan.command(A, position=200)
     scan.run(0.5)
@@ -259,7 +259,7 @@ def test_a_speed_that_was_not_acknowledged_is_not_taken_for_the_axis_s_own(scan:
 
 @pytest.mark.parametrize("link_is_back", [False, True])
 def test_a_move_cancelled_as_its_link_was_lost_is_held_though_it_had_ended(link_is_back: bool) -> None:
-    """Its caller never saw the error, and knows nothing of a motion that goes on."""
+    """Its caller never saw the error, and knows nothing of a motion that continues."""
     scan = started()
     move, outcome = scan.move(200, A, speed=0)
     scan.run(0.5)

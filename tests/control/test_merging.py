@@ -59,7 +59,7 @@ def positions(image: Request) -> tuple[int, ...]:
     return tuple(axis.position for axis in image.axes)
 
 
-# -- what is asked -----------------------------------------------------------------------------------------
+# -- the requests ------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("base", [GOING, HALTED])
@@ -88,7 +88,7 @@ AT_REST = status_of(0x39, 0xFF, position=(9, 22, 103, 40))
         # gripped keeps its request: asked to be where it is it would touch the object and not hold it.
         (HALTED, command(A, 200), RESTING, {}, (200, 102, 103, 104)),
         (HALTED, command(A, 200), RESTING, {"gripping": B}, (200, 20, 103, 104)),
-        # An axis that drifts stays where it is; those that are where they were asked to be stay so.
+        # An axis that drifts stays where it is; those at their requests stay so.
         (GOING, hold(A | B), MOVING, {}, (101, 102, 30, 40)),
         (GOING, hold(Finger.ALL), AT_REST, {}, (10, 20, 103, 40)),
         # One that has not arrived is held however close it stands.
@@ -167,7 +167,7 @@ def test_an_axis_not_addressed_keeps_its_request_or_stays(
             assert now.position == before.position
 
 
-# -- what position, contact and motion tell about a request ------------------------------------------------
+# -- requests that follow from position, contact and motion ------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -179,7 +179,7 @@ def test_an_axis_not_addressed_keeps_its_request_or_stays(
         (100, THERE, 102, 0, True),
         (100, THERE, 97, 0, False),
         (100, THERE, 103, 0, False),
-        # Fully open reads 6-7 although 0 was asked, fully closed 240 or more although 255 was asked.
+        # Fully open reads 6-7 for a request of 0, fully closed 240 or more for one of 255.
         (0, THERE, 6, 0, True),
         (0, THERE, 7, 0, True),
         (0, THERE, 20, 0, False),
@@ -211,7 +211,7 @@ def test_a_request_agrees_with_what_an_axis_does(
     assert agrees(THREE_FINGER, request_, what, position, direction) is expected
 
 
-# -- whether an axis has to be asked to stay ---------------------------------------------------------------
+# -- whether an axis needs a request to stay ---------------------------------------------------------------
 
 
 @pytest.mark.parametrize("arrived", [Finger.ALL, B | C | S])

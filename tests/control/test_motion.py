@@ -1,4 +1,4 @@
-"""Moves: when one has ended, what came of it, how long it may take, and which are under way."""
+"""Moves: their end, their result, their time limit, and those that run."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ UNDER = (255, 255, 255, 0)
 def test_a_move_has_arrived_when_every_addressed_axis_rests_under_its_request(
     axes: Finger, byte_0: int, byte_1: int, echo: tuple[int, ...], is_under: bool, has_arrived: bool
 ) -> None:
-    """Wherever it rests: open stops at 6-7 although 0 was asked, closed at 240 or above."""
+    """Wherever it rests: open stops at 6-7 for a request of 0, closed at 240 or above."""
     (each, _), status = move(255, axes), status_of(byte_0, byte_1, echo=echo, position=241)
     assert each.is_under(status, {}) is is_under
     assert each.has_arrived(status, Finger.ALL, {}) is has_arrived
@@ -189,7 +189,7 @@ def test_any_move_may_take_at_least_the_margin_and_at_most_the_slowest_full_stro
     assert 2.0 <= seconds <= 2 * SLOWEST_S * 255 / 235 + 2.0
 
 
-# -- the moves under way -----------------------------------------------------------------------------------
+# -- the moves that run ------------------------------------------------------------------------------------
 
 ENTRY = Ledger(128, 64).last
 ARRIVED = status_of(0xF9, 0xFF, echo=255, current=7)

@@ -1,4 +1,4 @@
-"""Other clients: what they had asked before the hand came, and what they ask beside it."""
+"""Other clients: their requests before the hand came, and beside it."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_our_own_writes_are_never_taken_for_another_client() -> None:
 
 
 def test_an_old_reply_that_was_looked_at_late_does_not_make_our_write_anothers(scan: Scan) -> None:
-    # The loop was held up between the request of a status and its reply: what it shows is as old as that.
+    # The loop was held up between the request of a status and its reply: it is as old as that.
     _, outcome = scan.move(200, A)
     scan.now += POLL_S
     request = scan.controller.decide(scan.now)

@@ -1,4 +1,4 @@
-"""Fault 0x09 after a second without a message: shown once, and no fault; one that lasts is."""
+"""Fault 0x09 after a second without a message: reported once, and no fault; one that lasts is."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 
 
 def quiet() -> Scan:
-    """Of a gripper that shows 0x09 in the first read after a second without a message."""
+    """A gripper with 0x09 in the first read after a second without a message, which has passed."""
     scan = Scan(habits=Habits(silence_fault=1.0))
     scan.now += 2
     return scan
@@ -30,7 +30,7 @@ def silent() -> Scan:
     return scan
 
 
-# -- what a silence shows ----------------------------------------------------------------------------------
+# -- statuses after a silence ------------------------------------------------------------------------------
 
 
 def test_a_start_looks_past_it_and_activates(silent: Scan) -> None:

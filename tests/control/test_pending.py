@@ -1,4 +1,4 @@
-"""What is merged between two writes, and how each call ends."""
+"""Requests merged between two writes, and the end of each call."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ Step = Callable[[Pending], None]
 
 
 def command(axes: Finger, position: int | None = None, setting: int | None = None) -> Step:
-    """With the same setting for speed and force."""
+    """A command with the same setting for speed and force."""
     return lambda pending: pending.merge(Command(axes, position, setting, setting))
 
 

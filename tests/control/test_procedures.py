@@ -22,7 +22,7 @@ IMAGE = Request(
     mode=Mode.PINCH,
     axes=(AxisRequest(10, 1, 5), AxisRequest(20, 2, 6), AxisRequest(30, 3, 7), AxisRequest(40, 4, 8)),
 )
-"""An image with something in every field, so that what a procedure keeps can be told from what it sets."""
+"""An image with something in every field, to distinguish those that a procedure keeps from those it sets."""
 
 RELEASING = status_of(0x11, fault=0x0B)
 
@@ -31,7 +31,7 @@ BEGIN_WITH: dict[Begin, RobotiqStatus] = {activation: RESET, automatic_release: 
 
 
 def first(begin: Begin, status: RobotiqStatus | None = None, image: Request = IMAGE) -> Request:
-    """What a procedure writes after the first status."""
+    """The write of a procedure after the first status."""
     steps = begin(lambda _: replace(image, go=False))
     assert next(steps) is None, "it has not seen anything yet"
     request = steps.send(status or BEGIN_WITH[begin])
@@ -54,7 +54,7 @@ def begun(begin: Begin, *shown: RobotiqStatus) -> Steps:
 
 @pytest.mark.parametrize("begin", BEGIN_WITH)
 def test_the_image_is_made_from_the_status_that_a_procedure_begins_with(begin: Begin) -> None:
-    """Between being asked for and being carried out, the gripper may have done something else."""
+    """Between its request and its beginning the gripper may have done something else."""
     asked: list[RobotiqStatus] = []
 
     def image(status: RobotiqStatus) -> Request:
@@ -72,7 +72,7 @@ def test_the_image_is_made_from_the_status_that_a_procedure_begins_with(begin: B
 @pytest.mark.parametrize(
     ("begin", "shown"),
     [
-        # Another client has activated it meanwhile, or it reports a fault.
+        # Another client has activated it by then, or it reports a fault.
         *((activation, shown) for shown in (READY, RUNNING, BUSY, FAULTY, RELEASED)),
         # The raised rACT would activate it.
         *((automatic_release, shown) for shown in (RESET, status_of(0x00, fault=0x09), status_of(0x30))),

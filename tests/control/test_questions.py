@@ -1,4 +1,4 @@
-"""Questions change nothing: a hand that is asked all of them decides as one that is asked none."""
+"""Queries change nothing: a hand that answers all of them decides as one that answers none."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.control.test_gate import CALLS, steps
 
 
 def answers(hand: Controller, now: float) -> list[object]:
-    """All that a hand can be asked."""
+    """The answers to all queries of a hand."""
     return [
         hand.is_moving,
         hand.is_undecided,
@@ -34,7 +34,7 @@ def answers(hand: Controller, now: float) -> list[object]:
 
 
 class Hand:
-    """A hand that may be asked questions, and all that it does."""
+    """A hand, with or without queries, and all that it does."""
 
     def __init__(self, *, is_asked: bool, activates: bool) -> None:
         self.machine = StateMachine()
@@ -78,7 +78,7 @@ def test_a_hand_that_is_asked_everything_does_what_one_does_that_is_asked_nothin
 
 
 def known_to_rest(*, is_asked: bool) -> Finger:
-    """The axes that are known to rest just after a fault, in which a request of theirs has shown."""
+    """The axes that are known to rest just after a fault, in which a request of theirs was echoed."""
     ledger, at = Ledger(128, 64), 1.0
     ledger.update(shows(100, at), at)
     ledger.adopt(shows(100, at))

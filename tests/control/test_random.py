@@ -20,7 +20,7 @@ PAUSES = st.sampled_from([0.0, 0.005, 0.01, 0.05])
 
 
 class RandomUse(RuleBasedStateMachine):
-    """Whatever is done to the hand, it does what was asked and nothing else."""
+    """Whatever is done to the hand, it carries out the requests and nothing else."""
 
     @initialize(
         device_cycle=st.sampled_from([0.0, 0.005, 0.03, 0.2]),
@@ -35,7 +35,7 @@ class RandomUse(RuleBasedStateMachine):
         self.outcomes: list[tuple[Move | None, Outcome]] = []
 
     def teardown(self) -> None:
-        """Whatever was going on, a stop that keeps a grip leaves nothing going."""
+        """Whatever went before, a stop that keeps a grip leaves nothing moving."""
         if hasattr(self, "scan"):
             self.scan.stop(keep_grip=True)
             before = self.scan.travels()
@@ -120,7 +120,7 @@ class RandomUse(RuleBasedStateMachine):
         assert self.scan.state is State.RUNNING_IDLE
         for axis in self.model.axes:
             if axis not in contacts:
-                # One that close to where it was asked to go has arrived, and keeps its request.
+                # One that close to its request has arrived, and keeps the request.
                 assert abs(self.scan.gripper.position(axis) - at[axis]) <= TOLERANCE, f"{axis!r} resumed"
 
     @rule()

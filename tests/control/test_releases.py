@@ -11,7 +11,7 @@ from tests.control.scan import Scan
 
 @pytest.fixture
 def releasing(scan: Scan) -> Scan:
-    """A gripper whose fingers open, and whose status has said so."""
+    """A gripper whose fingers open, and which has reported it."""
     scan.moved(200)
     scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
     scan.step()
@@ -22,7 +22,7 @@ def releasing(scan: Scan) -> Scan:
 
 
 def reset_and_activated_unseen(scan: Scan, seconds: float) -> None:
-    """By another client, between two polls; what follows is seen so many seconds after its activation."""
+    """Reset and activate it by another client between two polls; the next one is so many seconds later."""
     scan.gripper.write(0, [0x0000])
     scan.now += 0.02
     scan.gripper.status_registers()
@@ -67,7 +67,7 @@ def test_a_release_that_was_never_seen_to_begin_ends_too(scan: Scan, seconds: fl
 
 
 def test_a_shutdown_after_a_release_that_another_client_ended_does_not_release_again(releasing: Scan) -> None:
-    """What was written last has rATR set, and looks like what the gripper shows: rATR has no echo."""
+    """The last image has rATR set, and matches the status: rATR has no echo."""
     reset_and_activated_unseen(releasing, 20.0)
     releasing.step()
     releasing.gripper.write(0, [0x0900])

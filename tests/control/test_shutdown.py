@@ -53,7 +53,7 @@ def test_the_shutdown_takes_back_an_activation_of_ours() -> None:
 
 
 def test_the_shutdown_takes_back_an_activation_of_ours_that_began_after_the_link_was_back() -> None:
-    """A reset that shows before the write acts is from before it."""
+    """A reset reported before the write acts is from before it."""
     scan = Scan(device_cycle=0.2)
     scan.connect(activate=False)
     scan.run(0.3)
@@ -68,7 +68,7 @@ def test_the_shutdown_takes_back_an_activation_of_ours_that_began_after_the_link
 
 
 def test_the_shutdown_takes_back_an_activation_whose_image_the_gripper_had_before_its_power_cut() -> None:
-    """It was reset by the cut: an equal image from before it says nothing of what acts."""
+    """It was reset by the cut: an equal image from before it proves nothing of the one that acts."""
     scan = started(device_cycle=0.2)
     scan.gripper.power_cycle()
     scan.until(lambda: scan.state is State.RESET)

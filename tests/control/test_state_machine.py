@@ -1,4 +1,4 @@
-"""The state machine: each cell of its table, each refusal, and what a status shows."""
+"""The state machine: each cell of its table, each refusal, and the conditions in a status."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ RESET         | not now| goes      | reset  | nothing| nothing| not now| goes   
 DO_SHUTDOWN   | not now| off       | off    | off    | off    | off    | off    | nothing
 SHUTDOWN      | goes   | off       | off    | off    | off    | off    | off    | nothing
 """
-"""What becomes of what is asked: where it goes, "nothing" to do, or the error."""
+"""The fate of each request: the next state, "nothing" to do, or the error."""
 LEADS = {
     Trigger.SEEN_READY: State.RUNNING_IDLE,
     Trigger.SEEN_BUSY: State.WF_ACTIVATION,
@@ -94,7 +94,7 @@ RESET         | leads  | leads  | leads  | leads  | leads   | not now       | DI
 DO_SHUTDOWN   | nothing| nothing| nothing| nothing| nothing | not now       | nothing      | SHUTDOWN
 SHUTDOWN      | nothing| nothing| nothing| nothing| nothing | not now       | nothing      | nothing
 """
-"""What a status shows never leads to a state that sends something, and nothing before an acknowledgement."""
+"""A condition in a status never leads to a state that sends something, and none before an acknowledgement."""
 HAPPENING = (*LEADS, Trigger.DELIVERED, Trigger.LINK_LOST, Trigger.STOPPED)
 ERRORS: dict[str, type[RobotiqError]] = {
     "lost": ConnectionLostError,
@@ -106,7 +106,7 @@ ERRORS: dict[str, type[RobotiqError]] = {
 
 
 def contract() -> dict[tuple[State, Trigger], State | str]:
-    """For every state and trigger the next state, "nothing", or a key of the errors."""
+    """The next state for every state and trigger, "nothing", or a key of the errors."""
     cells: dict[tuple[State, Trigger], State | str] = {}
     for table, triggers in ((ASKED, tuple(GOES)), (HAPPENS, HAPPENING)):
         for line in table.strip().splitlines()[1:]:
@@ -225,7 +225,7 @@ def test_commands_are_logged_for_debugging_and_other_changes_as_info(
     ]
 
 
-# -- what a status shows -----------------------------------------------------------------------------------
+# -- conditions in a status --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -245,7 +245,7 @@ def test_commands_are_logged_for_debugging_and_other_changes_as_info(
         (0x21, 0x00, 0x06, Trigger.SEEN_BUSY),
         (0x00, 0x00, 0x07, Trigger.SEEN_RESET),
         (0x31, 0x00, 0x07, Trigger.SEEN_READY),
-        # Minor and major ones are, whatever else the status shows.
+        # Minor and major ones are, whatever else the status has.
         (0x00, 0x00, 0x09, Trigger.SEEN_FAULT),
         (0x39, 0x00, 0x0A, Trigger.SEEN_FAULT),
         (0x11, 0x00, 0x0D, Trigger.SEEN_FAULT),

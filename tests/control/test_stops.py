@@ -1,4 +1,4 @@
-"""A stop, shown one status after another: what it writes, when again, and what ends it."""
+"""A stop that gets one status after another: its writes, their repetition, and its end."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ STOPPED = status_of(0x31, 0xC0, echo=ECHO)
 
 
 class Again(NamedTuple):
-    """A status after which the stop is written again: it should show by now, and may be forgotten."""
+    """A status after which the stop is written again: it should be echoed by now, and may be forgotten."""
 
     status: RobotiqStatus
 
@@ -81,7 +81,7 @@ class Stopping:
     ],
 )
 def test_a_stop_changes_these_bits_of_the_image(level: Level, expected: Request) -> None:
-    """A reset asks the axes to be where they are, besides: nothing may start when rGTO rises again."""
+    """A reset also requests the present positions: nothing may start when rGTO rises again."""
     if level is Level.RESET:
         axes = zip(IMAGE.axes, HERE, strict=True)
         expected = replace(expected, axes=tuple(replace(axis, position=at) for axis, at in axes))
@@ -131,7 +131,7 @@ def test_a_shutdown_with_nothing_to_stop_writes_nothing() -> None:
         # Its rACT would activate a gripper that was reset.
         (Level.SHUTDOWN, [status_of(0x30), status_of(0x10)], RESET),
         (Level.HALT, [], STOPPED),
-        # Its caller has an answer after the second, whatever shows.
+        # Its caller has an answer after the second, whatever the status.
         (Level.HALT, [Again(BEFORE)], BEFORE),
     ],
 )
@@ -155,7 +155,7 @@ def test_what_shows_before_the_write_acts_ends_nothing(level: Level, end: Roboti
 
 @pytest.mark.parametrize("level", [Level.HALT, Level.SHUTDOWN, Level.RESET])
 def test_a_stop_that_came_early_is_written_again_whatever_shows(level: Level) -> None:
-    """A gripper may show it and forget it."""
+    """A gripper may echo it and forget it."""
     end = RESET if level is Level.RESET else STOPPED
     stopping = Stopping(level, is_early=True)
     assert not stopping.see(end)

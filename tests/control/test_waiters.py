@@ -1,4 +1,4 @@
-"""How callers are answered: once, with an error of their own."""
+"""Answers to callers: one each, with an error of their own."""
 
 from __future__ import annotations
 
