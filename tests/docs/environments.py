@@ -1,7 +1,7 @@
-"""The code of every page, run as the page says and in the environment that it names: ``make pages``.
+"""The code of every page, run as the page has it and in the environment that it names: ``make pages``.
 
 Not part of the suite, for it installs from the package index. Each environment is a new one that holds what
-the page's own ``pip install`` asks for and nothing else; the gripper is a simulated one of this process.
+the page's own ``pip install`` installs and nothing else; the gripper is a simulated one of this process.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def quietly(*command: str) -> None:
 async def run(
     *command: str, folder: Path, typed: str | None = None, variables: Mapping[str, str] | None = None
 ) -> str:
-    """What a command prints, in an environment without the variables that would lend it modules."""
+    """The output of a command, in an environment without the variables that would lend it modules."""
     variables = {"PATH": "/usr/bin:/bin", **(variables or {})}
     process = await asyncio.create_subprocess_exec(
         *command, stdin=PIPE, stdout=PIPE, stderr=STDOUT, cwd=folder, env=variables
@@ -120,7 +120,7 @@ async def test_code_for_pytest_runs(page: Path, tmp_path: Path) -> None:
 
 
 async def test_the_notebook(tmp_path: Path) -> None:
-    """Executed by a kernel of Jupyter, it shows what it shows."""
+    """Executed by a kernel of Jupyter, it has the outputs in the file."""
     python = environment(f"{requirements(read(DOCS / 'how-to' / 'notebooks.md'))} ipykernel nbclient")
     command = (python, str(DOCS / "make_notebook.py"), "--check")
     # Jupyter keeps things at home.
@@ -138,7 +138,7 @@ async def test_the_readme(tmp_path: Path) -> None:
 
 
 async def test_the_web_service(tmp_path: Path) -> None:
-    """In an environment that holds what the page has its reader install."""
+    """It runs in an environment with the packages that the page installs."""
     python = environment(requirements(read(WEB_SERVICE)))
     async with service(active_gripper(1.0), tmp_path, python) as here:
         await stops(here, signal.SIGINT)

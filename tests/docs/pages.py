@@ -23,7 +23,7 @@ def read(page: Path | str) -> str:
 
 
 def named(page: object) -> str:
-    """How tests name a page; nothing else has a name."""
+    """The name of a page in tests; nothing else has a name."""
     return str(page.relative_to(ROOT)) if isinstance(page, Path) else ""
 
 
@@ -57,7 +57,7 @@ def blocks(text: str, language: str | None = None) -> list[Block]:
 
 
 def outputs(text: str) -> dict[Block, Block]:
-    """What a page shows as printed by some of its blocks: a block of text right after one of Python."""
+    """The printed outputs on a page: a block of text right after one of Python."""
     return {
         block: following
         for block, following in pairwise(blocks(text))
@@ -72,7 +72,7 @@ def prose(text: str) -> str:
 
 
 def requirements(text: str) -> str:
-    """What a page has its reader install, as it is typed behind ``pip install``."""
+    """The requirements on a page, as typed behind ``pip install``."""
     return " ".join(re.findall(r"\bpip install (?!'robotiq-async|\.\.\. )([^`\n]+)", text))
 
 

@@ -1,4 +1,4 @@
-"""What the pages have typed into a shell exists: commands with their options, make's targets, extras, files.
+"""Shell lines of the pages name things that exist: commands, options, make's targets, extras, files.
 
 It is parsed and not run: most of it is for a gripper, a second machine or a ROS. What runs are the commands
 themselves (tests/cli), the targets (CI) and the Python code (test_pages, environments).
@@ -37,7 +37,7 @@ def words_of(line: str) -> list[str]:
 
 
 def lines(page: Path) -> Iterator[tuple[int, str]]:
-    """What a page has typed, with the numbers of its lines."""
+    """The shell lines of a page, with their numbers."""
     for block in blocks(read(page), "sh"):
         for number, line in enumerate(block.text.replace("\\\n", " ").splitlines(), block.line):
             if line.strip() and not line.startswith("#"):
@@ -78,7 +78,7 @@ def check(line: str) -> None:
 
 
 def has(module: str) -> bool:
-    """Whether ``python -m`` finds it: with Python, with what the page installs, or in the clone."""
+    """Whether ``python -m`` finds it: in Python, among the packages of the page, or in the clone."""
     place = ROOT.joinpath(*module.split("."))
     return (
         module in ("asyncio", "pytest", "venv", "http.server")

@@ -1,4 +1,4 @@
-"""What the pages about hands on other hosts say of files, bytes and objects is what the code has."""
+"""Files, bytes and objects on the pages about hands on other hosts are those of the code."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ EXAMPLES: Final = [
     json.loads(call(1, 0, what="acquire", label=LABEL).pack()),
     json.loads(Answer(NAME.base, 1, EPOCH, {"lease": 3, "window": 1.0}).pack()),
 ]
-"""In the order of the page."""
+"""The objects in the order of the page."""
 
 
 def shown(language: str, page: str) -> list[str]:

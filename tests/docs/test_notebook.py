@@ -1,4 +1,4 @@
-"""The notebook: its cells run and print what they show; make_notebook.py has Jupyter do the same."""
+"""The notebook: its cells run and print their outputs; make_notebook.py has Jupyter do the same."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ CELLS: list[dict[str, Any]] = NOTEBOOK["cells"]
 
 
 def shown(cell: dict[str, Any]) -> str:
-    """What a cell has printed; nothing else may be among its outputs."""
+    """The printed text of a cell; nothing else may be among its outputs."""
     assert [each["name"] for each in cell["outputs"]] == ["stdout"] * len(cell["outputs"])
     return "".join(each["text"] for each in cell["outputs"])
 

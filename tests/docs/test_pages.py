@@ -96,7 +96,7 @@ CODE = [
 OUTPUTS = {
     (page, block): shown for page in PAGES if page != TUTORIAL for block, shown in outputs(read(page)).items()
 }
-"""What the page shows behind a block."""
+"""The output on the page behind a block."""
 
 
 @pytest.fixture
@@ -136,7 +136,7 @@ async def test_code_runs(
 @pytest.mark.virtual_time
 @pytest.mark.parametrize("closed", [False, True])
 async def test_the_first_move_of_a_real_gripper_ends_wherever_its_fingers_are(closed: bool) -> None:
-    """At life's own speed: from closed fingers it takes twice the five seconds that it had."""
+    """In real time: from closed fingers it takes twice the five seconds that it had."""
     page = DOCS / "how-to" / "first-hour.md"
     (block,) = [block for _, block in CODE if "Finger.A" in block.text and _ == page]
     gripper = SimulatedGripper(asyncio.get_running_loop().time)

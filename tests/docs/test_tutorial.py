@@ -1,4 +1,4 @@
-"""The tutorial, typed as it stands: each block runs and prints what the page shows."""
+"""The tutorial, typed as it stands: each block runs and prints the output on the page."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TYPED = [
     for code, output in pairwise(BLOCKS)
     if code.language == "python" and "asyncio.run(" not in code.text
 ]
-"""What is typed at the prompt, each with the output that the page shows for it."""
+"""Blocks typed at the prompt, each with its output on the page."""
 (PROGRAM,) = [pair for pair in pairwise(BLOCKS) if "\nasyncio.run(" in pair[0].text]
 BETWEEN_STATEMENTS = 0.05
 """Seconds, as a person's keys are slow: ten polls, and half a second of the simulated fingers."""
@@ -42,7 +42,7 @@ def statements(block: Block) -> Iterator[CodeType]:
 
 
 async def typed(block: Block, names: dict[str, Any]) -> str:
-    """What a block prints, with the hand polling on between its statements as it does at the prompt."""
+    """The output of a block, with the hand polling on between its statements as it does at the prompt."""
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         for code in statements(block):
@@ -86,13 +86,13 @@ async def test_the_program_at_its_end(tmp_path: Path) -> None:
         )
         printed, _ = await asyncio.wait_for(process.communicate(), patience(30))
     assert process.returncode == 0, printed.decode()
-    # A busy machine may poll late, and the log says so.
+    # A busy machine may poll late, and logs it.
     lines = [each for each in printed.decode().splitlines(keepends=True) if LATE_POLLS not in each]
     assert agree(output.text, "".join(lines)), printed.decode()
 
 
 def test_blocks_can_be_pasted() -> None:
-    """At the prompt an empty line ends what is indented, and nothing else does."""
+    """At the prompt an empty line ends an indented block, and nothing else does."""
     goes_on = ("except", "else", "finally", " ")
     for code, _ in TYPED:
         for line, following in pairwise([*code.text.split("\n")]):

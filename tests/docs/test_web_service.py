@@ -101,7 +101,7 @@ async def stops(here: Service, number: signal.Signals) -> None:
 async def test_a_signal_stops_the_fingers_while_a_client_watches(
     number: signal.Signals, tmp_path: Path
 ) -> None:
-    """The server waits for its clients before the lifespan ends: the fingers went on for as long."""
+    """The server waits for its clients before the lifespan ends: the fingers moved on for as long."""
     async with service(active_gripper(1.0), tmp_path) as here:
         await stops(here, number)
 
