@@ -23,7 +23,7 @@ Trouble = Callable[[World], Coroutine[Any, Any, None]]
 TARGET = 130
 RATE_S = 0.01
 SETTLE_S = 2.5
-"""After the trouble: so long everything has to come right by itself, and nothing may come late."""
+"""Seconds after the trouble in which everything has to come right by itself, and nothing may come late."""
 
 
 # -- the client --------------------------------------------------------------------------------------------
@@ -44,7 +44,7 @@ def frozen(who: str, seconds: float) -> Trouble:
 
 
 async def client_held_up(world: World) -> None:
-    """A callback that blocks: zenoh's own threads go on, and the link stays."""
+    """A callback that blocks: zenoh's own threads run on, and the link stays."""
     world.holder.host.freeze()
     await asyncio.sleep(2)
     world.holder.host.thaw()
@@ -196,10 +196,10 @@ TROUBLES: Final[dict[str, Trouble]] = {
 
 @dataclass
 class Doing:
-    """What the holder does.
+    """The actions of the holder.
 
     Attributes:
-        asked: what a control loop asked for, and when.
+        asked: the requests of a control loop, with their times.
         call: ends when the call or the loop of the holder does; None if there is none.
     """
 
@@ -295,7 +295,7 @@ async def outcome(world: World, phase: str, trouble: Trouble) -> tuple[str, floa
 
 
 async def said(doing: Doing) -> str:
-    """What the holder got: how its call ended, else what its hand showed."""
+    """The result of the holder: the outcome of its call, else the observation of its hand."""
     holder, call = doing.world.holder, doing.call
     if holder.host.is_dead:
         return "killed"
@@ -311,7 +311,7 @@ async def said(doing: Doing) -> str:
 
 
 async def rest(world: World) -> float:
-    """When the fingers last moved."""
+    """The time when the fingers last moved."""
     since = world.now()
     while True:
         await asyncio.sleep(0.005)
@@ -322,7 +322,7 @@ async def rest(world: World) -> float:
 
 
 async def _fingers(doing: Doing, resting: asyncio.Task[float], began: float) -> tuple[str, float | None]:
-    """Where they came to rest, and after what time."""
+    """The position at which they came to rest, and the time until then."""
     world = doing.world
     async with asyncio.timeout(20):
         stood = await resting
@@ -343,7 +343,7 @@ def check_commands(doing: Doing) -> None:
 
 
 def commands(doing: Doing) -> list[tuple[float, tuple[int, int]]]:
-    """Which of its commands reached the gripper, and when."""
+    """Its commands that reached the gripper, with their times."""
     found: list[tuple[float, tuple[int, int]]] = []
     for at, what in motions(doing.world, doing.writes):
         if what in doing.asked and (not found or found[-1][1] != what):
@@ -357,7 +357,7 @@ def check_travel(world: World, addressed: Finger) -> None:
 
 
 def lease_of(world: World) -> str:
-    """Whose the lease is now, and whether the holder noticed."""
+    """The fate of the lease, and whether the holder noticed."""
     holder = world.holder
     if holder.host.is_dead:
         return "lease ended"
@@ -367,7 +367,7 @@ def lease_of(world: World) -> str:
 
 
 async def ending(work: Coroutine[Any, Any, Any]) -> str:
-    """How a call ends, in the words of the table."""
+    """The outcome of a call, in the words of the table."""
     try:
         await work
     except ControlLostError as error:
@@ -437,7 +437,7 @@ async def move_slowly(here: World) -> asyncio.Task[str]:
 
 
 async def ask(client: Client, verb: str, call: Call, key: str = "") -> RobotiqError | None:
-    """Ask something by hand; returns what it was refused with."""
+    """Send a request by hand; return the error that refused it."""
 
     async def once() -> bytes:
         reply = await client.bus.ask(key or LEFT.key(verb), call.pack(), timeout=2.0, urgency=Urgency.COMMAND)

@@ -1,8 +1,8 @@
 """Everything at once over a network of namespaces: cuts, losses, agents that are killed, halts, floods.
 
 ``python -m tests.fleet.chaos [ROUNDS]`` as root on Linux with ip and nft. A gripper, its agent and those who
-halts are on one side of a cable, a client that asks for bursts of moves on the other, with a program that
-asks questions without end. What it must show is in :func:`judged`.
+halts are on one side of a cable, a client that requests bursts of moves on the other, with a program that
+sends questions without end. :func:`judged` has the promises.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ async def gripper() -> None:
 
 
 async def worker() -> None:
-    """Moves in bursts, and goes on as soon as it may; who was stopped by others waits for SIGUSR1."""
+    """Moves in bursts, and continues as soon as it may; when stopped by others it waits for SIGUSR1."""
     ended, acquire = ended_by(signal.SIGTERM), ended_by(signal.SIGUSR1)
     outcomes: Counter[str] = Counter()
     longest = 0.0
@@ -89,7 +89,7 @@ async def worker() -> None:
 
 
 async def curious() -> None:
-    """Asks without end."""
+    """Sends questions without end."""
     ended = ended_by(signal.SIGTERM)
     bus, number, answers = await open_bus(client_configuration([ENDPOINT], insecure=True), ENDPOINT), 0, 0
     say("ready")
@@ -105,7 +105,7 @@ async def curious() -> None:
 
 
 async def panel() -> None:
-    """Halts with each SIGUSR1, on the agent's side of the cable; says when that was acknowledged, or 0."""
+    """Halts with each SIGUSR1, on the agent's side of the cable; prints the time of the answer, or 0."""
     pressed = ended_by(signal.SIGUSR1)
     async with RemoteHand(address("left", ENDPOINT), control=False) as hand:
         say("ready")
@@ -175,7 +175,7 @@ async def _run(namespaces: Namespaces, state: str, rounds: int, chance: random.R
 
 
 def judged(images: list[tuple[float, int, int]], barred: list[tuple[float, float]]) -> dict[str, Any]:
-    """What must not be: motion after a halt that was not taken back, or with another speed or force."""
+    """The broken promises: motion after a halt that was not taken back, or with another speed or force."""
     first = next((at for at, speed, force in images if (speed, force) == (SPEED, FORCE)), 0.0)
     return {
         "images": len(images),

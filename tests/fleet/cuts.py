@@ -29,7 +29,7 @@ WAYS = (("input",), ("output",), ("input", "output"))
 
 
 def missing() -> str:
-    """Why this cannot be tried here; empty if it can."""
+    """The reason why this cannot be tried here; empty if it can."""
     if not hasattr(os, "geteuid") or os.geteuid() != 0:
         return "network namespaces take root"
     lacking = [tool for tool in ("ip", "nft") if shutil.which(tool) is None]
@@ -112,7 +112,7 @@ async def kill(process: Process) -> None:
 
 
 async def report(process: Process) -> Any:
-    """What a program says at its end."""
+    """The report of a program at its end."""
     process.send_signal(signal.SIGTERM)
     async with asyncio.timeout(LIMIT_S):
         said, _ = await process.communicate()

@@ -1,4 +1,4 @@
-"""Hosts in one virtual loop: what runs on one can be frozen or killed while the others go on.
+"""Hosts in one virtual loop: programs on one can be frozen or killed while the others run on.
 
 A host is an event loop of its own that lives inside the virtual one: its callbacks, tasks, timers and
 connections are called through a gate. While the gate is shut nothing of the host runs, and when it opens
@@ -102,7 +102,7 @@ class Host(_Loop):
             finally:
                 asyncio._set_running_loop(before)
 
-    # -- what programs ask of a loop -------------------------------------------------------------------
+    # -- the loop for programs -------------------------------------------------------------------------
 
     def time(self) -> float:
         return self._outer.time() - self.slept

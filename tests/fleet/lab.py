@@ -73,11 +73,11 @@ class Lab:
 
     @property
     def lease(self) -> int:
-        """The number of the lease, as every status of the agent tells it."""
+        """The number of the lease, as in every status of the agent."""
         return status_message.unpack(self.agent.hands["left"].publisher.status_message()).lease
 
     async def answer(self, verb: str, request: bytes) -> Answer:
-        """What the agent answers to a stranger's request."""
+        """The agent's answer to a stranger's request."""
         bus = self.network.bus("stranger")
         reply = await bus.ask(LEFT.key(verb), request, timeout=1.0, urgency=Urgency.COMMAND)
         assert reply is not None
@@ -131,7 +131,7 @@ async def lab(
 
 
 class Between:
-    """Stands before a bus, and does with requests what its kind says."""
+    """Stands before a bus, and treats requests by its kind."""
 
     def __init__(self, bus: MemoryBus) -> None:
         self._bus = bus
@@ -145,7 +145,7 @@ class Spoiling(Between):
 
     Attributes:
         left: how many requests are still to be spoiled.
-        commands: the commands that were asked for, spoiled or not.
+        commands: the commands that were sent, spoiled or not.
     """
 
     def __init__(

@@ -2,7 +2,7 @@
 
 Between each two buses there are two streams, one in each direction, and what is sent on one arrives in its
 order, as over TCP: whatever is lost is only late, and so is all that follows. A link over which one side has
-not heard the other for LINK_LEASE_S is closed, with all that was under way on it; it is up again soon after
+not heard the other for LINK_LEASE_S is closed, with every message on it; it is up again soon after
 the trouble is over. A network that ``keeps_links`` closes none, and delivers all of it then, as routers do.
 """
 
@@ -23,7 +23,7 @@ LATENCY_S = 0.0002
 LINK_LEASE_S = 1.0
 RECONNECT_S = 0.2
 IN_ORDER_S = 1e-8
-"""From one message to the next: timers of the same instant come in any order."""
+"""Seconds from one message to the next: timers of the same instant come in any order."""
 
 
 def matches(expression: str, key: str) -> bool:
@@ -34,10 +34,10 @@ def matches(expression: str, key: str) -> bool:
 
 @dataclass
 class Stream:
-    """What goes from one bus to another.
+    """The messages from one bus to another.
 
     Attributes:
-        is_cut: nothing arrives; what is sent meanwhile arrives when it is mended, or never.
+        is_cut: nothing arrives; messages sent in that time arrive when it is mended, or never.
         keeps: whether it arrives then. Telemetry is dropped in any case.
         delay: seconds, added to every message.
         loss: share of messages that have to be sent again.
@@ -112,7 +112,7 @@ class Network:
         return frozenset((one, other)) not in self._parted
 
     def part(self, one: str, other: str) -> None:
-        """Close a link: what was asked over it ends without an answer, and neither side sees the other."""
+        """Close a link: requests over it end without an answer, and neither side sees the other."""
         if not self.is_up(one, other):
             return
         self._parted.add(frozenset((one, other)))
@@ -124,7 +124,7 @@ class Network:
         self._show_each_other(one, other, is_there=False)
 
     def join(self, one: str, other: str) -> None:
-        """Open it again, unless what closed it goes on."""
+        """Open it again, unless its cause lasts."""
         if not self.is_up(one, other) and not any(each.is_cut for each in self.both(one, other)):
             self._parted.discard(frozenset((one, other)))
             self._show_each_other(one, other, is_there=True)
@@ -196,7 +196,7 @@ class _Query:
                 self.asking.end()
 
     def end(self, *names: str) -> None:
-        """Some of those who were asked are gone."""
+        """Some of the processes that got the request are gone."""
         for name in names:
             self.source.loop.call_soon(self.take, name, None)
 
@@ -211,7 +211,7 @@ class _Received:
         self._reply(_Reply(payload, attachment))
 
     def __del__(self) -> None:
-        """A dropped query is reported to the client that asked."""
+        """A dropped query is reported to its client."""
         if not self._is_answered:
             self._reply(None)
 

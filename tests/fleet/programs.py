@@ -70,7 +70,7 @@ async def router(endpoint: str) -> None:
 
 
 async def served(endpoint: str) -> None:
-    """An agent with two grippers of its own; finger B stands elsewhere at each. It says what moved."""
+    """An agent with two grippers of its own; finger B stands elsewhere at each. It prints the motions."""
     loop, jumped = asyncio.get_running_loop(), [0.0]
     async with contextlib.AsyncExitStack() as stack:
         grippers = {}
@@ -97,10 +97,10 @@ def address(name: str, endpoint: str) -> str:
 
 
 async def move(endpoint: str) -> None:
-    """Move left slowly, and say what became of it."""
+    """Move left slowly, and print the outcome."""
     async with RemoteHand(address("left", endpoint)) as hand:
         moving = asyncio.ensure_future(hand.move(255, Finger.A, speed=0))
-        while not hand.is_moving:  # noqa: ASYNC110  # shown by the statuses, which are awaited nowhere here
+        while not hand.is_moving:  # noqa: ASYNC110  # seen in the statuses, which are awaited nowhere here
             await asyncio.sleep(0.01)
         say("moving")
         try:

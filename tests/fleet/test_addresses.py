@@ -226,7 +226,7 @@ def test_with_keys_everything_is_encrypted(endpoint: str) -> None:
     ],
 )
 def test_malformed_endpoints_are_refused(endpoint: str) -> None:
-    """What stands behind a # goes before the rest of zenoh's configuration."""
+    """Options behind a # precede the rest of zenoh's configuration."""
     for options in ({"has_keys": True}, {"has_keys": False}, {"has_keys": False, "insecure": True}):
         with pytest.raises(ValueError, match=r"must be tcp/HOST:PORT, tls/HOST:PORT or quic/HOST:PORT"):
             check([endpoint], **options)

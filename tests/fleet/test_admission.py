@@ -1,4 +1,4 @@
-"""What is carried out: nothing twice, late, out of order, under an old lease, or by the wrong gripper."""
+"""Nothing is carried out twice, late, out of order, under an old lease, or by the wrong gripper."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ FLOOD = 8000
 
 
 def admission(holder: str = "anna", number: int = 1) -> tuple[Admission, Call]:
-    """With a holder, and a call that is let in."""
+    """An admission with a holder, and a call that is let in."""
     one = Admission(BASE, EPOCH, Lease(1.0))
     lease = one.acquire(Call(BASE, holder, EPOCH, 0, number, NOW), holder)
     return one, Call(BASE, holder, EPOCH, lease, number + 1, NOW)
@@ -149,7 +149,7 @@ def test_a_thousand_clients_are_remembered_and_not_more() -> None:
 
 @dataclass
 class Model:
-    """What is promised, in the plainest words.
+    """The promises, in the plainest words.
 
     Attributes:
         given: the lease that each client was given last.
@@ -272,7 +272,7 @@ def test_each_client_has_a_second_s_worth_and_then_its_rate() -> None:
 
 
 def test_all_together_have_one_as_well() -> None:
-    """Who calls itself something else each time."""
+    """A client may call itself something else each time."""
     budget = Budget()
     assert sum(budget.allows(f"client {each}", 5.0) for each in range(FLOOD)) == ALL
     assert len(budget._each) <= 1000
@@ -312,7 +312,7 @@ async def test_a_flood_of_questions_leaves_other_clients_and_the_log_alone(
 
 
 async def flood(here: Lab) -> int:
-    """Ask for a second; returns how many answers came."""
+    """Send questions for a second; return the number of answers."""
     bus, answers = here.network.bus("flooding"), []
     for number in range(FLOOD // 8):
         call = Call(LEFT.base, "curious", number=number)

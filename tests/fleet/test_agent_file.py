@@ -1,4 +1,4 @@
-"""FLEET.toml: what is in it, and what is refused, in a line that says where."""
+"""FLEET.toml: its content, and the errors, each with its line."""
 
 from __future__ import annotations
 

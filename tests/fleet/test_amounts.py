@@ -1,4 +1,4 @@
-"""What a hand on another host knows of millimetres, and that counts alone are sent."""
+"""Millimetres on a hand of another host, and that counts alone are sent."""
 
 from __future__ import annotations
 

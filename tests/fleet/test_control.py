@@ -1,4 +1,4 @@
-"""How control is lost, noticed to be lost, and when it comes back, also from a restarted agent."""
+"""Control is lost, noticed to be lost, and comes back, also from a restarted agent."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ async def test_a_lease_that_was_lost_unnoticed_is_not_taken_for_held(here: Lab, 
 async def test_the_error_goes_on_saying_that_another_client_took_the_lease(
     here: Lab, hand: RemoteHand
 ) -> None:
-    """The hand does not ask for it again, and so does not hear that it is held."""
+    """The hand does not request it again, and so does not learn that it is held."""
     async with here.client("other", control=False) as other:
         await other.take()
         await asyncio.sleep(2)
@@ -119,7 +119,7 @@ async def test_the_error_goes_on_saying_that_another_client_took_the_lease(
 
 @inside(lab)
 async def test_a_move_that_runs_is_not_given_the_refusal_of_another_request(here: Lab) -> None:
-    """The answer to the move is lost; that to a renewal says that nothing was done."""
+    """The answer to the move is lost; by that to a renewal nothing was done."""
     bus = Spoiling(here.network.bus("client"), "/cmd/move", sends=True)
     async with here.client("other", control=False) as other, here.client_over(bus) as hand:
         moving = asyncio.create_task(hand.move(215, Finger.A, speed=0))
@@ -135,7 +135,7 @@ async def test_a_move_that_runs_is_not_given_the_refusal_of_another_request(here
 
 @inside(lab)
 async def test_silence_is_noticed_while_the_lease_is_asked_for_again(here: Lab, hand: RemoteHand) -> None:
-    """The last status of an agent that had died was shown as the present one for ever."""
+    """The last status of an agent that had died was the present one for ever."""
     here.network.cut(("client", "agent"))
     await until(lambda: not hand.is_in_control)
     here.network.cut(("agent", "client"))
@@ -185,7 +185,7 @@ INTERVENTIONS = [
     *((what, 0.0, (how,)) for what in ("halt", "take", "command") for how in ("killed", "ended")),
     *(("halt", 2.0, (how, how)) for how in ("killed", "ended")),
 ]
-"""What another client does, how long after the cut (at 2 s the lease has ended by itself), and restarts."""
+"""Action of another client, seconds after the cut (at 2 s the lease has ended by itself), and restarts."""
 
 
 @pytest.mark.parametrize(("what", "after", "restarts"), INTERVENTIONS)
@@ -197,7 +197,7 @@ async def test_a_client_that_was_cut_off_does_not_come_back_after_an_interventio
     hand, other = here.holder.hand, here.other.hand
 
     async def loop() -> None:
-        """A program that goes on as soon as it may."""
+        """A program that continues as soon as it may."""
         while True:
             await ending(hand.move(200, Finger.A, speed=0))
             await asyncio.sleep(0.05)

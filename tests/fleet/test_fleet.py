@@ -1,4 +1,4 @@
-"""A fleet: who is there, how old what is shown of them is, and what is left of one that was not entered."""
+"""A fleet: its members, the age of their summaries, and the rest of one that was not entered."""
 
 from __future__ import annotations
 

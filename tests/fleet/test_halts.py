@@ -128,7 +128,7 @@ async def test_commands_before_a_halt_are_not_written_after_it(here: World) -> N
     here.network.delay("holder", "agent", 0.05)
 
     async def loop_and_halt() -> None:
-        for number in range(40):  # more than may be under way: the last ones wait
+        for number in range(40):  # more than may run at a time: the last ones wait
             hand.command(Finger.A, position=200 + number, speed=0)
             await asyncio.sleep(0.002)
         await hand.halt()
@@ -190,7 +190,7 @@ async def cut_off(hand: RemoteHand) -> None:
 
 @inside(world)
 async def test_moving_axes_are_held_once_the_gripper_is_reached_again(here: World) -> None:
-    """The lease ends while the agent has lost its gripper, which goes on to its target."""
+    """The lease ends while the agent has lost its gripper, which moves on to its target."""
     await move_slowly(here)
     await here.servers["left"].stop()
     await here.until(lambda: here.other.hand.state is State.DISCONNECTED)
@@ -222,7 +222,7 @@ async def test_a_refused_command_does_not_forget_the_hold_that_is_owed(here: Lab
 @inside(lab)
 @pytest.mark.parametrize("lost", [1, 1_000_000])
 async def test_a_cancelled_move_is_called_off_although_that_was_lost(here: Lab, lost: int) -> None:
-    """It was asked once, and the fingers ran on under a lease that was renewed."""
+    """It was sent once, and the fingers ran on under a lease that was renewed."""
     bus = Spoiling(here.network.bus("client"), "cmd/cancel", times=lost)
     async with here.client_over(bus) as hand:
         await cut_off(hand)

@@ -1,4 +1,4 @@
-"""What comes from the threads of zenoh, and what goes to them."""
+"""Messages from the threads of zenoh, and to them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What goes over the network, in either direction; strangers may have written it."""
+"""Messages on the network, in either direction; strangers may have written them."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ async def test_each_role_watches_and_does_what_it_may(
 
 
 async def test_a_subscription_that_is_too_wide_and_a_key_without_a_rule_are_silent(keys: Path) -> None:
-    """In sessions of their own: what comes for one subscription of a session is given to all that match."""
+    """Each has a session of its own: a message for one subscription of a session goes to all that match."""
     async with line() as here:
         publish = (await here.answering(keys / "agent-cell")).publish
         narrow, wide = await here.client(keys / "read-alice"), await here.client(keys / "operate-bob")
@@ -125,7 +125,7 @@ async def test_wildcards_open_nothing(keys: Path) -> None:
 
 
 async def test_no_client_can_act_as_an_agent(keys: Path) -> None:
-    """Not even for clients in zenoh's sense, for whom the agent would carry on what others say."""
+    """Not even for clients in zenoh's sense, for whom the agent would pass on the messages of others."""
     async with line() as here:
         agent = await here.answering(keys / "agent-cell")
         bob, alice = [await here.client(keys / who, "client") for who in ("operate-bob", "read-alice")]
@@ -181,7 +181,7 @@ async def test_a_certificate_ends_and_so_does_the_link(keys: Path, tmp_path: Pat
 
 
 async def test_a_client_does_not_pass_for_an_agent_nor_one_host_for_another(keys: Path) -> None:
-    """Who listens shows a certificate for servers, and for the address that was connected to."""
+    """A listener presents a certificate for servers, and for the address that was connected to."""
     async with line() as one, line() as two, line("127.0.0.2") as three:
         await one.server(keys / "operate-bob")
         await two.server(keys / "agent-cell")

@@ -23,14 +23,14 @@ from tests.patience import patience
 
 ROOT = Path(__file__).parents[2]
 LIMIT_S = 8.0
-"""For what takes a second or two: the machine does other things too."""
+"""Seconds for work that takes one or two: the machine does other things too."""
 
 
 # -- processes ---------------------------------------------------------------------------------------------
 
 
 async def said(process: Process) -> str:
-    """The next line of a program, which says where it stands."""
+    """The next line of a program: its progress."""
     assert process.stdout is not None
     async with asyncio.timeout(patience(2 * LIMIT_S)):
         return (await process.stdout.readline()).decode().strip()

@@ -54,7 +54,7 @@ async def test_commands_that_waited_for_the_link_are_never_carried_out(here: Wor
 
 @virtual
 async def test_nothing_from_before_a_suspension_is_carried_out() -> None:
-    """The agent's machine was suspended with requests in its sockets; its clock stood still meanwhile."""
+    """The agent's machine was suspended with requests in its sockets; its clock stood still in that time."""
     slept = 0.0
     async with world(asleep=lambda: slept) as here:
         here.network.keeps_links = True

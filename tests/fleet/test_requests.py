@@ -36,7 +36,7 @@ PROMISE_S = 2.5
 
 
 class CountingBus(Spoiling):
-    """A bus that knows how many commands were under way at a time."""
+    """A bus that counts the commands that run at a time."""
 
     under_way = most = 0
 
@@ -223,7 +223,7 @@ async def test_a_move_that_is_cancelled_on_its_way_moves_until_the_agent_has_cal
         assert here.gripper.travel(A) == travel
 
 
-# -- said again --------------------------------------------------------------------------------------------
+# -- repetitions -------------------------------------------------------------------------------------------
 
 
 def first_copy_of(*numbers: int) -> Callable[[Call], bool]:
@@ -319,7 +319,7 @@ async def test_a_request_waits_for_the_one_that_was_asked_before_it(here: World)
 
 @virtual
 async def test_sixty_four_hands_at_once_again_and_again() -> None:
-    """With a fifth of all requests lost on the way."""
+    """A fifth of all requests is lost on the way."""
     network, chance = Network(), random.Random(7)
     names = [f"hand-{number}" for number in range(64)]
     loop = asyncio.get_running_loop()

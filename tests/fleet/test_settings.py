@@ -52,7 +52,7 @@ async def next_agent(here: World) -> int:
 async def test_an_agent_that_was_started_anew_moves_with_what_was_asked_of_the_former(
     here: World, motion: str
 ) -> None:
-    """Speed 10 and force 5 were asked for; after a restart it moved with 128 and 64."""
+    """Speed 10 and force 5 were requested; after a restart it moved with 128 and 64."""
     hand = here.holder.hand
     await here.holder.do(hand.set_speed(10, ALL))
     await here.holder.do(hand.set_force(5, ALL))

@@ -52,7 +52,7 @@ async def test_a_control_loop_is_refused_at_once_and_nothing_of_it_is_sent_after
     here: Lab, hand: RemoteHand, options: dict[str, bool], turns: int
 ) -> None:
     for position in range(100):
-        hand.command(A, position=position)  # four are under way, and the rest is merged
+        hand.command(A, position=position)  # four run, and the rest is merged
     for _ in range(turns):
         await asyncio.sleep(0)
     stopping = asyncio.create_task(hand.stop(**options))
@@ -87,7 +87,7 @@ async def test_a_caller_hears_at_once_that_the_hand_was_stopped(here: Lab, hand:
 async def test_the_strongest_stop_counts_in_any_order(
     here: Lab, hand: RemoteHand, first: str, second: str, between: float
 ) -> None:
-    """A gentler one that is under way does not leave rGTO set."""
+    """A gentler one that runs does not leave rGTO set."""
     await hand.set_speed(0)
     await hand.set_position(255)
     await until(lambda: here.gripper.is_moving)
@@ -283,7 +283,7 @@ def every_motion(hand: RemoteHand) -> Iterator[Asked]:
 
 @inside(lab)
 async def test_an_ending_agent_takes_no_request(here: Lab, hand: RemoteHand) -> None:
-    """Before its tasks have had a turn."""
+    """The request comes before its tasks have had a turn."""
     requests = list(every_motion(hand))
     writes = len(here.gripper.writes)
     here.serving.cancel()

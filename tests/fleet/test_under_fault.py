@@ -13,7 +13,7 @@ from tests.virtual import inside
 
 CELLS = list(cells())
 HALTED_AFTER_S = 0.25
-"""In the midst of all troubles that last."""
+"""Seconds from the trouble to the halt: in the midst of all that last."""
 
 
 @pytest.mark.parametrize("cell", CELLS, ids=lambda cell: f"{cell.phase}-{cell.trouble}".replace(" ", "_"))
@@ -34,7 +34,7 @@ def test_the_table_is_complete() -> None:
 @pytest.mark.parametrize("trouble", TROUBLES)
 @inside(world)
 async def test_a_halt_in_the_midst(here: World, trouble: str) -> None:
-    """A client that asks hears the truth, and the old holder does not come back."""
+    """A client that queries gets the truth, and the old holder does not come back."""
     doing = Doing(here)
     await moving(doing)
     going_on = asyncio.create_task(TROUBLES[trouble](here))

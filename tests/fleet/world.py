@@ -114,7 +114,7 @@ class World:
                     self.network.part(host.name, bus.name)
 
     def moved(self, axis: Finger, name: str = "left") -> float:
-        """How far an axis has moved since :meth:`settle`."""
+        """Counts that an axis has moved since :meth:`settle`."""
         return self.grippers[name].travel(axis) - self._before[name][axis]
 
     async def settle(self) -> None:
@@ -125,14 +125,14 @@ class World:
         }
 
     def check(self) -> None:
-        """What is promised whatever happens."""
+        """Check the promises that hold whatever happens."""
         assert not any(self.moved(axis, "right") for axis in THREE_FINGER.axes), "the wrong gripper moved"
         for client in self.clients:
             client.check()
 
 
 class MemoryRecords:
-    """What the agents of one world leave each other, as their folder would; it may be taken away."""
+    """The records that agents of one world leave each other, as in their folder; it may be taken away."""
 
     def __init__(self) -> None:
         self.records: dict[GripperName, dict[str, Any]] = {}
@@ -228,7 +228,7 @@ class Client:
             self.statuses = await self.do(_all_of(self.hand_statuses))
 
     async def _watch(self) -> None:
-        """Look at the hand as a program would, and compare what is shown as current with what is."""
+        """Look at the hand as a program would, and compare the observation with the truth."""
         while True:
             state = self.hand.state
             if not self.states or self.states[-1] is not state:
@@ -240,13 +240,13 @@ class Client:
             await asyncio.sleep(LOOK_S)
 
     def _check_current(self, status: RobotiqStatus) -> None:
-        """A status that is shown without a word is no older than the window and one look for silence."""
-        # One that says it is old may be: then the agent has not read a newer one.
+        """A status given without a warning is no older than the window and one look for silence."""
+        # One that is marked as old may be: then the agent has not read a newer one.
         said, age = self.world.now() - status.timestamp, self.world.now() - self.given_at(status)
         assert age <= max(said, WINDOW_S * 1.2) + PROMPT_S, f"stale: {age:.2f} s, said {said:.2f} s"
 
     def given_at(self, status: RobotiqStatus) -> float:
-        """When the gripper gave this status out, by the number it wrote into it: the last time before now."""
+        """The time when the gripper gave out this status, by the number in it: the last before now."""
         stamps, number = self.world.grippers[self.gripper].stamps, status.registers[7] & 0xFF
         # 256 numbers at 200 Hz are 1.3 s: start from when the client thinks it was.
         index = bisect_right(stamps, status.timestamp + 0.1, key=itemgetter(0))
@@ -293,7 +293,7 @@ async def world(**options: Any) -> AsyncIterator[World]:
 
 
 def motions(world: World, since: int) -> list[tuple[float, tuple[int, int]]]:
-    """What went to finger A by each write that set axes going: when, and position and speed."""
+    """Time, position and speed for finger A in each write that set axes going."""
     found: list[tuple[float, tuple[int, int]]] = []
     for write in world.gripper.writes[since:]:
         image = Request.from_registers(write.registers)
