@@ -1,4 +1,4 @@
-"""What a hand cannot be made with, started with or used with: refused with its name, value and range."""
+"""Arguments with which a hand cannot be made, started or used: refused with name, value and range."""
 
 from __future__ import annotations
 

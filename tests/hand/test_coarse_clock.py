@@ -15,11 +15,11 @@ from tests.virtual import VirtualLoop
 
 STEP_S = 1 / 64
 LOOK_S = 1e-6
-"""What a look at the clock takes, so that who waits busily does not wait for ever."""
+"""Seconds for a look at the clock, so that a busy wait does not wait for ever."""
 
 
 class CoarseLoop(VirtualLoop):
-    """Its time stands still between the steps; the gripper's goes on."""
+    """Its time stands still between the steps; the gripper's runs on."""
 
     def __init__(self) -> None:
         super().__init__()

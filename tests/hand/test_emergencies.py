@@ -46,7 +46,7 @@ async def reach(hand: RobotiqHand, state: State) -> asyncio.Task[None]:
 async def test_an_emergency_ends_every_sequence(
     server: SimulatorServer, gripper: SimulatedGripper, state: State, emergency: str, delay: float
 ) -> None:
-    """In DO_ACTIVATION and DO_ATR both were refused, and the fingers went on to move."""
+    """In DO_ACTIVATION and DO_ATR both were refused, and the fingers moved on."""
     hand = RobotiqHand(server.address)
     releasing = state in (State.DO_ATR, State.WF_ATR)
     await hand.start(activate=releasing)
@@ -168,7 +168,7 @@ async def test_a_recovery_that_waits_for_a_sequence_ends_with_the_link(
 
 
 class Watched(Wire):
-    """Notes what the gripper is asked."""
+    """Notes the requests to the gripper."""
 
     def __init__(self) -> None:
         super().__init__(speedup=20)

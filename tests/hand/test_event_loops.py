@@ -49,7 +49,7 @@ async def test_a_start_from_another_loop_is_refused(hand: RobotiqHand) -> None:
 
 
 class _Handle:
-    """A timer handle as qasync has it: it can be cancelled, and cannot tell its time."""
+    """A timer handle as qasync has it: it can be cancelled, and does not know its time."""
 
     def __init__(self, handle: asyncio.TimerHandle) -> None:
         self.cancel = handle.cancel
@@ -119,7 +119,7 @@ async def test_a_reader_that_waits_in_another_loop_gets_an_error(server: Simulat
 
 
 def test_without_an_asyncio_loop_a_start_says_what_is_needed() -> None:
-    """As under trio, which drives coroutines itself."""
+    """Under trio, for example, which drives coroutines itself."""
     hand = RobotiqHand("127.0.0.1:9")
     with pytest.raises(RuntimeError, match="trio is not supported"):
         hand.start().send(None)

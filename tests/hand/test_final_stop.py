@@ -29,7 +29,7 @@ LATENCY_S = 0.15
 TURNS = pytest.mark.parametrize(
     "turn", [0.0, 0.002, 0.004, 0.006, 0.05, 0.16], ids=lambda s: f"{s * 1000:g}ms"
 )
-"""When in a cycle the stop comes: before, in and after its read."""
+"""Moments in a cycle at which the stop comes: before, in and after its read."""
 
 
 def images_since(gripper: SimulatedGripper, count: int) -> list[Request]:
@@ -217,7 +217,7 @@ STOPS = {"leave": {"halt": False}, "keep": {"keep_grip": True}, "halt": {}}
 async def test_the_strongest_stop_counts_in_any_order(
     hand: RobotiqHand, gripper: SimulatedGripper, first: str, second: str, between: float
 ) -> None:
-    """With a gentler one under way, stop() returned with rGTO set, and the fingers went on."""
+    """Beside a gentler one, stop() returned with rGTO set, and the fingers moved on."""
     await hand.set_speed(0)
     await hand.set_position(255)
     await until(lambda: gripper.is_moving)
@@ -305,7 +305,7 @@ async def test_a_halt_or_a_hold_that_was_not_delivered_is_not_lost_with_a_gentle
 async def test_a_gentle_stop_during_a_start_stays_gentle(
     server: SimulatorServer, gripper: SimulatedGripper
 ) -> None:
-    """What start() does about its own failure does not count as a stronger stop."""
+    """The stop of a start() that fails does not count as a stronger stop."""
     hand = RobotiqHand(server.address)
     starting = asyncio.create_task(hand.start())
     await until(lambda: gripper.is_moving)
@@ -480,7 +480,7 @@ async def test_a_hand_that_has_only_looked_writes_nothing_at_its_end(
 async def test_a_hand_that_keeps_grips_keeps_one_when_its_task_is_cancelled(
     server: SimulatorServer, gripper: SimulatedGripper
 ) -> None:
-    """As a program does that cancels all tasks: their order decided whether the part fell."""
+    """A program may cancel all tasks: their order decided whether the part fell."""
     gripper.place_object(Finger.ABC, 120)
     async with RobotiqHand(server.address, keep_grip=True) as hand:
         await hand.grasp()

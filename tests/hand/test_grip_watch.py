@@ -1,4 +1,4 @@
-"""What becomes of grips, from the statuses alone; and what a closing holds, from how it ended."""
+"""The fate of grips, from the statuses alone; and the part in a closing, from its result."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ def seen(
     fault: int = 0,
     at: float = 0.0,
 ) -> RobotiqStatus:
-    """A status in which A does something; the others are where they were asked to go."""
+    """A status in which A does something; the others are at their requests."""
     echo, positions = (request, 0, 0, 0), (position, 6, 6, 6)
     return status_of(byte_0, 0xFC | what, fault, echo=echo, position=positions, at=at)
 
 
 def changes_in(*statuses: RobotiqStatus, watch: GripWatch | None = None) -> list[tuple[GripChange, int]]:
-    """What statuses tell, and how far A has moved then."""
+    """The changes in statuses, with the counts that A has moved."""
     watch = watch or GripWatch()
     events = [event for status in statuses for event in watch.see(status)]
     assert all(event.finger is A for event in events)
@@ -106,12 +106,12 @@ OPENS_LATE = [seen(CLOSING, position, 0) for position in (150, 147, 145, 141)]
     [
         # It creeps.
         ([seen(CLOSING, position) for position in range(150, 159)], [(SLIPPED, 4), (SLIPPED, 4)]),
-        # It closes on to its end, also when no status shows the motion.
+        # It closes on to its end, also when no status has the motion.
         ([HELD, seen(MOVING, 160), seen(REACHED, 241)], [(SLIPPED, 10), (LOST, 81)]),
         ([HELD, seen(REACHED, 241)], [(LOST, 91)]),
         ([SHORT, seen(MOVING, 160, 200), seen(REACHED, 200, 200)], [(SLIPPED, 10), (LOST, 40)]),
         ([SHORT, seen(REACHED, 200, 200)], [(LOST, 50)]),
-        # It is asked to let go: the event comes when the contact ends.
+        # A request releases it: the event comes when the contact ends.
         ([HELD, seen(MOVING, 149, 0)], [(RELEASED, -1)]),
         ([HELD, seen(REACHED, 6, 0)], [(RELEASED, -144)]),
         ([HELD, seen(REACHED, 150, 150)], [(RELEASED, 0)]),
@@ -133,7 +133,7 @@ OPENS_LATE = [seen(CLOSING, position, 0) for position in (150, 147, 145, 141)]
         ([HELD, seen(MOVING, 150, 0, fault=FAULT)], [(LOST, 0)]),
         # A contact that is still reported after a halt or in a fault is one.
         ([HELD, seen(CLOSING, 150, byte_0=0x31), seen(CLOSING, 150, fault=FAULT)], []),
-        # Without an echo to go by nothing counts as asked for; from the first echo on that presses it does.
+        # Without an echo nothing counts as a request; from the first echo on that presses it does.
         ([NO_ECHO, seen(REACHED, 241, 0)], [(LOST, 91)]),
         ([NO_ECHO, seen(MOVING, 150, 0)], [(LOST, 0)]),
         ([NO_ECHO, HELD, seen(MOVING, 149, 0)], [(RELEASED, -1)]),

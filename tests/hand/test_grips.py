@@ -1,4 +1,4 @@
-"""What becomes of a grip: each row of the table in docs/what-happens-when.md, with keep_grip and without."""
+"""The fate of a grip: each row of the table in docs/what-happens-when.md, with keep_grip and without."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HELD = B | C
 
 
 def rows() -> dict[str, tuple[str, str]]:
-    """For each row what becomes of the grip as usual, and with keep_grip."""
+    """The fate of the grip in each row as usual, and with keep_grip."""
     _, *rows = table("what-happens-when.md", "## A grip")
     return {what: (usual, kept) for what, usual, kept, _ in rows}
 

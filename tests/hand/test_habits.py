@@ -39,14 +39,14 @@ ABC = Finger.ABC
 
 
 async def silent() -> Wire:
-    """One that shows 0x09 in the first status after a second without a message."""
+    """One with 0x09 in the first status after a second without a message."""
     wire = Wire(habits=Habits(silence_fault=1.0))
     await asyncio.sleep(2)
     return wire
 
 
 async def pressed(wire: Wire, resets: int | None = None, *, active: bool = True) -> Wire:
-    """One whose emergency stop is pressed, or was, if it says how many resets are needed since."""
+    """One whose emergency stop is pressed, or was, if the number of resets needed since is given."""
     if active:
         await wire.activate()
     wire.gripper.emergency_stop(resets or 9)
@@ -259,7 +259,7 @@ async def test_a_first_motion_of_nothing_ends_at_once(
 async def test_the_newest_reason_is_given_and_since_when_the_link_is_down(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    """The adapter was pulled out: the first reason says nothing of it."""
+    """The adapter was pulled out, which is not in the first reason."""
     caplog.set_level(logging.WARNING, "robotiq_async")
     wire = Wire()
     await activate_beforehand(wire.gripper)
@@ -367,7 +367,7 @@ async def test_a_gripper_that_never_recovers_is_reset_twice_and_left_to_a_person
 
 
 async def test_an_activation_that_shows_nothing_new_is_not_reset() -> None:
-    """Without a priority code it may well go on; here it ends after 20 s."""
+    """Without a priority code it may well continue; here it ends after 20 s."""
 
     class Quiet(Wire):
         def shown(self) -> tuple[int, ...]:

@@ -24,7 +24,7 @@ from tests.calls import COMMANDS, called
 pytestmark = pytest.mark.virtual_time
 
 ABSENT = [Trouble("power-cut"), Trouble("refuse"), Trouble("silence"), Trouble("exception", 11, lasts=1e4)]
-"""What a gripper without power looks like: directly, and behind gateways that are there already."""
+"""A gripper without power: directly, and behind gateways that are there already."""
 
 
 @pytest.mark.parametrize("trouble", ABSENT, ids=lambda trouble: trouble.kind)
@@ -75,7 +75,7 @@ async def test_waiting_ends_at_once(trouble: Trouble, how: str, after: float) ->
             began = here.loop.time()
             if how == "stop":
                 await here.hand.stop()
-                if after:  # at once it is asked before the start has had its turn
+                if after:  # at once it is called before the start has had its turn
                     with pytest.raises(NotStartedError):
                         await starting
                 else:

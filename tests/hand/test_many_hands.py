@@ -47,7 +47,7 @@ class Cell:
         self.right = RobotiqHand(right.address, name="right", reconnect=False)
 
     async def pull_the_plug(self) -> None:
-        """Of the right one, once both move."""
+        """Pull the plug of the right one, once both move."""
         for hand in (self.left, self.right):
             async for status in hand.statuses():
                 if status.is_moving:
@@ -56,7 +56,7 @@ class Cell:
 
     @property
     def last_write(self) -> Request:
-        """To the gripper of the left one."""
+        """The last write to the gripper of the left one."""
         return Request.from_registers(self.servers[0].gripper.writes[-1].registers)
 
 

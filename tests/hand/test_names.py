@@ -1,4 +1,4 @@
-"""A hand that was given a name: errors, the log, its repr and figures tell which one it is."""
+"""A hand that was given a name: errors, the log, its repr and figures have the name."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ async def test_errors_of_waiting_calls_carry_the_name(
     await named.wait_for_state(State.RUNNING_IDLE)
     await named.stop()
     assert_tells(await failed(other, NotStartedError))
-    # What is raised again, copied or sent to another process tells it still, and once.
+    # An error that is raised again, copied or sent to another process has it still, and once.
     for again in (copy.copy(lost), pickle.loads(pickle.dumps(lost))):
         assert_tells(again)
 

@@ -72,9 +72,9 @@ async def test_replies_held_back_never_become_a_status(
     serial_server.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
     changed_at = asyncio.get_running_loop().time()
     statuses = serial_hand.statuses(buffer=1000)
-    line.let_go()  # what was held back says that there is no fault
+    line.let_go()  # the reply held back has no fault
     async for status in statuses:
-        # A reply within the timeout may be as old as that; then it was asked for at that time, too.
+        # A reply within the timeout may be as old as that; then it was requested at that time, too.
         age = status.timestamp - changed_at
         assert status.fault or age < 0.1, f"{age:.3f} s old: {status!r}"
         if age > 0.3:

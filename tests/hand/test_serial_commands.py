@@ -1,4 +1,4 @@
-"""Commands on a serial line: written at once on a status of the last 6 ms, and shown by the next read."""
+"""Commands on a serial line: written at once on a status of the last 6 ms, and echoed in the next read."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ async def test_over_tcp_a_command_is_decided_on_the_next_read() -> None:
 async def test_a_damaged_reply_costs_no_command_and_no_link(
     monkeypatch: pytest.MonkeyPatch, words: str
 ) -> None:
-    """The status that is read after it shows that the write was carried out."""
+    """By the status that is read after it the write was carried out."""
     async with at_a_line(monkeypatch, "2f85") as (hand, replies):
         await hand.set_position(50)
         (trouble,) = parse_troubles(words)
@@ -195,7 +195,7 @@ async def test_a_write_that_was_not_heard_is_lost_and_not_repeated(monkeypatch: 
 async def test_a_write_of_speed_alone_stays_in_doubt_after_a_damaged_reply(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """No status shows speeds and forces, so none can tell whether they were taken."""
+    """No status has speeds and forces, so none reveals whether they were taken."""
     async with at_a_line(monkeypatch, "2f85") as (hand, replies):
         await hand.set_position(50)
         await between_polls(hand)

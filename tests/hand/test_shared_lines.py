@@ -96,7 +96,7 @@ class Tee(asyncio.Protocol):
 
 
 class Branch(asyncio.Protocol):
-    """What comes from one of the devices."""
+    """The bytes from one of the devices."""
 
     def __init__(self, tee: Tee) -> None:
         self._tee = tee
@@ -146,7 +146,7 @@ async def longest_gap(hand: RobotiqHand, seconds: float) -> float:
 
 
 async def positions(hand: RobotiqHand, ended: asyncio.Event) -> set[int]:
-    """The positions that statuses show until something has ended."""
+    """The positions in statuses until something has ended."""
     seen = set()
     async for status in hand.statuses():
         seen.add(status.position(A))

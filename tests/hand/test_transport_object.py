@@ -332,7 +332,7 @@ async def test_a_write_fails_within_a_second_though_closing_takes_its_time_too()
 
 
 class Mute(Wire):
-    """Cannot tell whether it is open."""
+    """Does not know whether it is open."""
 
     def __init__(self) -> None:
         self.is_mute = self._is_open = False

@@ -1,4 +1,4 @@
-"""A gripper that acknowledges writes closer than 10 ms and forgets them: nothing that is asked is lost."""
+"""A gripper that acknowledges writes closer than 10 ms and forgets them: no request is lost."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ async def test_writes_keep_the_distance_that_is_asked_for(spacing: float) -> Non
 @pytest.mark.parametrize("later", [0.0, 0.001, 0.004, 0.006, 0.009])
 @pytest.mark.parametrize("call", ["halt", "stop", "stop that keeps a grip", "reset"])
 async def test_a_stop_waits_for_nothing_and_is_repeated_soon(call: str, later: float) -> None:
-    """stop() ended with a warning after 1.2 s, halt() after 0.5 s, reset() never; and the axis went on."""
+    """stop() ended with a warning after 1.2 s, halt() after 0.5 s, reset() never; and the axis moved on."""
     async with forgetful() as (gripper, hand):
         loop = asyncio.get_running_loop()
         await hand.set_speed(0)
@@ -123,7 +123,7 @@ async def test_an_activation_and_a_release_keep_their_distance_from_the_write_be
 
 @pytest.mark.parametrize("later", [0.0, 0.001, 0.002, 0.003, 0.004, 0.006])
 async def test_a_stop_is_not_taken_for_done_by_what_was_there_before_the_motion(later: float) -> None:
-    """Halted, then moved, then halted again: a status from before the motion showed rGTO = 0."""
+    """Halted, then moved, then halted again: a status from before the motion had gGTO = 0."""
     async with forgetful() as (gripper, hand):
         await hand.halt()
         await asyncio.sleep(1)
@@ -174,7 +174,7 @@ class ResetByAnother(Wire):
 async def test_a_stop_that_is_repeated_activates_nothing(
     call: str, spacing: float, later: float, resets_after: float
 ) -> None:
-    """It was written again with rACT = 1 on a gripper that had been reset meanwhile: the fingers moved."""
+    """It was written again with rACT = 1 on a gripper that had been reset in between: the fingers moved."""
     wire = ResetByAnother()
     wire.gripper.device_cycle = 0.0
     await wire.activate()
