@@ -15,7 +15,7 @@ from tests.virtual_line import VirtualLine
 
 @pytest.fixture
 async def device(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Device]:
-    """At the far end of a line, in virtual time."""
+    """The device at the far end of a line, in virtual time."""
     VirtualLine(monkeypatch)
     device = Device(serial.serial_for_url(VirtualLine.FAR))
     yield device
@@ -24,7 +24,7 @@ async def device(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Device]:
 
 @pytest.fixture
 async def transport(device: Device) -> AsyncIterator[ModbusTransport]:
-    """At the near end, open."""
+    """The transport at the near end, open."""
     transport = unopened(VirtualLine.NEAR)
     await transport.open()
     yield transport

@@ -16,7 +16,7 @@ from tests.serial_line import with_crc
 
 
 def request_size(inbox: bytes) -> int:
-    """Bytes of the first request in eight bytes or more: at the least, while they do not tell."""
+    """Bytes of the first request in eight bytes or more: at the least, while they do not suffice."""
     counts_at = {16: 6, 23: 10}.get(inbox[1])
     if counts_at is None:
         return 8
@@ -34,11 +34,11 @@ class Device:
         """Replies to be kept back from here on."""
         self.kept: list[bytes] = []
         self.spoil: Callable[[bytes], bytes] | None = None
-        """What becomes of the next reply; of every one, if :attr:`spoils_all`."""
+        """A change of the next reply; of every one, if :attr:`spoils_all`."""
         self.loses = 0
         """Requests that are lost from here on."""
         self.late: dict[int, float] = {}
-        """By unit id, how many seconds late the answers to its requests are; beyond all time-outs: silent."""
+        """Delay in seconds of answers, by unit id; beyond all time-outs: silent."""
         self.least_pause = 0.0
         """Requests that come sooner than this after a reply are not heard."""
         self.most = 8
@@ -48,7 +48,7 @@ class Device:
         self.refuses = False
         """Whether a function that is not served gets an exception; else it gets no answer."""
         self.echoes = False
-        """Whether the line brings back what is sent."""
+        """Whether the line echoes the bytes that are sent."""
         self._answered_at = 0.0
         self.spoils_all = False
         self._inbox = b""

@@ -120,7 +120,7 @@ def test_any_text_is_an_address_or_a_value_error_that_shows_the_forms(text: str)
 
 
 def refusal(text: object, error: type[Exception] = ValueError) -> str:
-    """The message that refuses an address; it shows the accepted forms."""
+    """The message that refuses an address; it has the accepted forms."""
     with pytest.raises(error) as caught:
         parse_address(text)
     assert FORMS in str(caught.value)

@@ -1,4 +1,4 @@
-"""Lines as they are: they lose the first request, add a byte, echo, need a longer silence, say "busy"."""
+"""Lines as they are: they lose the first request, add a byte, echo, need a longer silence, answer "busy"."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ IMAGE = (0x0900, 0x00FF, 0x4060, 0, 0, 0, 0, 0)
 
 
 def counts(device: Device) -> list[int]:
-    """The registers that each request asked for, or wrote."""
+    """The registers that each request read, or wrote."""
     return [int.from_bytes(request[4:6], "big") for request in device.requests]
 
 
 async def newest(transport: ModbusTransport, device: Device) -> None:
-    """A read gives what the device said last."""
+    """A read gives the device's last state."""
     registers = await transport.read()
     assert registers[0] == len(device.requests)
 

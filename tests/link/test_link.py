@@ -1,4 +1,4 @@
-"""ModbusTransport against a server that answers byte for byte what the test says.
+"""ModbusTransport against a server that answers with the bytes of the test.
 
 The frames are made by hand here: neither pymodbus nor our own code takes part on this side.
 """
@@ -57,7 +57,7 @@ class Scripted:
         self.connections = 0
         self.writers: list[asyncio.StreamWriter] = []
         self.left_over = b""
-        """What a client is sent before it has asked for anything."""
+        """Bytes that a client gets before its first request."""
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self.connections += 1
@@ -251,7 +251,7 @@ async def test_a_late_reply_that_comes_after_the_first_request_is_never_taken() 
 async def test_a_late_reply_that_a_gateway_numbers_anew_is_never_taken(late: int) -> None:
     """Behind a gateway to a serial line, whose replies carry no number, is a slow device.
 
-    The gateway takes what comes for the answer to what it is asked next.
+    The gateway takes the late reply for the answer to its next request.
     """
     asked: list[bytes] = []
     kept: list[bytes] = []
@@ -463,11 +463,11 @@ def test_a_resolver_that_does_not_answer_holds_up_nothing(monkeypatch: pytest.Mo
     answer.set()
 
 
-# -- more than was asked for -------------------------------------------------------------------------------
+# -- more than was requested -------------------------------------------------------------------------------
 
 REPLY = good(bytes.fromhex("0001 0000 0006 02 04 0000 0008"))
 BURSTS = [*(count * REPLY for count in (2, 11, 100, 1000)), *(bytes(size) for size in (517, 5000, 300_000))]
-"""pymodbus drops what it cannot keep, says nothing, and goes on."""
+"""pymodbus drops what it cannot keep, silently, and continues."""
 bursts = pytest.mark.parametrize("burst", BURSTS, ids=len)
 
 

@@ -60,14 +60,14 @@ async def test_late_replies_never_answer_a_later_request(
 async def test_late_replies_are_dropped_while_the_port_is_opened(
     transport: ModbusTransport, device: Device
 ) -> None:
-    device.keep = 2  # the read, and what was asked when it was not answered
+    device.keep = 2  # the read, and the request when it was not answered
     with pytest.raises(ResponseTimeoutError):
         await transport.read()
     await transport.open()
     assert await transport.read() == (len(device.requests),) * 8
 
 
-# -- a read that is asked once more ------------------------------------------------------------------------
+# -- a read that is repeated -------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("how", SPOILT)

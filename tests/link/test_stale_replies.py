@@ -44,7 +44,7 @@ class Liar:
     def __init__(self, seed: int) -> None:
         self.chance = random.Random(seed)
         self.numbers: Counter[int] = Counter()
-        """By unit id, the number of its last request."""
+        """The number of the last request, by unit id."""
         self.did: Counter[str] = Counter()
         self._loop = asyncio.get_running_loop()
         self._free_at = 0.0
@@ -77,7 +77,7 @@ class Liar:
 
 
 class SerialLiar(Liar):
-    """At the far end of a line."""
+    """A liar at the far end of a line."""
 
     def __init__(self, seed: int) -> None:
         super().__init__(seed)

@@ -1,4 +1,4 @@
-"""UrcapTransport against a text port that answers what the test says, line by line."""
+"""UrcapTransport against a text port with the answers of the test, line by line."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from robotiq_async.values.request import AxisRequest, Request
 pytestmark = pytest.mark.virtual_time
 
 ALL = ["ACT", "GTO", "PRE", "ACT", "GTO", "OBJ", "STA", "FLT", "POS"]
-"""What a read of everything asks for."""
+"""The variables in a read of everything."""
 
 Answer = Callable[[str], bytes | None]
 """Gets a line; gives the bytes of the answer, or None to close."""
@@ -50,7 +50,7 @@ def always(said: bytes | None) -> Answer:
 
 
 class Port:
-    """A text port whose answers can be scripted; else it is a gripper that does at once what it is told."""
+    """A text port whose answers can be scripted; else it is a gripper that carries out requests at once."""
 
     def __init__(self) -> None:
         self.values = {"ACT": 1, "GTO": 0, "STA": 3, "OBJ": 3, "FLT": 0, "PRE": 7, "POS": 7}
@@ -71,7 +71,7 @@ class Port:
 
     @property
     def asked(self) -> list[str]:
-        """The variables that were asked for since the last look."""
+        """The variables that were read since the last look."""
         asked = [line.removeprefix("GET ") for line in self.lines]
         self.lines.clear()
         return asked
@@ -556,10 +556,10 @@ def test_only_an_acknowledgement_is_one(received: bytes) -> None:
 
 
 async def test_no_answer_that_is_late_or_damaged_becomes_a_status() -> None:
-    """10,000 of them. The gripper counts its questions in POS, so that a status tells when it was read.
+    """10,000 of them. The gripper counts its questions in POS, so that a status has the time of its read.
 
-    What is late comes to the connection that asked or, as through a proxy with one of its own, before
-    the next answer.
+    Late answers come to the connection that sent the request or, as through a proxy with one of its own,
+    before the next answer.
     """
     chance = random.Random(7)
     async with linked() as (link, served):

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.virtual_time
 
 @pytest.fixture
 async def worker() -> AsyncIterator[Worker]:
-    """At the end of a test its task ends, and with it whatever waits."""
+    """A worker: at the end of a test its task ends, and with it whatever waits."""
     worker = Worker("worker")
     yield worker
     worker.end(nothing)
