@@ -62,12 +62,12 @@ class Bench:
         assert self.status.initialization is Initialization.COMPLETE
 
     def activate_individually(self) -> None:
-        """Active, every axis with its own register, told to stay where it is."""
+        """Activate it, every axis with its own register and a request to stay where it is."""
         self.activate(individual_fingers=True, individual_scissor=True)
         self.go({axis: self.gripper.position(axis) for axis in THREE_FINGER.axes})
 
     def settle(self, limit: float = 60.0) -> None:
-        """Let time pass until nothing moves, and no activation is under way."""
+        """Let time pass until nothing moves, and no activation runs."""
         end = self.now + limit
         while self.gripper.is_moving or self._is_activating:
             self.wait(0.05)
@@ -144,7 +144,7 @@ def individual() -> Bench:
 
 @asynccontextmanager
 async def simulator(**options: Any) -> AsyncIterator[SimulatorServer]:
-    """A simulator whose gripper goes by the clock of the loop, and stops exactly where it is asked to."""
+    """A simulator whose gripper goes by the clock of the loop, and stops exactly at its request."""
     gripper = SimulatedGripper(asyncio.get_running_loop().time, spread=False, **options)
     async with SimulatorServer(gripper) as server:
         yield server

@@ -20,7 +20,7 @@ MOVING, ARRIVED = ObjectStatus.IN_MOTION, ObjectStatus.AT_POSITION
 
 
 def where(bench: Bench, axis: Finger) -> tuple[int, ObjectStatus]:
-    """Where an axis is, and what it says of itself."""
+    """The position of an axis, and its object status."""
     return bench.gripper.position(axis), bench.status.finger_status(axis)
 
 
@@ -89,7 +89,7 @@ def test_a_contact_latches_against_requests_on_the_same_side(holding: Bench, tar
 
 
 def test_a_contact_latches_when_its_object_gives_way_or_is_gone(holding: Bench) -> None:
-    """A finger that locks itself does not follow; gDT says so until more is asked for."""
+    """A finger that locks itself does not follow; gDT has it until more is requested."""
     holding.gripper.place_object(Finger.A, 170)
     holding.wait(5)
     assert where(holding, Finger.A) == (150, CLOSING)

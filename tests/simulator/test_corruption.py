@@ -1,4 +1,4 @@
-"""What is done to the bytes of a reply: the frames are made by hand, on both kinds of link."""
+"""Corruptions of the bytes of a reply: the frames are made by hand, on both kinds of link."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def rtu(pdu: str, *, unit: str = "09") -> bytes:
 
 
 def corrupted(kind: str, frame: bytes, *, serial: bool = False, value: float | None = None) -> Parts:
-    """What a kind of trouble makes of a frame."""
+    """A frame after a kind of trouble."""
     corruption = KINDS[kind].corruption
     assert corruption is not None
     return corruption(Reply(frame, serial), Trouble(kind, value).amount)

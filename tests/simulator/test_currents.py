@@ -1,4 +1,4 @@
-"""What the motors draw: the manual's frames, and what the thesis says of the peak."""
+"""Currents of the motors: the manual's frames, and the thesis's peak."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 
 def current(bench: Bench, axis: Finger) -> int:
-    """Of one axis, in counts."""
+    """The current of one axis, in counts."""
     counts = bench.status.current(axis)
     assert counts is not None
     return counts
 
 
 def currents(bench: Bench) -> list[int]:
-    """Of all axes, in counts."""
+    """The currents of all axes, in counts."""
     return [current(bench, axis) for axis in THREE_FINGER.axes]
 
 

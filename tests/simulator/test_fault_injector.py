@@ -53,14 +53,14 @@ MISFITS = {
         *("byte-before", "byte-after", "seven-bits", "garbled", "echo", "strict-silence", "no-function-23"),
     },
 }
-"""What cannot happen on a kind of link."""
+"""Troubles that cannot happen on a kind of link."""
 
 
 @asynccontextmanager
 async def carried_out(
     server: SimulatorServer, words: str, announced: list[str]
 ) -> AsyncIterator[asyncio.Task[None]]:
-    """A plan that is under way, with what it has announced."""
+    """A plan that runs, with its announcements."""
     plan = asyncio.create_task(
         server.fault_injector.run(plan_of(words), lambda trouble: announced.append(str(trouble)))
     )
@@ -107,7 +107,7 @@ async def is_let_in(server: SimulatorServer) -> bool:
 
 
 async def activate(server: SimulatorServer) -> None:
-    """In the basic mode: B and C follow A, the scissor follows the mode."""
+    """Activate it in the basic mode: B and C follow A, the scissor follows the mode."""
     server.gripper.write(0, ACTIVE.registers)
     await asyncio.sleep(10)
     assert status(server).is_activated
@@ -240,7 +240,7 @@ async def test_refused_until_the_last_of_two_ends(
 
 
 async def ask_and_go(server: SimulatorServer, pdu: bytes = READ) -> bytes:
-    """Ask, do not wait for the answer, and return what was asked."""
+    """Send a request, do not wait for the answer, and return the request."""
     async with raw_client(server) as client:
         request = client.frame(pdu)
         client.writer.write(request)

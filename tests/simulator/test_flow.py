@@ -1,4 +1,4 @@
-"""Clients that ask and do not listen: what the simulator keeps for them is bounded, and others are served."""
+"""Clients that send requests and do not read: their buffer is bounded, and others are served."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ REQUESTS = 15_000
 READ = with_crc(bytes.fromhex("09 03 03e8 0008"))
 ANSWER = with_crc(bytes.fromhex("09 03 10") + bytes(16))
 LARGEST_READ = 256 * 1024
-"""What asyncio takes from a socket at a time."""
+"""Bytes that asyncio takes from a socket at a time."""
 
 
 def writes(client: RawClient, count: int) -> bytes:

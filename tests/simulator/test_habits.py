@@ -20,7 +20,7 @@ MOVING, ARRIVED = ObjectStatus.IN_MOTION, ObjectStatus.AT_POSITION
 
 
 def seconds_of_activation(bench: Bench, **changes: Any) -> float:
-    """How long an activation takes, as gIMC shows it."""
+    """Seconds of an activation, by gIMC."""
     began = bench.now
     bench.write(activate=True, **changes)
     while bench.status.initialization is Initialization.ACTIVATING:
@@ -54,7 +54,7 @@ def test_it_is_never_faster_than_the_fingers_and_as_slow_when_they_are_closed(be
 
 @pytest.fixture
 def late(individual: Bench) -> Bench:
-    """A gripper whose object status is 40 ms late; its fingers stand where they were told to."""
+    """A gripper whose object status is 40 ms late; its fingers stand at their requests."""
     individual.gripper.habits = Habits(status_lag=0.04)
     individual.wait(1)
     assert individual.outcomes == (ARRIVED,) * 4

@@ -33,7 +33,7 @@ def image(position: int, *, go: bool = True) -> tuple[int, ...]:
 
 
 async def begin(server: SimulatorServer) -> None:
-    """Active, and every axis told to stay open."""
+    """Activate it, with a request for every axis to stay open."""
     await activate(server)
     server.gripper.write(0, image(0))
     await asyncio.sleep(10)

@@ -54,7 +54,7 @@ class Bench:
         assert self.status.is_activated
 
     def move(self, position: int, *, speed: int = 255, force: int = 255) -> float:
-        """Until no finger moves: seconds."""
+        """Seconds until no finger moves."""
         began = self.now
         self.ask(position, speed=speed, force=force)
         self.run(0.02)
@@ -262,7 +262,7 @@ def test_a_finger_that_is_stopped_early_bends_earlier_than_a_free_one() -> None:
 
 
 def test_a_3_finger_keeps_its_contact_when_the_part_is_gone() -> None:
-    """By its manual fingers that met something stay there; those of a jaw go on."""
+    """By its manual fingers that met something stay there; those of a jaw move on."""
     bench = active("box:60x60x60,0.3", THREE_FINGER)
     bench.move(255, force=60)
     at = bench.status.position(Finger.A)

@@ -1,4 +1,4 @@
-"""How far, how fast, and where the axes end."""
+"""Distance, speed and end of motions."""
 
 from __future__ import annotations
 

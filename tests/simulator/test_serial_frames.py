@@ -1,4 +1,4 @@
-"""Where a request ends on a serial line, and who is meant by it; in virtual time."""
+"""The end of a request on a serial line, and its addressee; in virtual time."""
 
 from __future__ import annotations
 

@@ -192,7 +192,7 @@ async def test_only_one_unit_is_answered() -> None:
 
 
 async def test_many_requests_in_one_segment_are_answered_in_order(client: RawClient) -> None:
-    """On its own, pymodbus forgets all but the first."""
+    """Alone, pymodbus forgets all but the first."""
     burst = b"".join(client.frame(struct.pack(">BHH", 6, 1, value)) for value in range(100))
     client.writer.write(burst)
     answers = [await client.reply() for _ in range(100)]

@@ -1,4 +1,4 @@
-"""What is not exact about a gripper: on by default, off on request, the same for the same seed."""
+"""The spread of a gripper: on by default, off on request, the same for the same seed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FINGERS = THREE_FINGER.axes[:3]
 
 @pytest.fixture
 def real(make_bench: Callable[..., Bench]) -> Bench:
-    """The gripper one gets without asking for another, active, its axes on their own registers."""
+    """The default gripper, active, its axes on their own registers."""
     bench = make_bench(spread=True)
     bench.activate_individually()
     return bench
@@ -51,7 +51,7 @@ def test_open_and_closed_read_what_real_ones_read(make_bench: Callable[..., Benc
 
 @pytest.mark.parametrize("axis", THREE_FINGER.axes)
 def test_a_real_axis_may_rest_beside_its_target(real: Bench, axis: Finger) -> None:
-    """111 was asked and 112 reached, 208 and 210 (TAMS): past it, by up to two (manual); some it meets."""
+    """It reached 112 for 111 and 210 for 208 (TAMS): past it, by up to two (manual); some it meets."""
     beside = set()
     for position in (111, 208, 60, *range(100, 200, 10), *range(105, 45, -10)):
         way = 1 if position > real.gripper.position(axis) else -1
@@ -74,7 +74,7 @@ def test_a_seed_repeats_a_run_exactly(make_bench: Callable[..., Bench]) -> None:
 
 
 def test_an_axis_asked_to_stay_does_not_creep(real: Bench) -> None:
-    """A hand tells axes that it does not address to stay at their reading; it must not make them creep."""
+    """A hand requests axes that it does not address to stay at their reading; it must not make them creep."""
     real.reach(111)
     before = [real.gripper.travel(axis) for axis in THREE_FINGER.axes]
     for _ in range(3):

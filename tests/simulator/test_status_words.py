@@ -1,4 +1,4 @@
-"""The first two status bytes that the manual's examples show."""
+"""The first two status bytes in the manual's examples."""
 
 from __future__ import annotations
 

@@ -189,7 +189,7 @@ def test_a_direction_that_is_none_is_refused() -> None:
         Trouble("drop", on=direction)
 
 
-# What is meant when nothing is said.
+# The defaults.
 
 
 VALUES = {

@@ -37,7 +37,7 @@ EXCHANGES = [(READ, 21), (WRITE, 8)]
 
 
 def on_the_wire(request: bytes, answer_size: int) -> float:
-    """What an exchange takes; the silence after the answer comes before the next request."""
+    """Seconds of an exchange; the silence after the answer comes before the next request."""
     return (len(request) + answer_size) * BYTE_S + SILENCE_S
 
 
@@ -216,7 +216,7 @@ async def test_a_hand_works_on_lines_as_they_are(
 async def test_a_device_that_needs_the_longer_silence_now_and_then(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """The reads at opening do not show it; the third read without an answer does."""
+    """The reads at opening do not reveal it; the third read without an answer does."""
     loop, cable = asyncio.get_running_loop(), VirtualLine(monkeypatch)
     async with (
         SerialSimulatorServer(cable.FAR, SimulatedGripper(loop.time)) as server,
