@@ -1,4 +1,4 @@
-"""What a configured node does with its hand, without ROS: what it takes, what a stop ends, what it tells."""
+"""A configured node and its hand, without ROS: its commands, the end of them by a stop, its reports."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ async def gripper() -> SimulatedGripper:
 
 @pytest.fixture
 async def inactive(server: SimulatorServer) -> AsyncIterator[Connection]:
-    """Of a node that was configured."""
+    """The connection of a node that was configured."""
     connection = Connection(RobotiqHand(server.address, poll_interval=POLL_S), SETTINGS)
     await connection.open()
     yield connection
@@ -48,7 +48,7 @@ async def inactive(server: SimulatorServer) -> AsyncIterator[Connection]:
 
 @pytest.fixture
 async def connection(inactive: Connection) -> Connection:
-    """Of an active node, at an active gripper."""
+    """The connection of an active node, at an active gripper."""
     await inactive.permit()
     await inactive.command("activate")
     return inactive
@@ -72,7 +72,7 @@ async def refuses(words: str, *requests: Awaitable[object]) -> None:
 
 
 async def settled(gripper: SimulatedGripper) -> int:
-    """Where finger A is, after all that was to come has come."""
+    """The position of finger A, after all that was to come has come."""
     await asyncio.sleep(4)
     return gripper.position(Finger.A)
 

@@ -29,7 +29,7 @@ async def here() -> AsyncIterator[Lab]:
 
 @pytest.fixture
 async def connection(here: Lab) -> AsyncIterator[Connection]:
-    """Of an active node."""
+    """The connection of an active node."""
     connection = Connection(here.client(control=None), SETTINGS)
     await connection.open()
     assert not connection.hand.is_in_control, "connecting only reads"  # type: ignore[attr-defined]

@@ -1,4 +1,4 @@
-"""What the wheel brings for ROS 2, and what the pages say of it."""
+"""Files of the wheel for ROS 2, and the pages about them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is done at a rate, and how many of the statuses are published."""
+"""Work at a rate, and the number of statuses that are published."""
 
 from __future__ import annotations
 

@@ -98,7 +98,7 @@ class Package:
         (self.work / "python" / self.name / "__init__.py").touch()
 
     def _arguments(self, generator: str, output: Path, **more: object) -> str:
-        """The file that tells a generator what to do."""
+        """The file with a generator's arguments."""
         output.mkdir(parents=True, exist_ok=True)
         path = self.work / f"{generator}.json"
         known = [f"{used}:{idl}" for used in USED for idl in (PREFIX / "share" / used).glob("*/*.idl")]
@@ -171,7 +171,7 @@ def _tool(variable: str, usual: str) -> list[str]:
 
 
 def run(*command: str) -> None:
-    """Run a compiler; what it has to say goes to the terminal.
+    """Run a compiler; its messages go to the terminal.
 
     Raises:
         subprocess.CalledProcessError: it failed.

@@ -1,4 +1,4 @@
-"""What a live test works with: a client of ROS, in a thread of this process, and what it listens to.
+"""The surroundings of a live test: a client of ROS, in a thread of this process, and its topics.
 
 Everything here waits for what happens, and for PATIENCE_S at most.
 """
@@ -39,7 +39,7 @@ LATEST: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Topic:
-    """What is published, as it comes."""
+    """The messages of a topic, as they come."""
 
     def __init__(self) -> None:
         self.messages: list[Any] = []

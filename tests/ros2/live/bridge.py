@@ -1,4 +1,4 @@
-"""What crosses from the executor's thread into the event loop."""
+"""Calls from the executor's thread into the event loop."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.ros2.live.processes import PATIENCE_S
 
 
 async def test_calls_begin_in_their_order() -> None:
-    """Also if the loop was held up meanwhile: a cancel does not overtake its goal."""
+    """Also if the loop was held up: a cancel does not overtake its goal."""
     bridge, order = Bridge(asyncio.get_running_loop(), None), []
 
     async def note(what: str) -> None:

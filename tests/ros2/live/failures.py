@@ -12,7 +12,7 @@ from tests.ros2.live.simulated import Simulator
 
 
 def test_a_killed_node_leaves_the_fingers_running(simulator: Simulator) -> None:
-    """What the pages warn of. A node that is started again adopts the gripper, and can halt it."""
+    """The pages warn of it. A node that is started again adopts the gripper, and can halt it."""
     with active(simulator.address) as (process, client):
         begun(client.move(2.8))
         process.send(signal.SIGKILL)

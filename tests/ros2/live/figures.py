@@ -1,4 +1,4 @@
-"""What the node costs and how quick it is, beside the hand alone: the figures of docs/decisions/ros2.md.
+"""Cost and speed of the node, beside the hand alone: the figures of docs/decisions/ros2.md.
 
     .venv-ros2/jazzy/bin/python -m tests.ros2.live.figures
 
@@ -20,7 +20,7 @@ from tests.ros2.live.processes import Process, isolate, node
 from tests.ros2.live.simulated import Simulator
 
 SECONDS: Final = 10.0
-"""That CPU time and polls are taken over."""
+"""Seconds over which CPU time and polls are counted."""
 TICK: Final = os.sysconf("SC_CLK_TCK")
 ALONE: Final = """
 import asyncio, sys
@@ -98,7 +98,7 @@ def latencies(address: str) -> None:
 
 
 def stillness() -> None:
-    """From the cancel to when the gripper acts on the hold: by its own clock, which is this process's."""
+    """Seconds from the cancel until the gripper acts on the hold, by its clock, which is this process's."""
     held = []
     with Simulator(speedup=1.0) as simulator, active(simulator.address) as (_, client):
         for _ in range(20):

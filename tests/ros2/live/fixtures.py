@@ -34,7 +34,7 @@ def shared() -> Iterator[Cell]:
 
 @pytest.fixture
 def cell(shared: Cell) -> Iterator[Cell]:
-    """The same, with open fingers and nothing between them; what the node logs meanwhile is shown."""
+    """The same, with open fingers and nothing between them; the node's log is printed."""
     began = len(shared.node.lines)
     shared.simulator.do("remove_object")
     shared.client.set("allow_stalling", True)

@@ -206,6 +206,6 @@ def test_a_client_that_hammers_does_not_keep_out_another_one(cell: Cell) -> None
 
 
 def figures(cell: Cell) -> dict[str, str]:
-    """How the polling goes, as the node tells."""
+    """Figures of the polling, from the node."""
     link, _ = cell.client.diagnostics().wait().status
     return {each.key: each.value for each in link.values}

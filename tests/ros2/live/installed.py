@@ -1,4 +1,4 @@
-"""What `ros2 run` and `ros2 launch` look for, found as they find it: through the index of ament."""
+"""Files of `ros2 run` and `ros2 launch`, found as they find them: through the index of ament."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.ros2.live.simulated import Simulator
 
 @pytest.fixture(autouse=True)
 def index(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As the page says: the environment is added to what ROS looks through."""
+    """The index, as on the page: the environment is added to the paths of ROS."""
     monkeypatch.setenv("AMENT_PREFIX_PATH", f"{sys.prefix}:{os.environ.get('AMENT_PREFIX_PATH', '')}")
 
 

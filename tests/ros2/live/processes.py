@@ -12,15 +12,15 @@ from typing import Any, Final, Self
 
 ROOT: Final = Path(__file__).parents[3]
 PATIENCE_S: Final = 20.0
-"""For anything. The machine may be busy with something else."""
+"""Seconds for anything. The machine may be busy with something else."""
 BOOTSTRAP: Final = ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE")
-"""What the wheels leave in the environment; a child has to begin anew."""
+"""Variables that the wheels leave in the environment; a child has to begin without them."""
 OF_ROS: Final = "module 'sre_"
-"""How warnings begin that its parser causes."""
+"""Beginnings of warnings that its parser causes."""
 
 
 def isolate() -> None:
-    """Keep what this process and its children say among themselves. Before ROS is initialized."""
+    """Keep the messages of this process and its children among themselves. Before ROS is initialized."""
     os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)  # tests that run side by side have others
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 

@@ -43,7 +43,7 @@ class Simulator:
 
     @property
     def request(self) -> Request:
-        """What was last asked of it."""
+        """The last request to it."""
         return Request.from_registers(self.read("request_registers"))
 
     def do(self, method: str, *arguments: Any, **named: Any) -> Any:
@@ -51,7 +51,7 @@ class Simulator:
         return self._ask(f"gripper.{method}", arguments, named)
 
     def read(self, attribute: str) -> Any:
-        """What an attribute of the gripper is now."""
+        """The present value of an attribute of the gripper."""
         return self._ask(f"gripper.{attribute}")
 
     def lose_link(self) -> None:

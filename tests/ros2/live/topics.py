@@ -1,4 +1,4 @@
-"""What the node publishes, alone and beside another one."""
+"""Topics of the node, alone and beside another one."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_topics(simulator: Simulator, tmp_path_factory: pytest.TempPathFactory) 
         age = client.node.get_clock().now().nanoseconds / 1e9 - second.header.stamp.sec
         assert abs(age) < 5
         status = client.status()
-        # It is said ten times a second: the one before the node was activated may still come.
+        # It is published ten times a second: the one before the node was activated may still come.
         taking = status.wait(lambda it: json.loads(it.data)["takes_commands"], new=False)
         assert json.loads(taking.data)["state"] == "RESET"
         diagnostics = client.diagnostics()
