@@ -19,7 +19,7 @@ from tests.grippers import activate_beforehand
 
 SHORT = Lengths(reads=50, idle=(0.5, 1.0, 1.5, 5.0), alone=(10.0,), soak=3.0, commands=0.5, interval=0.04)
 FOAM = 120
-"""Where the fingers meet it."""
+"""The position at which the fingers meet it."""
 WHICH = {Finger.A: "a", Finger.B: "l", Finger.C: "r", Finger.SCISSOR: "s"}
 
 
@@ -61,10 +61,10 @@ class Roll:
 
 
 class Helper:
-    """Agrees to everything, names the finger that really moved, and does what is asked for by hand.
+    """Agrees to everything, names the finger that really moved, and does the work by hand.
 
     Attributes:
-        asked: what it was asked.
+        asked: the questions it got.
         alarms: what it was warned of.
         has_stopped: whether a key was pressed.
         before: is called with every question; what it returns, if anything, is the answer.

@@ -81,7 +81,7 @@ def test_with_its_option_a_hand_keeps_its_contract(trouble: str, option: str) ->
     habit = HABIT.set((parse_troubles(trouble)[0], slowly | options(option)))
     failed, count = set(), 0
     try:
-        for name, scene in scenes("test_arguments"):  # refused before the gripper is asked anything
+        for name, scene in scenes("test_arguments"):  # refused before anything is sent to the gripper
             count += 1
             try:
                 scene()

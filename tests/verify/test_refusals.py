@@ -1,4 +1,4 @@
-"""What is not written to: another device, another client's gripper, one that moves or holds something."""
+"""Devices that are not written to: another one, another client's gripper, one that moves or holds a part."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ async def test_a_fault(fault: int) -> None:
 
 
 async def test_a_program_that_was_killed_in_a_full_stroke() -> None:
-    """What it left set is reported, and cleared only on consent; the next run begins with no motion."""
+    """The rGTO it left set is reported, and cleared only on consent; the next run begins with no motion."""
     async with served(active=True) as server:
         server.gripper.write(0, CLOSING.registers)
         await asyncio.sleep(15)
@@ -128,7 +128,7 @@ async def test_a_stage_that_needs_an_active_gripper() -> None:
 
 
 async def test_a_gripper_that_loses_its_activation_between_two_stages() -> None:
-    """While the person reads what comes next."""
+    """It happens while the person reads about the next stage."""
     async with served() as server:
         helper = Helper(server)
 
@@ -147,7 +147,7 @@ async def test_a_gripper_that_loses_its_activation_between_two_stages() -> None:
 
 @contextlib.asynccontextmanager
 async def device(block: Callable[[], bytes]) -> AsyncIterator[tuple[str, list[bytes]]]:
-    """Another Modbus server; its address, and what it was asked to write."""
+    """Another Modbus server; its address, and the writes to it."""
     written: list[bytes] = []
 
     def answer(request: bytes) -> bytes:

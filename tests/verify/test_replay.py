@@ -53,7 +53,7 @@ def recording(**options: Any) -> Any:
 
 
 plain, short = recording(), recording(last=3)
-"""To the last stage that is compared, and up to the activation."""
+"""Recordings to the last stage that is compared, and up to the activation."""
 hardware_like, jaw = recording(is_like_hardware=True), recording(model=TWO_FINGER_85)
 
 
@@ -141,7 +141,7 @@ def test_habits_that_the_simulator_has_not_are_listed(hardware_like: Path) -> No
 def test_a_frame_that_was_changed_by_hand_is_listed_and_no_other(
     short: Path, tmp_path: Path, register: int, bits: int, field: str
 ) -> None:
-    """The first status of stage 3, which still shows a gripper that is reset."""
+    """The first status of stage 3, still of a gripper that is reset."""
     left = [0]
 
     def change(topic: str, fields: dict[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""What a run leaves behind: report.json, report.md, recording.mcap."""
+"""The files of a run: report.json, report.md, recording.mcap."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ async def test_the_recording_has_every_frame(tmp_path: Path) -> None:
     assert stages == [f"verify stage {number}" for number in range(4)]
 
 
-# -- nothing that tells where it was ---------------------------------------------------------------------
+# -- nothing about the place -----------------------------------------------------------------------------
 
 
 @pytest.mark.virtual_time
@@ -203,7 +203,7 @@ async def test_a_report_that_cannot_be_written_ends_the_run_after_the_stage() ->
 
 @pytest.mark.virtual_time
 async def test_after_each_stage_the_report_is_on_the_disk(tmp_path: Path) -> None:
-    """So a run that is killed leaves what it knew."""
+    """So a run that is killed leaves its findings."""
     seen: list[list[int]] = []
     async with served() as server, threads():
         address = parse_address(server.address)

@@ -43,7 +43,7 @@ async def test_a_habit_is_found_and_nothing_else(trouble: str, check: str, optio
     ("model", "options"), [(THREE_FINGER, {}), (TWO_FINGER_85, {"write_function": 16})], ids=str
 )
 async def test_a_line_without_function_23(model: Model, options: dict[str, int]) -> None:
-    """A jaw is written with it unless told otherwise."""
+    """A jaw is written with it by default."""
     async with served("no-function-23", serial=True, model=model) as server:
         report = await verified(server, last=2)
     assert report.why == "done", report.words
@@ -133,7 +133,7 @@ async def test_a_trouble_in_a_stage_ends_it(trouble: str, stage: int, cell: str)
 
 @pytest.mark.parametrize("stage", range(3, 10))
 async def test_a_key_stops_a_gripper_that_forgets_writes_and_shows_them_late(stage: int) -> None:
-    """What was written last may be a moment ago: the stop is written again until it shows."""
+    """The last write may be a moment ago: the stop is written again until it is echoed."""
     habits = ("write-spacing 0.05", "status-lag 0.1", "slow-device 0.1")
     async with served(*habits, active=stage > 3) as server:
         helper = Helper(server)
@@ -153,7 +153,7 @@ async def test_a_stage_whose_stop_is_not_confirmed_ends_the_run() -> None:
     async with served(active=True) as server:
         helper, injector = Helper(server), server.fault_injector
         begun: list[asyncio.Future[object]] = []
-        # The last two frames are rGTO = 0 and the status that shows it.
+        # The last two frames are rGTO = 0 and the status with its echo.
         cue = Cue(
             whole.kept - 2, lambda: begun.append(asyncio.ensure_future(injector.begin(Trouble("silence"))))
         )

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.virtual_time
 
 @pytest.mark.parametrize("name", MODELS)
 async def test_every_stage_ends_well_but_the_one_with_foam(name: str) -> None:
-    """No foam among bodies that are rigid: nobody puts any there."""
+    """Bodies are rigid: there is no foam among them."""
     async with served(model=name, physics=Physics("table")) as server:
         helper = Helper(server)
         helper.before = lambda words: True if words in (soft_part.PLACE, soft_part.RELEASE) else None
