@@ -25,7 +25,7 @@ DRIVER: Final = shutil.which("chromedriver")
 MISSING: Final = "needs a browser and its driver: apt-get install chromium chromium-driver"
 PATIENCE: Final = 20
 SMALL: Final = (460, 420)
-"""Of a window, in pixels: what is drawn without a graphics card takes the processor's time."""
+"""Size of a window in pixels: drawing without a graphics card takes the processor's time."""
 FLAGS: Final = (
     "--headless",
     "--no-sandbox",
@@ -45,7 +45,7 @@ if (!palm || !link) return null;
 scene.updateMatrixWorld(true);
 return palm.worldToLocal(link.getWorldPosition(palm.position.clone())).toArray();
 """
-"""Where the browser draws a link, in the frame of the root."""
+"""The place at which the browser draws a link, in the frame of the root."""
 MIDDLE: Final = "arguments[0].scrollIntoView({block: 'center'})"
 VISIBLE: Final = """
 const scene = window[Object.keys(window).find((key) => key.startsWith('scene_'))];
@@ -109,7 +109,7 @@ class Browser:
         await self.do(lambda: self.find(name).click())
 
     async def press_keys(self, keys: str) -> None:
-        """Where the focus is."""
+        """Press keys in the element with the focus."""
         await self.do(lambda: ActionChains(self.driver).send_keys(keys).perform())
 
     async def focus_slider(self, name: str) -> None:
@@ -119,7 +119,7 @@ class Browser:
         return await self.do(lambda: self.driver.execute_script(script, *arguments))
 
     def link(self, name: str, root: str = "palm") -> Any:
-        """Where it draws a link, in the frame of the root; None before it does."""
+        """The place at which it draws a link, in the frame of the root; None before it does."""
         return self.driver.execute_script(LINK, name, root)
 
     async def in_touch(self) -> None:
@@ -130,7 +130,7 @@ class Browser:
         return list(self.driver.get_log(kind))  # type: ignore[no-untyped-call]
 
     def requested(self) -> set[str]:
-        """Every address that was asked for since the last time, but what the browser asks of itself."""
+        """Every address that was requested since the last time, except the browser's own requests."""
         messages = [json.loads(each["message"])["message"] for each in self._log("performance")]
         asked = {
             each["params"].get("request", each["params"]).get("url", "")
@@ -141,7 +141,7 @@ class Browser:
         return {url for url in asked if not url.startswith("chrome://")}
 
     def complaints(self) -> list[str]:
-        """What the page has complained about since the last time."""
+        """Complaints of the page since the last time."""
         return [each["message"] for each in self._log("browser") if each["level"] == "SEVERE"]
 
 
@@ -149,7 +149,7 @@ class Pace:
     """The clock of a simulated gripper, which may run faster or slower than ours."""
 
     def __init__(self, rate: float = 1.0) -> None:
-        """So many times as fast as ours."""
+        """Start a clock with a rate relative to ours."""
         self._rate = rate
         self._at = self._now = monotonic()
 
@@ -161,6 +161,6 @@ class Pace:
         return self._now
 
     def set(self, rate: float) -> None:
-        """From now on it runs so many times as fast as ours."""
+        """Set its rate relative to ours from now on."""
         self()
         self._rate = rate

@@ -53,7 +53,7 @@ async def shown(*hands: Hand, control: bool = True) -> AsyncIterator[PageServer]
 
 @dataclass
 class Stage:
-    """What is shown, and where."""
+    """A gripper with its own clock, its hand and the page."""
 
     pace: Pace
     gripper: SimulatedGripper
@@ -62,7 +62,7 @@ class Stage:
     page: PageServer
 
     async def clear(self) -> None:
-        """As it was before the first test."""
+        """Restore the state before the first test."""
         self.pace.set(FAST)
         self.gripper.remove_object()
         async with asyncio.timeout(20):
@@ -76,7 +76,7 @@ class Stage:
         await self.hand.move(WIDTH_NORMAL, Finger.SCISSOR)
 
     async def slow(self) -> None:
-        """From now on a stroke takes 40 seconds: on a busy machine a click takes ten."""
+        """Slow the gripper down: a stroke takes 40 seconds, and a click on a busy machine ten."""
         await self.hand.set_speed(0)
         self.pace.set(SLOW)
 
@@ -157,7 +157,7 @@ async def press(browser: Browser, hand: RobotiqHand, name: str) -> None:
 
 
 async def seen(hand: RobotiqHand, *, moving: bool, go: bool = True, within: float = 20) -> RobotiqStatus:
-    """Wait until the fingers move or stand still, and are asked to go or not."""
+    """Wait until the fingers move or stand still, with rGTO set or not."""
     async with asyncio.timeout(within):
         async for status in hand.statuses():
             if status.is_moving is moving and (go or not status.go_echo):
@@ -165,7 +165,7 @@ async def seen(hand: RobotiqHand, *, moving: bool, go: bool = True, within: floa
     raise AssertionError("the hand has ended")
 
 
-# -- what it shows -----------------------------------------------------------------------------------------
+# -- the display -------------------------------------------------------------------------------------------
 
 
 async def test_the_page_loads_and_asks_no_other_host(browser: Browser, stage: Stage) -> None:
@@ -177,20 +177,20 @@ async def test_the_page_loads_and_asks_no_other_host(browser: Browser, stage: St
     for url in browser.requested():
         scheme, _, rest = url.partition("://")
         assert (scheme in ("http", "ws") and rest.startswith(base)) or url.startswith(("data:", "blob:")), url
-    # Chromium asks for an icon by itself, at the door, where it has no cookie.
+    # Chromium requests an icon by itself, at the door, where it has no cookie.
     assert [each for each in browser.complaints() if "favicon" not in each] == []
     assert "token" not in await browser.run("return location.href")
 
 
 async def test_following_a_link_opens_the_page(window: Browser, stage: Stage) -> None:
-    """In a terminal in the browser, or from the file that --open writes: cookies may stay at home then."""
+    """The link may be in a terminal in the browser, or in the file of --open: without cookies then."""
     await window.open(f"data:text/html,<a id=link href='{stage.page.url}'>here</a>")
     await window.do(lambda: window.driver.find_element("id", "link").click())
     await window.says("state", "ready")
 
 
 async def test_the_joints_move_when_the_gripper_moves(browser: Browser, hand: RobotiqHand) -> None:
-    """Three.js puts every link where the library says that it is."""
+    """Three.js puts every link at the library's place for it."""
     for position, scissor in ((120, 60), (200, 219)):
         await hand.move(0)
         await hand.move(scissor, Finger.SCISSOR)
@@ -291,7 +291,7 @@ async def test_halt_stops_it_and_so_does_the_space_bar(browser: Browser, stage: 
 
 
 async def test_a_halt_is_not_under_a_question_that_is_open(browser: Browser, stage: Stage) -> None:
-    """On a phone there is no space bar; the first tap closed the question, and the fingers went on."""
+    """On a phone there is no space bar; the first tap closed the question, and the fingers moved on."""
     await stage.slow()
     await press(browser, stage.hand, "close")
     await browser.click("reset")
@@ -314,7 +314,7 @@ async def test_dangerous_actions_ask_first(browser: Browser, hand: RobotiqHand) 
         return hand.state is State.RESET
 
     await browser.until(insist)
-    await browser.press_keys(Keys.ESCAPE)  # it may have asked once more
+    await browser.press_keys(Keys.ESCAPE)  # it may have sent it once more
     await browser.says("state", "reset")
 
 
@@ -331,7 +331,7 @@ async def test_dangerous_actions_ask_first(browser: Browser, hand: RobotiqHand) 
 async def test_each_axis_is_sent_where_its_slider_was_let_go(
     name: str, axes: Finger, browser: Browser, hand: RobotiqHand
 ) -> None:
-    """The slider alone moves nothing, and one that is not touched shows where its axis stands."""
+    """The slider alone moves nothing, and one that is not touched has the position of its axis."""
     first = next(axis for axis in THREE_FINGER.axes if axis in axes)
     await browser.until(lambda: place_of(browser, name) == hand.status.position(first))
     target, before = place_of(browser, name) + 30, hand.status
@@ -352,18 +352,18 @@ async def test_each_axis_is_sent_where_its_slider_was_let_go(
 
 
 def place_of(browser: Browser, name: str) -> int:
-    """Where the slider of an axis is."""
+    """The value of the slider of an axis."""
     return int(str(browser.find(f"position-{name}").get_attribute("aria-valuenow")))
 
 
 def outcome_of(browser: Browser, name: str) -> str | Literal[False]:
-    """How a command ended, once it has."""
+    """The outcome of a command, once it has ended."""
     words = browser.find("outcome").text
     return words.startswith(f"{name}: ") and words
 
 
 async def test_a_slider_sends_where_it_was_let_go(browser: Browser, hand: RobotiqHand) -> None:
-    """And not where it was some milliseconds before, which is what the server knows of it then."""
+    """The server knows only its value some milliseconds before."""
     requests = hand.requests()
     await browser.focus_slider("speed")
     pressed, before, done = 0, 0, 0
@@ -388,7 +388,7 @@ async def test_a_slider_is_not_set_back_to_what_the_server_knew(browser: Browser
 
 
 def speeds_set(browser: Browser, times: int) -> list[str] | Literal[False]:
-    """How each change of the speed ended, once there are so many."""
+    """The outcome of each change of the speed, once there are so many."""
     lines = [line for line in browser.find("events").text.splitlines() if "set_speed" in line]
     return len(lines) >= times and lines
 
@@ -421,7 +421,7 @@ async def test_closing_a_page_holds_what_it_has_set_in_motion_and_the_other_page
 
 
 async def test_a_page_that_cannot_be_heard_holds_its_motion(browser: Browser, stage: Stage) -> None:
-    """As a phone that leaves the wireless network: no connection is closed."""
+    """A phone may leave the wireless network: no connection is closed."""
     await stage.slow()
     await press(browser, stage.hand, "close")
     await browser.run("window.emitEvent = () => {}; window.socket.emit = () => {};")
@@ -461,7 +461,7 @@ def shown_after(browser: Browser, time: float) -> float | Literal[False]:
 async def test_a_page_whose_process_stands_still_holds_its_motion_and_takes_no_press(
     browser: Browser, stage: Stage
 ) -> None:
-    """What is pressed meanwhile arrives when it runs again, or never, and moves nothing."""
+    """A press in that time arrives when it runs again, or never, and moves nothing."""
     await stage.slow()
     await press(browser, stage.hand, "close")
     process = stage.page._process.pid

@@ -1,4 +1,4 @@
-"""Who gets in, and who does not."""
+"""Requests that are let in, and those that are not."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ GUARD = Guard(None, RULES)  # type: ignore[arg-type]
 
 
 async def entered(client: str, password: str, *, ends: bool = True) -> dict[str, Any]:
-    """What is answered to a password."""
+    """The answer to a password."""
     answers: list[dict[str, Any]] = []
     parts = [{"type": "http.request", "body": f"password={password}".encode(), "more_body": not ends}]
 

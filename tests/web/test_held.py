@@ -1,4 +1,4 @@
-"""What the page draws between the fingers, and how they stand around it: compared with the URDF."""
+"""The part that the page draws between the fingers, and their pose around it: compared with the URDF."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the page is made of, without a browser: commands, updates, the mirror, being in touch."""
+"""The parts of the page, without a browser: commands, updates, the mirror, the heartbeat."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from tests.grippers import active_gripper, shows, until
 
 
 class Pages:
-    """What pages ask for, and how they are answered."""
+    """Requests of pages, and their answers."""
 
     def __init__(self, *hands: Any) -> None:
         self.answers: list[dict[str, Any]] = []
@@ -107,7 +107,7 @@ def test_no_refusal_has_a_method_or_a_state_of_the_library(trigger: Trigger, sta
 
 
 async def test_without_operators_nothing_is_carried_out() -> None:
-    """Whatever the process of the page says: looking only is decided where the hand is."""
+    """Whatever the process of the page sends: looking only is decided in the process of the hand."""
     pages = Pages()
     for name in ("close", "halt"):
         pages.do(name)
@@ -123,7 +123,7 @@ MOVING: tuple[tuple[str, dict[str, Any]], ...] = (
 
 @pytest.mark.parametrize("ago", [FRESH_S + 0.1, 1e9, -1.0])
 async def test_late_requests_move_nothing_but_a_halt_is_never_too_late(hand: RobotiqHand, ago: float) -> None:
-    """Whether it waited in the browser, on the network, or for this loop, which something had held up."""
+    """It may have waited in the browser, on the network, or for this loop, which something had held up."""
     await assert_only_a_halt(Pages(hand), hand, "arrived too late", ago=ago)
 
 
