@@ -1,4 +1,4 @@
-"""What every test relies on: nothing is left running, and the loop complains about what it sees."""
+"""Fixtures of every test: nothing is left running, and the loop's complaints are failures."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ async def clock() -> Clock:
 
 @pytest.fixture
 async def gripper(clock: Clock) -> SimulatedGripper:
-    """A fast one that stops exactly where it is asked to."""
+    """A fast one that stops exactly at its request."""
     return SimulatedGripper(clock, speedup=20, spread=False)
 
 

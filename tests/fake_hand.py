@@ -1,6 +1,6 @@
 """A third kind of hand, one page long: no link, no task, no simulator. All happens at once.
 
-It proves that a hand takes no more than what Hand asks of its subclasses, and that what stands around a hand
+It proves that a hand takes no more than Hand requires of its subclasses, and that the parts around a hand
 needs nothing but a Hand.
 """
 
@@ -146,7 +146,7 @@ class FakeHand(Hand):
         self._read()
 
     def _read(self) -> None:
-        """What a gripper shows that has done what it was asked."""
+        """The status of a gripper that has carried out its request."""
         block = [0] * reg.REGISTER_COUNT
         reg.gACT.write(block, self._request.activate)
         reg.gGTO.write(block, self._request.go)

@@ -19,17 +19,17 @@ from robotiq_async.values.request import Request
 
 EXCHANGE_S = 0.001
 SILENCE_S = 0.4
-"""How long a transport waits for an answer."""
+"""Seconds that a transport waits for an answer."""
 DEVICE_CYCLE_S = 0.005
-"""So long a simulated gripper takes to see a write."""
+"""Seconds until a write acts on a simulated gripper."""
 LOST = ConnectionLostError("unplugged")
 
 
 class Wire:
-    """A gripper in the time of the loop; the transport fails when told to.
+    """A gripper in the time of the loop; the transport fails on demand.
 
     Attributes:
-        calls: what was asked of it, in order.
+        calls: of it, in order.
         written: the images that have reached the gripper.
         failing: the calls that fail, and with what; until taken out.
         silent: the calls that are not answered.
@@ -58,7 +58,7 @@ class Wire:
         return self.shown()
 
     async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
-        """What a link does beyond a transport object."""
+        """The part of a link beyond a transport object."""
         registers = decide()
         if registers is None:
             return False
@@ -88,7 +88,7 @@ class Wire:
             raise self.failing[what]
 
     def shown(self) -> Registers:
-        """What the gripper shows."""
+        """The status of the gripper."""
         return self.gripper.status_registers()
 
     def take(self, registers: Registers) -> None:

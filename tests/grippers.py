@@ -60,7 +60,7 @@ async def shows(hand: Hand, wanted: Callable[[RobotiqStatus], bool]) -> RobotiqS
 
 
 async def lose_link(server: SimulatorServer, hand: Hand) -> None:
-    """Take the link away, and let no connection in; wait until the hand shows it."""
+    """Take the link away, and let no connection in; wait until the hand notices."""
     server.refuse()
     server.cut()
     await hand.wait_for_state(State.DISCONNECTED)

@@ -4,7 +4,7 @@
 
 What was written is written to a simulated gripper at the same times, from where the recorded one stood. What
 hands did (foam, cables, switches) is not in a recording, and whether a write is forgotten is a matter of less
-time than a recording tells: stages 7, 8 and 9 are left out, but for the decoder.
+time than a recording has: stages 7, 8 and 9 are left out, but for the decoder.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ ROUNDING_S: Final = 1e-6
 COUNTS: Final = 3
 """Positions, too."""
 EARLIER_S: Final = 100.0
-"""Before a stage the simulated gripper has so long to come to where the recorded one was."""
+"""Seconds that the simulated gripper has before a stage to come to the place of the recorded one."""
 LIKE_HARDWARE: Final = Habits(12.0, status_lag=0.05, silence_fault=1 - 2 * APART_S, write_spacing=0.01)
 """Those of ``simulate``; the silence is a little shorter, for looking around a frame ends it."""
 EXACT: Final = {
@@ -56,7 +56,7 @@ class Difference(NamedTuple):
     seconds: float  # since the stage began
     field: str  # its name; "decoder" for a status that is understood otherwise now
     recorded: object
-    simulated: object  # what the simulator shows about then
+    simulated: object  # the simulator's status about then
 
 
 @dataclass
@@ -107,7 +107,7 @@ def _decoded(stage: Segment) -> Iterator[Difference]:
 
 
 def _simulated(stages: list[Segment], habits: Habits) -> Iterator[Difference]:
-    """The stages are in one piece: what an axis shows at the beginning of one is from the one before."""
+    """The stages are in one piece: the status of an axis at the beginning of one is from the one before."""
     times = [seconds for stage in stages for seconds, _ in stage.statuses]
     moment = [times[0] - EARLIER_S]
     model = stages[0].model

@@ -1,11 +1,11 @@
-"""How strong the tests are: small mistakes are made in the library, and the tests should notice each.
+"""The strength of the tests: small mistakes are made in the library, and the tests should notice each.
 
     python -m tests.mutants ../mutants.jsonl [--mutants 300] [--seed 24]
 
 The first run keeps a copy of the tree beside the file, runs the tests once and notes which test runs which
 statement. Then the mistakes are made in the copy, one at a time, and some of those tests run that run the
-statement. The file gets a line of JSON for each; the same command goes on where it was interrupted. A mistake
-counts as killed by a test that passes without it.
+statement. The file gets a line of JSON for each; the same command continues where it was interrupted. A
+mistake counts as killed by a test that passes without it.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def is_for_types(node: ast.AST) -> bool:
 
 
 def instead_of(node: ast.AST, *, inside: bool) -> Iterator[Any]:
-    """What can be put in the place of a node."""
+    """Mutations of a node."""
     match node:
         case ast.Compare(ops=[op]) if type(op) in SWAPS:
             yield ast.Compare(node.left, [SWAPS[type(op)]()], node.comparators)
@@ -171,7 +171,7 @@ class Recorder:
 
 
 def record(work: Path) -> None:
-    """To be called in the copy: run the tests with probes in the library."""
+    """Run the tests with probes in the library; to be called in the copy."""
     recorder = Recorder([])
     for path in Path("robotiq_async").rglob("*.py"):
         if path.parts[1] in PARTS:
@@ -197,7 +197,7 @@ def is_head(statement: ast.stmt) -> bool:
 
 
 def fitting(seconds: dict[str, float], part: str) -> list[str]:
-    """Of all tests some: of a function not more than three at first, the nearest, the quickest."""
+    """Some of all tests: of a function not more than three at first, the nearest, the quickest."""
     order, seen = [], collections.Counter[str]()
     for test in sorted(seconds, key=lambda test: (seconds[test], test)):
         function = test.split("[")[0]
@@ -265,7 +265,7 @@ class Tree:
         return {self.tests[number] for number in numbers} & self.seconds.keys()
 
     def outcome(self, file: str, number: int) -> dict[str, Any]:
-        """What becomes of a mistake."""
+        """The fate of a mistake."""
         path = self.root / file
         original, stat = path.read_text(), path.stat()
         module = ast.parse(original)

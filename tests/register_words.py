@@ -11,7 +11,7 @@ from robotiq_async.values.request import Request
 from robotiq_async.values.status import RobotiqStatus
 
 REQUEST_RESERVED = (0xE0, 0xF3, 0xFF, *(0,) * 12, 0xFF)
-"""For each of the sixteen request bytes the bits that must be written 0 (rGLV and rAAC among them)."""
+"""The bits that must be written 0 in each of the sixteen request bytes (rGLV and rAAC among them)."""
 
 
 def registers_of(content: Sequence[int]) -> tuple[int, ...]:
@@ -53,7 +53,7 @@ def with_object_status(status: Registers, old: Registers) -> Registers:
 
 
 def only_holds(gripper: SimulatedGripper, since: int) -> bool:
-    """Whether all that was written after so many writes only asks axes to stay where they have stayed."""
+    """Whether all writes after so many only request axes to stay where they have stayed."""
     writes = gripper.writes[max(since - 1, 0) :]
     images = [Request.from_registers(write.registers, gripper.model) for write in writes]
     for before, image in pairwise(images):

@@ -16,7 +16,7 @@ PACKAGE = Path(robotiq_async.__file__).parent
 ROOT = Path(__file__).parents[1]
 AROUND = re.compile(r"robotiq_async\.(cli|fleet|ros2|tools)\b|pytest_robotiq_async\b")
 OUTSIDE = {"__init__", "__main__", "__pycache__", "_demo", "data", "py", "version"}
-"""What no contract needs to speak of."""
+"""Modules that no contract needs to name."""
 
 
 def test_every_room_has_its_layer_and_says_what_it_is_for() -> None:
@@ -78,7 +78,7 @@ def test_importing_the_library_imports_neither_simulator_nor_extras() -> None:
 
 
 def test_the_tests_of_the_core_run_without_what_stands_around_it() -> None:
-    """``make test-core``: nobody who changes the core waits for a page, or for another host."""
+    """``make test-core``: a change of the core waits for no page and no other host."""
     folders = (ROOT / "tests" / "core.txt").read_text(encoding="utf-8").split()
     left = [file for folder in folders for file in (ROOT / folder).rglob("*.py")]
     known = set(left)

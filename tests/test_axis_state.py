@@ -1,4 +1,4 @@
-"""What people read of an axis that was never asked for anything: never that it moves."""
+"""The state for people of an axis that never had a request: never that it moves."""
 
 from __future__ import annotations
 

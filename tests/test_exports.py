@@ -1,4 +1,4 @@
-"""What the package exports, and that its methods and constants are documented."""
+"""The exports of the package, and that its methods and constants are documented."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ EXTRAS = {
     "JAW": "the axis of a 2F or a Hand-E",
     "WrongModelError": "what a start with another model raises",
 }
-"""What is exported beyond it, with the reason."""
+"""Exports beyond it, with the reason."""
 
 
 def methods() -> Iterator[tuple[str, object]]:

@@ -1,4 +1,4 @@
-"""What a message says about an extra that is missing: something that works, wherever the library is from."""
+"""The message about a missing extra: a command that works, wherever the library is from."""
 
 from __future__ import annotations
 

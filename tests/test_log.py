@@ -1,4 +1,4 @@
-"""The log: which hand a record is about, and that what others say stays within its line."""
+"""The log: which hand a record is about, and that texts of others stay within their line."""
 
 from __future__ import annotations
 

@@ -245,7 +245,7 @@ async def test_a_gripper_of_another_model_is_refused_and_not_written_to(
 ) -> None:
     gripper = SimulatedGripper(asyncio.get_running_loop().time, model=there)
     async with SimulatorServer(gripper) as server:
-        # The registers of a sibling lie elsewhere, and both are served: it is the content that tells.
+        # The registers of a sibling lie elsewhere, and both are served: the content decides.
         hand = RobotiqHand(f"127.0.0.1:{server.port}", model=named)
         with pytest.raises(WrongModelError, match=words):
             await hand.start()
@@ -254,7 +254,7 @@ async def test_a_gripper_of_another_model_is_refused_and_not_written_to(
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=lambda model: model.name)
 def test_zeros_contradict_no_model(model: Model) -> None:
-    """A gateway may show them before its gripper has answered."""
+    """A gateway may send them before its gripper has answered."""
     assert not model.contradiction((0,) * 8)
 
 

@@ -1,4 +1,4 @@
-"""Every surface that offers options of a hand has what the one table says, and nothing else."""
+"""Every surface that offers options of a hand has those of the one table, and no others."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ from tests.fake_hand import FakeHand
 
 ROOT = Path(robotiq_async.__file__).parent
 AROUND = [path for room in ("tools", "cli") for path in sorted((ROOT / room).rglob("*.py"))]
-"""What stands around a hand."""
+"""The packages around a hand."""
 
 
 # -- who satisfies it --------------------------------------------------------------------------------------
@@ -46,7 +46,7 @@ def members(kind: type) -> dict[str, object]:
 
 
 def test_every_hand_has_the_public_members_of_hand() -> None:
-    """But for what belongs to the process that owns the link, and what takes a lease."""
+    """Except for members of the process that owns the link, and those that need a lease."""
     shared = members(Hand).keys()
     assert members(RobotiqHand).keys() - shared == {"add_listener"}
     assert members(RemoteHand).keys() - shared == {"acquire", "take", "release", "is_in_control"}
@@ -71,7 +71,7 @@ def names_in(path: Path) -> Iterator[str]:
 
 
 def test_tools_do_not_know_which_kind_of_hand_they_use() -> None:
-    """But for the one function that makes a hand from an address. Of the blocking hand there is one kind."""
+    """Except for the one function that makes a hand from an address. The blocking hand has one kind."""
     blocking = ROOT / "tools" / "lerobot"
     knowing = [path for path in AROUND if "RobotiqHand" in names_in(path) and path.parent != blocking]
     assert knowing == [ROOT / "cli" / "connect.py"]
@@ -89,7 +89,7 @@ async def hand() -> AsyncIterator[FakeHand]:
 async def test_everything_around_a_hand(
     hand: FakeHand, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """What mypy sees of the types, done once; what each tool does has its own tests."""
+    """The calls that mypy checks, made once; the work of each tool has its own tests."""
     pytest.importorskip("foxglove")
     from robotiq_async.tools.viewer import Viewer  # noqa: PLC0415
 

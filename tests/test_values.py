@@ -1,4 +1,4 @@
-"""What the library hands out are values: they can be compared, hashed, copied and sent to other processes."""
+"""Results of the library are values: they can be compared, hashed, copied and sent to other processes."""
 
 from __future__ import annotations
 
@@ -167,7 +167,7 @@ def kinds() -> Iterator[type]:
 
 
 def named(each: list[Any]) -> list[Any]:
-    """As parameters."""
+    """The values as parameters."""
     return [pytest.param(one, id=f"{type(one).__name__}-{number}") for number, one in enumerate(each)]
 
 
@@ -258,7 +258,7 @@ DICTS: dict[str, Any] = {type(value).__name__: value for value in VALUES if hasa
 
 
 def leaves(fields: Any) -> Iterator[object]:
-    """What is in a dict of dicts, with its keys; a list may hold nothing but numbers and words."""
+    """The leaves of a dict of dicts, with their keys; a list may hold nothing but numbers and words."""
     for key, value in fields.items():
         yield key
         if type(value) is dict:

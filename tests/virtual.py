@@ -29,7 +29,7 @@ T = TypeVar("T")
 BLUR_S = 0.001
 """Time that others took counts from the last look at it, which is at most so long ago."""
 LATENCY_S = 0.0002
-"""What bytes need from one end of a connection to the other."""
+"""Seconds that bytes need from one end of a connection to the other."""
 LIMIT_S = 500.0
 """Virtual seconds that a test inside a scene may take: what takes longer hangs."""
 
@@ -59,7 +59,7 @@ class HoldWatch:
             self._file = os.open(f"/proc/self/task/{threading.get_native_id()}/schedstat", os.O_RDONLY)
 
     def begin(self) -> None:
-        """What was until now is not counted."""
+        """Count from now on."""
         self._began = 0.0
         self.turn()
 
@@ -151,7 +151,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
     @property
     def turns(self) -> int:
-        """How often the loop has looked for something to do."""
+        """The number of times that the loop has looked for work."""
         return self._virtual.turns
 
     def end_after(self, seconds: float) -> None:
@@ -195,7 +195,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
 
 class _Listener:
-    """What create_server returns, as much of it as is used."""
+    """The part of create_server's result that is used."""
 
     def __init__(self, listeners: dict[int, _Listener], factory: Callable[[], Any], port: int) -> None:
         self.factory = factory
@@ -227,7 +227,7 @@ class MemoryTransport(asyncio.Transport):
         self._arriving: deque[bytes | ConnectionResetError | None] = deque()
         self._is_paused = False
         self._passed_over = 0
-        """What was due while reading was paused."""
+        """Deliveries due while reading was paused."""
         self.peer: MemoryTransport
         self.protocol: Any = None
 

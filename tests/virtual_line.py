@@ -22,7 +22,7 @@ class VirtualLine:
         self._loop = asyncio.get_running_loop()
         self._ports: list[_Port] = []
         self._is_plugged = True
-        # pyserial is below what is tested; pymodbus asks it for a port and gets one of ours.
+        # pyserial is below the code under test; pymodbus requests a port of it and gets one of ours.
         patch.setattr(serial, "serial_for_url", self._open)
 
     def pull(self) -> None:
@@ -57,7 +57,7 @@ class VirtualLine:
 
 
 class _Port:
-    """As much of serial.Serial as pymodbus uses."""
+    """The part of serial.Serial that pymodbus uses."""
 
     def __init__(self, line: VirtualLine, url: str, loop: asyncio.AbstractEventLoop) -> None:
         self.url = url

@@ -35,7 +35,7 @@ EPISODE = (
 
 
 class Commands:
-    """LeRobot's commands for the robot at one gripper. Nothing is asked of a hub."""
+    """LeRobot's commands for the robot at one gripper. No hub is queried."""
 
     def __init__(self, server: SimulatorServer, folder: Path) -> None:
         self.server = server
@@ -59,11 +59,11 @@ class Commands:
         )
 
     async def run(self, name: str, *arguments: str, fails: bool = False) -> str:
-        """What a command prints."""
+        """The output of a command."""
         return await ended(await self.begin(name, *arguments), fails=fails)
 
     def targets(self) -> list[int]:
-        """Where the fingers were sent, by every write so far."""
+        """Targets of the fingers in every write so far."""
         writes = [Request.from_registers(each.registers, TWO_FINGER_85) for each in self.gripper.writes]
         return [each.position(JAW) for each in writes if each.go]
 
@@ -82,7 +82,7 @@ async def ended(process: asyncio.subprocess.Process, *, fails: bool = False) -> 
 
 @pytest_asyncio.fixture
 async def commands(tmp_path: Path) -> AsyncIterator[Commands]:
-    """At a gripper that is active and open."""
+    """The commands at a gripper that is active and open."""
     async with SimulatorServer(active_gripper(1.0, model=TWO_FINGER_85)) as server:
         yield Commands(server, tmp_path)
 
@@ -129,7 +129,7 @@ async def test_what_is_recorded_is_replayed(commands: Commands) -> None:
 
 
 async def test_a_position_alone_is_recorded_and_cannot_be_replayed(commands: Commands) -> None:
-    """Why there are two dimensions; when LeRobot replays one, ``action_force`` can go."""
+    """This is the reason for two dimensions; when LeRobot replays one, ``action_force`` can go."""
     root = f"--dataset.root={commands.folder / 'data'}"
     alone = (*LEADER, "--teleop.force=false")
     printed = await commands.run("lerobot-record", *alone, *DATASET, root, *EPISODE, fails=True)

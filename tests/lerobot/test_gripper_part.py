@@ -37,7 +37,7 @@ def part(wire: Wire) -> Iterator[GripperPart]:
 
 
 def request(wire: Wire) -> tuple[int, int]:
-    """Position and force that the fingers were last asked for."""
+    """Position and force in the last request to the fingers."""
     (asked,) = {(axis.position, axis.force) for axis in decoded(wire).axes[:3]}
     return asked
 
@@ -155,7 +155,7 @@ def jaw() -> Iterator[GripperPart]:
 
 
 def test_numbers_of_numpy_and_arrays_of_one_value_are_numbers(part: GripperPart, wire: Wire) -> None:
-    """As tensors are, of which lerobot-replay sends one for each value."""
+    """So are tensors, of which lerobot-replay sends one for each value."""
     part.act(np.float32(0))
     until(lambda: request(wire)[0] == 255)
     part.act(np.array(100.0), np.array([20.0]))
@@ -193,7 +193,7 @@ def test_before_connecting_and_afterwards_nothing_goes(wire: Wire) -> None:
 
 
 def test_a_gripper_that_falls_silent_ends_the_loop(wire: Wire) -> None:
-    """While the hand still waits for an answer and takes the link for a good one."""
+    """It ends while the hand still waits for an answer and takes the link for a good one."""
     hand = RobotiqHand(wire)
     part = GripperPart(hand, lost_after=0.1)
     part.connect()

@@ -1,7 +1,8 @@
 """``make canary``: does the library live with the newest of everything it depends on?
 
 The constraints are left out, so the environment has what a user gets who installs today, the tools of the
-tests included. It is thrown away; what is newer than in constraints.txt is named, whatever the tests say.
+tests included. It is thrown away; packages newer than in constraints.txt are named, whatever the result of
+the tests.
 
     make canary TESTS="tests/cli tests/tools"
 """
@@ -26,7 +27,7 @@ def pinned() -> dict[str, set[str]]:
 
 
 def news(packages: Iterable[str]) -> list[str]:
-    """Which packages, ``name==version`` each, are not those of the constraints: ``name old -> new`` each."""
+    """The packages, ``name==version`` each, that differ from the constraints: ``name old -> new`` each."""
     known, found = pinned(), []
     for package in packages:
         name, _, version = package.partition("==")

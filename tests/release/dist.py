@@ -99,7 +99,7 @@ def try_base(artifact: Path, folder: Path) -> list[str]:
 
 
 def try_command(artifact: Path, folder: Path) -> None:
-    """With the extra ``cli``: the command."""
+    """Try the command, with the extra ``cli``."""
     python = make(folder / "cli", *CONSTRAINTS, f"robotiq-async[cli] @ {artifact.as_uri()}")
     command = str(python.parent / "robotiq-async")
     if run(command, "--version", folder=folder).strip() != version():

@@ -1,4 +1,4 @@
-"""New environments with nothing in them but what is asked for; programs and the tests, run there."""
+"""New environments with the packages that are given and no others; programs and the tests, run there."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ BARE: Final = {"PATH": "/usr/local/bin:/usr/bin:/bin"}
 PATIENCE: Final = 600.0
 """Seconds after which a program counts as hanging."""
 CORE: Final = "@tests/core.txt tests/contract"
-"""What is run unless the variable TESTS says otherwise."""
+"""The tests that run unless the variable TESTS names others."""
 NEEDS: Final = ("--requirement", str(ROOT / "tests" / "core-needs.txt"))
 
 
@@ -33,13 +33,13 @@ def make(folder: Path, *requirements: str, python: str = sys.executable) -> Path
 
 
 def installed(interpreter: Path) -> list[str]:
-    """What an environment holds: ``name==version`` each."""
+    """The packages of an environment: ``name==version`` each."""
     printed = uv("pip", "list", "--python", str(interpreter), "--format", "freeze", "--exclude-editable")
     return [line for line in printed.splitlines() if "==" in line]
 
 
 def uv(*arguments: str) -> str:
-    """What uv prints; how it reaches the package index may be in the variables."""
+    """The output of uv; its way to the package index may be in the variables."""
     return run(sys.executable, "-m", "uv", *arguments, variables=os.environ)
 
 
@@ -50,7 +50,7 @@ def run(
     variables: Mapping[str, str] = BARE,
     patience: float | None = PATIENCE,
 ) -> str:
-    """What a program prints that ends as it should, and in time."""
+    """The output of a program that ends as it should, and in time."""
     try:
         done = subprocess.run(
             command,
@@ -78,7 +78,7 @@ def run_suite(python: Path) -> str:
 
 
 def exit_code(work: Callable[[], object]) -> int:
-    """1 if a part of the work fails; says which."""
+    """1 if a part of the work fails; prints which."""
     try:
         work()
     except FailedError as error:

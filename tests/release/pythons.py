@@ -1,6 +1,6 @@
 """``make pythons``: the tests of the core on other Pythons.
 
-One that is not here is asked of uv, which downloads it; one that cannot be had is named and left out: nothing
+One that is not here comes from uv, which downloads it; one that cannot be had is named and left out: nothing
 fails then, and nothing is claimed.
 """
 
@@ -32,7 +32,7 @@ def interpreter(version: str) -> str | None:
 
 
 def _asked(command: str, version: str) -> str:
-    """Where a command's interpreter is; empty if it does not run."""
+    """The path of a command's interpreter; empty if it does not run."""
     # pyenv's commands do nothing unless they know which version is meant.
     variables = {**os.environ, "PYENV_VERSION": version}
     asked = [command, "-c", "import sys; print(sys.executable)"]
@@ -41,7 +41,7 @@ def _asked(command: str, version: str) -> str:
 
 
 def tried(version: str) -> str:
-    """How the tests end on a Python."""
+    """The outcome of the tests on a Python."""
     python = interpreter(version)
     if python is None:
         return "left out: it is not here, and uv cannot get it"

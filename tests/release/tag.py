@@ -1,8 +1,8 @@
-"""May a tag be released from a repository? The workflow asks before it builds.
+"""May a tag be released from a repository? The workflow checks before it builds.
 
     python -m tests.release.tag v0.1.0 https://github.com/OWNER/robotiq_async
 
-Prints what the changelog says of the version: the notes of the release. A release is refused whose tag is not
+Prints the changelog of the version: the notes of the release. A release is refused whose tag is not
 the version, whose heading in the changelog has no date, or whose addresses are those of another repository.
 """
 
@@ -19,7 +19,7 @@ from tests.release.environments import ROOT, FailedError, exit_code
 
 
 def repositories() -> dict[str, str]:
-    """Where the project's files say that its repository is, by file."""
+    """The repository named in the project's files, by file."""
     urls = tomllib.loads(_read("pyproject.toml"))["project"]["urls"]
     package = ET.fromstring(_read("ros2/package.xml"))
     citation = re.search(r"^repository-code: (\S+)$", _read("CITATION.cff"), re.MULTILINE)
@@ -35,7 +35,7 @@ def _read(name: str) -> str:
 
 
 def notes(changelog: str, wanted: str) -> str:
-    """What a changelog says of a version that has a date.
+    """The notes in a changelog on a version that has a date.
 
     Raises:
         FailedError: there is no such version, or it has no date.

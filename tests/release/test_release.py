@@ -1,4 +1,4 @@
-"""What the releases' programs decide; the rest they try themselves: make dist, pythons, canary."""
+"""Decisions of the releases' programs; the rest they try themselves: make dist, pythons, canary."""
 
 from __future__ import annotations
 

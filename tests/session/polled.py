@@ -28,7 +28,7 @@ POLL_S = 0.01
 
 
 class Published(Channel[T]):
-    """What is published; an error of a receiver is an error of the poller."""
+    """The published items; an error of a receiver is an error of the poller."""
 
     def __init__(self, push: Callable[[T], None]) -> None:
         super().__init__(Listeners())

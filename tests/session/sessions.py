@@ -25,7 +25,7 @@ def options(wire: Wire, policy: ReconnectPolicy | None, key: str = "wire") -> Ha
 
 
 class Run:
-    """What outlives a session, and the means to make one."""
+    """The parts that outlive a session, and the means to make one."""
 
     def __init__(
         self, key: str = "wire", policy: ReconnectPolicy | None = None, speedup: float = 1.0

@@ -1,4 +1,4 @@
-"""The one clock: whatever loop a hand runs in, what it tells of times belongs together."""
+"""The one clock: whatever loop a hand runs in, its times belong together."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_the_clock_is_the_system_s_monotonic_one(
 def test_a_loop_with_a_time_of_its_own_is_believed(
     factory: Callable[[], asyncio.AbstractEventLoop],
 ) -> None:
-    """Also one that shows the system's time at the moment: it need not stay so."""
+    """Also one that has the system's time at the moment: it need not stay so."""
     loop = factory()
     assert clock_of(loop) == loop.time
     loop.close()

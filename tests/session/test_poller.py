@@ -1,4 +1,4 @@
-"""The task that owns the link: what it asks of it, in which order, and how it begins and ends."""
+"""The task that owns the link: its exchanges, their order, its beginning and its end."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ async def test_a_write_that_was_not_acknowledged_is_published_as_such_and_never_
 async def test_when_the_loop_was_held_up_the_gripper_is_read_again_before_anything_is_written(
     here: Polled,
 ) -> None:
-    """What another client has done, or where an axis is by now, must be seen before the next write."""
+    """Another client's write, or a new position of an axis, must be seen before the next write."""
     await here.polls(3)
     here.controller.command(Command(Finger.A, 100))
 
@@ -134,7 +134,7 @@ async def test_when_the_loop_was_held_up_the_gripper_is_read_again_before_anythi
 
 
 async def test_when_the_loop_was_held_up_between_two_cycles_a_stop_reads_first(here: Polled) -> None:
-    """Another client has reset the gripper meanwhile: the halt, made of the old status, would activate it."""
+    """Another client has reset the gripper: the halt, made of the old status, would activate it."""
     await here.polls(3)
     waiter = here.loop.create_future()
 

@@ -75,7 +75,7 @@ async def test_a_link_that_is_lost_at_the_end_lets_a_grip_go(here: Polled) -> No
 
 
 async def test_a_stop_that_was_not_heard_is_sent_again(here: Polled) -> None:
-    """Unlike a motion: a gripper that lost its client goes on moving."""
+    """Unlike a motion: a gripper that lost its client keeps moving."""
     await moves(here)
     here.wire.failing["write"] = LOST
     here.poller.request_stop(halt=True)

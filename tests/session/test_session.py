@@ -141,7 +141,7 @@ async def test_callers_that_wait_when_the_task_fails_get_an_error(caplog: pytest
 
 
 async def test_a_bug_while_it_connects_is_named(caplog: pytest.LogCaptureFixture) -> None:
-    """It was told as "the hand was stopped while it connected"."""
+    """It was reported as "the hand was stopped while it connected"."""
     here = Run()
     here.wire.failing["open"] = ZeroDivisionError("a bug")  # type: ignore[assignment]
     session = here.session()

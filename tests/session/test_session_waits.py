@@ -1,4 +1,4 @@
-"""What a caller waits for beside the task that polls, and how it learns that it will not come."""
+"""Waits of callers beside the task that polls, and their end when it is in vain."""
 
 from __future__ import annotations
 

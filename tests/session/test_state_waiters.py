@@ -28,7 +28,7 @@ async def test_a_state_both_awaited_and_failing_counts_as_reached(waiters: State
 
 
 async def test_a_shutdown_alone_does_not_tell_why_and_ends_no_wait(waiters: StateWaiters) -> None:
-    """fail() says right after whether the hand was stopped or gave up."""
+    """fail() follows with whether the hand was stopped or gave up."""
     with waiters.watching({State.RESET}, {}) as reached:
         waiters.reached(State.SHUTDOWN)
         assert not reached.done()

@@ -27,7 +27,7 @@ async def steps(count: int = 3) -> None:
 
 
 async def rest(stream: Stream[int]) -> list[int]:
-    """What a stream still gives until it ends."""
+    """The items that a stream still gives until it ends."""
     return [item async for item in stream]
 
 
@@ -228,7 +228,7 @@ async def test_a_second_reader_that_takes_the_item_does_not_end_the_first(channe
 
 @pytest.fixture
 def no_collector() -> Iterator[None]:
-    """What goes has to go by itself."""
+    """Run without the collector: an object that goes has to go by itself."""
     gc.collect()
     gc.disable()
     yield
@@ -315,14 +315,14 @@ async def test_a_dropped_stream_is_forgotten_at_once(
 
 
 def held(channel: Channel[int]) -> int:
-    """How many streams a channel knows of, once another one has been opened."""
+    """The number of streams that a channel knows of, once another one has been opened."""
     last = channel.open(None)
     assert channel._streams.pop()() is last
     return len(channel._streams)
 
 
 def test_a_stream_that_another_thread_drops_takes_no_other_with_it(channel: Channel[int]) -> None:
-    """The list was made anew in that thread, without what was opened at the same moment in the loop's."""
+    """The list was rebuilt in that thread, without the one opened at the same moment in the loop's."""
     dropped, before = [channel.open(1)], channel._streams
     with ThreadPoolExecutor(1) as pool:
         pool.submit(dropped.clear).result()
@@ -332,7 +332,7 @@ def test_a_stream_that_another_thread_drops_takes_no_other_with_it(channel: Chan
 
 async def test_a_waiting_reader_is_kept_although_its_task_is_not_referenced(channel: Channel[int]) -> None:
     """The loop holds its tasks weakly; what will wake one has to hold it."""
-    # Python complains of a pending task that is destroyed; that is not what is asked here.
+    # Python complains of a pending task that is destroyed; that is not tested here.
     asyncio.get_running_loop().set_exception_handler(lambda *_: None)
     seen: list[int] = []
     asyncio.create_task(read(channel, seen))  # noqa: RUF006
@@ -383,7 +383,7 @@ async def test_a_reader_in_the_loop_of_another_thread_does_no_harm(
 
 
 def letters(count: int) -> list[str]:
-    """So many of them."""
+    """So many letters."""
     return list("abcdefghij"[:count])
 
 

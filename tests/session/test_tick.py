@@ -58,7 +58,7 @@ def ticking() -> Iterator[Tick]:
 
 
 async def deadlines(tick: Tick, count: int) -> list[float]:
-    """When so many ticks came."""
+    """The times of so many ticks."""
     times = []
     for _ in range(count):
         await tick.wait()
@@ -206,7 +206,7 @@ def test_where_no_timerfd_is_to_be_had_the_loop_keeps_them(loop: type[DeafLoop])
 
 
 class Meanwhile(asyncio.SelectorEventLoop):
-    """Lets another thread do something when it is asked whether it is closed."""
+    """Lets another thread do something when is_closed() is called."""
 
     meanwhile: Callable[[], None] | None = None
 
@@ -228,7 +228,7 @@ async def begun() -> Tick:
 
 @pytest.mark.parametrize("what", ["comes", "goes"])
 def test_a_loop_comes_while_others_of_other_threads_come_and_go(what: str) -> None:
-    """In real life that takes luck, or sys.setswitchinterval(1e-6)."""
+    """In a real program that takes luck, or sys.setswitchinterval(1e-6)."""
     asked, going, coming, late = Meanwhile(), *(asyncio.new_event_loop() for _ in range(3))
     ticks = [loop.run_until_complete(begun()) for loop in (asked, going)]
 

@@ -32,7 +32,7 @@ PATIENCE = 5.0
 class Wire:
     """A transport without a network; its gripper has a clock that the test moves ahead.
 
-    The hand asks it in its own thread, and the test from another one: one at a time.
+    The hand calls it in its own thread, and the test in another one: one at a time.
     """
 
     def __init__(self) -> None:
@@ -63,7 +63,7 @@ class Wire:
         self.is_open = False
 
     def look(self, what: Callable[[SimulatedGripper], T]) -> T:
-        """Ask the gripper something, or do something to it."""
+        """Read something of the gripper, or do something to it."""
         with self._asking:
             return what(self._gripper)
 
@@ -78,14 +78,14 @@ class Wire:
         self.look(lambda gripper: gripper.write(0, Request(activate=True, go=True, axes=axes).registers))
 
     def targets(self) -> list[int]:
-        """Where the fingers A, B and C are driven to."""
+        """Targets of the fingers A, B and C."""
         return self.look(lambda gripper: [gripper.target(axis) for axis in (Finger.A, Finger.B, Finger.C)])
 
     def is_moving(self) -> bool:
         return self.look(lambda gripper: gripper.is_moving)
 
     def writes(self) -> int:
-        """How often the hand has written."""
+        """The number of writes of the hand."""
         return self.look(lambda gripper: len(gripper.writes)) - 1
 
 
@@ -120,7 +120,7 @@ async def run_to_its_end(program: str) -> tuple[SimulatedGripper, str]:
 
 
 class Interrupt(KeyboardInterrupt):
-    """As Ctrl-C, and of the test's own: pytest ends with the other one."""
+    """The test's own Ctrl-C: pytest ends with the real one."""
 
 
 @pytest.fixture

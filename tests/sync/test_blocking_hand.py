@@ -204,7 +204,7 @@ def test_threads_that_begin_at_once_share_one_thread() -> None:
 
 
 def test_it_may_be_started_and_stopped_at_any_moment() -> None:
-    """The thread ends and begins anew; a call that comes at that moment is made all the same."""
+    """The thread ends and begins again; a call that comes at that moment is made all the same."""
     hands = [RobotiqHand(Wire()) for _ in range(4)]
 
     def again_and_again(hand: RobotiqHand) -> None:
@@ -229,7 +229,7 @@ def test_calls_of_several_threads_go_side_by_side(hand: RobotiqHand, wire: Wire)
 
 
 async def test_another_event_loop_may_run_in_the_thread_that_calls(wire: Wire) -> None:
-    """As in a notebook: its kernel runs one."""
+    """A notebook does that: its kernel runs one."""
     with RobotiqHand(wire) as hand:
         hand.set_position(100, A)
         assert next(hand.statuses()).is_activated

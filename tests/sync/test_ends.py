@@ -1,4 +1,4 @@
-"""What becomes of a blocking hand when the program ends without a word, or is forked."""
+"""A blocking hand when the program ends without stopping it, or is forked."""
 
 from __future__ import annotations
 

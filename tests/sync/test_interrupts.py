@@ -1,4 +1,4 @@
-"""Ctrl-C while a blocking hand waits: nothing goes on moving, and the event loop goes on."""
+"""Ctrl-C while a blocking hand waits: nothing keeps moving, and the event loop runs on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A blocking hand in a coroutine: each call holds up the loop that runs there, and the log says so once."""
+"""A blocking hand in a coroutine: each call holds up the loop that runs there, and is logged once."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ WORDS = "an event loop runs in this thread"
 
 
 def warnings(caplog: pytest.LogCaptureFixture) -> list[str]:
-    """What a hand that is used warns of; that it polled late is a matter of the machine."""
+    """The warnings of a hand that is used; late polls are a matter of the machine."""
     with caplog.at_level(logging.WARNING), RobotiqHand("sim://?speedup=50", name="left") as hand:
         hand.move(40)
     messages = [record.getMessage() for record in caplog.records]

@@ -129,7 +129,7 @@ def pytest_pyfunc_call(pyfuncitem):
         trio.run(functools.partial(pyfuncitem.obj, **{name: pyfuncitem.funcargs[name] for name in names}))
         return True
 """
-"""What pytest-trio does."""
+"""A plugin that does as pytest-trio."""
 
 
 @pytest.mark.parametrize("ini", ["asyncio_mode = strict", "asyncio_mode = auto"])

@@ -1,4 +1,4 @@
-"""What a person asks for, and whether this person has moved anything."""
+"""The actions of a person, and whether this person has moved anything."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ LEFT, STOPPED, MOVING = "left as they are", "were stopped", "may STILL MOVE"
 
 @pytest.fixture
 async def operator(server: SimulatorServer) -> AsyncIterator[Operator]:
-    """Of a gripper that is reset."""
+    """The operator of a gripper that is reset."""
     operator = Operator(RobotiqHand(server.address))
     await operator.hand.start(activate=False)
     yield operator
@@ -43,7 +43,7 @@ async def operator(server: SimulatorServer) -> AsyncIterator[Operator]:
 
 @pytest.fixture
 async def active(operator: Operator) -> Operator:
-    """Of a gripper that was activated, and not by this operator."""
+    """The operator of a gripper that was activated, and not by this operator."""
     await operator.hand.activate()
     return operator
 
@@ -230,7 +230,7 @@ async def test_fingers_that_a_halt_has_stopped_stand_still(active: Operator, pau
 async def test_an_old_halt_is_no_stop(
     active: Operator, server: SimulatorServer, gripper: SimulatedGripper
 ) -> None:
-    """Another client goes on after it, and the link is lost."""
+    """Another client moves on after it, and the link is lost."""
     await active.move(50, Finger.A)
     await active.act(ACTIONS["halt"])
     image = list(gripper.request_registers)

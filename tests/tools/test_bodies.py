@@ -79,7 +79,7 @@ def test_pads_look_at_each_other_at_every_opening(model: Model) -> None:
 
 @pytest.mark.parametrize("model", [TWO_FINGER_85, TWO_FINGER_140], ids=str)
 def test_pads_of_a_2f_move_away_from_the_base_as_they_close(model: Model) -> None:
-    """Until the cranks stand upright, shortly before the end."""
+    """They do until the cranks stand upright, shortly before the end."""
     heights = [faces(model, share / 10)[0].position[2] for share in range(10)]
     assert heights[:9] == sorted(heights[:9])
     assert heights[-1] - heights[0] > 0.01

@@ -1,4 +1,4 @@
-"""The description of the 3-Finger: what it says, and where its links are. The others: test_jaws.py."""
+"""The description of the 3-Finger: its texts, and the places of its links. The others: test_jaws.py."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is wrong with my connection? Each ailment is found, and reported with what to do."""
+"""The doctor finds each ailment of a connection, and reports it with its remedy."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ async def helps(address: str, **options: Any) -> None:
 
 
 class Device(asyncio.Protocol):
-    """Answers each request as told."""
+    """Answers each request by a script."""
 
     def __init__(self, answer: Callable[[bytes], bytes]) -> None:
         self._answer = answer
@@ -69,7 +69,7 @@ class Device(asyncio.Protocol):
 
 @contextlib.asynccontextmanager
 async def answering(answer: Callable[[bytes], bytes]) -> AsyncIterator[str]:
-    """The address of a device that answers each request as told."""
+    """The address of a device that answers each request by a script."""
     server = await asyncio.get_running_loop().create_server(lambda: Device(answer), "127.0.0.1", 0)
     try:
         yield f"127.0.0.1:{server.sockets[0].getsockname()[1]}"
@@ -82,7 +82,7 @@ def reply(request: bytes, pdu: bytes) -> bytes:
 
 
 def registers_in(request: bytes, block: bytes) -> bytes:
-    """The first registers of a block, as many as the request asks for."""
+    """The first registers of a block, as many as the request has."""
     size = 2 * request[11]
     return reply(request, bytes((request[7], size)) + block[:size])
 
@@ -359,7 +359,7 @@ async def test_an_echo_on_the_line_is_told() -> None:
 async def test_a_line_that_loses_its_first_requests_needs_no_option(
     server_of: type[SimulatorServer], lost: int
 ) -> None:
-    """What answered after them was taken for what the gripper needs: read_function=4, request_address=0."""
+    """Settings that answered after them were taken for the gripper's: read_function=4, request_address=0."""
     left = [lost]
 
     def losing(frame: bytes) -> list[tuple[float, bytes]]:

@@ -1,4 +1,4 @@
-"""What the doctor says of a URCap's text port."""
+"""The doctor's findings at a URCap's text port."""
 
 from __future__ import annotations
 

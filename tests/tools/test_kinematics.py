@@ -66,7 +66,7 @@ def test_every_axis_moves_its_own_joints(positions: tuple[int, int, int, int]) -
 
 
 def test_one_map_names_the_fingers() -> None:
-    """docs/decisions/finger-names.md says why. A change of it changes the joints, too."""
+    """docs/decisions/finger-names.md has the reason. A change of it changes the joints, too."""
     assert list(FINGER_NAMES.items()) == [
         (Finger.C, "finger_1"),
         (Finger.B, "finger_2"),

@@ -1,4 +1,4 @@
-"""Figures for Prometheus, asked for as Prometheus does."""
+"""Figures for Prometheus, requested as Prometheus does."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Samples = dict[tuple[str, str], float]
 
 
 async def page(where: tuple[str, int]) -> str:
-    """What Prometheus gets."""
+    """The page that Prometheus gets."""
 
     def get() -> str:
         with urllib.request.urlopen(f"http://{where[0]}:{where[1]}/metrics", timeout=10) as answer:

@@ -1,4 +1,4 @@
-"""A link that does not tell the motor current: nothing around a hand makes a 0 of that."""
+"""A link that does not carry the motor current: nothing around a hand makes a 0 of that."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What another process shows of a hand."""
+"""A hand on the page of another process."""
 
 from __future__ import annotations
 

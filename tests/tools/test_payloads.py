@@ -1,4 +1,4 @@
-"""What is recorded and published says which hand it is of."""
+"""Recorded and published objects name their hand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is drawn can be told apart, and the words hide nothing."""
+"""Curves can be distinguished, and the words hide nothing."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from robotiq_async.values.model import THREE_FINGER
 
 
 def words(picture: Path) -> list[str]:
-    """What is written in a picture; matplotlib draws glyphs, and puts the words into comments."""
+    """The words in a picture; matplotlib draws glyphs, and puts the words into comments."""
     return re.findall(r"<!-- (.+?) -->", picture.read_text(encoding="utf-8"))
 
 

@@ -103,7 +103,7 @@ async def test_commands_transitions_and_faults(
 async def test_an_event_has_the_time_of_what_it_tells(
     hand: RobotiqHand, gripper: SimulatedGripper, file: Path
 ) -> None:
-    """A fault that of the status that shows it, a transition its own: it follows within microseconds."""
+    """A fault that of the status with it, a transition its own: it follows within microseconds."""
     transitions = hand.transitions()
     async with Recorder(hand, file):
         gripper.inject_fault(9)
@@ -266,7 +266,7 @@ async def test_a_file_that_is_there_is_not_overwritten(hand: RobotiqHand, file: 
 
 
 class FullDisk(Recorder):
-    """After some bytes the disk is full."""
+    """A disk that is full after some bytes."""
 
     room = 20_000
 
@@ -284,7 +284,7 @@ async def test_a_full_disk_ends_the_recording_and_nothing_else(
     with pytest.raises(RecordingError, match=r"it\.mcap: No space left on device"):  # noqa: PT012
         async with recorder:
             writes = len(gripper.writes)
-            with pytest.raises(TimeoutError):  # it goes on when this waiting ends
+            with pytest.raises(TimeoutError):  # it continues when this waiting ends
                 await asyncio.wait_for(recorder.failure(), 0.01)
             async with asyncio.timeout(20):
                 failure = await recorder.failure()

@@ -1,4 +1,4 @@
-"""A program around hands: it ends on a signal, says how it is, and is watched by systemd."""
+"""A program around hands: it ends on a signal, reports its health, and is watched by systemd."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ async def test_further_signals_disturb_nothing_until_someone_insists(server: Sim
 async def test_an_insistent_signal_does_what_it_did_before(
     server: SimulatorServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As when the loop is held up for good, and nothing can be stopped."""
+    """The loop may be held up for good, and nothing can be stopped."""
     seen, clock = list[int](), [100.0]
     monkeypatch.setattr("time.monotonic", lambda: clock[0])
     before = signal.signal(signal.SIGTERM, lambda number, _: seen.append(number))

@@ -1,4 +1,4 @@
-"""What viewers get: seen by a plain websocket client."""
+"""Messages to viewers, received by a plain websocket client."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ async def test_it_listens_on_loopback_only(hand: RobotiqHand) -> None:
 
 
 def listening() -> set[tuple[str, int]]:
-    """Where this process listens."""
+    """Addresses at which this process listens."""
     ours = set()
     for file in Path("/proc/self/fd").iterdir():
         with contextlib.suppress(OSError):
@@ -97,7 +97,7 @@ async def test_joint_states_are_read_by_another_implementation(hand: RobotiqHand
 
 
 async def test_a_late_client_gets_the_state(hand: RobotiqHand, server: SimulatorServer) -> None:
-    """A gripper that is lost tells nothing more; its state is published once a second all the same."""
+    """A gripper that is lost reports nothing more; its state is published once a second all the same."""
     await lose_link(server, hand)
     async with viewed(hand) as client:
         await client.subscribe("/gripper/state")

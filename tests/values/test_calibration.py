@@ -1,4 +1,4 @@
-"""What the values 0..255 mean."""
+"""Speeds, forces and times of the values 0..255."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_the_thesis_is_the_default_of_the_time_outs() -> None:
     ],
 )
 def test_the_table_has_been_read_when_a_hand_or_a_simulated_gripper_is_made(made: str) -> None:
-    """What is made may run in an event loop from then on, and no move is to wait for a disk there."""
+    """They may run in an event loop from then on, and no move is to wait for a disk there."""
     listen = "files = []; sys.addaudithook(lambda event, args: event == 'open' and files.append(args[0]))"
     move = "SpeedCalibration.thesis().closing_time(3); print(files)"
     imported = "from robotiq_async.values.calibration import SpeedCalibration"

@@ -27,7 +27,7 @@ from robotiq_async.values.model import THREE_FINGER
 
 
 class Broken:
-    """Says that it has an index, as an array of several does, and has none."""
+    """Pretends to have an index, as an array of several does, and has none."""
 
     def __index__(self) -> int:
         raise TypeError("only integer scalar arrays can be converted to a scalar index")

@@ -132,7 +132,7 @@ def test_a_new_file_has_the_mode_that_the_umask_leaves_and_keeps_another(file: P
 
 
 def test_a_planted_link_is_not_followed(file: Path) -> None:
-    """In a folder where others write, too: the name of the file beside can be guessed."""
+    """Others may write in the folder, too: the name of the file beside can be guessed."""
     victim = file.with_name("victim")
     victim.write_text("precious", encoding="utf-8")
     file.with_name(f".{file.name}.{os.getpid()}").symlink_to(victim)

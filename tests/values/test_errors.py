@@ -26,7 +26,7 @@ TREE = {
     "ConnectionLostError": "RobotiqConnectionError",
     "ResponseTimeoutError": "RobotiqConnectionError TimeoutError",
     "ProtocolError": "RobotiqConnectionError",
-    # What a user may tell from other time-outs.
+    # Those that a user may distinguish from other time-outs.
     "WrongModelError": "ProtocolError",
     # Around a hand; not among the names of the package.
     "RecordingError": "RobotiqError",

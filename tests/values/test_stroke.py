@@ -1,4 +1,4 @@
-"""What a position means as an opening: straight, on the arc of a linkage, or between measured points."""
+"""The opening at a position: straight, on the arc of a linkage, or between measured points."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def test_the_position_is_the_closest_one(model: Model, share: float) -> None:
 
 
 def test_the_ends_of_a_fraction_are_those_of_open_and_close() -> None:
-    """A leader device that is closed asks for a grip, and not for a gap of nothing."""
+    """A leader device that is closed requests a grip, and not a gap of nothing."""
     units = Units(stroke=TWO_FINGER_85.stroke)
     assert (units.position(open_fraction=1), units.position(open_fraction=0)) == (0, 255)
     assert (units.position(open_fraction=0.999), units.position(open_fraction=0.001)) == (3, 228)
@@ -252,7 +252,7 @@ def test_a_status_whose_fault_is_passed_over_keeps_its_points() -> None:
 
 
 def test_the_ends_of_a_gripper_are_those_that_were_measured() -> None:
-    """Fingertips of one's own that meet at 213: closed is there, and 210 asked for is not."""
+    """Fingertips of one's own that meet at 213: closed is there, and a request of 210 is not."""
     own = TWO_FINGER_85.stroke.measured(OWN)
     for position, request, reached in (
         (213, 255, True),
@@ -282,7 +282,7 @@ async def test_a_move_to_a_measured_end_has_reached_it(caplog: pytest.LogCapture
 
 
 def test_a_part_is_held_while_the_gripper_reports_a_closing_contact() -> None:
-    """A request in force (gGTO), active (gIMC = 3), no serious fault: else gOBJ says nothing about a part."""
+    """A request in force (gGTO), active (gIMC = 3), no serious fault: else gOBJ is not about a part."""
     assert of_jaw(0xB9, 0xBD).part == Part(JAW, of_jaw(0xB9, 0xBD).opening_mm(JAW))
     assert [of_jaw(first, 0xBD).part for first in (0xF9, 0x79, 0x39, 0xB1, 0x99)] == [None] * 5
     assert of_jaw(0xB9, 0xBD, fault=0x0E).part is None
