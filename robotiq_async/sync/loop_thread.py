@@ -5,6 +5,19 @@ may need, and holds nothing that it must release: otherwise the loop could stop,
 fingers. It passes calls with :meth:`~asyncio.loop.call_soon_threadsafe` and waits at a queue written in C.
 """
 
+# Theory of operation
+#
+# There is at most one loop (_Server): a thread that wants to start one takes _starting, and finds the one
+# that came first. A call is passed to the loop, and then one of three things happens:
+#
+#   it begins      as a task, whose end wakes its caller
+#   it is refused  the loop has just run out of tasks: the caller starts the next one
+#   it is lost     the loop was closed, as its caller notices within LOOK_S: the call is made again, unless
+#                  it had begun. So no call is made twice
+#
+# A caller that is interrupted gives its call up. If it has not begun, it never does; else it is cancelled.
+# After that ``interrupted`` runs, which holds the fingers. The caller waits for both, GIVE_UP_S at most.
+
 from __future__ import annotations
 
 import asyncio

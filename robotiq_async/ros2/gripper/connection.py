@@ -1,5 +1,17 @@
 """Connection: the hand of a configured node, its goals and its commands."""
 
+# Theory of operation
+#
+# A connection lasts from configure to cleanup, and takes goals and commands while the node is active. A halt
+# is taken at any time.
+#
+#   _stop()       counts the stop, ends goals and commands, and halts. Until the halt is answered all else is
+#                 refused. A goal keeps the number of stops from its acceptance: after a stop it never begins
+#   forbid()      the same at deactivation. It cannot fail: the node refuses commands in any case
+#   PendingStop   a hold or a halt that a lost link has prevented: sent once the link is back. No goal and no
+#                 command is taken before, or for PENDING_S
+#   close()       ends the hand, and stops the fingers if commands were ever accepted
+
 from __future__ import annotations
 
 import asyncio

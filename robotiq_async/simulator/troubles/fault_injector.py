@@ -1,5 +1,18 @@
 """Makes troubles happen to one simulator, one at a time or by a plan."""
 
+# Theory of operation
+#
+# A trouble is over as soon as it has begun (an event), or lasts in _ongoing until end(), or until its first
+# hit if it is for once. It acts in one of three ways:
+#
+#   on demand   the simulator calls hears(), lets_in(), deliver() and the properties; of several troubles
+#               about one request or reply the oldest decides
+#   on state    _do() changes the gripper or the server, and _undo() restores it. Troubles of one kind overlap
+#               in any order, so those that last are applied again
+#   on habits   the gripper's own habits are kept from the first such trouble on, and restored at its end
+#
+# end() completes its work even when cancelled, and run() ends every trouble of its plan however it is left.
+
 from __future__ import annotations
 
 import asyncio
