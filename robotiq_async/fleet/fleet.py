@@ -50,9 +50,9 @@ class Member:
         holder: label of the client that commands it; None if no client does.
         problem: why the agent cannot reach the gripper; empty if it can.
         address: of the gripper, as its agent reaches it.
-        seen_at: when the agent last read the gripper, in monotonic seconds of this process; None if it never
-            has. The clocks of hosts differ, so the true time may be earlier, by the transit time of the
-            fastest summary.
+        seen_at: time of the agent's last read of the gripper, in monotonic seconds of this process; None if
+            it never has. The clocks of hosts differ, so the true time may be earlier, by the transit time of
+            the fastest summary.
     """
 
     name: GripperName
@@ -81,7 +81,7 @@ class Fleet:
 
         Args:
             site: the site's name; None for all sites.
-            route: how to reach agents; None for the route in the environment, else agents on this machine.
+            route: the way to agents; None for the route in the environment, else agents on this machine.
             bus: an open session to share; it stays open. None opens one.
 
         Raises:

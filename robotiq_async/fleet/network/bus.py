@@ -94,7 +94,7 @@ class Bus(Protocol):
         The request leaves within this call: requests of the same urgency arrive in the order of the calls.
 
         Args:
-            key: where to send it.
+            key: its destination.
             payload: the request.
             timeout: seconds.
             urgency: of the request and its answers.

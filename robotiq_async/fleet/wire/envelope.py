@@ -79,8 +79,8 @@ class Answer:
         to: base key of the gripper that answers.
         number: of the request.
         epoch: of the agent.
-        value: what the request returned.
-        error: what the request raised; None if it was carried out.
+        value: the result of the request.
+        error: the error of the request; None if it was carried out.
     """
 
     to: str

@@ -211,7 +211,7 @@ class Label(NamedTuple):
 
     Attributes:
         at: its time in seconds.
-        left: where the words begin, as a share of the width.
+        left: the beginning of the words, as a share of the width.
         row: from the bottom, from 0.
     """
 

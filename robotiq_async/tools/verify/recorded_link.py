@@ -27,8 +27,8 @@ RECENT_S: Final = 2.0
 class Frame:
     """One exchange."""
 
-    began: float  # when it was sent, in the loop's time
-    ended: float  # when it was answered, or failed
+    began: float  # the loop's time of sending
+    ended: float  # that of the answer, or of the failure
     kind: str  # "status", "command", "failure", or "probe" for a read in another place
     registers: Registers = ()  # those read or written; empty for a probe and for a failure of a read
     words: str = ""  # the failure, or the finding of a probe
@@ -46,8 +46,8 @@ class RecordedLink:
         self.link = link
         self.written: Request | None = None  # the last image that was written; None before the first
         self.shown: RobotiqStatus | None = None  # the last status that was read; None before the first
-        self.asked = 0.0  # when that read was sent, in the loop's time
-        self.wrote = -math.inf  # when the last write was sent, in the loop's time
+        self.asked = 0.0  # the loop's time at which that read was sent
+        self.wrote = -math.inf  # the loop's time at which the last write was sent
         self._keep = keep
         self._echoes: deque[tuple[float, Echo]] = deque(maxlen=2000)
 

@@ -79,7 +79,7 @@ class Runner:
     """One run.
 
     Attributes:
-        report: what it has found so far.
+        report: its findings so far.
     """
 
     def __init__(self, plan: Plan, person: Person, tape: Tape, save: Callable[[Report], object]) -> None:

@@ -35,7 +35,7 @@ class SpeedCalibration:
     """The meaning of speed values: closing times.
 
     Attributes:
-        source: where the figures come from, for people.
+        source: of the figures, for people.
         points: rising speed values, each with the seconds of a full closing.
         stroke: of the gripper.
     """
@@ -134,7 +134,7 @@ class ForceCalibration:
     """The rough meaning of force values in newtons; see the module.
 
     Attributes:
-        source: where the figures come from, for people.
+        source: of the figures, for people.
         points: rising force values, each with newtons.
     """
 

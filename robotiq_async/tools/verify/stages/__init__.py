@@ -17,11 +17,11 @@ class Stage(NamedTuple):
     number: int  # 0..9
     title: str  # a few words
     run: Callable[[Bench], Awaitable[None]]  # runs it; raises to end the run
-    moves: str  # what moves
-    how_far: str  # how far
-    how_fast: str  # how fast
-    clear: str  # what must be clear
-    lasts: str  # how long it takes
+    moves: str  # the parts that move
+    how_far: str  # the distance
+    how_fast: str  # the speed
+    clear: str  # the place that must be clear
+    lasts: str  # the duration
     jaw_moves: str = ""  # the same of a gripper with a jaw, if that is something else
 
     @property
