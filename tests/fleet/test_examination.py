@@ -1,4 +1,4 @@
-"""What is wrong with my connection to an agent? Each ailment is found, and reported with its remedy."""
+"""Each ailment of a connection to an agent is found, and reported with its remedy."""
 
 from __future__ import annotations
 
