@@ -10,7 +10,9 @@ from ..values.errors import RobotiqError
 class Run(Protocol):
     """The present run of a hand, from a start to the next stop."""
 
-    is_over: bool
+    @property
+    def is_over(self) -> bool:
+        """Whether the run has ended, or is ending."""
 
     @property
     def lost_its_loop(self) -> bool:

@@ -54,6 +54,23 @@ async def test_a_halt_of_the_holder_bars_no_client(here: World) -> None:
 
 
 @inside(lab)
+async def test_a_lease_that_comes_back_after_its_release_is_not_held(here: Lab, hand: RemoteHand) -> None:
+    """The hand had asked for its lost lease by itself when the program released it."""
+    here.network.delay("client", "agent", 0.05)
+    here.network.cut(("client", "agent"), ("agent", "client"))
+    await until(lambda: not hand.is_in_control)
+    lost = here.lease
+    here.network.mend(*here.network.both("client", "agent"))
+    await until(lambda: here.lease > lost)
+    assert not hand.is_in_control, "the answer is on its way"
+    await hand.release()
+    await asyncio.sleep(2)
+    assert not hand.is_in_control
+    with pytest.raises(ControlLostError):
+        await hand.move(30)
+
+
+@inside(lab)
 @pytest.mark.parametrize(("lost", "keeps"), [(1, True), (100, False)])
 async def test_one_lost_renewal_does_not_lose_the_lease(here: Lab, lost: int, keeps: bool) -> None:
     bus = Spoiling(here.network.bus("client"), "/lease", times=0)

@@ -303,7 +303,7 @@ async def test_a_request_waits_for_the_one_that_was_asked_before_it(here: World)
     await client.do(client.hand.take())
     session = client.hand._session
     assert session is not None
-    made = session.call({"position": 50, "fingers": 1})
+    made = session.client.call({"position": 50, "fingers": 1})
 
     def call(number: int, after: int) -> Call:
         return Call(LEFT.base, made.client, made.epoch, made.lease, number, made.seen, {"fingers": 1}, after)

@@ -154,7 +154,7 @@ def test_malformed_settings_are_refused(fields: object) -> None:
 async def test_a_lease_with_settings_that_are_none_is_refused(here: Lab, reader: RemoteHand) -> None:
     assert reader._session is not None
     settings = {"settings": {"1": {"speed": 999}}}
-    call = reader._session.call({"what": "acquire", "label": "", **settings})
+    call = reader._session.client.call({"what": "acquire", "label": "", **settings})
     with pytest.raises(ValueError, match="speed"):
         (await here.answer("lease", call.pack())).outcome(instantly)
     assert here.lease == 0

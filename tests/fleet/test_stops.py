@@ -277,8 +277,8 @@ def every_motion(hand: RemoteHand) -> Iterator[Asked]:
         ("reset", {}),
         ("recover", {}),
     ):
-        yield Asked(f"cmd/{name}", session.call(arguments))
-    yield Asked("lease", session.call({"what": "take", "label": "stranger"}))
+        yield Asked(f"cmd/{name}", session.client.call(arguments))
+    yield Asked("lease", session.client.call({"what": "take", "label": "stranger"}))
 
 
 @inside(lab)

@@ -6,16 +6,14 @@ import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from ...values.enums import Finger
 from ...values.errors import ControlLostError, NotStartedError, RobotiqError
 from ..network.bus import Urgency
 from ..wire.envelope import Call
+from .client import Client
 from .pending_request import PendingRequest
-
-if TYPE_CHECKING:
-    from .session import RemoteSession
 
 UNDER_WAY: Final = 4  # unanswered requests at a time: enough for 200 a second up to a round trip of 20 ms
 ANSWER_S: Final = 1.0  # seconds for the answer to a command
@@ -24,8 +22,8 @@ ANSWER_S: Final = 1.0  # seconds for the answer to a command
 class Outbox:
     """Merges commands while UNDER_WAY requests are unanswered. They keep their order among other requests."""
 
-    def __init__(self, session: RemoteSession) -> None:
-        self._session = session
+    def __init__(self, client: Client) -> None:
+        self._client = client
         self._asked: Call | None = None
         """The lease, and the newest stamp, at the time of the oldest waiting command."""
         self._waiting: dict[Finger, dict[str, int]] = {}
@@ -40,7 +38,7 @@ class Outbox:
     def put(self, axes: Finger, changes: dict[str, int]) -> None:
         if self._asked is None or not self._is_under_this_lease(self._asked):
             self.clear()
-            self._asked = self._session.call()
+            self._asked = self._client.call()
         for axis in axes:
             self._waiting.setdefault(axis, {}).update(changes)
         self._send_next()
@@ -51,7 +49,7 @@ class Outbox:
 
     def drop(self) -> None:
         if self._waiting:
-            self._session.log.info("stopped: commands that were not sent yet are dropped")
+            self._client.log.info("stopped: commands that were not sent yet are dropped")
         self.clear()
 
     def flush(self) -> None:
@@ -62,19 +60,19 @@ class Outbox:
             is_motion = any("position" in changes for changes in waiting.values())
             arguments = {"axes": {str(int(axis)): changes for axis, changes in waiting.items()}}
             # With the stamp of its first command: the time in the outbox counts like time in the network.
-            call = replace(self._session.call(arguments), seen=asked.seen)
-            posted = self._session.requests.post(
+            call = replace(self._client.call(arguments), seen=asked.seen)
+            posted = self._client.requests.post(
                 call, "cmd/command", timeout=ANSWER_S, urgency=Urgency.COMMAND
             )
             self._under_way += 1
-            asking = self._session.spawn(self._await(posted))
+            asking = self._client.spawn(self._await(posted))
             asking.add_done_callback(lambda _: self._done())
             if is_motion:
                 self.count_motion(asking)
 
     def _is_under_this_lease(self, asked: Call) -> bool:
-        now = self._session
-        return now.keeper.is_in_control and (asked.epoch, asked.lease) == (now.mirror.epoch, now.keeper.lease)
+        lease = self._client.lease
+        return lease.is_held and (asked.epoch, asked.lease) == (self._client.mirror.epoch, lease.number)
 
     def count_motion(self, asking: asyncio.Task[Any]) -> None:
         """Count a request as a motion until it is answered."""
@@ -94,7 +92,7 @@ class Outbox:
             self._motions -= 1
 
     def _send_next(self) -> None:
-        if self._under_way < UNDER_WAY and not self._session.is_over:
+        if self._under_way < UNDER_WAY and not self._client.is_over:
             self.flush()
 
     def _done(self) -> None:
@@ -102,15 +100,15 @@ class Outbox:
         try:
             self._send_next()
         except RobotiqError as error:
-            self._session.log.warning("a command was not sent: %s", error)
+            self._client.log.warning("a command was not sent: %s", error)
 
     async def _await(self, posted: PendingRequest) -> None:
         try:
-            await self._session.answer(posted)
+            await self._client.answer(posted)
         except NotStartedError:
             pass  # the next command() raises it
         except ControlLostError as error:
             if error.reason == "late":  # any other is raised by the next command()
-                self._session.log.warning("a command was not carried out: %s", error)
+                self._client.log.warning("a command was not carried out: %s", error)
         except (RobotiqError, TypeError, ValueError) as error:
-            self._session.log.warning("a command was not carried out: %s", error)
+            self._client.log.warning("a command was not carried out: %s", error)

@@ -172,7 +172,8 @@ class RemoteHand(Hand):
     @property
     def is_in_control(self) -> bool:
         """Whether this hand holds the lease, as far as it knows."""
-        return self._session is not None and not self._session.is_over and self._session.keeper.is_in_control
+        session = self._session
+        return session is not None and not session.is_over and session.client.lease.is_held
 
     async def acquire(self) -> None:
         """Get the lease, unless another client holds it.
@@ -274,16 +275,16 @@ class RemoteHand(Hand):
         """Have the agent carry out a command; if this call is cancelled, cancel the command there."""
         session = self._running_session()
         outbox = session.outbox
-        if self._control is None and not session.keeper.is_in_control and session.keeper.lost is None:
+        if self._control is None and not session.client.lease.is_held and session.client.lease.lost is None:
             with no_answer_as_lost_connection():
                 await session.keeper.acquire()
         session.check_control()
         # Commands that were asked for before are sent first.
         outbox.flush()
-        call = session.call(arguments)
+        call = session.client.call(arguments)
         try:
             with no_answer_as_lost_connection(), outbox.motion() if name in MOTIONS else nullcontext():
-                value: Fields = await session.send(
+                value: Fields = await session.client.send(
                     call, f"cmd/{name}", timeout=timeout, urgency=Urgency.COMMAND
                 )
         except (asyncio.CancelledError, RobotiqConnectionError, NotAllowedError):

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Coroutine
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import Any, Final, TypeVar
 
 from ...runtime.clock import now
 from ...values.enums import StopLevel
 from ...values.errors import AgentError, NotAllowedError, ProtocolError, RobotiqError
 from ..network.bus import Urgency
 from ..wire.envelope import Call
+from .client import Client
 from .requests import NoAnswerError, label
-
-if TYPE_CHECKING:
-    from .session import RemoteSession
 
 TRIES: Final = 2  # attempts to cancel a command, within one window
 CONTINUES: Final = frozenset({"activate", "reset", "atr", "recover"})
@@ -30,8 +28,8 @@ T = TypeVar("T")
 class Stops:
     """Halts and cancellations of one run."""
 
-    def __init__(self, run: RemoteSession) -> None:
-        self._run = run
+    def __init__(self, client: Client) -> None:
+        self._client = client
         self._halts: set[asyncio.Task[Any]] = set()
         self._cancels: set[asyncio.Task[Any]] = set()
 
@@ -51,28 +49,30 @@ class Stops:
 
     def cancel_command(self, name: str, call: Call) -> asyncio.Task[Any] | None:
         """The call of a command was cancelled: hold what it set in motion, unless the command continues."""
-        if not self._run.keeper.is_in_control or self._run.is_over:
+        if not self._client.lease.is_held or self._client.is_over:
             return None
         if name in CONTINUES:
-            return self._run.spawn(self._cancel_command(call))
+            return self._client.spawn(self._cancel_command(call))
         return self._begin(self._cancels, self._cancel_command(call))
 
     async def _halt_once(self, left: float) -> None:
-        await self._run.ask("halt", {"label": label()}, timeout=left, urgency=Urgency.STOP)
+        await self._client.ask("halt", {"label": label()}, timeout=left, urgency=Urgency.STOP)
 
     async def _cancel_command(self, call: Call) -> None:
         for _ in range(TRIES):
             try:
-                await self._run.ask("cmd/cancel", {"number": call.number}, timeout=self._run.window / TRIES)
+                await self._client.ask(
+                    "cmd/cancel", {"number": call.number}, timeout=self._client.window / TRIES
+                )
             except RobotiqError as error:
                 if getattr(error, "reason", "late") == "late":
                     continue
             return  # acknowledged; or the lease has ended, and the agent cancelled all
         # Without renewals the lease ends, and the agent holds what moves.
-        self._run.keeper.lose("expired", "a command could not be cancelled")
+        self._client.lose_lease("expired", "a command could not be cancelled")
 
     def _begin(self, others: set[asyncio.Task[Any]], work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
-        task = self._run.spawn(work)
+        task = self._client.spawn(work)
         others.add(task)
         task.add_done_callback(others.discard)
         return task
