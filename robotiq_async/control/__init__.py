@@ -11,7 +11,9 @@
 #
 # A cycle is see(), then decide(). An image is made from the base, which is what the gripper has, so that an
 # axis that nobody addresses keeps its request. It leaves through one gate (gate.py): only the procedure that
-# was asked for raises rACT or rATR, whatever an image carries along from another client or an older one.
+# was asked for raises rACT or rATR, whatever an image carries along from another client or an older one. One
+# race is left: if another client resets the gripper while a status is a device cycle old, an image with rACT
+# activates it [follows]. A stop takes that back; after a command or a hold the activation runs to its end.
 #
 # One write. A change is merged with others until the next cycle, then taken out and sent once, because it
 # may move an axis. Its acknowledgement answers its callers. It acts within a device cycle; a status shows it;
@@ -25,7 +27,8 @@
 # by itself [manual], and nothing must resume then.
 #
 # A stop goes before all else: a halt, a reset, the end of the hand. It is written at once, again until it is
-# seen, and is over when its write acts and a status shows it. A halt and a reset fail with the link: sent
+# seen, and is over when its write acts and a status shows it; stops.py has what that is for each level. A
+# halt that does not show after two writes fails. A halt and a reset fail with the link, too: sent
 # later they would stop another client, or drop a part. The end of a hand begins its stop anew on a new link.
 #
 # Procedures raise rACT or rATR. While one is under way, what a status shows is its matter, not news. When it

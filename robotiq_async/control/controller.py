@@ -36,7 +36,7 @@ from .pending import Command, Pending, merged
 from .procedures import Procedure
 from .state_machine import RUNNING, StateMachine
 from .stops import Keeping, Stop
-from .waiters import Waiter, fail, resolve
+from .waiters import Waiter, fail
 
 WARNING_S: Final = 1.0
 """Seconds between two warnings about another client."""
@@ -200,7 +200,7 @@ class Controller:
         self._begin(Trigger.ASK_RELEASE)
 
     def drop_requests(self, error: RobotiqError) -> None:
-        """Fail the requests that are not sent, except holds and halts."""
+        """Fail every command and every move, sent or not. Holds and halts remain."""
         self._requests.fail_motions(error)
         self._show(Trigger.DELIVERED)
 
@@ -363,7 +363,11 @@ class Controller:
     def _is_hidden(self, status: RobotiqStatus) -> bool:
         """Whether what is under way hides the condition that a status shows. Ends a stop that is reached."""
         stop = self._stop
-        if isinstance(stop, Keeping):
+        if stop is not None and stop.has_activated(self._ledger, status):
+            error = NotActivatedError("the gripper was reset as it was stopped: its activation is taken back")
+            self.machine.log.warning("%s", error)
+            self._begin_reset(Trigger.ASK_RESET, error)
+        elif isinstance(stop, Keeping):
             self._advance_keeping(stop)
         elif stop is not None:
             self._advance_stop(stop, status)
@@ -371,13 +375,9 @@ class Controller:
         return hides or self.is_busy or self.machine.state in _OFF
 
     def _advance_stop(self, stop: Stop, status: RobotiqStatus) -> None:
-        if stop.has_activated(self._ledger, status):
-            error = NotActivatedError("the gripper was reset as it was stopped: its activation is taken back")
-            self.machine.log.warning("%s", error)
-            self._begin_reset(Trigger.ASK_RESET, error)
-        elif stop.is_reached(self._ledger, status):
+        if stop.is_reached(self._ledger, status):
             self._stop = None
-            resolve(stop.waiters)
+            stop.answer(status, self.machine.log)
             if stop.level is not StopLevel.HALT:
                 self._finish(status, has_written=True)
 
@@ -398,7 +398,7 @@ class Controller:
             self.machine.log.info("stopped with rGTO set; in contact: %s", status.contacts or "nothing")
 
     def _note_end_of_activation(self, activation: Entry, status: RobotiqStatus) -> None:
-        """Whether the activation that this hand began is over: what shows may be from before it."""
+        # What shows may be from before it.
         is_over = classify(status) in (Trigger.SEEN_READY, Trigger.SEEN_RESET)
         if (is_over or status.fault.severity is Severity.MAJOR) and self._ledger.acts(activation):
             self._activation = None
@@ -570,8 +570,8 @@ class Controller:
     def _send(
         self, image: Request, sent: Pending, status: RobotiqStatus, now: float, of: Procedure | None = None
     ) -> Entry:
-        activates, releases = (of is not None and of.releases is each for each in (False, True))
-        image = gate(image, status, activates=activates, releases=releases)
+        releases = of is not None and of.releases
+        image = gate(image, status, activates=of is not None and not releases, releases=releases)
         entry = self._ledger.write(image, sent.moved, now)
         self._requests.sending(sent, entry)
         self._written_at = now

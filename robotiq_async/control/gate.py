@@ -26,7 +26,8 @@ def gate(
         releases: whether it begins an automatic release that was asked for.
     """
     # The status may be a device cycle old. If another client resets the gripper within it, rACT passes and
-    # activates [follows]: stops.py takes that back, and a command is refused from the next status on.
+    # activates [follows]. A stop takes that back (has_activated in stops.py); nothing takes it back after a
+    # command or a hold.
     return replace(
         image,
         activate=image.activate and (activates or status.activation_echo),

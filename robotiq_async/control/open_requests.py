@@ -72,15 +72,18 @@ class OpenRequests:
         self.pending = Pending()
 
     def fail_motions(self, error: RobotiqError) -> None:
-        """Fail everything that would move an axis; holds that callers have named remain."""
+        """Fail everything that would move an axis, sent or not; holds that callers have named remain."""
         self.pending.drop_changes(error)
-        self._fail_sent(error)
+        fail((waiter for _, waiter in self._sent.asking), error)
+        self._sent.asking.clear()
         self.moves.fail(error)
 
     def fail(self, error: RobotiqError) -> None:
         """Fail everything asked so far. A write may be on the line all the same."""
         self.fail_motions(error)
         self.pending.drop(error)
+        fail((waiter for _, waiter in self._sent.holding), error)
+        self._sent.holding.clear()
 
     def lost(self, error: RobotiqError) -> None:
         """The link is down: fail everything. Holds stop motion: their axes remain, for when it is back."""
@@ -88,8 +91,3 @@ class OpenRequests:
         hold = self.pending.hold | self._sent.hold
         self.fail(error)
         self.pending.hold, self._sent = hold, Pending()
-
-    def _fail_sent(self, error: RobotiqError) -> None:
-        fail(self._sent.waiters, error)
-        self._sent.asking.clear()
-        self._sent.holding.clear()

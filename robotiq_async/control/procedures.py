@@ -84,7 +84,8 @@ def automatic_release(image: Image) -> Steps:
     Does nothing if the gripper was reset: the image has rACT set and would activate it.
 
     Raises:
-        NotActivatedError: the gripper was reset meanwhile; it may have been activated again since.
+        NotActivatedError: the gripper was reset in the meantime, and may have been activated again since; or
+            it does not show the release.
     """
     status = yield None
     if not status.activation_echo:
@@ -98,5 +99,7 @@ def automatic_release(image: Image) -> Steps:
         goes_on = status.is_reset or status.fault is Fault.AUTOMATIC_RELEASE
         is_sure = begun or (status.timestamp - asked > WINDOW_S and not status.fault.is_serious)
         if classify(status) is Trigger.SEEN_RESET or (is_sure and not goes_on):
-            raise NotActivatedError("the gripper was reset during the automatic release")
+            if begun or classify(status) is Trigger.SEEN_RESET:
+                raise NotActivatedError("the gripper was reset during the automatic release")
+            raise NotActivatedError("the gripper does not show the automatic release (its write was lost)")
         status = yield None

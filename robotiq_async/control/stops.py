@@ -1,11 +1,22 @@
 """Stops: a halt, a reset, and what ends a hand. Each is a level, and a stronger one replaces a weaker.
 
-A stop differs from all else that is written. It does not wait for write_spacing and is written before the
-read of its cycle: a gripper may obey and not answer. It may be written again, because it only ends motion: a
-gripper may acknowledge a write that comes soon after another one and forget it (manual of 2014: space them by
-10 ms). So it is sent once more after the spacing if it came early, and again if it acts by its time and does
-not show. It is reached when its write acts and a status shows it: what shows may be from before the write.
+A stop differs from all else that is written. It is written before the read of its cycle: a gripper may obey
+and not answer. It may be written again, because it only ends motion: a gripper may acknowledge a write that
+comes soon after another one and forget it (manual of 2014: space them by 10 ms). It is reached when its write
+acts and a status shows it: what shows may be from before the write.
 """
+
+# Level     First write           Written again                    Over when
+#
+# RESET     at once               while gACT shows                 the gripper shows reset
+# HALT      at once               once, if gGTO shows              gGTO = 0 and nothing that waits sets it; or
+#                                                                  after two writes: then halt() fails
+# SHUTDOWN  at once               by its time, if nothing shows    the echo is that of the image, or reset; at
+#                                                                  once if there is nothing to stop
+# KEEP      after write_spacing,  never: replaced by SHUTDOWN      every axis rests for REST_S
+#           only what moves
+#
+# A first write that came within write_spacing of another is written again before it counts.
 
 from __future__ import annotations
 
@@ -13,14 +24,16 @@ import math
 from dataclasses import replace
 from typing import Final
 
+from ..runtime.log import Log
 from ..values.enums import Fault, Finger, StopLevel, Trigger
+from ..values.errors import StateTimeoutError
 from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .entry import Entry
 from .evidence import classify, is_activating
 from .ledger import Ledger
 from .pending import Pending, at_rest, merged
-from .waiters import Waiter
+from .waiters import Waiter, fail, resolve
 
 KEEP_S: Final = 0.5
 """Time for the axes to come to rest. The rest of the 2 s of a stop is enough to clear rGTO even on the
@@ -28,8 +41,8 @@ slowest gripper considered (a device cycle of 0.2 s)."""
 REST_S: Final = 0.05
 """Time for which every axis must rest: ten polls. rest.py waits, besides, for recent requests that gDT may
 not show yet."""
-HALTS: Final = 2
-"""The most times that a halt is sent. Then its caller gets the answer, even if rGTO still shows."""
+MOST_HALTS: Final = 2
+"""The most times that a halt is sent. If rGTO still shows then, its callers get an error."""
 
 
 class Stop:
@@ -92,7 +105,7 @@ class Stop:
             case StopLevel.RESET:
                 is_due = status.activation_echo
             case StopLevel.HALT:
-                is_due = status.go_echo and self._times < HALTS
+                is_due = status.go_echo and self._times < MOST_HALTS
             case _:  # while another client resets the gripper it comes to rest, and rACT might cross that
                 is_due = not entry.image.activate or status.activation_echo
         return entry.image if is_due else None
@@ -110,10 +123,21 @@ class Stop:
             case StopLevel.RESET:
                 return is_reset
             case StopLevel.HALT:
-                return not status.go_echo or self._times >= HALTS
+                return not status.go_echo or self._times >= MOST_HALTS
         # gGTO = 0 alone may be from before the write before, and the next client would adopt an echo that is
         # about to change.
         return is_reset or status.echo == entry.echo
+
+    def answer(self, status: RobotiqStatus, log: Log) -> None:
+        """Answer the callers of halt(): it is reached, or was sent as often as it may be."""
+        if self.level is StopLevel.HALT and status.go_echo:
+            error = StateTimeoutError(
+                f"the gripper does not show that it has stopped after {MOST_HALTS} halts: the fingers may "
+                "still move (another client commands it, or it forgets writes)"
+            )
+            log.warning("%s", error)
+            fail(self.waiters, error)
+        resolve(self.waiters)
 
     def has_activated(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether its rACT activates a gripper that another client has reset just before.

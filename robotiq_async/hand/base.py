@@ -333,6 +333,9 @@ class Hand(Kind):
         repeated once the link is back, unless another client moves the axes then. In RESET and ATR_DONE, and
         during an activation, a release or a reset, it sends nothing; :meth:`halt` ends those.
 
+        A hold needs to know what the gripper has, so it may wait: for ``write_spacing``, and for up to 0.25 s
+        after a write of another client or a lost acknowledgement. :meth:`halt` waits for nothing.
+
         Raises:
             MoveSupersededError: reset() took over before it was sent.
             NotActivatedError: the gripper lost its activation before it was sent.
@@ -352,7 +355,8 @@ class Hand(Kind):
 
         Raises:
             MoveSupersededError: reset() took over before it was sent.
-            StateTimeoutError: an activation or a release was not seen to end within 5 s.
+            StateTimeoutError: the gripper does not show that it has stopped after two writes, or that an
+                activation or a release has ended within 5 s: the fingers MAY STILL MOVE.
             RobotiqError: not connected, or the link went down before the acknowledgement.
         """
         with self._naming:

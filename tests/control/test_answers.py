@@ -87,6 +87,16 @@ def test_a_request_that_failed_on_the_line_is_not_answered_again() -> None:
     assert isinstance(asking.error, MoveSupersededError)
 
 
+def test_a_hold_on_the_line_is_answered_although_its_client_has_gone() -> None:
+    scan = moving()
+    holder = scan.hold(A)
+    assert scan.controller.decide(scan.now) is not None
+    scan.controller.drop_requests(MoveSupersededError("its client is gone"))
+    assert not holder.is_answered
+    scan.controller.acknowledged(scan.now)
+    assert holder.answers == [None]
+
+
 def test_a_fault_ends_what_moves_and_not_what_stops() -> None:
     scan = moving()
     asking, holder, halter = scan.command(A, position=100), scan.hold(B), scan.halt()

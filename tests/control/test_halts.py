@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from robotiq_async import ConnectionLostError, Fault, Finger, MoveSupersededError, State
+from robotiq_async import ConnectionLostError, Fault, Finger, MoveSupersededError, State, StateTimeoutError
 from robotiq_async.values.enums import Initialization, Mode
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
@@ -168,18 +168,31 @@ def test_a_halt_outlives_a_fault_in_the_same_poll() -> None:
     assert scan.positions()[A] <= at + 4
 
 
-@pytest.mark.parametrize("forgotten", [1, 2])
-def test_a_halt_that_the_gripper_forgets_is_written_once_more(scan: Scan, forgotten: int) -> None:
-    """A gripper may acknowledge a write and forget it. The caller gets an answer in any case."""
+def test_a_halt_that_the_gripper_forgets_is_written_once_more(scan: Scan) -> None:
+    """A gripper may acknowledge a write and forget it."""
     scan.move(255, speed=0)
     scan.run(0.5)
     halted, before = scan.halt(), len(scan.written)
-    scan.forgets = forgotten
+    scan.forgets = 1
     scan.run(1.5)
     assert halted.answers == [None]
     assert len(scan.written) - before == 2
     assert scan.written[-1] == scan.written[-2]
-    assert scan.gripper.is_moving is (forgotten == 2)
+    assert not scan.gripper.is_moving
+
+
+def test_a_halt_that_never_shows_fails(scan: Scan, caplog: pytest.LogCaptureFixture) -> None:
+    """Its caller took it for stopped while the fingers went on."""
+    scan.move(255, speed=0)
+    scan.run(0.5)
+    halted, before = scan.halt(), len(scan.written)
+    scan.forgets = 2
+    scan.run(1.5)
+    assert scan.gripper.is_moving
+    assert len(scan.written) - before == 2
+    assert isinstance(halted.error, StateTimeoutError)
+    assert "the fingers may still move" in str(halted.error)
+    assert str(halted.error) in caplog.text
 
 
 @pytest.mark.parametrize("how", ["halt", "stop"])

@@ -258,6 +258,24 @@ def test_an_activation_of_ours_is_still_taken_back() -> None:
     assert not scan.last_image.activate
 
 
+def test_a_hold_that_activates_a_gripper_reset_by_another_client_is_taken_back() -> None:
+    """Clearing rGTO ends no activation: the fingers went to their stops after the hand had ended."""
+    scan = started()
+    scan.move(255, speed=0)
+    scan.run(0.5)
+    scan.controller.stop()
+    scan.controller.shut_down(StopLevel.KEEP)
+    scan.gripper.write(0, [0x0000])
+    scan.now += 0.006
+    scan.hurry()
+    assert scan.last_image.activate, "the hold has crossed the reset"
+    scan.until(lambda: not scan.controller.is_busy, 1.0)
+    before = scan.travels()
+    scan.now += 20
+    assert not scan.status().activation_echo
+    assert scan.travels() == before
+
+
 def test_axes_that_do_not_come_to_rest_are_stopped_in_time(caplog: pytest.LogCaptureFixture) -> None:
     scan = Scan()
     scan.gripper = Restless(lambda: scan.now, device_cycle=0.2)

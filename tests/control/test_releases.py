@@ -66,6 +66,19 @@ def test_a_release_that_was_never_seen_to_begin_ends_too(scan: Scan, seconds: fl
     assert scan.state in (State.WF_ACTIVATION, State.RUNNING_IDLE)
 
 
+def test_a_release_that_the_gripper_forgets_is_not_called_a_reset(
+    scan: Scan, caplog: pytest.LogCaptureFixture
+) -> None:
+    scan.gripper.inject_fault(Fault.SCISSOR_INTERFERENCE, 0.2)
+    scan.step()
+    scan.forgets = 1
+    scan.controller.release()
+    scan.run(1.5)
+    assert scan.state is State.RUNNING_IDLE
+    assert "does not show the automatic release" in caplog.text
+    assert "was reset" not in caplog.text
+
+
 def test_a_shutdown_after_a_release_that_another_client_ended_does_not_release_again(releasing: Scan) -> None:
     """The last image has rATR set, and matches the status: rATR has no echo."""
     reset_and_activated_unseen(releasing, 20.0)
