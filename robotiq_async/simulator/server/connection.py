@@ -6,12 +6,14 @@ import asyncio
 import socket
 import struct
 from collections import deque
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
-from .framing import BadFrameError
+from .framing import BadFrameError, Frame
 
 if TYPE_CHECKING:
-    from .endpoint import SimulatorEndpoint
+    from collections.abc import Iterable
+
+    from ..physics.gripper import SimulatedGripper
 
 MOST_WAITING: Final = 1000
 """Replies that wait to be sent later; while there are so many, no more requests are taken."""
@@ -21,17 +23,47 @@ _LINGER_NOT: Final = struct.pack("ii", 1, 0)
 """SO_LINGER on, for no time at all: closing the socket then resets the connection."""
 
 
+class Server(Protocol):
+    """The server of a gripper, as its connections use it."""
+
+    gripper: SimulatedGripper
+
+    def lets_in(self, client: Connection) -> bool:
+        """Take note of a client that has come; return whether it may stay."""
+
+    def forget(self, client: Connection) -> None:
+        """Take note that a client has gone."""
+
+    def take(self, inbox: bytearray) -> Frame | None:
+        """Cut the next request out of what has arrived; raises BadFrameError."""
+
+    def hears(self, frame: Frame) -> bool:
+        """Whether a request is heard, and meant for this gripper."""
+
+    def answer(self, frame: Frame) -> bytes:
+        """Carry out a request; return the frame of the reply."""
+
+    def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
+        """The parts to send for a reply; None to hang up."""
+
+    def undelivered(self, part: bytes) -> None:
+        """Take bytes for a client that is gone."""
+
+    def left_over(self) -> Iterable[bytes]:
+        """Bytes that a new client gets before its first request."""
+
+
 class Connection(asyncio.Protocol):
-    """Answers one request in a turn of the loop, and sends the reply by the endpoint's policy.
+    """Answers one request in a turn of the loop, and sends the reply by the server's policy.
 
     Attributes:
         transport: to the client; None before it has come, and once it is gone.
     """
 
-    def __init__(self, endpoint: SimulatorEndpoint) -> None:
+    def __init__(self, server: Server) -> None:
         self.transport: Any = None
         self._loop = asyncio.get_running_loop()
-        self._endpoint = endpoint
+        self._server = server
         self._inbox = bytearray()
         self._goes_on = False
         """Whether the next request is answered in the next turn of the loop."""
@@ -47,10 +79,10 @@ class Connection(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self.transport = transport
-        if not self._endpoint.lets_in(self):
+        if not self._server.lets_in(self):
             self.hang_up(reset=True)
             return
-        for part in self._endpoint.left_over():
+        for part in self._server.left_over():
             self.pass_on(part)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  # asyncio's
@@ -69,7 +101,7 @@ class Connection(asyncio.Protocol):
         self._answer_next()
 
     def _send(self, reply: bytes) -> None:
-        parts = self._endpoint.deliver(reply)
+        parts = self._server.deliver(reply)
         if parts is None:
             self.hang_up()
             return
@@ -84,7 +116,7 @@ class Connection(asyncio.Protocol):
 
     def pass_on(self, part: bytes) -> None:
         if not self.is_active():
-            self._endpoint.undelivered(part)
+            self._server.undelivered(part)
         elif part:
             self.transport.write(part)
 
@@ -99,7 +131,7 @@ class Connection(asyncio.Protocol):
 
     def _leave(self) -> None:
         self.transport = None
-        self._endpoint.forget(self)
+        self._server.forget(self)
 
     def _go_on(self) -> None:
         self._goes_on = False
@@ -111,21 +143,21 @@ class Connection(asyncio.Protocol):
         A thousand requests at once do not hold up the loop: each turn answers one. A gripper without power
         does not even receive them.
         """
-        if not self._endpoint.gripper.is_powered:
+        if not self._server.gripper.is_powered:
             self._inbox.clear()
         while not self._goes_on and not self._is_full and self.is_active():
             try:
-                frame = self._endpoint.take(self._inbox)
+                frame = self._server.take(self._inbox)
             except BadFrameError:
                 self.hang_up()
                 return
             if frame is None:
                 break
-            if self._endpoint.hears(frame):
+            if self._server.hears(frame):
                 if self._inbox:
                     self._goes_on = True
                     self._loop.call_soon(self._go_on)
-                self._send(self._endpoint.answer(frame))
+                self._send(self._server.answer(frame))
                 break
         self._regulate()
 

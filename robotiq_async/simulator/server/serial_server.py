@@ -259,6 +259,7 @@ class SerialConnection(Connection):
     def __init__(self, endpoint: SimulatorEndpoint, reply_silence: float | None) -> None:
         """Make a connection with the time of its bytes; None for one where they take none."""
         super().__init__(endpoint)
+        self._line = endpoint.fault_injector
         self._wire = None if reply_silence is None else WireTime(reply_silence)
         self._heard_at = 0.0
         self._sent_at = -math.inf
@@ -269,10 +270,9 @@ class SerialConnection(Connection):
     def data_received(self, data: bytes) -> None:
         """Take bytes from the line, once they have come; more than it can carry for long is lost."""
         now = self._loop.time()
-        line = self._endpoint.fault_injector
-        if line.echoes:
+        if self._line.echoes:
             self._put(data)
-        if not self._inbox and now - self._sent_at < line.strict_silence:
+        if not self._inbox and now - self._sent_at < self._line.strict_silence:
             return
         if self._wire is None:
             pause, self._heard_at = now - self._heard_at, now

@@ -20,19 +20,44 @@ import contextlib
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.registers import REGISTER_COUNT
 from robotiq_async.values.request import AxisRequest, Request
 
 from ..functions import READ_INPUT, READ_WRITE
-from .trouble import KINDS, Trouble
+from .corruption import Reply, ReplyPolicy
+from .trouble import KINDS, Link, Trouble
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator
 
-    from ..server.endpoint import SimulatorEndpoint
+    from ..physics.gripper import SimulatedGripper
+
+
+class Target(Protocol):
+    """A simulator that has troubles."""
+
+    link: ClassVar[Link]
+    gripper: SimulatedGripper
+    policy: ReplyPolicy
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it serves, so that connections can be accepted again."""
+
+    def cut(self, *, reset: bool = False) -> None:
+        """Drop all connections."""
+
+    def refuse(self) -> None:
+        """Refuse new connections."""
+
+    async def accept(self) -> None:
+        """Accept connections again."""
+
+    def as_reply(self, frame: bytes) -> Reply:
+        """A reply in the form for troubles."""
 
 
 @dataclass(slots=True, eq=False)
@@ -56,7 +81,7 @@ class FaultInjector:
     Of those that are about the same reply the oldest acts; with none of them, the simulator's policy.
     """
 
-    def __init__(self, target: SimulatorEndpoint) -> None:
+    def __init__(self, target: Target) -> None:
         self._target = target
         self._ongoing: list[Ongoing] = []
         self._device_cycle = target.gripper.device_cycle

@@ -2,40 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import ssl
 import sys
-from collections.abc import Iterator
-from contextlib import suppress
 from tempfile import TemporaryDirectory
-from typing import Any, BinaryIO
 
 from ....runtime.sockets import listen
 from ..settings import PageSettings
-
-
-class Pipes:
-    """The two pipes to the process that has the hands; each message is a line of JSON."""
-
-    def __init__(self) -> None:
-        self._out: BinaryIO = os.fdopen(os.dup(1), "wb", buffering=0)
-        os.dup2(2, 1)
-        self._in = sys.stdin.buffer
-
-    def say(self, message: dict[str, Any]) -> None:
-        """Send a message; ignored if the other process has gone, because this one then ends, too."""
-        with suppress(OSError):
-            self._out.write(json.dumps(message).encode() + b"\n")
-
-    def first_line(self) -> bytes:
-        """The settings; empty if there are none."""
-        return self._in.readline()
-
-    def lines(self) -> Iterator[bytes]:
-        """The following lines, to the end. Blocks."""
-        return iter(self._in.readline, b"")
+from .pipes import Pipes
 
 
 def main() -> int:

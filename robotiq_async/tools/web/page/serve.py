@@ -7,7 +7,7 @@ import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import uvicorn
 from fastapi import FastAPI
@@ -18,9 +18,7 @@ from .access import Access
 from .guard import Guard
 from .mirror import Mirror
 from .pages import register
-
-if TYPE_CHECKING:
-    from .__main__ import Pipes
+from .pipes import Pipes
 
 BEAT_S: Final = 0.25
 MESSAGE_MAX: Final = 65_536
