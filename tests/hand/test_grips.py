@@ -22,7 +22,7 @@ HELD = B | C
 def rows() -> dict[str, tuple[str, str]]:
     """The fate of the grip in each row as usual, and with keep_grip."""
     _, *rows = table("what-happens-when.md", "## A grip")
-    return {what: (usual, kept) for what, usual, kept, _ in rows}
+    return {what: (usual, kept) for what, usual, kept in rows}
 
 
 class Bench:
