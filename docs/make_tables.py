@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import inspect
 import re
+import textwrap
 import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -17,7 +18,7 @@ from typing import Final
 
 from robotiq_async import ReconnectPolicy, RobotiqHand
 from robotiq_async.control.state_machine import SEQUENCES, TABLE, Verdict
-from robotiq_async.simulator.troubles.trouble import KINDS, Kind
+from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values import registers
 from robotiq_async.values.enums import (
     Fault,
@@ -266,18 +267,8 @@ def reconnect_policy() -> str:
 
 
 def troubles() -> str:
-    """What can go wrong with the simulator."""
-
-    def usually(kind: Kind) -> str:
-        parts = ["" if kind.value is None else f"{kind.value:g}", "once" if kind.lasts == 0 else "for ever"]
-        if kind.link is not None:
-            parts.append(f"{kind.link.upper()} only")
-        return ", ".join(filter(None, parts))
-
-    return table(
-        ["kind", "what goes wrong", "VALUE and duration by default"],
-        ([f"`{name}`", kind.meaning, usually(kind)] for name, kind in KINDS.items()),
-    )
+    """The names of what can go wrong with the simulator; ``simulate --troubles`` says more of each."""
+    return textwrap.fill(", ".join(f"`{name}`" for name in KINDS), 120, break_on_hyphens=False)
 
 
 def _arguments(documented: Callable[..., object], section: str) -> str:
