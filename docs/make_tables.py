@@ -268,26 +268,20 @@ def reconnect_policy() -> str:
 
 def troubles() -> str:
     """The names of what can go wrong with the simulator; ``simulate --troubles`` says more of each."""
-    return textwrap.fill(", ".join(f"`{name}`" for name in KINDS), 120, break_on_hyphens=False)
+    return _listed(KINDS)
 
 
 def _arguments(documented: Callable[..., object], section: str) -> str:
+    """Those that the docstring has, each with its default; what they mean is on the page of the API."""
     parameters = inspect.signature(documented).parameters
     text = inspect.getdoc(documented) or ""
     (body,) = re.findall(rf"^{section}:\n((?: .*\n?|\n(?= ))+)", text, re.MULTILINE)
-    entries = re.findall(r"^    (\w+): ((?:.*\n?)(?:^     +.*\n?)*)", body, re.MULTILINE)
-    return table(
-        ["option", "default", "meaning"],
-        (
-            [f"`{name}`", f"`{_default(parameters[name].default)}`", _first_sentence(_plain(meaning))]
-            for name, meaning in entries
-        ),
-    )
+    names = re.findall(r"^    (\w+): ", body, re.MULTILINE)
+    return _listed(f"{name}={_default(parameters[name].default)}" for name in names)
 
 
-def _first_sentence(text: str) -> str:
-    """The rest is on the page of the API."""
-    return re.split(r"(?<=\.) (?=[A-Z])", text)[0]
+def _listed(words: Iterable[str]) -> str:
+    return textwrap.fill(", ".join(f"`{each}`" for each in words), 120, break_on_hyphens=False)
 
 
 def _default(value: object) -> str:

@@ -112,5 +112,5 @@ def test_the_arguments_of_the_command_line() -> None:
         assert parameter.help.startswith(there[each.name].help)
 
 
-def test_the_table_of_the_reference_has_a_row_for_each() -> None:
-    assert re.findall(r"^\| `(\w+)` \|", make_tables.options(), re.MULTILINE) == list(OPTIONS)
+def test_the_reference_names_each() -> None:
+    assert re.findall(r"`(\w+)=", make_tables.options()) == list(OPTIONS)

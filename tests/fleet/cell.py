@@ -285,7 +285,7 @@ async def outcome(world: World, phase: str, trouble: Trouble) -> tuple[str, floa
         check_travel(world, Finger(0))
         fingers = "grips"
     elif phase == "idle":
-        fingers = "at rest"
+        fingers = "rest"
     check_commands(doing)
     check_travel(world, Finger.A)
     words = f"{what}, {fingers}, {lease_of(world)}"
@@ -360,10 +360,10 @@ def lease_of(world: World) -> str:
     """The fate of the lease, and whether the holder noticed."""
     holder = world.holder
     if holder.host.is_dead:
-        return "lease ended"
+        return "ended"
     if not holder.hand.is_in_control:
-        return "lease lost"
-    return "lease back" if False in holder.had_control else "lease kept"
+        return "lost"
+    return "back" if False in holder.had_control else "kept"
 
 
 async def ending(work: Coroutine[Any, Any, Any]) -> str:

@@ -51,7 +51,7 @@ def test_arguments_of_the_launch_file_are_parameters() -> None:
 
 
 def test_the_page_has_every_parameter_and_service() -> None:
-    rows = set(re.findall(r"`([^`]+)`", "".join(re.findall(r"^\| `[^|]*\|", PAGE, re.MULTILINE))))
+    rows = set(re.findall(r"`([^`]+)`", "".join(re.findall(r"^\| `[^|]*\||^- `[^`]+`", PAGE, re.MULTILINE))))
     assert set(PARAMETERS) <= rows
     assert {f"~/{name}" for name in COMMANDS} <= rows
 
