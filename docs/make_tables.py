@@ -99,8 +99,9 @@ def is_on_the_way(state: State) -> bool:
 
 
 def asked() -> str:
-    """What each state answers to each call."""
-    triggers = [trigger for trigger in Trigger if trigger.name.startswith("ASK_")]
+    """What each state answers to each call, but for start() and stop(), of which a sentence tells."""
+    told = (Trigger.ASK_START, Trigger.ASK_STOP)
+    triggers = [trigger for trigger in Trigger if trigger.name.startswith("ASK_") and trigger not in told]
 
     def cell(source: State, to: State | Verdict) -> str:
         if isinstance(to, Verdict):
