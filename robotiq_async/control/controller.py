@@ -249,7 +249,7 @@ class Controller:
         """Begin an activation or a release."""
         releases = trigger is Trigger.ASK_RELEASE
         self._procedure, self._stop = Procedure(self._ledger, releases=releases), None
-        self._requests.pending.hold = NO_AXES
+        self._requests.pending.hold_only(NO_AXES)
         self._ledger.grips.forget()
         self._show(trigger)
 
@@ -335,24 +335,22 @@ class Controller:
         ``asked`` is when it was asked for, in monotonic seconds; None for the time of the reply.
         """
         asked = status.timestamp if asked is None else asked
-        ledger, before = self._ledger, self._evidence.condition
+        ledger, stop, before = self._ledger, self._stop, self._evidence.condition
         self.status = status
         ledger.update(status, asked)
         condition = self._evidence.update(status, asked)
         # This runs at every poll, so it works out only what is waited for.
         if self._activation is not None:
             self._note_end_of_activation(self._activation, status)
-        if self._is_hidden(status) or self.is_undecided:
+        if stop is not None:
+            self._advance_stop(stop, status)
+            if stop.level is not StopLevel.HALT:
+                return  # what shows during a stop is its business, and so is what shows in a procedure
+        if condition is None or self.is_busy:
             return
-        if before is None and condition is Trigger.SEEN_RESET and self.activates:
-            self._begin(Trigger.ACTIVATES)
+        is_news = condition is not before or ledger.match is None
+        if is_news and not self._note_news(before, condition, status):
             return
-        if condition is not before:
-            self._follow_change(before, condition, status)
-        elif ledger.match is None and condition in FOLLOWS:
-            self._adopt_other_client(status)
-        if ledger.match is None and condition not in FOLLOWS:
-            ledger.adopt(status)  # after a reset or a power cycle, no image from before it acts
         if condition is Trigger.SEEN_READY:
             ledger.update_rest(status)
             if self._requests.moves:
@@ -360,22 +358,29 @@ class Controller:
         if condition is not before:
             self._show(condition)
 
-    def _is_hidden(self, status: RobotiqStatus) -> bool:
-        """Whether what is under way hides the condition that a status shows. Ends a stop that is reached."""
-        stop = self._stop
-        if stop is not None and stop.has_activated(self._ledger, status):
+    def _note_news(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> bool:
+        """Take in another condition than before, or an image of nobody; return whether it is to be shown."""
+        if self.machine.state in _OFF:
+            return False
+        if before is None and condition is Trigger.SEEN_RESET and self.activates:
+            self._begin(Trigger.ACTIVATES)
+            return False
+        if condition is not before:
+            self._follow_change(before, condition, status)
+        elif condition in FOLLOWS:
+            self._adopt_other_client(status)
+        if self._ledger.match is None and condition not in FOLLOWS:
+            self._ledger.adopt(status)  # after a reset or a power cycle, no image from before it acts
+        return True
+
+    def _advance_stop(self, stop: Stop, status: RobotiqStatus) -> None:
+        if stop.has_activated(self._ledger, status):
             error = NotActivatedError("the gripper was reset as it was stopped: its activation is taken back")
             self.machine.log.warning("%s", error)
             self._begin_reset(Trigger.ASK_RESET, error)
         elif isinstance(stop, Keeping):
             self._advance_keeping(stop)
-        elif stop is not None:
-            self._advance_stop(stop, status)
-        hides = stop is not None and stop.level is not StopLevel.HALT
-        return hides or self.is_busy or self.machine.state in _OFF
-
-    def _advance_stop(self, stop: Stop, status: RobotiqStatus) -> None:
-        if stop.is_reached(self._ledger, status):
+        elif stop.is_reached(self._ledger, status):
             self._stop = None
             stop.answer(status, self.machine.log)
             if stop.level is not StopLevel.HALT:
@@ -420,12 +425,11 @@ class Controller:
             self._fail_all(NotActivatedError("the gripper lost its activation"))
         elif condition in FOLLOWS and before not in FOLLOWS:
             # Others have reset and activated it, even if its image is equal to one of ours.
-            ledger.adopt(status)
-            ledger.ours = NO_AXES
+            ledger.adopt(status, is_found=True)
         elif ledger.match is None and condition in FOLLOWS:
             self._adopt_other_client(status)
         if condition not in FOLLOWS:
-            requests.pending.hold = NO_AXES
+            requests.pending.hold_only(NO_AXES)
 
     def _resume_or_adopt(self, condition: Trigger, status: RobotiqStatus) -> None:
         """The link is back: go on from the image of ours that the gripper shows, or adopt it."""
@@ -433,10 +437,9 @@ class Controller:
         if condition not in FOLLOWS:
             return
         if ledger.match is None or not ledger.match.is_ours:
-            ledger.adopt(status)
-            ledger.ours = NO_AXES
+            ledger.adopt(status, is_found=True)
         if condition is Trigger.SEEN_FAULT and status.activation_echo:
-            pending.hold = Finger.ALL  # as when a fault begins: no motion may resume when it clears
+            pending.merge_hold(Finger.ALL)  # as when a fault begins: no motion may resume when it clears
         pending.hold_only(ledger.ours)
 
     def _adopt_other_client(self, status: RobotiqStatus) -> None:
@@ -528,14 +531,15 @@ class Controller:
             if isinstance(end, RobotiqError):
                 self.machine.log.warning("%s", end)
             if not has_written:  # it had nothing to do, so there is no write to wait for
-                procedure.entry = self._ledger.shown
+                procedure.written(self._ledger.shown)
                 self._show(Trigger.DELIVERED)
             self._procedure = None
             self._finish(status, has_written=has_written)
             return None
         if image is None:
             return None
-        procedure.entry = entry = self._send(image, Pending(), status, now, of=procedure)
+        entry = self._send(image, Pending(), status, now, of=procedure)
+        procedure.written(entry)
         if not procedure.releases:
             self._activation = entry
         return entry.image
@@ -564,8 +568,7 @@ class Controller:
                 self._requests.nothing_to_send()
                 self._show(Trigger.DELIVERED)
             return None
-        self._requests.pending = Pending()
-        return self._send(image, pending, status, now).image
+        return self._send(image, self._requests.taken(), status, now).image
 
     def _send(
         self, image: Request, sent: Pending, status: RobotiqStatus, now: float, of: Procedure | None = None
@@ -579,10 +582,8 @@ class Controller:
 
     def acknowledged(self, now: float) -> None:
         """The image that decide() returned was acknowledged."""
-        entry = self._ledger.acknowledge(now)
+        self._ledger.acknowledge(now)
         self._requests.acknowledged()
-        if self._stop is not None and self._stop.entry is entry:
-            self._stop.is_delivered = True
         self._show(Trigger.DELIVERED)
 
     def lost(self, why: RobotiqError | None = None) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ..values.enums import NO_AXES, Finger
@@ -45,6 +45,11 @@ class Entry:
     again: Finger = NO_AXES
     rested: Finger = NO_AXES
     started: Finger = NO_AXES
+
+    def limit(self, positions: Mapping[Finger, int], echo: Echo | None = None) -> None:
+        """Put limits in place of requests; ``echo`` if it is known to be another than that of the image."""
+        self.image = self.image.with_positions(positions)
+        self.echo = self.image.echo if echo is None else echo
 
     @property
     def time(self) -> float:

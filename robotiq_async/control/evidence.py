@@ -91,25 +91,32 @@ class Evidence:
         """Whether the first status on a new link shows 0x09, perhaps because of the silence before it."""
         return self._passing.is_open and self.condition is None
 
-    def update(self, status: RobotiqStatus, asked: float) -> Trigger:
-        """Take in a status that was asked for at ``asked``; return its condition. That counts from now on.
+    def update(self, status: RobotiqStatus, asked: float) -> Trigger | None:
+        """Take in a status that was asked for at ``asked``.
 
-        The first condition on a new link does not count while it is undecided.
+        Returns:
+            Its condition, which counts from now on; None while the first one on a new link is undecided.
         """
+        condition = classify(status)
+        if self._passing.is_counting or condition is Trigger.SEEN_FAULT:
+            status = self._without_passing(status, asked)
+            condition = classify(status)
+        self.status = status
+        if self.condition is None and self.is_undecided:
+            return None
+        self.condition = condition
+        return condition
+
+    def _without_passing(self, status: RobotiqStatus, asked: float) -> RobotiqStatus:
         passing, passed = self._passing, self._passing.passed
-        if passing.is_counting or classify(status) is Trigger.SEEN_FAULT:
-            judged = passing.filtered(status, asked)
-            # In a fault 0x09 is no news, and counts at once: hiding it would show the fault as cleared.
-            status = status if self.condition is Trigger.SEEN_FAULT else judged
+        judged = passing.filtered(status, asked)
         if passing.passed > passed == 0:
             self._log.info(
                 "the gripper showed fault 0x09 for a moment, as some do after a second without a poll: "
                 "ignored, and from here on only counted"
             )
-        self.status, condition = status, classify(status)
-        if not self.is_undecided:
-            self.condition = condition
-        return condition
+        # In a fault 0x09 is no news, and counts at once: hiding it would show the fault as cleared.
+        return status if self.condition is Trigger.SEEN_FAULT else judged
 
     def lost(self) -> None:
         """The link is down: the next condition is the first."""

@@ -228,10 +228,9 @@ class Ledger:
         if image.go:
             self.unrested |= entry.asks
 
-    def acknowledge(self, now: float) -> Entry:
+    def acknowledge(self, now: float) -> None:
         """The last image was acknowledged."""
         self._entries[-1].acknowledged = now
-        return self._entries[-1]
 
     def lost(self) -> None:
         """The link is down: a write without acknowledgement may or may not have arrived."""
@@ -253,8 +252,8 @@ class Ledger:
         entries, echo, shown = self._entries, status.echo, self.shown
         if len(entries) > 1:
             self._raise_floor()
-        # The common case first: nothing has changed since the last poll.
-        if shown.echo == echo and shown.number >= entries[0].number and not self._limits.has_alias:
+        # The common case first: nothing has changed since the last poll, and nothing waits to show.
+        if shown.echo == echo and (shown is entries[-1] or self._shows_still(shown)):
             self.match = shown
         else:
             self.match = self._find(status)
@@ -263,6 +262,10 @@ class Ledger:
         # A moving axis of another client shows its direction with time, an axis at rest its true gDT.
         if self._adoption is not None and self.match is self.last:
             self._adoption.update(status, self.now)
+
+    def _shows_still(self, shown: Entry) -> bool:
+        """Whether an echo of the entry shown before is its own, although others wait."""
+        return shown.number >= self._entries[0].number and not self._limits.has_alias
 
     def _raise_floor(self) -> None:
         """Take the entries that were replaced longer than WINDOW_S ago out of those that a status may show.
@@ -369,10 +372,11 @@ class Ledger:
             return False
         return self._limits.explains(self.shown, waiting, status, self.now.time)
 
-    def adopt(self, status: RobotiqStatus) -> None:
+    def adopt(self, status: RobotiqStatus, *, is_found: bool = False) -> None:
         """The status shows nobody's image: it gets an entry, and what the hand writes next is made from that.
 
-        The entries that wait may still act after it. Nothing is written.
+        The entries that wait may still act after it. Nothing is written. With ``is_found`` the gripper was
+        found like this, and no axis moves because of us.
         """
         before = self.base
         # A client that keeps writing must not make us wait anew each time.
@@ -386,6 +390,8 @@ class Ledger:
         for axis, old in before.by_axis:
             if old.position != image.position(axis):
                 self.ours &= ~axis
+        if is_found:
+            self.ours = NO_AXES
         waiting = self._waiting()
         self._past.extend(each for each in self._entries if each.number <= self.shown.number)
         self._entries, self.shown, self.match = deque([other, *waiting]), other, other

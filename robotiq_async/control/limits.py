@@ -86,9 +86,8 @@ class Limits(NoLimits):
                 if last.image.position(axis) == entry.image.position(axis):
                     self.limited[axis] = limit
                     if last is not entry:
-                        last.image = last.image.with_positions({axis: limit})
-                        last.echo = last.image.echo
-            entry.image, entry.echo = entry.image.with_positions(self.apply(entry.image)), echo
+                        last.limit({axis: limit})
+            entry.limit(self.apply(entry.image), echo)
         self._aliases = {each: alias for each, alias in self._aliases.items() if each.number > entry.number}
 
     def rests(self, axis: Finger, status: RobotiqStatus) -> None:

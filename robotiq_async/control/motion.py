@@ -53,6 +53,10 @@ class Move:
         # The times are those of one gripper without load [thesis, table A1.1]: twice leaves room.
         return 2 * max(stroke * closing_time(speeds[axis]) for axis, stroke in strokes.items()) + MARGIN_S
 
+    def written(self, entry: Entry) -> None:
+        """It is about to be sent."""
+        self.entry = entry
+
     def note_currents(self, status: RobotiqStatus) -> None:
         """Take in the currents of a status read after the write."""
         for axis, peak in self._peak.items():
@@ -122,7 +126,7 @@ class LiveMoves:
         """The moves added since the last write go out with this one."""
         for move in self._moves:
             if move.entry is None:
-                move.entry = entry
+                move.written(entry)
 
     def end_arrived(
         self,

@@ -56,6 +56,11 @@ class OpenRequests:
 
     # -- what becomes of it ----------------------------------------------------------------------------
 
+    def taken(self) -> Pending:
+        """Take what is pending, to be sent."""
+        taken, self.pending = self.pending, Pending()
+        return taken
+
     def sending(self, sent: Pending, entry: Entry) -> None:
         """The changes taken from the pending ones go out with this entry."""
         self._sent = sent
@@ -68,8 +73,7 @@ class OpenRequests:
 
     def nothing_to_send(self) -> None:
         """Everything pending is in force already."""
-        resolve(self.pending.waiters)
-        self.pending = Pending()
+        resolve(self.taken().waiters)
 
     def fail_motions(self, error: RobotiqError) -> None:
         """Fail everything that would move an axis, sent or not; holds that callers have named remain."""
@@ -90,4 +94,5 @@ class OpenRequests:
         # A hold of our own making has no caller to hear of the error.
         hold = self.pending.hold | self._sent.hold
         self.fail(error)
-        self.pending.hold, self._sent = hold, Pending()
+        self.pending.merge_hold(hold)
+        self._sent = Pending()

@@ -43,6 +43,10 @@ class Procedure:
         self.entry: Entry | None = None
         next(self.steps)  # to its first yield: what the gripper shows decides whether it begins
 
+    def written(self, entry: Entry) -> None:
+        """Its image is about to be sent. If it has none to send, what shows stands in for that."""
+        self.entry = entry
+
     @property
     def state(self) -> State:
         """DO_ until the write is acknowledged, then WF_."""

@@ -51,23 +51,31 @@ class Stop:
     Attributes:
         level: its level. A new level is a new stop.
         waiters: the callers of halt().
-        entry: its last write; None before that.
-        is_early: whether that came within write_spacing, so that it is due again.
-        is_delivered: whether a write of it was acknowledged.
+        is_early: whether its last write came within write_spacing, so that it is due again.
     """
 
     def __init__(self, level: StopLevel, waiters: list[Waiter[None]] | None = None) -> None:
         self.level: Final = level
         self.waiters: Final = waiters or []
-        self.entry: Entry | None = None
         self.is_early = False
-        self.is_delivered = False
+        self._entries: Final[list[Entry]] = []
         self._times = 0
         self._was_ready = False
 
+    @property
+    def entry(self) -> Entry | None:
+        """Its last write; None before that."""
+        return self._entries[-1] if self._entries else None
+
+    @property
+    def is_delivered(self) -> bool:
+        """Whether a write of it was acknowledged: it is sent again only after that."""
+        return bool(self._entries) and self._entries[0].acknowledged is not None
+
     def written(self, entry: Entry, status: RobotiqStatus, *, is_early: bool) -> None:
         """A write of it is about to be sent, made from this status."""
-        self.entry, self.is_early = entry, is_early
+        self._entries.append(entry)
+        self.is_early = is_early
         self._times += not is_early
         self._was_ready = classify(status) is Trigger.SEEN_READY
 

@@ -56,7 +56,6 @@ class Stopping:
         entry = self.ledger.write(image, NO_AXES, self.now)
         self.stop.written(entry, BEFORE, is_early=is_early)
         self.ledger.acknowledge(self.now)
-        self.stop.is_delivered = True
 
     def see(self, status: RobotiqStatus, after: float = WINDOW_S) -> bool:
         """Whether the stop is reached."""
