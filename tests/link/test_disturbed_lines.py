@@ -9,6 +9,7 @@ from collections.abc import Callable
 import pytest
 
 from robotiq_async import ProtocolError, ResponseTimeoutError, RobotiqConnectionError
+from robotiq_async.link.connection import HUSH_S
 from robotiq_async.link.modbus import ModbusTransport
 from robotiq_async.link.silence import LONG_S
 from tests.link.scripted_device import Device, unopened, wrong_checksum
@@ -174,6 +175,29 @@ async def test_a_byte_after_the_reply_to_a_read_costs_a_read(
     device.spoil = lambda reply: reply + stray
     await newest(transport, device)
     assert transport.is_open
+
+
+async def test_nothing_is_asked_while_the_rest_of_a_damaged_reply_comes(
+    transport: ModbusTransport, device: Device
+) -> None:
+    """An adapter holds bytes back, and gives them out a few at a time: each of them extends the silence."""
+    loop, asked_by_then = asyncio.get_running_loop(), []
+
+    def give_out() -> None:
+        device.send(b"\x00")
+        asked_by_then.append(len(device.requests))
+
+    def spoil(reply: bytes) -> bytes:
+        for part in (1, 2, 3):
+            loop.call_later(0.75 * HUSH_S * part, give_out)
+        return wrong_checksum(reply)
+
+    device.spoil = spoil
+    asked = len(device.requests) + 1
+    await newest(transport, device)
+    assert asked_by_then == [asked] * 3
+    await newest(transport, device)
+    assert transport.repeats == 1
 
 
 @pytest.mark.parametrize("stray", [b"\x00", b"\xff", b"\x00\xff\x00"])
