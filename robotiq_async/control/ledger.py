@@ -367,19 +367,18 @@ class Ledger:
         self._has_doubtful = any(each.is_doubtful for each in self._entries)
 
     def _is_limit(self, waiting: list[Entry], status: RobotiqStatus) -> bool:
-        is_unknown = any(each.acknowledged is None or each.is_doubtful for each in waiting)
-        if not waiting or is_unknown or self._adoption is not None:
-            return False
-        return self._limits.explains(self.shown, waiting, status, self.now.time)
+        # A write in doubt may not have arrived: then another client explains the echo better.
+        is_known = not any(each.is_doubtful for each in waiting)
+        return is_known and self._limits.explains(self.shown, waiting, status, self.now.time)
 
     def adopt(self, status: RobotiqStatus, *, is_found: bool = False) -> None:
-        """The status shows nobody's image: it gets an entry, and what the hand writes next is made from that.
+        """Add an entry for the image that a status shows, as no other explains it; the next is made from it.
 
         The entries that wait may still act after it. Nothing is written. With ``is_found`` the gripper was
         found like this, and no axis moves because of us.
         """
         before = self.base
-        # A client that keeps writing must not make us wait anew each time.
+        # A client that keeps writing must not make us wait again each time.
         since = self.now if self._adoption is None else self._adoption.since
         self._freeze(before)
         self._adoption = Adoption(status, self.now, since)

@@ -6,7 +6,7 @@ import logging
 
 import pytest
 
-from robotiq_async import Finger, MoveSupersededError, ObjectStatus
+from robotiq_async import ConnectionLostError, Finger, MoveSupersededError, ObjectStatus, State
 from robotiq_async.control.limits import ALONE_S, Limits
 from robotiq_async.simulator import Habits
 from robotiq_async.values.model import THREE_FINGER
@@ -118,6 +118,24 @@ def test_two_moves_at_once_one_of_them_beyond_a_limit() -> None:
     scan.until(lambda: finger.is_answered and scissor.is_answered)
     assert finger.result.positions == {A: 150}
     assert scissor.result.positions == {S: HIGH}
+
+
+@pytest.mark.parametrize("arrives", [True, False])
+def test_what_shows_after_a_lost_link_is_no_limit_of_a_write_that_may_not_have_arrived(
+    arrives: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
+    scan = echoing()
+    scan.forgets = not arrives
+    lost = scan.command(S, position=255)
+    scan.step(answer=False)
+    scan.gripper.write(0, scan.last_image.with_positions({S: 200}).registers)
+    scan.come_back(0.1)
+    assert scan.state is State.RUNNING_IDLE
+    assert isinstance(lost.error, ConnectionLostError)
+    scan.until(lambda: not scan.controller.is_moving)
+    scan.run(1.0)
+    assert "its limit" not in caplog.text
 
 
 def test_after_a_reconnect_it_goes_on() -> None:

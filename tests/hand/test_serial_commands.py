@@ -92,6 +92,16 @@ async def test_a_command_is_written_before_the_next_read_which_shows_it(
             await asyncio.sleep(0.05)
 
 
+async def test_the_read_that_shows_a_command_does_not_wait_for_the_next_poll(
+    monkeypatch: pytest.MonkeyPatch, model: str
+) -> None:
+    async with at_a_line(monkeypatch, model, poll_interval=0.1) as (hand, replies):
+        asked = await between_polls(hand)
+        await hand.set_position(100)
+        await asyncio.sleep(0.01)
+        assert replies.since(asked) == ([WRITE, READ] if model == "3f" else [BOTH])
+
+
 async def test_an_old_status_is_read_anew_before_a_command(
     monkeypatch: pytest.MonkeyPatch, model: str
 ) -> None:
