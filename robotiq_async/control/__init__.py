@@ -1,4 +1,4 @@
-"""What decides: the state machine, and what to write after what has been read. Pure."""
+"""Decision logic: the state machine, and the next write after each read. Pure."""
 
 # Theory of operation
 #
@@ -10,7 +10,7 @@
 # * what it shows: one of five conditions (evidence.py), and which axes rest (rest.py).
 #
 # A cycle is see(), then decide(). An image is made from the base, which is what the gripper has, so that an
-# axis that nobody addresses keeps its request. It leaves through one gate (gate.py): only the procedure that
+# axis that is not addressed keeps its request. It leaves through one gate (gate.py): only the procedure that
 # was asked for raises rACT or rATR, whatever an image carries along from another client or an older one. One
 # race is left: if another client resets the gripper while a status is a device cycle old, an image with rACT
 # activates it [follows]. A stop takes that back; after a command or a hold the activation runs to its end.
@@ -29,11 +29,11 @@
 # A stop goes before all else: a halt, a reset, the end of the hand. It is written at once, again until it is
 # seen, and is over when its write acts and a status shows it; stops.py has what that is for each level. A
 # halt that does not show after two writes fails. A halt and a reset fail with the link, too: sent
-# later they would stop another client, or drop a part. The end of a hand begins its stop anew on a new link.
+# later they would stop another client, or drop a part. The end of a hand begins its stop again on a new link.
 #
-# Procedures raise rACT or rATR. While one is under way, what a status shows is its matter, not news. When it
-# ends, nothing of ours is on its way, and the ledger begins anew. What an activation of ours began is
-# remembered until its end shows: stopping the hand takes it back.
+# Procedures raise rACT or rATR. While one runs, it alone judges what a status shows. When it ends, no write
+# of ours is on its way, and the ledger begins with what shows then. An activation of ours is remembered until
+# its end shows: stopping the hand takes it back.
 #
 # Another client is seen by a status that shows none of our images. It is adopted: its image becomes the base,
 # the moves whose request is gone fail, the others go on, and our writes on their way are in doubt. An
@@ -42,6 +42,9 @@
 # Each question "is it reached" asks two things: does the write act, and does a status show it. What shows may
 # be from before the write, and what acts may have been undone by another client.
 #
-# The state of the hand is a view of all this: _view() says which of the fourteen holds, state_machine.py what
-# each answers to a call. Evidence: [manual] and [thesis] are printed, [seen] is from real grippers, [vendor]
+# The state of the hand is a view of all this: _view() works out which of the fourteen holds, and
+# state_machine.py has what each answers to a call.
+#
+# Evidence stands beside each rule: [manual] and [thesis] are printed, [seen] is from real grippers, [vendor]
 # from the maker's examples, [follows] from Modbus and two clients alone, [conceivable] from nothing but care.
+# A rule without one is a promise of ours, and needs no fact about the gripper.

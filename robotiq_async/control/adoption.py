@@ -1,4 +1,4 @@
-"""What another client has asked of each axis, as far as the status tells.
+"""The requests of another client for each axis, as far as the status shows them.
 
 The hand adopts an active gripper without writing. Its first write carries a request for every axis, and the
 axes that it does not address must neither move nor let go. Their requests are known only from the status, and

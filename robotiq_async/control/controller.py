@@ -161,7 +161,7 @@ class Controller:
         if self.is_busy or self._evidence.condition is Trigger.SEEN_BUSY:
             self._begin_reset(Trigger.ASK_HALT, MoveSupersededError("a halt took over"))
         self._requests.supersede(Finger.ALL, MoveSupersededError("a halt stopped the fingers"))
-        if self._stop is None or self._stop.is_delivered:  # a new halt is sent anew
+        if self._stop is None or self._stop.is_delivered:  # a new halt is sent again
             self._stop = Stop(StopLevel.HALT, [] if self._stop is None else self._stop.waiters)
         self._stop.waiters.append(waiter)
         self._show(Trigger.ASK_HALT)
@@ -224,7 +224,7 @@ class Controller:
             self.machine.show(State.SHUTDOWN, Trigger.STOPPED)
 
     def keep_no_grip(self, why: str) -> None:
-        """Make the shutdown under way clear rGTO after all."""
+        """Make the stop that has begun clear rGTO after all."""
         self._doubt = why
         if isinstance(self._stop, Keeping):
             self._stop = Stop(StopLevel.SHUTDOWN)
@@ -284,7 +284,7 @@ class Controller:
 
     @property
     def is_busy(self) -> bool:
-        """Whether a procedure, a reset or the end of the hand is under way."""
+        """Whether a procedure, a reset or the end of the hand has begun and not ended."""
         is_stopping = self._stop is not None and self._stop.level is not StopLevel.HALT
         return is_stopping or self._procedure is not None
 
@@ -306,7 +306,7 @@ class Controller:
         return waits or self._requests.has_undelivered_hold
 
     def _view(self) -> State:
-        """The state: what is under way decides, and if nothing is, what the gripper shows."""
+        """The state: that of the stop or procedure that runs; if none does, what the gripper shows."""
         if self.machine.state in _OFF:
             return self.machine.state
         if self._evidence.condition is None:
@@ -327,7 +327,7 @@ class Controller:
             state = State.RUNNING_IDLE  # a call begins it, and not a fault that clears while a hold waits
         self.machine.show(state, trigger)
 
-    # -- what a status says ----------------------------------------------------------------------------
+    # -- what a status shows ---------------------------------------------------------------------------
 
     def see(self, status: RobotiqStatus, asked: float | None = None) -> None:
         """Take in a status that was read after every acknowledgement so far.
@@ -359,7 +359,7 @@ class Controller:
             self._show(condition)
 
     def _note_news(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> bool:
-        """Take in another condition than before, or an image of nobody; return whether it is to be shown."""
+        """Take in a new condition, or an image that no entry explains; return whether it is to be shown."""
         if self.machine.state in _OFF:
             return False
         if before is None and condition is Trigger.SEEN_RESET and self.activates:
@@ -519,7 +519,7 @@ class Controller:
         return entry.image
 
     def _next_step(self, procedure: Procedure, status: RobotiqStatus, now: float) -> Request | None:
-        """Advance the procedure under way; return the image that it wants written."""
+        """Advance the procedure; return the image that it wants written."""
         has_written = procedure.entry is not None
         if procedure.entry is not None and not self._ledger.acts(procedure.entry):
             return None

@@ -22,9 +22,9 @@ LASTS_READS: Final = 3
 LASTS_S: Final = 0.01
 """Seconds between the first and the last of these reads. A gripper renews its registers at 100 Hz or faster
 (manual of 2014, Modbus TCP), so three reads over this time show it more than once. It must not be longer:
-fingers that must stop move on meanwhile, a count or two at full speed."""
+fingers that must stop move on in this time, a count or two at full speed."""
 SILENCE_S: Final = 0.9
-"""After this time without a read a gripper may show it again, and the count begins anew. One second is what
+"""After this time without a read a gripper may show it again, and the count begins again. One second is what
 is known [seen]. A program that is stepped through in a debugger makes such silences."""
 FOLLOWS: Final = frozenset({Trigger.SEEN_READY, Trigger.SEEN_FAULT})
 """The conditions in which the gripper follows requests, ours or another client's."""
@@ -43,7 +43,7 @@ def classify(status: RobotiqStatus) -> Trigger:
 
 
 def is_activating(status: RobotiqStatus) -> bool:
-    """Whether an activation is under way. A change of mode is busy as well, and keeps what the hand holds."""
+    """Whether the gripper activates. A change of mode is busy as well, and keeps what the hand holds."""
     return classify(status) is Trigger.SEEN_BUSY and status.initialization is Initialization.ACTIVATING
 
 

@@ -35,10 +35,10 @@ from .entry import Entry, NoLimits
 from .rest import LONG_AGO, Asked, Grips, Moment, Rest, is_doubtful, rest_of
 
 WINDOW_S: Final = 0.5
-"""How long after its acknowledgement a write may take to show. The slowest device cycle considered is 0.2 s
-[conceivable]."""
+"""Time after its acknowledgement in which a write shows, if it acts. The slowest device cycle considered is
+0.2 s [conceivable]."""
 SILENT_S: Final = 0.25
-"""How long a change without an echo (speed, force) may take to act: the slowest device cycle and 0.05 s."""
+"""Time in which a change without an echo (speed, force) acts: the slowest device cycle and 0.05 s."""
 NEVER: Final = float("-inf")
 
 
@@ -53,7 +53,7 @@ class Ledger:
 
     Attributes:
         shown: the newest entry that has shown.
-        match: the entry that the newest status shows; None if that is nobody's.
+        match: the entry that the newest status shows; None if it shows none.
         now: when the newest status was asked for. It may show the state of that time, however late a busy
             loop reads the reply; so the age of a write is measured by this.
         ours: the axes that may move because of us: we gave them their position.
@@ -82,7 +82,7 @@ class Ledger:
         # The masks and the flag spare a poll the questions whose answers are known.
         # The axes that may still show a status from before their last request; all those unrested.
         self._unproven = NO_AXES
-        # The axes of which an entry says that they rested before it, and that have not moved since.
+        # The axes that rested before an entry, as noted there, and that have not moved since.
         self._may_start = NO_AXES
         self._has_doubtful = False
 
@@ -137,7 +137,7 @@ class Ledger:
         age = self.now.time - entry.time
         if age >= WINDOW_S:
             return True
-        # As long as the entries between have the same echo, no status can tell which of them acts. Equal
+        # As long as the entries between have the same echo, no status shows which of them acts. Equal
         # images act at once; a speed or a force may take SILENT_S.
         for each in chain(self._between(entry), (self.shown,)):
             if each.echo != entry.echo:
@@ -214,13 +214,13 @@ class Ledger:
     def _note_asked(self, entry: Entry) -> None:
         image, before = entry.image, entry.before
         for axis, old, new in zip(image.model.axes, before.axes, image.axes, strict=True):
-            # More force lets an axis in contact try again; one that moves goes on as it did.
+            # More force lets an axis in contact try again; one that moves keeps moving.
             pressed = new.force > old.force
             is_new = image.go is not before.go or new.position != old.position
             if is_new or (pressed and not axis & self.unrested):
                 entry.asks |= axis
                 entry.again |= axis if pressed or (image.go and not before.go) else NO_AXES
-        # With rGTO clear gDT says nothing, so no axis was proven to rest under what was asked before.
+        # With rGTO clear gDT has no meaning, so no axis was proven to rest under what was asked before.
         if before.go:
             entry.rested = entry.asks & ~self._unproven
             self._may_start |= entry.rested
@@ -247,7 +247,7 @@ class Ledger:
     # -- what is read ----------------------------------------------------------------------------------
 
     def update(self, status: RobotiqStatus, asked: float) -> None:
-        """Take in a status. The questions then speak of it."""
+        """Take in a status. From then on the questions are about it."""
         self.now = Moment(asked, self.now.reads + 1)
         entries, echo, shown = self._entries, status.echo, self.shown
         if len(entries) > 1:
@@ -338,7 +338,7 @@ class Ledger:
     def _revive(self, entry: Entry) -> None:
         """An entry in doubt acts after all, and so will those that were acknowledged after it.
 
-        Images act in their order. What these ask is asked anew, of the image that showed until now.
+        Images act in their order. What these ask is compared with the image that showed until now.
         """
         self._freeze(self.base)
         before = self.shown.image
@@ -405,10 +405,10 @@ class Ledger:
         self._limits.note_other_client(self.now.time)
 
     def restart(self, status: RobotiqStatus) -> bool:
-        """A procedure has ended: the gripper has its last image, and no other write is under way.
+        """A procedure has ended: the gripper has its last image, and no other write is on its way.
 
         Returns:
-            Whether the status shows that image. If not, another client has written meanwhile. rATR has no
+            Whether the status shows that image. If not, another client has written since. rATR has no
             echo, so an image with rATR counts as not shown by a gripper that follows requests.
         """
         image, time = self.base, self.now.time
@@ -427,7 +427,7 @@ class Ledger:
         """Find out which axes have come to rest. Not in a fault: it keeps axes from starting."""
         if self._unproven:  # usually none is
             self._note_shown()
-            if status.go_echo:  # gDT says nothing without rGTO [manual]
+            if status.go_echo:  # gDT has no meaning without rGTO [manual]
                 self._find_rest(status)
         if status.go_echo and (self.grips or status.contacts):
             contacts = status.contacts
@@ -441,7 +441,7 @@ class Ledger:
             if each.shown is not None:
                 return
             if not each.is_doubtful and self.acts(each):
-                # If the echo cannot tell when it began to act, the time for that and the lag end together.
+                # If the echo does not show when it began to act, the time for that and the lag end together.
                 never_showed = each.number > self.shown.number and self.now.time - each.time >= WINDOW_S
                 each.shown = LONG_AGO if never_showed else self.now
 

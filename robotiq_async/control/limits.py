@@ -1,6 +1,6 @@
 """Software limits that a gripper echoes in place of the request.
 
-The manual says that a limit replaces a request beyond it, and not which of the two the gripper echoes. If it
+By the manual a limit replaces a request beyond it; which of the two the gripper echoes is not in it. If it
 echoes the limit, the status looks as if another client had written just after us. It counts as a limit only
 if
 

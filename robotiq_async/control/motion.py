@@ -101,7 +101,7 @@ class Move:
 
 
 class LiveMoves:
-    """The moves under way. Each leaves once: when it arrives, when it fails, or when its caller gives up."""
+    """The moves that have not ended. Each leaves once: when it arrives or fails, or its caller gives up."""
 
     def __init__(self, log: Log = log) -> None:
         self._moves: list[Move] = []
@@ -116,7 +116,7 @@ class LiveMoves:
         self._moves.append(move)
 
     def remove(self, move: Move) -> bool:
-        """Remove a move whose caller has given up; return whether it was under way."""
+        """Remove a move whose caller has given up; return whether it had not ended."""
         if move not in self._moves:
             return False
         self._moves.remove(move)
@@ -152,7 +152,7 @@ class LiveMoves:
                 self._warn_of_unreached(move, move.end(status), limited)
 
     def _warn_of_unreached(self, move: Move, result: MoveResult, limited: Mapping[Finger, int]) -> None:
-        """Warn once if a gripper says "at position" and stands far from where it was asked to go.
+        """Warn once if a gripper shows "at position" and stands far from where it was asked to go.
 
         Not of the scissor: its range ends within 15..232 (drivers), and programs ask it for 0 and 255.
         """

@@ -91,7 +91,7 @@ class OpenRequests:
 
     def lost(self, error: RobotiqError) -> None:
         """The link is down: fail everything. Holds stop motion: their axes remain, for when it is back."""
-        # A hold of our own making has no caller to hear of the error.
+        # A hold of our own making has no caller to get the error.
         hold = self.pending.hold | self._sent.hold
         self.fail(error)
         self.pending.merge_hold(hold)

@@ -62,7 +62,7 @@ class Pending:
 
     @property
     def is_asked(self) -> bool:
-        """Whether there is more than holds of our own making, for which nobody waits."""
+        """Whether there is more than holds of our own making, for which no caller waits."""
         return self.has_changes or bool(self.holding)
 
     @property

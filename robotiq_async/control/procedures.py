@@ -28,7 +28,7 @@ Image = Callable[[RobotiqStatus], Request]
 
 
 class Procedure:
-    """An activation or an automatic release under way.
+    """An activation or an automatic release, from its request to its end.
 
     Attributes:
         releases: whether it is an automatic release.
@@ -88,7 +88,7 @@ def automatic_release(image: Image) -> Steps:
     Does nothing if the gripper was reset: the image has rACT set and would activate it.
 
     Raises:
-        NotActivatedError: the gripper was reset in the meantime, and may have been activated again since; or
+        NotActivatedError: the gripper was reset during it, and may have been activated again since; or
             it does not show the release.
     """
     status = yield None
@@ -100,9 +100,9 @@ def automatic_release(image: Image) -> Steps:
         begun = begun or status.fault is Fault.AUTOMATIC_RELEASE
         # gIMC is 0 during a release. Until the release shows, a status may be from before the write, and its
         # fault from before the release.
-        goes_on = status.is_reset or status.fault is Fault.AUTOMATIC_RELEASE
+        still_releases = status.is_reset or status.fault is Fault.AUTOMATIC_RELEASE
         is_sure = begun or (status.timestamp - asked > WINDOW_S and not status.fault.is_serious)
-        if classify(status) is Trigger.SEEN_RESET or (is_sure and not goes_on):
+        if classify(status) is Trigger.SEEN_RESET or (is_sure and not still_releases):
             if begun or classify(status) is Trigger.SEEN_RESET:
                 raise NotActivatedError("the gripper was reset during the automatic release")
             raise NotActivatedError("the gripper does not show the automatic release (its write was lost)")

@@ -1,7 +1,7 @@
 """Whether an axis rests under its last request, by an object status (gDT) that may be late.
 
-The manual says that gDT and gSTA are valid once the echo shows. The vendor's own software for the two-finger
-grippers says that they trail the echo by some exchanges [vendor]. So a gDT that is read just after a request
+By the manual gDT and gSTA are valid once the echo shows. In the vendor's own software for the two-finger
+grippers they trail the echo by some exchanges [vendor]. So a gDT that is read just after a request
 acts may be from before it. It counts at once only if it can result from no other request than the last, or if
 no request contradicts it since it was true; and in any case when the lag is over. docs/decisions/
 late-status.md has the reasons. The functions here are questions about the last requests of one axis.
@@ -23,7 +23,7 @@ from ..values.status import RobotiqStatus
 from .contact import agrees
 
 LAG_S: Final = 0.25
-"""How long gDT may show the state before a request, from the first status that echoes the request. The
+"""Time in which gDT may show the state before a request, from the first status that echoes the request. The
 vendor's example for the two-finger grippers waits 0.2 s for a motion to show (robotiq/grippers,
 move_gripper.cpp); 0.05 s are added for a poll and a slow host. Nothing was measured on a 3-Finger."""
 LAG_READS: Final = 10
@@ -32,7 +32,7 @@ them."""
 
 
 class Moment(NamedTuple):
-    """When a status was asked for, in monotonic seconds and in statuses read."""
+    """The time at which a status was asked for, in monotonic seconds and in statuses read."""
 
     time: float
     reads: int
@@ -49,7 +49,7 @@ class Asked(NamedTuple):
     """One request of an axis.
 
     Attributes:
-        position: in counts; None while rGTO is clear, where gDT says nothing [manual].
+        position: in counts; None while rGTO is clear, where gDT has no meaning [manual].
         again: whether it makes an axis in contact try again: it sets rGTO or raises the force.
         shown: the first status that showed that it acts; None before that.
     """

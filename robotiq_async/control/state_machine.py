@@ -2,13 +2,13 @@
 
 Every state has an entry for every trigger: the next state, IGNORED where there is nothing to do, or the
 error that the caller gets. A refusal changes nothing. What a status shows is never refused. The table comes
-from three rules and 18 entries: :func:`_row` says what holds wherever the link is up, what a status shows
-leads to its state from wherever nothing is under way, and the entries are what differs.
+from three rules and 18 entries: :func:`_row` has what holds wherever the link is up, what a status shows
+leads to its state wherever no procedure runs, and the entries are what differs.
 
-The state follows from what is under way and what the gripper shows; the controller works it out, and the
-table says what it may be. DO_ states and RUNNING_CC last from the decision to write until the
-acknowledgement, so the state tells what was under way when the link went down. This module knows no register,
-clock or task. The diagram and the tables in docs/ are made from the table below.
+The state follows from what the hand does and what the gripper shows; the controller works it out, and the
+table has what it may be. DO_ states and RUNNING_CC last from the decision to write until the
+acknowledgement, so the last state before DISCONNECTED names the write that may be lost. This module knows no
+register, clock or task. The diagram and the tables in docs/ are made from the table below.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def _all(triggers: tuple[Trigger, ...], entry: State | Verdict) -> Row:
 
 
 # First rule: what a call finds wherever the link is up, in _row(). Second: what a status shows leads to its
-# state, from wherever nothing is under way, in _SEEN. Third: a hand that is off refuses, in _OFF.
+# state, wherever no procedure runs, in _SEEN. Third: a hand that is off refuses, in _OFF.
 _STOPS: Final = (Trigger.ASK_HOLD, Trigger.ASK_HALT)
 _MOTIONS: Final = (Trigger.ASK_ACTIVATE, Trigger.ASK_COMMAND)
 _USER: Final = (*_MOTIONS, *_STOPS, Trigger.ASK_RELEASE, Trigger.ASK_RESET)
@@ -73,7 +73,7 @@ def _row(entries: Row) -> Row:
     """The entries that are usual while the link is up, replaced by those given."""
     return {
         **{trigger: Verdict.IGNORED if trigger.is_seen else Verdict.NOT_NOW for trigger in Trigger},
-        # In a sequence no commanded motion is under way, and only rACT = 0 ends it.
+        # In a sequence no axis moves by a command, and only rACT = 0 ends it.
         Trigger.ASK_HOLD: Verdict.IGNORED,
         Trigger.ASK_HALT: State.DO_RESET,
         Trigger.ASK_RESET: State.DO_RESET,
@@ -163,7 +163,7 @@ class StateMachine:
         return self._state
 
     def ask(self, trigger: Trigger, status: RobotiqStatus | None = None) -> bool:
-        """Whether there is anything to do for what is asked: False where the table says IGNORED.
+        """Whether there is anything to do for what is asked: False where the table has IGNORED.
 
         ``status`` is the newest one, for the error of what a fault refuses.
 

@@ -46,7 +46,7 @@ MOST_HALTS: Final = 2
 
 
 class Stop:
-    """A stop under way.
+    """One stop, from its request until it is reached.
 
     Attributes:
         level: its level. A new level is a new stop.
@@ -163,8 +163,8 @@ class Stop:
 class Keeping(Stop):
     """The weakest stop: leaves rGTO set if every axis rests.
 
-    Clearing rGTO is what stops the fingers for certain, but no public source says what then becomes of a
-    grip. So rGTO stays set if every axis is seen at rest under a known request. Axes that move are held
+    Clearing rGTO is what stops the fingers for certain, but what then becomes of a grip is in no public
+    source. So rGTO stays set if every axis is seen at rest under a known request. Axes that move are held
     first, once, as after a cancelled move. In any doubt rGTO is cleared. docs/decisions/keeping-a-grip.md has
     the reasons.
 
@@ -221,7 +221,7 @@ class Keeping(Stop):
 
     def _trouble(self, ledger: Ledger, status: RobotiqStatus) -> str:
         """The reason that the condition of the gripper gives against it; empty for none."""
-        # Any fault, also a minor one: its clearing is an event that nobody would be there to see.
+        # Any fault, also a minor one: no hand would be there to see it clear.
         condition = classify(status)
         if condition is not Trigger.SEEN_READY or status.fault is not Fault.NONE:
             return f"the {condition.value} ({status.fault.description})"

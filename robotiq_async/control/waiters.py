@@ -1,4 +1,4 @@
-"""How a caller gets its answer: a protocol that ``asyncio.Future`` satisfies."""
+"""Answers to callers: a protocol that ``asyncio.Future`` satisfies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Addresses: one string says which gripper, and one spelling says whether two lead to the same."""
+"""Addresses: a string that names a gripper, and one spelling for all that lead to the same."""
 
 from __future__ import annotations
 
@@ -362,7 +362,7 @@ HERE: Final = "localhost"
 
 
 def canonical_address(address: Address) -> str:
-    """Where an address leads: equal strings for equal places.
+    """One spelling of an address: equal strings for equal places.
 
     Every spelling of this machine becomes localhost. A symbolic link to a serial port becomes that port. A
     socket is the same place whatever protocol it carries.

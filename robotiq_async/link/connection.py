@@ -52,7 +52,7 @@ NOISE: Final = (MisfitError, ResponseTimeoutError)
 """Errors that a lost or damaged byte can cause."""
 
 Bears = Callable[[RobotiqConnectionError], bool]
-"""Tells the errors after which the connection stays open."""
+"""Whether the connection stays open after an error."""
 
 
 class StillOpenError(Exception):
@@ -79,7 +79,7 @@ class Connection:
         self._address = address
         self._users: set[object] = set()
         self._rests: WeakKeyDictionary[object, float] = WeakKeyDictionary()
-        """When a user whose gripper did not answer may take its next turn, by the clock of the loop."""
+        """The time of the next turn of a user whose gripper did not answer, by the clock of the loop."""
         self._client: Client | None = None
         self._transport: Any = None
         """The asyncio transport of the connection; pymodbus's class for serial ports is not typed."""
@@ -88,7 +88,7 @@ class Connection:
         self._failure: RobotiqConnectionError | None = None
         """An error of the link between two exchanges; the next exchange raises it."""
         self._is_echoed: bool | None = False
-        """Whether the line echoes what is sent; None until the first exchange of a connection tells."""
+        """Whether the line echoes what is sent; None until the first exchange of a connection shows it."""
         self._is_hushing = False
         """Whether arriving bytes are dropped as the rest of a damaged reply."""
         self._is_disturbed = False
@@ -223,7 +223,7 @@ class Connection:
             frame: the request.
             seconds: the longest time from the request to the end of the reply.
             by: when it must be over even so, in the loop's time.
-            bears: tells the errors after which the connection stays open, and StillOpenError is raised.
+            bears: whether the connection stays open after an error, and StillOpenError is raised.
         """
         await self.pause(user)
         failure = self._failure

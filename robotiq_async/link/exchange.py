@@ -1,9 +1,9 @@
 """One request on its way, and what has arrived of its reply.
 
-A line that echoes what is sent (a half-duplex adapter that hears itself) is recognised by the first read of
-a connection. It needs no option: a reply to a read does not begin with the whole request, checksum included.
-From then on each request must come back whole before its reply, so that the echo of a write is never taken
-for its acknowledgement, which begins with the same six bytes.
+A line that echoes what is sent (a half-duplex adapter that receives its own bytes) is recognised by the first
+read of a connection. It needs no option: a reply to a read does not begin with the whole request, checksum
+included. From then on each request must come back whole before its reply, so that the echo of a write is
+never taken for its acknowledgement, which begins with the same six bytes.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ _FROM_GATEWAYS: Final = (10, 11)
 """The exceptions that only a gateway sends (Modbus Application Protocol 7)."""
 _ILLEGAL_FUNCTION: Final = 1
 _PASSING: Final = (5, 6, 11)
-"""The exceptions of a device that may answer the next time: it works, is busy, or was not heard in time."""
+"""The exceptions of a device that may answer the next time: it works, is busy, or was not reached in time."""
 
 
 _CHECKSUM: Final = 2

@@ -13,7 +13,7 @@ here, because a client that may retry, reconnect or accept a doubtful reply coul
   Python 3.11 swallows a cancellation that lands together with the reply, and takes a blocked loop for silence
   although the reply is waiting in the socket.
 * A read, the first one of a connection too, is asked once more where its answer can be missing or damaged
-  without harm: on a serial line, and when a gateway or a gripper says that it is busy (:meth:`_read_again`).
+  without harm: on a serial line, and when a gateway or a gripper answers "busy" (:meth:`_read_again`).
   A write is never repeated: whether the first one was carried out is unknown.
 * Foreign exceptions stop here.
 """
@@ -113,9 +113,9 @@ class ModbusTransport:
         self._rest: Registers = ()
         """The registers after those that a poll reads, as they were at opening, if any was not 0."""
         self._unanswered: deque[float] = deque(maxlen=MOST_UNANSWERED)
-        """When the last reads were repeated because there was no answer."""
+        """The times of the last reads that were repeated because there was no answer."""
         self._warned = -math.inf
-        """When the last warning about a repeated read was logged."""
+        """The time of the last warning about a repeated read."""
 
     @property
     def is_open(self) -> bool:
@@ -240,7 +240,7 @@ class ModbusTransport:
         Args:
             request: unit and PDU.
             by: when it must be over, in the loop's time, even if the response timeout is longer.
-            bears: tells the errors after which the connection stays open, and StillOpenError is raised.
+            bears: whether the connection stays open after an error, and StillOpenError is raised.
         """
         frame = serial_frame(request) if self._rtu else tcp_frame(self._next_number(), request)
         return await self._connection.exchange(self, frame, self._response_timeout, by, bears)
@@ -365,7 +365,7 @@ class ModbusTransport:
         return answer
 
     def _repeat_by(self) -> float:
-        """When a repeated read must be over, in the loop's time."""
+        """The latest end of a repeated read, in the loop's time."""
         is_slow = self._response_timeout > USUAL_RESPONSE_S
         return asyncio.get_running_loop().time() + (self._response_timeout if is_slow else REPEAT_S)
 

@@ -1,4 +1,4 @@
-"""How the registers of a gripper are read and written: by its address, and the options of a hand."""
+"""The register map of a gripper, from its address and the options of a hand."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def registers_of(
     request_address: object = None,
     status_address: object = None,
 ) -> RegisterMap:
-    """How the registers of a gripper are read and written; None stands for the usual value of the link."""
+    """The register map of a gripper; None stands for the usual value of the link."""
     model = model_of(address.model)
     usual = model.rtu if address.is_rtu else model.tcp
     # On a serial line 0 is a broadcast, which no device answers, and ids above 247 are reserved. Over TCP

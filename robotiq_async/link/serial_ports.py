@@ -26,7 +26,7 @@ _WHY: Final = {
 
 
 def why_no_port(error: OSError | None, folder: Path = BY_ID) -> str:
-    """Why a serial port cannot be opened, for a person. ``error`` is pyserial's, or None."""
+    """Readable reason why a serial port cannot be opened. ``error`` is pyserial's, or None."""
     if error is None:
         return "cannot open the serial port"
     # For a port that it cannot configure, pyserial gives no number; its context, the error of termios, does.
@@ -57,12 +57,12 @@ def hasten(port: object) -> None:
 
 
 def latency_timer(device: str, folder: Path = USB_SERIAL) -> int | None:
-    """How long the adapter of a port holds received bytes back, in milliseconds; None if unknown."""
+    """Milliseconds for which the adapter of a port holds received bytes back; None if unknown."""
     with contextlib.suppress(OSError, ValueError):
         return int(latency_file(device, folder).read_text())
     return None
 
 
 def latency_file(device: str, folder: Path = USB_SERIAL) -> Path:
-    """Where the latency timer of a port can be read and set."""
+    """The file in which the latency timer of a port can be read and set."""
     return folder / os.path.basename(os.path.realpath(device)) / "latency_timer"

@@ -72,8 +72,8 @@ class Link(Protocol):
         """Write what ``decide`` returns, exactly once, if it returns anything.
 
         A write may have to wait: for the silence between the frames of a serial line, or for the task that
-        calls a transport object. A request that stops the hand meanwhile must still count, so ``decide`` is
-        called in the turn of the event loop in which the write leaves.
+        calls a transport object. A request that stops the hand in that time must still count, so ``decide``
+        is called in the turn of the event loop in which the write leaves.
 
         Returns:
             Whether something was written, and acknowledged.

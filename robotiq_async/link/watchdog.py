@@ -32,7 +32,7 @@ class Watchdog:
         self._on_timeout = on_timeout
         self._due = 0.0
         self._has_grace = False
-        # The handle of a foreign loop (qasync's) cannot tell its time, so that is kept beside it.
+        # The handle of a foreign loop (qasync's) does not give its time, so that is kept beside it.
         self._timer: asyncio.Handle | None = None
         self._timer_due = math.inf
 

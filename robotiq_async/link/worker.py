@@ -41,12 +41,12 @@ class Worker:
         try:
             await asyncio.wait({call.done}, timeout=seconds)
             if not call.done.done() and loop.time() - due > HELD_S:
-                # The loop was blocked: a result that was waiting meanwhile is in time.
+                # The loop was blocked: a result that waits by now is in time.
                 await asyncio.wait({call.done}, timeout=GRACE_S)
         finally:
             call.give_up()
         if not call.done.done():
-            why = "" if call.task else ": the call before goes on although it was cancelled"
+            why = "" if call.task else ": the previous call ignored its cancellation"
             raise LateError(f"within {seconds:g} s{why}")
         if call.error is None:
             result: T = call.result

@@ -1,4 +1,4 @@
-"""How a gripper is reached, what identifies it, and claims: no two hands of a process own the same one."""
+"""The way to a gripper, its identity, and claims: no two hands of a process own the same one."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Gripper:
-    """What identifies a gripper before it is connected.
+    """Identity of a gripper before it is connected.
 
     Attributes:
         place: the same for all spellings of its address.
@@ -55,7 +55,7 @@ class Gripper:
 
 @dataclass(frozen=True, slots=True)
 class GripperLink:
-    """How a gripper is reached.
+    """The way to a gripper.
 
     Attributes:
         address: in its full form, as errors and the log show it.
@@ -63,7 +63,7 @@ class GripperLink:
         make: makes a transport for one start of the hand, from ``connect_timeout`` and ``response_timeout``.
         is_slow: whether a status takes a good part of a poll interval: over a serial line, or in questions.
         model: of the gripper.
-        has_current: whether a status tells the motor currents.
+        has_current: whether a status has the motor currents.
     """
 
     address: str
@@ -161,7 +161,7 @@ class Claims(Generic[T]):
         """Claim a gripper for the running loop; return its present owner if it has one.
 
         Args:
-            gripper: identifies it; called anew for each later claim, because a serial port may be renamed.
+            gripper: identifies it; called again for each later claim, because a serial port may be renamed.
             owner: the new owner.
             is_over: whether an owner in this loop has ended without a release.
         """

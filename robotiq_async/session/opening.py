@@ -21,7 +21,7 @@ SHORTEST_S: Final = 0.01  # between two tries
 
 
 class Opener:
-    """Tries until the link is open. :meth:`end` ends that at any moment, and for good.
+    """Tries until the link is open. :meth:`end` cancels that at any moment, permanently.
 
     ``connect`` is one try, and raises RobotiqConnectionError when it fails.
     """
@@ -35,13 +35,13 @@ class Opener:
         self._scope: anyio.CancelScope | None = None
 
     def end(self) -> None:
-        """Try no more; a try that is under way is cancelled. Never blocks."""
+        """Try no more; a try that has begun is cancelled. Never blocks."""
         self._has_ended = True
         if self._scope is not None:
             self._scope.cancel()
 
     async def first(self, wait: float) -> bool:
-        """Open the link of a hand that starts; False when that was ended meanwhile.
+        """Open the link of a hand that starts; False if :meth:`end` came first.
 
         Raises:
             RobotiqConnectionError: the last try has failed.
@@ -55,7 +55,7 @@ class Opener:
             raise ConnectFailedError(self._options.link.address, why) from error
 
     async def again(self, policy: ReconnectPolicy, failed: Callable[[RobotiqConnectionError], None]) -> bool:
-        """Open a link that was lost; False when that was ended meanwhile.
+        """Open a link that was lost; False if :meth:`end` came first.
 
         ``failed`` is called with the error of each try but the last.
 

@@ -76,7 +76,7 @@ LONGEST_NAME: Final = 64  # characters of a hand's name: it begins every line of
 
 
 class Place(Flag):
-    """Where an option is offered, besides :class:`~robotiq_async.RobotiqHand`."""
+    """The places that offer an option, besides :class:`~robotiq_async.RobotiqHand`."""
 
     NONE = 0
     FILE = auto()
@@ -89,7 +89,7 @@ class Place(Flag):
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """What the table says about one option.
+    """A row of the table: one option.
 
     Attributes:
         help: what it is, with its unit, as a sentence without its full stop.
@@ -186,7 +186,7 @@ def check_stroke(name: str, stroke: object) -> Points | None:
 
 @dataclass(frozen=True, slots=True)
 class ReconnectPolicy:
-    """How a lost link is opened again.
+    """The way in which a lost link is opened again.
 
     Attributes:
         first_delay: seconds before the first try, 0..10.
@@ -313,9 +313,9 @@ class HandOptions:
     ] = None  # type: ignore[assignment]  # that of the address; a name becomes its model
 
     link: GripperLink = field(default=None, repr=False, compare=False)  # type: ignore[assignment]
-    """How the gripper is reached; made from the address."""
+    """The way to the gripper; made from the address."""
     units: Units = field(init=False, repr=False, compare=False)
-    """What positions, speeds and forces mean to people; default timeouts of moves come from its speeds."""
+    """Units of positions, speeds and forces; default timeouts of moves come from its speeds."""
     log: Log = field(init=False, repr=False, compare=False)  # for what happens to the hand
 
     def __post_init__(self) -> None:
@@ -341,7 +341,7 @@ class HandOptions:
 
     @property
     def policy(self) -> ReconnectPolicy | None:
-        """What is done about a lost link; None for nothing."""
+        """The answer to a lost link; None to give up at once."""
         if isinstance(self.reconnect, ReconnectPolicy):
             return self.reconnect
         return ReconnectPolicy() if self.reconnect else None
@@ -371,7 +371,7 @@ def offered(place: Place) -> dict[str, Option]:
 def units_of(
     calibration: object, force_calibration: object, model: Model = THREE_FINGER, stroke: object = None
 ) -> Units:
-    """What the values of a hand mean; None for the usual speeds of its model and the manual's figures."""
+    """Meaning of the values of a hand; None for the usual speeds of its model and the manual's figures."""
     speeds = _check_speeds("calibration", calibration)
     forces = _check_forces("force_calibration", force_calibration)
     points = check_stroke("stroke", stroke)

@@ -55,7 +55,7 @@ STOP_S: Final = 1.4
 """From stop() to the disconnection at the latest. stop() promises 2 s, and a transport object may take half a
 second to close."""
 IN_FLIGHT_S: Final = 0.9
-"""Of STOP_S: how long the exchange in flight may take before the link is closed and opened anew."""
+"""Of STOP_S: how long the exchange in flight may take before the link is closed and reopened."""
 SHUTDOWN_S: Final = 1.2  # of STOP_S: time to reach the gripper and to see the fingers stop
 SHUTDOWN_PAUSE_S: Final = 0.05  # between two attempts at that
 READS: Final = 3  # the most reads in a cycle that has a request to write, while the loop is held up
@@ -63,7 +63,7 @@ FRESH_S: Final = 0.006
 """On a slow link a command is decided on the newest status if that was asked for within this time: the poll
 interval and a bit. A read of three registers takes half of it."""
 SOON_S: Final = 0.0025
-"""How long a cycle waits for write_spacing: half of a usual period, so that its status is still fresh."""
+"""Longest wait of a cycle for write_spacing: half of a usual period, so that its status is still fresh."""
 LATE_S: Final = 0.05
 """A poll that is later than this is worth a warning; on a busy machine a few milliseconds are usual."""
 LATE_WARNING_S: Final = 60.0  # seconds between two warnings about late polls
@@ -260,13 +260,13 @@ class Poller:
                     return
 
     async def _cycle(self) -> None:
-        """Read, decide, write. Write a stop before reading, too: a gripper may obey and not answer."""
+        """Read, decide, write. Write a stop before reading, too: a gripper may execute it and not reply."""
         due = self._due()
         if due is not None and not self._is_held_up():
             if due.is_urgent and await self._is_soon(due, LONGEST_SPACING_S):
                 await self._write()
             elif self._is_fresh_for(due) and await self._is_soon(due, SOON_S):
-                # What is read shows the echo. A command that came meanwhile begins the next cycle.
+                # What is read shows the echo. A command that comes after it begins the next cycle.
                 if not await self._write_and_read():
                     await self._poll_once()
                 return
@@ -335,7 +335,7 @@ class Poller:
 
     async def _write(self) -> None:
         self._decided = None
-        # Listeners hear of changes after the write: a request of theirs would come too late for this one.
+        # Listeners get the changes after the write: a request of theirs would come too late for this one.
         began = self._tick.time()
         try:
             is_written = await self._transport.send(self._decide)
@@ -351,7 +351,7 @@ class Poller:
         self._channels.requests.push(SentRequest(*self._decided, acknowledged=True))
 
     def _decide(self) -> Registers | None:
-        """The image to write, decided in the turn in which the link writes: no stop comes between."""
+        """The image to write, decided in the same turn as the write, so that no stop can intervene."""
         now = self._tick.time()
         request = self._controller.decide(now)
         if request is None:
@@ -482,7 +482,7 @@ class Poller:
 
     async def _stop_fingers_once(self) -> None:
         if not self._transport.is_open:
-            # A gripper without a client goes on moving. Read first: if it lost its power meanwhile, an image
+            # A gripper without a client keeps moving. Read first: if it has lost its power, an image
             # with rACT would activate it.
             await self._transport.open()
             await self._poll_once()

@@ -117,13 +117,13 @@ class Session:
         return not self.is_over and self._loop.is_closed()
 
     async def stop(self, *, halt: bool, keep_grip: bool = False) -> None:
-        """Stop as :meth:`Hand.stop` says, also when cancelled meanwhile."""
+        """Stop as :meth:`Hand.stop` promises, also when cancelled during it."""
         self.check_loop("hand.stop()")
         self._poller.request_stop(halt=halt, keep_grip=keep_grip)
         await self.ended()
 
     async def ended(self) -> None:
-        """Wait for the end of the task; a cancellation meanwhile is raised after it."""
+        """Wait for the end of the task; a cancellation during the wait is raised after it."""
         try:
             await wait_shielded(self._task)
         finally:
@@ -216,7 +216,7 @@ class Session:
         return self._loop.create_future()
 
     def ask(self, request: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Make a request of the controller; listeners hear of its changes of state after it."""
+        """Make a request of the controller; listeners get its changes of state after it."""
         try:
             return request(*args, **kwargs)
         finally:
@@ -284,9 +284,9 @@ class Session:
 
         Raises:
             GripperFaultError: it is refused because of a fault, or ended in one.
-            NotActivatedError: the gripper was reset meanwhile, or reset() or halt() took over.
+            NotActivatedError: the gripper was reset during it, or reset() or halt() took over.
             ActivationTimeoutError: not finished within the activation timeout, or stalled.
-            InvalidStateError: it is refused: a reset or a release is under way.
+            InvalidStateError: it is refused during a reset or a release.
             ConnectionLostError: the link is or went down.
             NotStartedError: the hand was stopped.
         """

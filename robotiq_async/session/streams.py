@@ -373,7 +373,7 @@ class Channels:
     def publish_changes(self) -> None:
         """Publish the changes of state of a call after the call.
 
-        A listener may command the hand. If it heard of a change in the middle of a call, the rest of that
+        A listener may command the hand. If it got a change in the middle of a call, the rest of that
         call would overwrite its request.
         """
         while self.changes:

@@ -74,7 +74,7 @@ class StateWaiters:
 class StallWatch:
     """A context manager that follows the statuses, and cancels a wait when they stop changing.
 
-    During an activation this needs a priority fault, which says that the gripper waits for the activation;
+    During an activation this needs a priority fault, with which the gripper waits for the activation;
     without one a gripper may activate and show nothing new. A release always shows: it opens the fingers.
     """
 

@@ -101,7 +101,7 @@ async def test_a_call_that_does_not_end_is_not_waited_for_and_nothing_is_made_me
 
     with pytest.raises(LateError):
         await worker.call(lambda: stubborn(until), 0.1)
-    with pytest.raises(LateError, match="the call before goes on although it was cancelled"):
+    with pytest.raises(LateError, match="the previous call ignored its cancellation"):
         await worker.call(lambda: note("given up before it began"), 0.1)
     worker.end(lambda: note("end"))
     assert not await worker.ended(0.1)
