@@ -8,6 +8,7 @@ ADDRESS ?= sim://
 MINUTES ?= 30
 MODEL ?= 3f
 LINK ?= tcp
+HANDS ?= 1
 HABITS ?= status-lag; silence-fault; write-spacing
 DISTROS ?= jazzy kilted
 PYTHONS ?= 3.12 3.13 3.14
@@ -70,8 +71,8 @@ pythons: $(RELEASE)/.complete  ## Test the core on other Pythons (PYTHONS="3.12 
 canary: $(RELEASE)/.complete  ## Test with the newest of all dependencies, in an environment that is thrown away
 	@$(RELEASE)/bin/python -m tests.release.canary
 
-soak: $(STAMP)  ## Move a MODEL=3f under random faults for MINUTES=30 over LINK=tcp (or rtu), and print figures
-	@$(BIN)/python -m tests.adversity.soak --minutes $(MINUTES) --link $(LINK) --model $(MODEL)
+soak: $(STAMP)  ## Move a MODEL=3f under random faults for MINUTES=30 over LINK=tcp (rtu, urcap), and print figures
+	@$(BIN)/python -m tests.adversity.soak --minutes $(MINUTES) --link $(LINK) --model $(MODEL) --hands $(HANDS)
 
 habits: $(STAMP)  ## Everything under fault once more, with HABITS="status-lag; silence-fault; write-spacing"
 	@HABITS="$(HABITS)" $(BIN)/python -m pytest tests/adversity

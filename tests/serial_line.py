@@ -28,12 +28,13 @@ def with_crc(frame: bytes) -> bytes:
 
 
 class SerialLine:
-    """Two ports joined by a cable: what goes in at one comes out at the other.
+    """Ports joined by a cable: what goes in at the near one comes out at the far ones, and the other way.
 
-    The near port has a name of its own (a link in a folder), so that it can be pulled and put back.
+    The near port has a name of its own (a link in a folder), so that it can be pulled and put back. There is
+    a far port for each device, as several hang on RS-485.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, devices: int = 1) -> None:
         if sys.platform == "win32":
             pytest.skip("Windows has no pseudo terminals")
         self.near = folder / "ttyNEAR"
@@ -42,9 +43,11 @@ class SerialLine:
         self._loop = asyncio.get_running_loop()
         self._near_master = -1
         self._near_slave = -1
-        self._far_master, self._far_slave = self._pair()
-        self.far = os.ttyname(self._far_slave)
-        self._loop.add_reader(self._far_master, self._from_far)
+        self._far = [self._pair() for _ in range(devices)]
+        self.fars = [os.ttyname(slave) for _, slave in self._far]
+        self.far = self.fars[0]
+        for master, _ in self._far:
+            self._loop.add_reader(master, self._from_far, master)
 
     def __enter__(self) -> Self:
         self.plug()
@@ -54,9 +57,10 @@ class SerialLine:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.pull()
-        self._loop.remove_reader(self._far_master)
-        for descriptor in (self._far_master, self._far_slave):
-            os.close(descriptor)
+        for master, slave in self._far:
+            self._loop.remove_reader(master)
+            os.close(master)
+            os.close(slave)
 
     def plug(self) -> None:
         """Put the near port in place."""
@@ -89,11 +93,13 @@ class SerialLine:
 
     def _from_near(self) -> None:
         with contextlib.suppress(OSError):
-            os.write(self._far_master, os.read(self._near_master, 4096))
+            data = os.read(self._near_master, 4096)
+            for master, _ in self._far:
+                os.write(master, data)
 
-    def _from_far(self) -> None:
+    def _from_far(self, master: int) -> None:
         with contextlib.suppress(OSError):
-            data = os.read(self._far_master, 4096)
+            data = os.read(master, 4096)
             if self.held is not None:
                 self.held.append(data)
             else:

@@ -1,11 +1,12 @@
 """Moves under random faults for as long as you like, in real time and over real connections.
 
-    python -m tests.adversity.soak --minutes 30
+    python -m tests.adversity.soak --minutes 30 --link rtu --hands 2
 
 A hand, a simulated gripper and everything that watches them share one event loop. In cycles of some
 seconds two users move axes, cancel, halt and run control loops, while the fault injector cuts, delays,
 corrupts and refuses, and the application holds up the loop now and then. After each cycle everything comes to
-rest and is compared. Exits with 1 when a promise was broken.
+rest and is compared. Several hands do so beside each other, on a serial line with one port for all of them.
+Exits with 1 when a promise was broken.
 """
 
 from __future__ import annotations
@@ -27,16 +28,17 @@ from typing import Any
 
 from robotiq_async import JAW, Finger, Model, MoveResult, RobotiqError, RobotiqHand, State
 from robotiq_async.control.state_machine import RUNNING
-from robotiq_async.simulator import Trouble
-from robotiq_async.values.model import MODELS, model_of
+from robotiq_async.simulator import KINDS, Trouble
+from robotiq_async.values.model import MODELS, THREE_FINGER, model_of
+from robotiq_async.values.registers import RTU_REGISTERS
 from tests.adversity.fuzz import resident
 from tests.adversity.watch import LoopWatch, WriteWatch, check
-from tests.adversity.world import MODEL, RtuServer, StampedGripper, TcpServer, World
+from tests.adversity.world import MODEL, RtuServer, Server, StampedGripper, TcpServer, UrcapServer, World
 from tests.serial_line import SerialLine
 
 SPEEDUP = 5.0
 CYCLE_S = (4.0, 12.0)
-ON_ANY_LINK = [
+TROUBLES = [
     *(Trouble(kind) for kind in ("drop", "late", "half", "twice", "wrong-function", "wrong-length")),
     *(Trouble(kind) for kind in ("wrong-count", "wrong-unit", "wrong-echo", "release", "foreign")),
     Trouble("drop", on="write"),
@@ -45,15 +47,14 @@ ON_ANY_LINK = [
     *(Trouble("slow-device", seconds) for seconds in (0.02, 0.2)),
     *(Trouble("fault", code) for code in (5, 9, 12, 13)),
     *(Trouble(kind) for kind in ("silence", "pieces", "power-cut", "interference")),
-]
-ON_TCP = [Trouble(kind) for kind in ("reset", "close", "refuse", "accept-silence", "exception")] + [
+    *(Trouble(kind) for kind in ("reset", "close", "refuse", "accept-silence", "exception")),
     *(Trouble(kind) for kind in ("wrong-transaction", "wrong-protocol")),
     *(Trouble("multiplexer", seconds) for seconds in (0.02, 0.3, 0.7)),
-]
-ON_A_LINE = [Trouble(kind) for kind in ("wrong-checksum", "byte-before", "byte-after")] + [
+    *(Trouble(kind) for kind in ("wrong-checksum", "byte-before", "byte-after")),
     *(Trouble(kind, lasts=0.0) for kind in ("garbled", "seven-bits")),
     *(Trouble(kind) for kind in ("echo", "strict-silence")),
 ]
+"""What can go wrong; of these, what fits the link and the gripper does."""
 MOVES_EVERYTHING = ("foreign", "release")
 OF_A_SCISSOR = "interference"
 
@@ -64,6 +65,7 @@ class Soak:
 
     world: World
     line: SerialLine | None
+    """The line that this run may pull out."""
     rng: random.Random
     loop: LoopWatch
     writes: WriteWatch
@@ -81,7 +83,7 @@ class Soak:
         print(f"BROKEN: {what}", file=sys.stderr, flush=True)  # noqa: T201
 
     async def cycle(self) -> None:
-        """Some seconds of use and trouble, then rest, then a look at everything."""
+        """Some seconds of use and trouble, then rest."""
         axes = Finger(self.rng.randrange(1, 16)) & self.hand.model.all_axes or JAW
         before = self.world.travels()
         self.writes.forget()
@@ -95,9 +97,12 @@ class Soak:
         for axis, travel in self.world.travels().items():
             if axis not in axes and travel != before[axis] and not self.everything_moved:
                 self.breach(f"{axis!r} moved, addressed were {axes!r}")
+
+    def look(self) -> None:
+        """Look at everything that was said and done in a cycle."""
+        self.figures["cycles"] += 1
         for each in check(self.world, self.writes, self.loop):
             self.breach(each)
-        await self.restart()
 
     async def user(self, axes: Finger, ends: float) -> None:
         """A user who moves these axes."""
@@ -174,7 +179,7 @@ class Soak:
 
     async def fault_injector(self, ends: float) -> None:
         """One trouble after the other."""
-        kinds = ON_ANY_LINK + (ON_TCP if self.line is None else ON_A_LINE)
+        kinds = [trouble for trouble in TROUBLES if KINDS[trouble.kind].fits(self.world.server.link)]
         if Finger.SCISSOR not in self.hand.model.all_axes:
             kinds = [kind for kind in kinds if kind.kind != OF_A_SCISSOR]
         while time.monotonic() < ends:
@@ -237,60 +242,83 @@ class Soak:
 
 
 @contextlib.asynccontextmanager
-async def soak(link: str, model: Model, seed: int, loop: LoopWatch) -> AsyncIterator[Soak]:
-    """Everything in place, the hand started."""
-    gripper = StampedGripper(speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP, model=model)
+async def soaks(link: str, model: Model, hands: int, seed: int, loop: LoopWatch) -> AsyncIterator[list[Soak]]:
+    """Everything in place, the hands started."""
     async with contextlib.AsyncExitStack() as stack:
         line: SerialLine | None = None
-        server: TcpServer | RtuServer
         if link == "rtu":
             # In memory: pulling and plugging makes and removes a link, and a busy disk takes its time.
             memory = "/dev/shm" if Path("/dev/shm").is_dir() else None  # noqa: ASYNC240
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(dir=memory)))
-            line = stack.enter_context(SerialLine(folder))
-            server, address = RtuServer(line.far, gripper), f"rtu://{line.near}"
-        else:
-            server, address = TcpServer(gripper), ""
-        await stack.enter_async_context(server)
-        hand = await stack.enter_async_context(RobotiqHand(address or server.address, model=model))
-        world = World(gripper, server, None, hand)
-        watching = asyncio.create_task(world.watch())
-        yield Soak(world, line, random.Random(seed), loop, WriteWatch(model))
-        watching.cancel()
-        await asyncio.gather(watching, return_exceptions=True)
+            line = stack.enter_context(SerialLine(folder, hands))
+        them = []
+        for number in range(hands):
+            gripper = StampedGripper(speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP, model=model)
+            world = await stack.enter_async_context(started(gripper, link, line, number))
+            pulled = line if number == 0 else None
+            them.append(Soak(world, pulled, random.Random(seed + number), loop, WriteWatch(model)))
+        yield them
 
 
-async def run(minutes: float, link: str, model: Model, seed: int, loop: LoopWatch) -> int:
+@contextlib.asynccontextmanager
+async def started(
+    gripper: StampedGripper, link: str, line: SerialLine | None, number: int
+) -> AsyncIterator[World]:
+    """A gripper with its server, and a hand; of several on a line it is the one with this number."""
+    server: Server
+    unit = None
+    if line is not None:
+        unit = RTU_REGISTERS.device_id + number
+        server = RtuServer(line.fars[number], gripper, device_id=unit)
+    else:
+        server = UrcapServer(gripper) if link == "urcap" else TcpServer(gripper)
+    async with server:
+        address = server.address if line is None else f"rtu://{line.near}"
+        async with RobotiqHand(address, model=gripper.model, device_id=unit) as hand:
+            world = World(gripper, server, None, hand)
+            watching = asyncio.create_task(world.watch())
+            yield world
+            watching.cancel()
+            await asyncio.gather(watching, return_exceptions=True)
+
+
+async def run(minutes: float, link: str, model: Model, hands: int, seed: int, loop: LoopWatch) -> int:
     """Run it and print the figures as a table.
 
     Returns:
         The exit code.
     """
     began, memory = time.monotonic(), 0
-    async with soak(link, model, seed, loop) as it:
+    async with soaks(link, model, hands, seed, loop) as them:
         last_word = began
         while time.monotonic() - began < 60 * minutes:
-            await it.cycle()
-            it.figures["cycles"] += 1
+            await asyncio.gather(*(it.cycle() for it in them))
+            for it in them:
+                it.look()
+            await asyncio.gather(*(it.restart() for it in them))
             if not memory and time.monotonic() - began > 60 * minutes / 4:
                 memory = resident()  # by now what grows once has grown: histories, samples, caches
             if time.monotonic() - last_word > 60:
                 last_word = time.monotonic()
-                done = it.figures["moves done"]
+                done = sum(it.figures["moves done"] for it in them)
+                broken = sum(len(it.broken) for it in them)
                 passed = (last_word - began) / 60
-                print(f"{passed:5.1f} min  {done} moves done, {len(it.broken)} promises broken", flush=True)  # noqa: T201
-        it.collect()
+                print(f"{passed:5.1f} min  {done} moves done, {broken} promises broken", flush=True)  # noqa: T201
+        for it in them:
+            it.collect()
+    figures = sum((it.figures for it in them), Counter[str]())
+    broken = sum(len(it.broken) for it in them)
     rows = [
         ("minutes", f"{(time.monotonic() - began) / 60:.1f}"),
-        ("promises broken", str(len(it.broken))),
-        *((name, str(it.figures[name])) for name in sorted(it.figures)),
-        ("longest stall that statistics saw, ms", f"{1000 * it.longest_stall:.0f}"),
+        ("promises broken", str(broken)),
+        *((name, str(figures[name])) for name in sorted(figures)),
+        ("longest stall that statistics saw, ms", f"{1000 * max(it.longest_stall for it in them):.0f}"),
         ("longest hold by library, simulator and checks, ms", f"{1000 * loop.hold.longest:.1f}"),
         ("memory growth in the last three quarters, MiB", f"{(resident() - memory) / 2**20:.1f}"),
     ]
-    head = [(f"{model.title}, {link}", "figure"), ("--", "--")]
+    head = [(f"{hands} {model.title}, {link}", "figure"), ("--", "--")]
     print("\n".join(f"| {name} | {value} |" for name, value in head + rows))  # noqa: T201
-    return 1 if it.broken else 0
+    return 1 if broken else 0
 
 
 def main() -> int:
@@ -300,11 +328,17 @@ def main() -> int:
     )
     parser.add_argument("--minutes", type=float, default=30.0, help="how long (default: 30)")
     parser.add_argument(
-        "--link", choices=("tcp", "rtu"), default="tcp", help="Modbus TCP or a pseudo terminal"
+        "--link",
+        choices=("tcp", "rtu", "urcap"),
+        default="tcp",
+        help="Modbus TCP, a pseudo terminal, or the text port of a UR",
     )
+    parser.add_argument("--hands", type=int, default=1, help="how many; on rtu they share the line")
     parser.add_argument("--model", type=model_of, default=MODEL, help=f"one of {', '.join(MODELS)}")
     parser.add_argument("--seed", type=int, default=int(time.time()), help="of everything that is random")
     options = parser.parse_args()
+    if options.link == "urcap" and options.model is THREE_FINGER:
+        parser.error("a UR has no 3-Finger: --model 2f85, for example")
     print(f"seed {options.seed}", flush=True)  # noqa: T201
     logging.getLogger("robotiq_async").setLevel(logging.CRITICAL)
     # Most garbage here is that of the checks: it is collected between cycles, when nothing is measured.
@@ -312,7 +346,9 @@ def main() -> int:
     gc.disable()
     loop = LoopWatch()
     with asyncio.Runner(loop_factory=loop.make_loop) as runner:
-        return runner.run(run(options.minutes, options.link, options.model, options.seed, loop))
+        return runner.run(
+            run(options.minutes, options.link, options.model, options.hands, options.seed, loop)
+        )
 
 
 if __name__ == "__main__":

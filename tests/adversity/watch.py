@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 from robotiq_async.values.model import Model
 from robotiq_async.values.request import AxisRequest, Request
-from tests.adversity.world import LONGEST_HOLD_S, World
+from tests.adversity.world import LONGEST_HOLD_S, UrcapServer, World
 from tests.virtual import HoldWatch
 
 
@@ -106,6 +106,8 @@ def check(world: World, writes: WriteWatch, loop: LoopWatch) -> Iterator[str]:
     world.statuses.clear()
     world.states.clear()
     del world.gripper.stamps[:-300], world.server.heard[:-300]
+    if isinstance(world.server, UrcapServer):
+        del world.server.given[:-300]
     if loop.hold.longest > LONGEST_HOLD_S:
         yield f"the loop was held for {1000 * loop.hold.longest:.1f} ms"
         loop.hold.longest = 0.0

@@ -13,7 +13,14 @@ from typing import Any
 import pytest
 
 from robotiq_async import JAW, Finger, RobotiqConnectionError, RobotiqHand, RobotiqStatus, State
-from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, parse_troubles
+from robotiq_async.link.urcap import lines
+from robotiq_async.simulator import (
+    SerialSimulatorServer,
+    SimulatedGripper,
+    SimulatorServer,
+    UrcapSimulatorServer,
+    parse_troubles,
+)
 from robotiq_async.simulator.server.framing import Frame
 from robotiq_async.simulator.troubles.fault_injector import FaultInjector
 from robotiq_async.values.model import Model, model_of
@@ -72,7 +79,7 @@ def stamp_of(status: RobotiqStatus) -> int:
 
 
 class Heard:
-    """Notes when each request came in, understood or not; has the habits that are given."""
+    """Notes when each request for this gripper came in; has the habits that are asked for."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -88,7 +95,7 @@ class Heard:
 
     def take(self, inbox: bytearray) -> Frame | None:
         frame: Frame | None = super().take(inbox)  # type: ignore[misc]
-        if frame is not None:
+        if frame is not None and self._is_meant(frame.unit):  # type: ignore[attr-defined]
             self.heard.append(asyncio.get_running_loop().time())
             self.asked.set()
         return frame
@@ -102,12 +109,34 @@ class RtuServer(Heard, SerialSimulatorServer):
     pass
 
 
+class UrcapServer(Heard, UrcapSimulatorServer):
+    """Keeps what it has answered, for there is no room for a number in the variables.
+
+    Attributes:
+        given: when a variable was read, its name and its value.
+    """
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.given: list[tuple[float, str, int]] = []
+
+    def answer(self, frame: Frame) -> bytes:
+        said = super().answer(frame)
+        if frame.pdu.startswith(b"GET "):
+            name, value = said.decode().split()
+            self.given.append((asyncio.get_running_loop().time(), name, int(value)))
+        return said
+
+
+Server = TcpServer | RtuServer | UrcapServer
+
+
 @dataclass
 class World:
     """All there is in one test."""
 
     gripper: StampedGripper
-    server: TcpServer | RtuServer
+    server: Server
     line: VirtualLine | None
     hand: RobotiqHand
     statuses: list[RobotiqStatus] = field(default_factory=list)
@@ -159,6 +188,23 @@ class World:
         """Every status is the answer to the last request before it, and none came twice."""
         numbers = [status.sequence for status in self.statuses]
         assert numbers == sorted(set(numbers))
+        if isinstance(self.server, UrcapServer):
+            self._check_variables(self.server.given)
+        else:
+            self._check_stamps()
+
+    def _check_variables(self, given: Sequence[tuple[float, str, int]]) -> None:
+        """Each variable of a status has the value that was given out last before it."""
+        values: dict[str, int] = {}
+        next_one = 0
+        for status in self.statuses:
+            while next_one < len(given) and given[next_one][0] <= status.timestamp:
+                _, name, value = given[next_one]
+                values[name] = value
+                next_one += 1
+            assert status.registers == lines.status_registers(values), f"{status!r} is not {values}"
+
+    def _check_stamps(self) -> None:
         given_at = [at for at, _ in self.gripper.stamps]
         for status in self.statuses:
             index = bisect_right(given_at, status.timestamp) - 1
@@ -201,7 +247,7 @@ async def world(
     """A world whose gripper was just switched on, and a hand that is not started.
 
     Args:
-        link: tcp or rtu.
+        link: tcp, rtu, or urcap for a jaw.
         monkeypatch: for rtu, where the fake serial ports are put in place.
         speedup: of the gripper.
         model: of the gripper, and of the hand.
@@ -210,11 +256,13 @@ async def world(
     loop = asyncio.get_running_loop()
     gripper = StampedGripper(loop.time, speedup=speedup, device_cycle=0.005 * speedup, model=model)
     line: VirtualLine | None = None
-    server: TcpServer | RtuServer
+    server: Server
     if link == "rtu":
         assert monkeypatch is not None
         line = VirtualLine(monkeypatch)
         server, address = RtuServer(line.FAR, gripper), f"rtu://{line.NEAR}"
+    elif link == "urcap":
+        server, address = UrcapServer(gripper), ""
     else:
         server, address = TcpServer(gripper), ""
     async with server:
@@ -222,6 +270,9 @@ async def world(
         options = {"poll_interval": 0.03, "model": model} | options
         if any(habit.kind == "function-3-only" for habit in HABITS):
             options = {"read_function": 3} | options
+        for habit in HABITS:
+            if habit.kind == "write-spacing":  # a jaw may need more than is usual for it
+                options = {"write_spacing": habit.amount} | options
         hand = RobotiqHand(address or server.address, **options)  # type: ignore[arg-type]
         here = World(gripper, server, line, hand)
         watching = [asyncio.create_task(here.watch()), asyncio.create_task(here.watch_states())]
