@@ -1,4 +1,4 @@
-"""One cell of the table of docs/under-fault.md: one trouble in one phase, and all that is promised then."""
+"""One cell of the tables of docs/under-fault.md: one trouble in one phase, and all that is promised then."""
 
 from __future__ import annotations
 
@@ -208,21 +208,39 @@ class Cell(NamedTuple):
 
 def cells() -> Iterator[Cell]:
     """Every cell, for every kind of link it fits."""
-    head, *rows = table("under-fault.md")
-    phases = {phase.name: phase for phase in PHASES}
-    assert head[1:] == list(phases), "a column for each phase"
-    (_, *rests_in), *rows = rows
-    of_lines = {words for troubles, *_ in rows if is_of_lines(troubles) for words in words_in(troubles)}
-    for troubles, *outcomes in rows:
+    rows = list(_rows("## Every trouble in every phase"))
+    of_lines = {words for troubles, _ in rows if is_of_lines(troubles) for words in words_in(troubles)}
+    for troubles, outcomes in rows:
         for trouble in words_in(troubles):
             for words, link in variants(trouble):
                 if link == "rtu" and words in of_lines and not is_of_lines(troubles):
                     continue
                 if link == "tcp" and is_of_lines(troubles):
                     continue
-                for name, outcome, state in zip(head[1:], outcomes, rests_in, strict=True):
-                    ends = outcome if "→" in outcome else f"{outcome} → {state}"
-                    yield Cell(words, link, phases[name], ends)
+                yield from (Cell(words, link, phase, ends) for phase, ends in outcomes)
+
+
+def cells_of_a_urcap() -> Iterator[Cell]:
+    """Every cell of a jaw behind the text port of a UR."""
+    for troubles, outcomes in _rows("## Behind Robotiq's URCap"):
+        for trouble in words_in(troubles):
+            for words in forms(trouble):
+                yield from (Cell(words, "urcap", phase, ends) for phase, ends in outcomes)
+
+
+def _rows(heading: str) -> Iterator[tuple[str, list[tuple[Phase, str]]]]:
+    """The rows of a table: the troubles, and what comes of them in each phase."""
+    head, (_, *rests_in), *rows = table("under-fault.md", heading)
+    phases = {phase.name: phase for phase in PHASES}
+    assert head[1:] == list(phases), "a column for each phase"
+    for troubles, *outcomes in rows:
+        yield (
+            troubles,
+            [
+                (phases[name], outcome if "→" in outcome else f"{outcome} → {state}")
+                for name, outcome, state in zip(head[1:], outcomes, rests_in, strict=True)
+            ],
+        )
 
 
 def is_of_lines(troubles: str) -> bool:
@@ -241,12 +259,17 @@ def variants(trouble: str) -> Iterator[tuple[str, str]]:
         yield trouble, "rtu"
         return
     (parsed,) = parse_troubles(trouble)
-    kind = KINDS[parsed.kind]
-    forms = [trouble]
-    if parsed.lasts is None and kind.corruption is not None:
-        forms = [f"{trouble} once", f"{trouble} for 60"]
-    elif parsed.lasts is None and kind.lasts > 0:
-        forms = [f"{trouble} for 60"]
     for link in ("tcp", "rtu"):
-        if kind.link in (None, link):
-            yield from ((form, link) for form in forms)
+        if KINDS[parsed.kind].link in (None, link):
+            yield from ((form, link) for form in forms(trouble))
+
+
+def forms(trouble: str) -> list[str]:
+    """A trouble for one reply and for the whole call, where nothing is said about how long it lasts."""
+    (parsed,) = parse_troubles(trouble)
+    kind = KINDS[parsed.kind]
+    if parsed.lasts is None and kind.corruption is not None:
+        return [f"{trouble} once", f"{trouble} for 60"]
+    if parsed.lasts is None and kind.lasts > 0:
+        return [f"{trouble} for 60"]
+    return [trouble]

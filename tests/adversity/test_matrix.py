@@ -1,4 +1,4 @@
-"""Every trouble in every phase: the table of docs/under-fault.md, cell by cell."""
+"""Every trouble in every phase: the tables of docs/under-fault.md, cell by cell."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from robotiq_async import Finger
 from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values.model import TWO_FINGER_85, Model
 from robotiq_async.values.registers import REGISTER_COUNT
-from tests.adversity.cell import Cell, cells, outcome
+from tests.adversity.cell import Cell, cells, cells_of_a_urcap, outcome
 from tests.adversity.world import HABITS, MODEL, HeldLoopError, world
 from tests.virtual import run
 
 CELLS = list(cells())
+OF_A_URCAP = list(cells_of_a_urcap())
 OF_A_JAW = [
     *("drop once", "silence for 60", "line pulled", "power-cut for 60", "foreign 128"),
     *("fault 14 for ever", "release", "e-stop for 60", "status-lag 0.2 for 60"),
@@ -34,12 +35,18 @@ WITH_FUNCTION_23 = {
     for lasts in ("once", "for 60")
 }
 """Outcomes of cells on a serial line to a jaw, which is written with function 23."""
-FORGETTING = {
+WITH_HABIT = {
     # The other client's write comes too soon after ours, and is the one that is forgotten.
-    ("tcp", "moving", "foreign 128"): "done → RUNNING_IDLE",
-    ("rtu", "moving", "foreign 128"): "done → RUNNING_IDLE",
+    "write-spacing": {
+        (link, "moving", "foreign 128"): "done → RUNNING_IDLE" for link in ("tcp", "rtu", "urcap")
+    },
+    # A lag that grows, or a fault, shows the closing once more: an axis that moves is held where it is.
+    "status-lag": {
+        ("urcap", "keeping a grip", trouble): "done, let go → SHUTDOWN"
+        for trouble in ("status-lag 0.2 for 60", "fault 5 for 60")
+    },
 }
-"""Outcomes of cells on a gripper that forgets writes (``make habits``), where they differ."""
+"""Outcomes of cells on a gripper with a habit (``make habits``), where they differ."""
 
 
 def kind_of(cell: Cell) -> str:
@@ -54,9 +61,14 @@ def expected(cell: Cell, model: Model) -> str:
         return f"done, {'let go' if lets_go else 'kept'} → SHUTDOWN"
     if len(model.axes) == 1 and cell.link == "rtu" and (cell.phase.name, cell.trouble) in WITH_FUNCTION_23:
         return WITH_FUNCTION_23[cell.phase.name, cell.trouble]
-    forgets = any(habit.kind == "write-spacing" for habit in HABITS)
-    other = FORGETTING.get((cell.link, cell.phase.name, cell.trouble)) if forgets else None
-    return other or cell.outcome
+    return usual(cell)
+
+
+def usual(cell: Cell) -> str:
+    """What the page says, unless the gripper has habits."""
+    place = cell.link, cell.phase.name, cell.trouble
+    others = (WITH_HABIT.get(habit.kind, {}).get(place) for habit in HABITS)
+    return next(filter(None, others), cell.outcome)
 
 
 def tried(cell: Cell, model: Model, patch: pytest.MonkeyPatch) -> str:
@@ -93,6 +105,13 @@ def test_cell(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_cell_of_a_jaw(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
     assert tried(cell, TWO_FINGER_85, monkeypatch) == expected(cell, TWO_FINGER_85)
+
+
+@pytest.mark.parametrize(
+    "cell", OF_A_URCAP, ids=lambda cell: f"{cell.phase.name}-{cell.trouble}".replace(" ", "_")
+)
+def test_cell_of_a_urcap(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert tried(cell, TWO_FINGER_85, monkeypatch) == usual(cell)
 
 
 def test_every_kind_of_trouble_is_in_the_table() -> None:
