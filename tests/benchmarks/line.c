@@ -1,10 +1,11 @@
-/* A 2F-85 on a serial line that costs next to nothing, and a bare client: what a hand is measured beside.
+/* A gripper on a serial line that costs next to nothing, and a bare client: what a hand is measured beside.
  *
- *     line gripper LINK SILENCE_MS TURNAROUND_MS
+ *     line gripper MODEL LINK SILENCE_MS TURNAROUND_MS
  *
  * makes a pseudo terminal, points LINK at it and serves until its standard input ends. A reply is there when
  * its last byte would be at 115200 baud: the bytes of the request, SILENCE, TURNAROUND, the bytes of the reply.
- * Functions 3, 16 and 23 on whole frames of unit 9; the gripper is active at once and where it is told to be.
+ * Functions 3, 4, 16 and 23 on whole frames of unit 9. The gripper, 2f85 or 3f, is active at once and where it is
+ * told to be.
  *
  *     line bare PORT HZ SECONDS
  *
@@ -62,13 +63,18 @@ static void raw(int fd) {
 /* -- the gripper ----------------------------------------------------------------------------------------- */
 
 static uint8_t image[2 * REGISTERS], status[2 * REGISTERS];
+static int axes;
 
-static void obey(const uint8_t *content, int bytes) {
-    memcpy(image, content, bytes < (int)sizeof image ? bytes : (int)sizeof image);
+static void obey(int first, const uint8_t *content, int bytes) {
+    if (first < 0 || 2 * first + bytes > (int)sizeof image) return;
+    memcpy(image + 2 * first, content, bytes);
     int active = image[0] & 1, goes = image[0] >> 3 & 1;
-    status[0] = active ? (uint8_t)(0xC0 | 0x30 | goes << 3 | 1) : 0;
-    status[3] = image[3];
-    if (goes) status[4] = image[3];
+    status[0] = active ? (uint8_t)(0xC0 | 0x30 | (image[0] & 0x0F)) : 0;
+    if (axes > 1) status[1] = active ? 0xFF : 0; /* on a jaw the object status is in the first byte */
+    for (int at = 3; at < 3 + 3 * axes; at += 3) {
+        status[at] = image[at];
+        if (goes) status[at + 1] = image[at];
+    }
 }
 
 static int size_of(const uint8_t *frame, int have) {
@@ -80,11 +86,11 @@ static int size_of(const uint8_t *frame, int have) {
 static int reply_to(const uint8_t *frame, uint8_t *reply) {
     if (frame[0] != UNIT) return 0;
     if (frame[1] == 16) {
-        obey(frame + 7, frame[6]);
+        obey(word(frame + 2) - REQUEST, frame + 7, frame[6]);
         memcpy(reply, frame, 6);
         return with_checksum(reply, 6);
     }
-    if (frame[1] == 23) obey(frame + 11, frame[10]);
+    if (frame[1] == 23) obey(word(frame + 6) - REQUEST, frame + 11, frame[10]);
     int first = word(frame + 2) - STATUS, count = word(frame + 4);
     if (first < 0 || count < 1 || first + count > REGISTERS) return 0;
     reply[0] = UNIT;
@@ -171,9 +177,11 @@ static int bare(const char *port, double hz, double seconds) {
 }
 
 int main(int count, char **words) {
-    if (count == 5 && !strcmp(words[1], "gripper"))
-        return serve(words[2], atof(words[3]) / 1000, atof(words[4]) / 1000);
+    if (count == 6 && !strcmp(words[1], "gripper")) {
+        axes = strcmp(words[2], "3f") ? 1 : 4;
+        return serve(words[3], atof(words[4]) / 1000, atof(words[5]) / 1000);
+    }
     if (count == 5 && !strcmp(words[1], "bare")) return bare(words[2], atof(words[3]), atof(words[4]));
-    fprintf(stderr, "line gripper LINK SILENCE_MS TURNAROUND_MS | line bare PORT HZ SECONDS\n");
+    fprintf(stderr, "line gripper MODEL LINK SILENCE_MS TURNAROUND_MS | line bare PORT HZ SECONDS\n");
     return 2;
 }

@@ -5,8 +5,9 @@
 The simulated gripper runs in a process of its own, on one end of a pair of pseudo terminals, and takes the
 time that the bytes take at 115200 baud. Beside the usual interval stand others.
 
-``beside`` compares a hand at a 2F-85 with a bare client, on a line that is not ours (line.c, needs gcc): the
-bytes, 0.3 ms of silence and 0.5 ms for the reply.
+``beside`` compares a hand with a bare client and with pyRobotiqGripper at a 2F-85, on a line that is not
+ours (line.c, needs gcc): the bytes, 0.3 ms of silence and 0.5 ms for the reply. A hand at a 3-Finger stands
+beside.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import random
 import selectors
 import subprocess
 import sys
@@ -22,9 +24,10 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 
-from robotiq_async import JAW, Finger, RobotiqHand, RobotiqStatus
+from robotiq_async import Finger, RobotiqHand, RobotiqStatus
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
 from robotiq_async.values.statistics import percentile
 from tests.benchmarks import program
@@ -37,8 +40,11 @@ STREAM_S = 0.002
 """Seconds from one command of a stream to the next: more commands than any line can carry."""
 TARGET_S = 0.01
 """Seconds from one target to the next of the control loop that is compared with others."""
+ALONE_S = (0.02, 0.037)
+"""Seconds from one command to the next, where each has ended before."""
 LINE_MS = ("0.3", "0.5")
 """Silence and turnaround of the line that is not ours."""
+OTHER = "pyRobotiqGripper"
 
 
 # -- the gripper, in a process of its own ------------------------------------------------------------------
@@ -122,11 +128,11 @@ async def asked(hand: RobotiqHand, seconds: float) -> list[float]:
 
 
 @contextmanager
-def independent(program: Path) -> Iterator[str]:
-    """The port of a 2F-85 in C."""
+def independent(program: Path, model: str = "2f85") -> Iterator[str]:
+    """The port of a gripper in C."""
     with tempfile.TemporaryDirectory() as folder:
         port = f"{folder}/tty"
-        command = [str(program), "gripper", port, *LINE_MS]
+        command = [str(program), "gripper", model, port, *LINE_MS]
         with subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT
         ) as process:
@@ -139,36 +145,38 @@ def independent(program: Path) -> Iterator[str]:
                 process.stdin.close()
 
 
-async def compared(port: str, seconds: float, options: dict[str, int]) -> dict[str, float]:
-    """A hand that polls, and then follows a target that changes 100 times a second."""
-    async with RobotiqHand(f"rtu://{port}?model=2f85", **options) as hand:  # type: ignore[arg-type]
+async def compared(port: str, seconds: float, options: dict[str, int | str]) -> dict[str, float]:
+    """A hand that polls, then follows a target that changes 100 times a second, then single commands."""
+    async with RobotiqHand(f"rtu://{port}", **options) as hand:  # type: ignore[arg-type]
         await asyncio.sleep(0.3)
-        polls, used, began = hand.statistics.polls, time.process_time(), time.monotonic()
-        await asyncio.sleep(seconds / 2)
-        idle = hand.statistics.polls - polls
-        cpu = (time.process_time() - used) / idle
-        idle_rate = idle / (time.monotonic() - began)
+        part = seconds / 3
+        before, used, began = hand.statistics, time.process_time(), time.monotonic()
+        await asyncio.sleep(part)
+        polls, wall = hand.statistics.polls - before.polls, time.monotonic() - began
+        cpu = (time.process_time() - used) / polls
         before, began = hand.statistics, time.monotonic()
-        took = await followed(hand, seconds / 2)
-        wall, after = time.monotonic() - began, hand.statistics
-        took.sort()
+        in_stream = await followed(hand, part, lambda: TARGET_S)
+        streaming, after = time.monotonic() - began, hand.statistics
+        alone = await followed(hand, part, lambda: random.uniform(*ALONE_S))
         return {
-            "idle": idle_rate,
-            "statuses": (after.polls - before.polls) / wall,
-            "writes": (after.writes - before.writes) / wall,
-            "p50": percentile(took, 0.5),
-            "p99": percentile(took, 0.99),
+            "idle": polls / wall,
+            "statuses": (after.polls - before.polls) / streaming,
+            "writes": (after.writes - before.writes) / streaming,
+            "p50": percentile(alone, 0.5),
+            "p99": percentile(alone, 0.99),
+            "in_stream": percentile(in_stream, 0.5),
             "cpu": cpu,
         }
 
 
-async def followed(hand: RobotiqHand, seconds: float) -> list[float]:
-    """Seconds from each target until a status has it, or a later one."""
+async def followed(hand: RobotiqHand, seconds: float, pause: Callable[[], float]) -> list[float]:
+    """Seconds from each target until a status shows it, or a later one; sorted."""
     pending: dict[int, float] = {}
     took: list[float] = []
+    axis = hand.model.axes[0]
 
     def see(item: object) -> None:
-        if isinstance(item, RobotiqStatus) and (asked := pending.get(item.requested_position(JAW))):
+        if isinstance(item, RobotiqStatus) and (asked := pending.get(item.requested_position(axis))):
             for target, when in list(pending.items()):
                 if when <= asked:
                     took.append(item.timestamp - when)
@@ -178,10 +186,50 @@ async def followed(hand: RobotiqHand, seconds: float) -> list[float]:
     while time.monotonic() < ends:
         target = (target + 1) % 200
         pending[target] = time.monotonic()
-        hand.command(position=target)
-        await asyncio.sleep(TARGET_S)
+        hand.command(axis, position=target)
+        await asyncio.sleep(pause())
     remove()
-    return took
+    return sorted(took)
+
+
+def blocking(port: str, seconds: float) -> dict[str, float]:
+    """pyRobotiqGripper, whose calls block: it reads, and then it moves 100 times a second.
+
+    A move writes and reads in one exchange. A target comes at a random moment, as with the bare client, and
+    waits for the next cycle.
+    """
+    from pyrobotiqgripper import RobotiqGripper  # noqa: PLC0415  # the other programs do without it
+
+    driver = RobotiqGripper(com_port=port)
+    driver.activate()
+    reads, used, began = 0, time.process_time(), time.monotonic()
+    while (idle := time.monotonic() - began) < seconds / 2:
+        driver.readStatus()
+        reads += 1
+    cpu = (time.process_time() - used) / reads
+    took, cycles, target = [], 0, 0
+    began = tick = time.monotonic()
+    asked = began + random.uniform(0, TARGET_S)
+    while (wall := time.monotonic() - began) < seconds / 2:
+        is_new = time.monotonic() >= asked
+        target = (target + is_new) % 200
+        driver.move(target, speed=255, force=64, wait=False)
+        cycles += 1
+        if is_new and driver.status(refreshStatus=False)["gPR"] == target:
+            took.append(time.monotonic() - asked)
+            asked = time.monotonic() + random.uniform(0, TARGET_S)
+        tick += TARGET_S
+        time.sleep(max(0.0, tick - time.monotonic()))
+    driver.disconnect()
+    took.sort()
+    return {
+        "idle": reads / idle,
+        "statuses": cycles / wall,
+        "writes": cycles / wall,
+        "p50": percentile(took, 0.5),
+        "p99": percentile(took, 0.99),
+        "cpu": cpu,
+    }
 
 
 # -- the tables --------------------------------------------------------------------------------------------
@@ -213,7 +261,7 @@ class Benchmarks(program.Benchmarks):
             }
 
     def beside(self) -> Iterator[Row]:
-        """A hand at a 2F-85 beside a bare client, on the same line."""
+        """A hand beside a bare client and pyRobotiqGripper, on the same line."""
         line = program.build("line", self.folder, "util")
 
         def bare(hz: int) -> dict[str, float]:
@@ -223,16 +271,24 @@ class Benchmarks(program.Benchmarks):
                 found: dict[str, float] = json.loads(done.stdout)
             return {"idle": found["statuses"], "cpu": 0.0, **found}
 
-        def hand(**options: int) -> dict[str, float]:
+        def other() -> dict[str, float]:
             with independent(line) as port:
-                return figures_of("serial", "--beside", port, self.seconds, json.dumps(options))
+                return figures_of("serial", "--other", port, self.seconds)
+
+        def hand(model: str = "2f85", **options: int) -> dict[str, float]:
+            with independent(line, model) as port:
+                said = json.dumps({"model": model, **options})
+                return figures_of("serial", "--beside", port, self.seconds, said)
 
         turns: dict[str, Callable[[], dict[str, float]]] = {
             "bare, 100 Hz": partial(bare, 100),
             "bare, free run": partial(bare, 0),
             "hand": hand,
             "hand, write_function=16": partial(hand, write_function=16),
+            "hand, 3-Finger": partial(hand, "3f"),
         }
+        if find_spec("pyrobotiqgripper"):
+            turns[OTHER] = other
         for name, figures in self.in_turns("beside", turns).items():
             it = median_of(figures)
             yield {
@@ -242,8 +298,11 @@ class Benchmarks(program.Benchmarks):
                 "writes a second": f"{it['writes']:.0f}",
                 "echo p50, ms": f"{1000 * it['p50']:.2f}",
                 "p99, ms": f"{1000 * it['p99']:.1f}",
+                "echo in the stream p50, ms": f"{1000 * it.get('in_stream', it['p50']):.2f}",
                 "CPU a status, ms": f"{1000 * it['cpu']:.2f}" if it["cpu"] else "",
             }
+        if OTHER not in turns:
+            print(f"{OTHER} is not installed", file=sys.stderr)  # noqa: T201
 
     def _one(self, interval: float, what: str) -> dict[str, float]:
         with served() as port:
@@ -263,6 +322,8 @@ if __name__ == "__main__":
                 runner.run(gripper(folder))
         case ["--beside", port, seconds, options]:
             print(json.dumps(asyncio.run(compared(port, float(seconds), json.loads(options)))))  # noqa: T201
+        case ["--other", port, seconds]:
+            print(json.dumps(blocking(port, float(seconds))))  # noqa: T201
         case ["--hand", port, interval, seconds, what]:
             figures = asyncio.run(measured(port, float(interval), float(seconds), streams=what == "stream"))
             print(json.dumps(figures))  # noqa: T201
