@@ -16,7 +16,7 @@ import asyncio
 import math
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 from weakref import WeakKeyDictionary, WeakValueDictionary
 
 import anyio
@@ -31,7 +31,7 @@ from ..values.errors import (
 )
 from .address import Address, canonical_address
 from .connecting import Client, connected_client, disconnect
-from .exchange import Exchange, strays
+from .exchange import Echo, Exchange, strays
 from .frames import MisfitError, RefusedError
 from .silence import Silence
 from .watchdog import Watchdog
@@ -51,8 +51,17 @@ for 20 polls of theirs."""
 NOISE: Final = (MisfitError, ResponseTimeoutError)
 """Errors that a lost or damaged byte can cause."""
 
+T = TypeVar("T")
+
 Bears = Callable[[RobotiqConnectionError], bool]
 """Whether the connection stays open after an error."""
+Strays = Callable[[bytes], ProtocolError | None]
+"""The error for bytes that answer nothing; None if they mean nothing."""
+
+
+def bears_nothing(_: RobotiqConnectionError) -> bool:
+    """For an exchange after which every error ends the connection."""
+    return False
 
 
 class StillOpenError(Exception):
@@ -69,26 +78,27 @@ class Connection:
     Attributes:
         silence: between the frames of a serial line.
         keeps_silence: whether this end must keep it; a serial server keeps its own.
+        echo: whether the line brings back what is sent.
     """
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, address: Address, strays: Strays = strays) -> None:
         """Keep the address; opens nothing."""
         self._turns = asyncio.Lock()
         self.silence = Silence(address.line.character_s)
         self.keeps_silence = not address.is_socket
+        self.echo = Echo()
         self._address = address
+        self._strays = strays
         self._users: set[object] = set()
         self._rests: WeakKeyDictionary[object, float] = WeakKeyDictionary()
         """The time of the next turn of a user whose gripper did not answer, by the clock of the loop."""
         self._client: Client | None = None
         self._transport: Any = None
         """The asyncio transport of the connection; pymodbus's class for serial ports is not typed."""
-        self._exchange: Exchange | None = None
+        self._exchange: Exchange[Any] | None = None
         """The exchange in flight."""
         self._failure: RobotiqConnectionError | None = None
         """An error of the link between two exchanges; the next exchange raises it."""
-        self._is_echoed: bool | None = False
-        """Whether the line echoes what is sent; None until the first exchange of a connection shows it."""
         self._is_hushing = False
         """Whether arriving bytes are dropped as the rest of a damaged reply."""
         self._is_disturbed = False
@@ -102,11 +112,6 @@ class Connection:
     @property
     def address(self) -> Address:
         return self._address
-
-    @property
-    def echoes(self) -> bool:
-        """Whether the line was seen to echo what is sent; the echo is dropped."""
-        return bool(self._is_echoed)
 
     @property
     def is_shared(self) -> bool:
@@ -138,8 +143,8 @@ class Connection:
         self._loop = loop = asyncio.get_running_loop()
         self.clock = clock_of(loop)
         self._watchdog = Watchdog(loop, math.inf, lambda: self._is_waiting, self._on_timeout)
-        self._failure, self._is_echoed = None, None if self._address.is_rtu else False
-        self._is_disturbed = False
+        self._failure, self._is_disturbed = None, False
+        self.echo.is_on = None if self._address.is_rtu else False
         try:
             with anyio.fail_after(seconds):
                 client = await connected_client(self._address, self._on_data, self._on_connection, seconds)
@@ -213,14 +218,16 @@ class Connection:
         if not self.is_open_for(user):
             raise ConnectionLostError(f"not connected to {self._address}")
 
-    async def exchange(self, user: object, frame: bytes, seconds: float, by: float, bears: Bears) -> bytes:
+    async def exchange(
+        self, user: object, exchange: Exchange[T], seconds: float, by: float, bears: Bears = bears_nothing
+    ) -> T:
         """Send one request after the silence between frames, and wait for its reply.
 
         Every other outcome closes the connection for this user.
 
         Args:
             user: who sends it.
-            frame: the request.
+            exchange: the request, and the check of its reply.
             seconds: the longest time from the request to the end of the reply.
             by: when it must be over even so, in the loop's time.
             bears: whether the connection stays open after an error, and StillOpenError is raised.
@@ -231,12 +238,11 @@ class Connection:
             self._failure = None
             raise StillOpenError(failure)
         self.check_open(user)
-        exchange = Exchange(frame, self._loop, serial=self._address.is_rtu, is_echoed=self._is_echoed)
         self._exchange, self._allowed_s = exchange, seconds
         self._watchdog.watch(min(self._loop.time() + seconds, by))
         try:
-            self._transport.write(frame)
-            answer = await exchange.answer
+            self._transport.write(exchange.frame)
+            return await exchange.answer
         except RobotiqConnectionError as error:
             if isinstance(error, ResponseTimeoutError):
                 self._rests[user] = self.clock() + REST_S
@@ -256,9 +262,6 @@ class Connection:
             raise
         finally:
             self._exchange = None
-            self._is_echoed = self._is_echoed or exchange.is_echoed
-        self._is_echoed = bool(self._is_echoed)
-        return answer
 
     async def hush(self, user: object) -> None:
         """Drop what arrives until the line is silent.
@@ -298,7 +301,8 @@ class Connection:
         return self._exchange is not None and self._exchange.is_waiting
 
     def _on_timeout(self) -> None:
-        self._fail(ResponseTimeoutError(f"{self._address} did not answer within {self._allowed_s:g} s"))
+        assert self._exchange is not None, "only an exchange is watched"
+        self._fail(ResponseTimeoutError(self._exchange.late(self._address, self._allowed_s)))
 
     def _fail(self, error: RobotiqConnectionError) -> None:
         """End the exchange in flight with an error; without one, keep the error for the next exchange."""
@@ -315,9 +319,11 @@ class Connection:
             self.silence.heard = self.clock()
             if self._is_hushing:
                 return
-        if self._exchange is None or not self._exchange.is_waiting:
-            self._fail(strays(data))
-        elif (error := self._exchange.take(data)) is not None:
+        if self._exchange is not None and self._exchange.is_waiting:
+            error = self._exchange.take(data)
+        else:
+            error = self._strays(data)
+        if error is not None:
             self._fail(error)
 
     def _on_connection(self, connected: bool) -> None:

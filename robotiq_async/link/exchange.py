@@ -1,4 +1,6 @@
-"""One request on its way, and what has arrived of its reply.
+"""One request on its way, and what has arrived of its reply: of any protocol, and of Modbus.
+
+A connection sends an exchange and hands it what arrives; the exchange knows when its reply is whole.
 
 A line that echoes what is sent (a half-duplex adapter that receives its own bytes) is recognised by the first
 read of a connection. It needs no option: a reply to a read does not begin with the whole request, checksum
@@ -9,27 +11,27 @@ never taken for its acknowledgement, which begins with the same six bytes.
 from __future__ import annotations
 
 import asyncio
+from abc import ABC, abstractmethod
+from typing import Generic, TypeVar
 
 from ..values.errors import ProtocolError, RobotiqConnectionError
+from .address import Address
 from .frames import MisfitError, RefusedError, check_sum, expected_reply, is_write, show
 
+T = TypeVar("T")
 
-class Exchange:
-    """A request frame and the check of its reply, byte by byte.
+
+class Exchange(ABC, Generic[T]):
+    """A request and its reply, whatever the protocol.
 
     Attributes:
-        answer: the whole reply, or why there is none.
-        is_echoed: whether the line echoes requests; None until that is known.
+        frame: the bytes to send.
+        answer: what the whole reply says, or why there is none.
     """
 
-    def __init__(
-        self, frame: bytes, loop: asyncio.AbstractEventLoop, *, serial: bool, is_echoed: bool | None = False
-    ) -> None:
-        self.answer: asyncio.Future[bytes] = loop.create_future()
-        self.is_echoed = is_echoed
-        self._frame = frame
-        self._serial = serial
-        self._expected = expected_reply(frame, serial=serial)
+    def __init__(self, frame: bytes) -> None:
+        self.frame = frame
+        self.answer: asyncio.Future[T] = asyncio.get_running_loop().create_future()
         self._received = b""
 
     @property
@@ -37,12 +39,47 @@ class Exchange:
         """Whether the reply, or an end without one, has yet to come."""
         return not self.answer.done()
 
+    @abstractmethod
     def take(self, data: bytes) -> ProtocolError | None:
         """Take bytes; the last one of the reply ends the exchange, or the first wrong one.
 
         Returns:
-            The error for bytes after the acknowledgement of a write, which counts all the same.
+            An error of the link that leaves the answer valid.
         """
+
+    def fail(self, error: RobotiqConnectionError) -> None:
+        """End the exchange with an error."""
+        if self.is_waiting:
+            self.answer.set_exception(error)
+
+    def late(self, address: Address, seconds: float) -> str:
+        """The message for a reply that has not come in time."""
+        return f"{address} did not answer within {seconds:g} s"
+
+
+class Echo:
+    """What is known of the echo of a line.
+
+    Attributes:
+        is_on: whether the line brings back what is sent; None until the first exchange of a connection tells.
+    """
+
+    def __init__(self) -> None:
+        self.is_on: bool | None = False
+
+
+class ModbusExchange(Exchange[bytes]):
+    """A request frame and the check of its reply, byte by byte."""
+
+    def __init__(self, frame: bytes, echo: Echo, *, serial: bool) -> None:
+        """An exchange that is not sent; it notes in ``echo`` what it learns."""
+        super().__init__(frame)
+        self._echo = echo
+        self._serial = serial
+        self._expected = expected_reply(frame, serial=serial)
+
+    def take(self, data: bytes) -> ProtocolError | None:
+        """Take bytes; the error is for those after an acknowledgement, which counts all the same."""
         self._received += data
         try:
             reply = self._without_echo(self._received)
@@ -53,13 +90,9 @@ class Exchange:
         except ProtocolError as error:
             self.fail(error)
             return None
+        self._echo.is_on = bool(self._echo.is_on)
         self.answer.set_result(reply)
         return strays(extra) if extra else None
-
-    def fail(self, error: RobotiqConnectionError) -> None:
-        """End the exchange with an error."""
-        if self.is_waiting:
-            self.answer.set_exception(error)
 
     def _is_whole(self, reply: bytes) -> bool:
         try:
@@ -77,16 +110,16 @@ class Exchange:
 
     def _without_echo(self, received: bytes) -> bytes:
         """The part of the bytes that belongs to the reply."""
-        if self.is_echoed is False:
+        if self._echo.is_on is False:
             return received
-        size = len(self._frame)
-        if received[:size] != self._frame[: len(received)]:
-            if self.is_echoed:
+        size = len(self.frame)
+        if received[:size] != self.frame[: len(received)]:
+            if self._echo.is_on:
                 raise MisfitError(f"the line echoes what is sent, but not this time: {show(received)}")
             return received
         if len(received) < size:
             return b""
-        self.is_echoed = True
+        self._echo.is_on = True
         return received[size:]
 
     def _beyond_acknowledgement(self, reply: bytes) -> bytes:
@@ -96,7 +129,7 @@ class Exchange:
         and reporting it as in doubt would end the motion. For a read it costs nothing to read again.
         """
         size = self._expected.size
-        return reply[size:] if self._serial and is_write(self._frame) else b""
+        return reply[size:] if self._serial and is_write(self.frame) else b""
 
 
 def strays(data: bytes) -> MisfitError:

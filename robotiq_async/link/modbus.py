@@ -32,7 +32,8 @@ from ..runtime.log import Log, log
 from ..values.errors import ResponseTimeoutError, RobotiqConnectionError
 from ..values.registers import REGISTER_COUNT, RegisterMap, Registers
 from .address import Address
-from .connection import Bears, Connection, StillOpenError, plain, shared_connection
+from .connection import Bears, Connection, StillOpenError, bears_nothing, plain, shared_connection
+from .exchange import ModbusExchange
 from .frames import (
     MisfitError,
     RefusedError,
@@ -64,10 +65,6 @@ UNANSWERED_S: Final = 60.0
 """With so many unanswered reads in so many seconds, a line gets the longer silence."""
 REPEAT_WARNING_S: Final = 60.0
 """At most one warning about repeated reads in this time."""
-
-
-def _nothing(_: RobotiqConnectionError) -> bool:
-    return False
 
 
 class ModbusTransport:
@@ -124,7 +121,7 @@ class ModbusTransport:
     @property
     def echoes(self) -> bool:
         """Whether the line was seen to echo what is sent; the echo is dropped."""
-        return self._connection.echoes
+        return bool(self._connection.echo.is_on)
 
     async def open(self) -> None:
         """Connect, and make sure that no answer to an earlier request is taken for one to come.
@@ -234,7 +231,7 @@ class ModbusTransport:
 
     # -- one exchange ----------------------------------------------------------------------------------
 
-    async def _ask(self, request: bytes, *, by: float = math.inf, bears: Bears = _nothing) -> bytes:
+    async def _ask(self, request: bytes, *, by: float = math.inf, bears: Bears = bears_nothing) -> bytes:
         """Send one request and return its reply, in a turn of this gripper.
 
         Args:
@@ -243,7 +240,8 @@ class ModbusTransport:
             bears: whether the connection stays open after an error, and StillOpenError is raised.
         """
         frame = serial_frame(request) if self._rtu else tcp_frame(self._next_number(), request)
-        return await self._connection.exchange(self, frame, self._response_timeout, by, bears)
+        exchange = ModbusExchange(frame, self._connection.echo, serial=self._rtu)
+        return await self._connection.exchange(self, exchange, self._response_timeout, by, bears)
 
     def _can_repeat(self, error: RobotiqConnectionError) -> bool:
         """Whether a read can be asked again after this error."""
@@ -314,7 +312,7 @@ class ModbusTransport:
             *(self._address, 1000 * silence.short_s, why),
         )
 
-    async def _resynchronise(self, by: float = math.inf, *, bears: Bears = _nothing) -> None:
+    async def _resynchronise(self, by: float = math.inf, *, bears: Bears = bears_nothing) -> None:
         """Make sure that no answer to an earlier request is still on its way.
 
         Serial replies carry no transaction id, and a gateway from TCP to a serial line gives a late reply the

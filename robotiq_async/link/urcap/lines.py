@@ -106,6 +106,12 @@ def without_ends(received: bytes) -> bytes:
     return received.lstrip(_END)
 
 
+def strays(received: bytes) -> ProtocolError | None:
+    """The error for bytes that answer nothing; None for empty lines."""
+    text = without_ends(received)
+    return ProtocolError(f"{len(text)} bytes without a question: {show(text)}") if text else None
+
+
 def status_registers(values: Mapping[str, int]) -> Registers:
     """The status registers of a jaw with these values of its variables; the current reads 0."""
     first = values["ACT"] | values["GTO"] << 3 | values["STA"] << 4 | values["OBJ"] << 6

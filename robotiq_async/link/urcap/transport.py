@@ -25,27 +25,17 @@ import asyncio
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import Any, Final, Generic, TypeVar
-
-import anyio
+from typing import Final, TypeVar
 
 from ...runtime.log import Log, log
 from ...values import registers as reg
-from ...values.errors import (
-    ConnectFailedError,
-    ConnectionLostError,
-    ProtocolError,
-    ResponseTimeoutError,
-    RobotiqConnectionError,
-)
+from ...values.errors import ConnectFailedError, ProtocolError, ResponseTimeoutError
 from ...values.registers import Registers
 from ..address import Address
-from ..connecting import Client, connected_client, disconnect
-from ..watchdog import Watchdog
+from ..connection import Connection
+from ..exchange import Exchange
 from . import lines
 
-SETTLE_S: Final = 0.02
-"""From connecting to the first question, as over Modbus TCP: what comes meanwhile answers nothing of ours."""
 SHOWS_S: Final = 0.5
 """After a write everything is read for this long at most, until the echo shows it."""
 SLOW: Final = ("GTO", "STA", "FLT", "ACT")
@@ -58,41 +48,29 @@ TRIES: Final = 4
 T = TypeVar("T")
 
 
-class _Question(Generic[T]):
-    """A line on its way, and what has arrived of its answer.
+class _Question(Exchange[T]):
+    """A line and the check of its answer."""
 
-    Attributes:
-        asked: the line, without its end.
-        answer: what the whole answer says, or why there is none.
-        received: the bytes so far.
-    """
-
-    def __init__(
-        self, line: bytes, read: Callable[[bytes], T | None], loop: asyncio.AbstractEventLoop
-    ) -> None:
-        self.asked = line.decode().strip()
-        self.answer: asyncio.Future[T] = loop.create_future()
-        self.received = b""
+    def __init__(self, line: bytes, read: Callable[[bytes], T | None]) -> None:
+        super().__init__(line)
         self._read = read
-
-    @property
-    def is_waiting(self) -> bool:
-        return not self.answer.done()
 
     def take(self, data: bytes) -> None:
         """Take bytes; the last one of the answer ends the question, or the first wrong one."""
-        self.received += data
+        self._received += data
         try:
-            said = self._read(self.received)
+            said = self._read(self._received)
         except ProtocolError as error:
             self.fail(error)
         else:
             if said is not None:
                 self.answer.set_result(said)
 
-    def fail(self, error: RobotiqConnectionError) -> None:
-        if self.is_waiting:
-            self.answer.set_exception(error)
+    def late(self, address: Address, seconds: float) -> str:
+        """The message for an answer that has not come in time."""
+        half = lines.without_ends(self._received)
+        what = f"half a line, {lines.show(half)}, answers" if half else "no answer to"
+        return f"{address}: {what} {self.frame.decode().strip()} within {seconds:g} s"
 
 
 class UrcapTransport:
@@ -117,15 +95,9 @@ class UrcapTransport:
         self._gripper = gripper
         self._connect_timeout = connect_timeout
         self._response_timeout = response_timeout
-        self._client: Client | None = None
-        self._line: Any = None
-        """The asyncio transport of the connection, which pymodbus's types leave open."""
-        self._question: _Question[Any] | None = None
-        """The question on its way."""
-        self._failure: RobotiqConnectionError | None = None
-        """An error of the link between two questions; the next one raises it."""
-        self._unanswered = ""
-        """The question that the last connection ended with, if it was open."""
+        self._connection = Connection(address, lines.strays)
+        self._asked = b""
+        """The question that has no answer; that of a connection that has ended, too."""
         self._values: dict[str, int] = {}
         """The newest value of each variable on this connection."""
         self._turn = 0
@@ -140,12 +112,10 @@ class UrcapTransport:
         """Activation, go and echo that the last write will show, if it changes activation or go."""
         self._shows_by = -math.inf
         """Until when that is awaited."""
-        self._loop: asyncio.AbstractEventLoop
-        self._watchdog: Watchdog
 
     @property
     def is_open(self) -> bool:
-        return self._client is not None
+        return self._connection.is_open_for(self)
 
     async def open(self) -> None:
         """Connect, and make sure that no answer to an earlier question is taken for one to come.
@@ -157,24 +127,11 @@ class UrcapTransport:
             ResponseTimeoutError: the connection is open, but no answer comes.
         """
         await self.close()
-        self._loop = loop = asyncio.get_running_loop()
-        self._watchdog = Watchdog(loop, self._response_timeout, lambda: self._is_waiting, self._on_timeout)
-        self._failure, self._changes, self._written = None, True, ()
+        self._changes, self._written = True, ()
         self._values.clear()
         self._positions.clear()
-        try:
-            with anyio.fail_after(self._connect_timeout):
-                client = await connected_client(
-                    self._address, self._on_data, self._on_connection, self._connect_timeout
-                )
-        except TimeoutError:
-            raise ConnectFailedError(
-                str(self._address), f"no connection within {self._connect_timeout:g} s"
-            ) from None
-        self._client, self._line = client, client.ctx.transport
-        await self._settle()
-        await self._get("FLT" if self._unanswered == "GET STA" else "STA")
-        self._unanswered = ""
+        await self._connection.open(self, self._connect_timeout)
+        await self._get("FLT" if self._asked == lines.question("STA") else "STA")
         if self._gripper is not None:
             await self._choose(self._gripper)
 
@@ -197,7 +154,7 @@ class UrcapTransport:
         Raises:
             RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
         """
-        self._check_connected()
+        self._connection.check_open(self)
         image = decide()
         if image is None:
             return False
@@ -221,7 +178,7 @@ class UrcapTransport:
 
     async def close(self) -> None:
         """Disconnect; does nothing when closed."""
-        self._drop()
+        self._connection.leave(self)
 
     # -- a status ----------------------------------------------------------------------------------------
 
@@ -244,7 +201,7 @@ class UrcapTransport:
             if not await self._read_pair(by):
                 break
         else:
-            self._drop()
+            await self.close()
             raise ProtocolError(f"{self._address}: ACT and GTO change too often to be read")
         for name in ("OBJ", "STA", "FLT", "POS"):
             await self._is_new(name, by)
@@ -280,87 +237,12 @@ class UrcapTransport:
 
     async def _ask(self, line: bytes, read: Callable[[bytes], T | None], by: float = math.inf) -> T:
         """Send a line and wait for its answer; every other outcome closes the connection."""
-        self._check_connected()
-        question: _Question[T] = _Question(line, read, self._loop)
-        self._question = question
-        self._watchdog.watch(by)
-        try:
-            self._line.write(line)
-            return await question.answer
-        except RobotiqConnectionError:
-            self._drop()
-            raise
-        except OSError as error:
-            self._drop()
-            raise ConnectionLostError(f"{self._address}: {error}") from error
-        except BaseException:
-            # Cancelled in the middle of a question: its answer must not become that of another one.
-            self._drop()
-            if question.answer.done() and not question.answer.cancelled():
-                question.answer.exception()  # asyncio reports an exception that was never looked at
-            raise
-        finally:
-            self._question = None
-
-    def _check_connected(self) -> None:
-        if self._failure is not None:
-            # Between two questions the link broke, or bytes arrived without a question.
-            failure, self._failure = self._failure, None
-            self._drop()
-            raise failure
-        if self._client is None:
-            raise ConnectionLostError(f"not connected to {self._address}")
-
-    @property
-    def _is_waiting(self) -> bool:
-        return self._question is not None and self._question.is_waiting
+        self._asked = line
+        question = _Question(line, read)
+        answer = await self._connection.exchange(self, question, self._response_timeout, by)
+        self._asked = b""
+        return answer
 
     def _now(self) -> float:
         """The time by the loop's own clock, as the watchdog has it."""
         return asyncio.get_running_loop().time()
-
-    def _on_timeout(self) -> None:
-        question = self._question
-        assert question is not None, "only a question is watched"
-        half = lines.without_ends(question.received)
-        what = f"half a line, {lines.show(half)}, answers" if half else "no answer to"
-        self._fail(
-            ResponseTimeoutError(
-                f"{self._address}: {what} {question.asked} within {self._response_timeout:g} s"
-            )
-        )
-
-    def _fail(self, error: RobotiqConnectionError) -> None:
-        """End the question on its way with an error; without one, keep the error for the next question."""
-        if self._question is not None and self._question.is_waiting:
-            self._question.fail(error)
-        elif self._failure is None:
-            self._failure = error
-
-    def _drop(self) -> None:
-        client, self._client = self._client, None
-        if client is not None:
-            self._unanswered = "" if self._question is None else self._question.asked
-            self._watchdog.stop()
-            disconnect(client)
-
-    # -- what the connection calls -----------------------------------------------------------------------
-
-    def _on_data(self, data: bytes) -> None:
-        if self._is_waiting:
-            assert self._question is not None
-            self._question.take(data)
-        elif strays := lines.without_ends(data):
-            self._fail(ProtocolError(f"{len(strays)} bytes without a question: {lines.show(strays)}"))
-
-    def _on_connection(self, connected: bool) -> None:
-        if not connected:
-            self._fail(ConnectionLostError(f"{self._address} closed the connection"))
-
-    async def _settle(self) -> None:
-        try:
-            await asyncio.sleep(SETTLE_S)
-        except BaseException:
-            self._drop()
-            raise
-        self._check_connected()
