@@ -34,7 +34,7 @@ from ..hand import Hand
 from ..runtime.clock import now
 from ..runtime.log import log
 from ..runtime.signals import ending_signals
-from ..values.enums import Fault, Finger, ObjectStatus, State
+from ..values.enums import Fault, Finger, State
 from ..values.errors import NotStartedError
 from ..values.status import RobotiqStatus
 
@@ -53,7 +53,7 @@ class Health:
         state: of the hand.
         status_age: seconds since the newest status was read; None if there is none.
         fault: the gripper's fault in the newest status.
-        holds: the axes that report a contact while closing, in the newest status.
+        holds: the fingers that hold a part by the newest status, as its ``part`` says.
         problem: the reason why the hand takes no motion commands now, in a sentence; empty if it does.
     """
 
@@ -90,22 +90,15 @@ def health(hand: Hand) -> Health:
     except NotStartedError:
         status = None
     age = None if status is None else max(0.0, now() - status.timestamp)
+    part = None if status is None else status.part
     return Health(
         hand.name or hand.address,
         hand.state,
         age,
         Fault.NONE if status is None else status.fault,
-        Finger(0) if status is None else _holds(status),
+        Finger(0) if part is None else part.holds,
         _problem(hand.state, age, status),
     )
-
-
-def _holds(status: RobotiqStatus) -> Finger:
-    held = Finger(0)
-    for axis in status.model.axes:
-        if status.finger_status(axis) is ObjectStatus.CONTACT_CLOSING:
-            held |= axis
-    return held
 
 
 def _problem(state: State, age: float | None, status: RobotiqStatus | None) -> str:

@@ -194,6 +194,8 @@ async def test_health_in_every_condition(server: SimulatorServer) -> None:
         async with server.fault_injector.making(Trouble("fault", 14)):
             await hand.wait_for_state(State.FAULT, timeout=1)
             assert health(hand).problem.startswith("fault 0x0E: ")
+            assert hand.status.contacts == Finger.ABC
+            assert health(hand).holds == Finger(0), "a contact in a fault is no grip"
         await hand.recover()
         async with server.fault_injector.making(Trouble("silence")):
             await hand.wait_for_state(State.DISCONNECTED, timeout=1)
@@ -207,6 +209,18 @@ async def test_health_in_every_condition(server: SimulatorServer) -> None:
         assert health(hand).problem == "the hand is in RESET"
         await hand.stop()
     assert health(hand).problem == "the hand is not started"
+
+
+async def test_a_contact_that_is_left_over_is_no_grip(server: SimulatorServer) -> None:
+    """After a stop the gripper still shows the contact, and presses no more."""
+    server.gripper.place_object(Finger.ABC, 120)
+    async with server:
+        async with RobotiqHand(server.address) as hand:
+            await hand.grasp()
+            assert health(hand).holds == Finger.ABC
+            await hand.halt()
+            assert hand.status.contacts == Finger.ABC
+            assert (health(hand).holds, hand.part) == (Finger(0), None)
 
 
 # -- systemd -----------------------------------------------------------------------------------------------
