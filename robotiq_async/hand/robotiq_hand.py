@@ -90,8 +90,9 @@ class RobotiqHand(Hand):
             (a serial line behind a socket), ``urcap://HOST[:63352]`` (a UR with Robotiq's URCap, for a jaw:
             it carries no currents), ``sim://`` (or ``sim://?speedup=10&object=150``), or a transport object.
             Without one the gripper is simulated, and the first start logs a warning of that. A serial port
-            sends at 115200 baud, 8N1, unless the address ends in ``?baud=500000``, ``&parity=E`` or
-            ``&stopbits=2``.
+            sends at 115200 baud, 8N1, unless the address ends in
+            ``?baud=500000``, ``&parity=E`` or ``&stopbits=2``. Any of them can end in ``?model=2f85`` and in
+            ``?stroke=/cell/left.csv``, which are the options ``model`` and ``stroke``.
         name: name of this hand, 1..64 printable characters: errors and the log begin with it, and
             metrics and recordings carry it. None calls it by its address.
         device_id: Modbus unit id, 0..255 over TCP and 1..247 over RTU; by default 2 over TCP and 9 over
@@ -126,9 +127,10 @@ class RobotiqHand(Hand):
         force_calibration: labels of force values in :attr:`units`. None for the manual's figures.
         stroke: points that were measured on this gripper, from open to closed: two or more pairs of a
             position in counts and an opening in millimetres, or the path of a file that
-            ``robotiq-async measure stroke`` wrote, which is read when the hand is made. Millimetres and
-            fractions of this hand, and of its statuses and results, follow them. None for the nominal
-            openings of the model.
+            ``robotiq-async measure stroke`` wrote, which is read when the hand is made and refused if it was
+            measured on another model. Millimetres and fractions of this hand, and of its statuses and
+            results, follow them. None for the file that the address names, and else the nominal openings of
+            the model.
         keep_grip: default of :meth:`stop`, and always in force when the block is left: False stops the
             fingers for certain (rGTO = 0), True holds axes that move and keeps a grip in force. A gripper
             that is not polled afterwards may lose its activation, and with it the grip.

@@ -27,14 +27,16 @@ FORMS: Final = (
     "urcap://HOST[:PORT] (a UR with Robotiq's URCap; it needs a model), "
     "sim:// (or sim://?speedup=10&object=150), "
     "zenoh://SITE/HOST/GRIPPER (on another host: for robotiq_async.fleet.RemoteHand and for commands); "
-    "?model=2f85, 2f140 or hand-e at the end for a sibling of the 3-Finger, ?baud=500000 for a serial port "
-    "with another rate than 115200"
+    "?model=2f85, 2f140 or hand-e at the end for a sibling of the 3-Finger, ?stroke=/FOLDER/FILE.csv for its "
+    "measured openings, ?baud=500000 for a serial port with another rate than 115200"
 )
 
 BAUD: Final = 115200  # the rate of a serial line, 8N1, as a gripper comes out of the box (manual)
 SLOWEST_BAUD: Final = 9600
 FASTEST_BAUD: Final = 1_000_000
 """No manual lists the rates that the vendor's tool can set; users have named 125000, 250000 and 500000."""
+GRIPPER_OPTIONS: Final = ("model", "stroke")
+"""Options at the end of any address."""
 LINE_OPTIONS: Final = ("baud", "parity", "stopbits")
 
 SLOWEST: Final = 0.01
@@ -120,6 +122,8 @@ class Address:
         simulation: what the gripper is like (sim); nothing special for the others.
         line: how the serial port sends (rtu); the usual for the others.
         model: of the gripper; None if the address does not name it.
+        stroke: absolute path of a file with measured openings, which is read when a hand is made; None for
+            nominal ones.
     """
 
     kind: Kind
@@ -128,6 +132,7 @@ class Address:
     simulation: Simulation = NOTHING_SPECIAL
     line: Line = USUAL_LINE
     model: Model | None = None
+    stroke: str | None = None
 
     @property
     def is_rtu(self) -> bool:
@@ -141,8 +146,9 @@ class Address:
 
     def __str__(self) -> str:
         query = str(self.simulation) + str(self.line)
-        if self.model is not None:
-            query += f"{'&' if query else '?'}model={self.model.name}"
+        name = None if self.model is None else self.model.name
+        for option, value in zip(GRIPPER_OPTIONS, (name, self.stroke), strict=True):
+            query += "" if value is None else f"{'&' if query else '?'}{option}={value}"
         if self.is_socket:
             host = f"[{self.host}]" if ":" in self.host else self.host
             return f"{self.kind}://{host}:{self.port}{query}"
@@ -165,9 +171,9 @@ def parse_address(address: object) -> Address:
             raise ValueError(f"malformed address {address!r}: {meant}; accepted: {FORMS}")
         scheme, rest = "tcp", address
     try:
-        rest, model = _without_model(rest)
+        rest, model, stroke = _without_options_of_a_gripper(rest)
         if scheme == "sim" and rest[:1] in ("", "?"):
-            return Address("sim", simulation=parse_simulation(rest), model=model)
+            return Address("sim", simulation=parse_simulation(rest), model=model, stroke=stroke)
     except ValueError as error:
         raise ValueError(f"malformed address {address!r}: {error}; accepted: {FORMS}") from None
     if scheme == "rtu" and rest.strip("/") and rest == rest.strip() and rest.isprintable():
@@ -178,7 +184,7 @@ def parse_address(address: object) -> Address:
             device, line = _device_and_line(rest)
         except ValueError as error:
             raise ValueError(f"malformed address {address!r}: {error}; accepted: {FORMS}") from None
-        return Address("rtu", device, line=line, model=model)
+        return Address("rtu", device, line=line, model=model, stroke=stroke)
     if scheme in _SOCKETS:
         if any(option.partition("=")[0] in LINE_OPTIONS for option in rest.partition("?")[2].split("&")):
             what = "baud, parity and stopbits are options of a serial port; a serial server has its own"
@@ -189,7 +195,7 @@ def parse_address(address: object) -> Address:
             what = f"{host} is not an IPv4 address: four numbers in 0..255, without leading zeros"
             raise ValueError(f"malformed address {address!r}: {what}; accepted: {FORMS}")
         if host and port is not None:
-            return Address(kind, host, port, model=model)
+            return Address(kind, host, port, model=model, stroke=stroke)
     if scheme == "zenoh":
         raise ValueError(
             f"{address!r} is a gripper on another host: use robotiq_async.fleet.RemoteHand; accepted: {FORMS}"
@@ -214,17 +220,26 @@ def _plain(model: str) -> str:
     return re.sub(r"[-_ ]", "", model).lower()
 
 
-def _without_model(text: str) -> tuple[str, Model | None]:
-    """Take ``model=NAME`` out of the options after a question mark."""
+def _without_options_of_a_gripper(text: str) -> tuple[str, Model | None, str | None]:
+    """Take ``model=NAME`` and ``stroke=FILE`` out of the options after a question mark."""
+    text, name = _without("model", text, "NAME")
+    text, stroke = _without("stroke", text, "FILE")
+    if stroke is not None and not os.path.isabs(stroke):
+        why = "an address is the same in any folder"
+        raise ValueError(f"stroke must be the absolute path of a file, for {why}, got {stroke!r}")
+    return text, None if name is None else model_of(name), stroke
+
+
+def _without(name: str, text: str, form: str) -> tuple[str, str | None]:
     place, _, query = text.partition("?")
     options = query.split("&") if query else []
-    names = [option.removeprefix("model=") for option in options if option.startswith("model=")]
-    if not names:
+    given = [option.removeprefix(f"{name}=") for option in options if option.startswith(f"{name}=")]
+    if not given:
         return text, None
-    if len(names) > 1:
-        raise ValueError("model must be given once, as model=NAME")
-    others = "&".join(option for option in options if not option.startswith("model="))
-    return place + (f"?{others}" if others else ""), model_of(names[0])
+    if len(given) > 1:
+        raise ValueError(f"{name} must be given once, as {name}={form}")
+    others = "&".join(option for option in options if not option.startswith(f"{name}="))
+    return place + (f"?{others}" if others else ""), given[0]
 
 
 def _device_and_line(text: str) -> tuple[str, Line]:
@@ -243,9 +258,10 @@ def _device_and_line(text: str) -> tuple[str, Line]:
 
 
 def _no_option_of_a_line(name: str) -> str:
-    meant = next((each for each in ("model", *LINE_OPTIONS) if _is_like(name, each)), "")
+    known = *GRIPPER_OPTIONS, *LINE_OPTIONS
+    meant = next((each for each in known if _is_like(name, each)), "")
     hint = f"; did you mean {meant}?" if meant else ""
-    return f"no option {name!r} of a serial port{hint}; known are: model, {', '.join(LINE_OPTIONS)} ({USUAL})"
+    return f"no option {name!r} of a serial port{hint}; known are: {', '.join(known)} ({USUAL})"
 
 
 def _is_like(name: str, known: str) -> bool:
@@ -315,7 +331,7 @@ def _ends_in_a_number(host: str) -> bool:
 
 def parse_simulation(query: str) -> Simulation:
     """Parse the part after ``sim://``: nothing, or ``?OPTION=VALUE&...``."""
-    known = ", ".join(SIMULATION_OPTIONS)
+    known = ", ".join(GRIPPER_OPTIONS + SIMULATION_OPTIONS)
     given = _options(
         query.removeprefix("?") if query else None,
         SIMULATION_OPTIONS,

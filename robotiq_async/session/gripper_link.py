@@ -64,6 +64,7 @@ class GripperLink:
         is_slow: whether a status takes a good part of a poll interval: over a serial line, or in questions.
         model: of the gripper.
         has_current: whether a status has the motor currents.
+        stroke: path of a file with measured openings that the address names; None if it names none.
     """
 
     address: str
@@ -72,6 +73,7 @@ class GripperLink:
     is_slow: bool = False
     model: Model = THREE_FINGER
     has_current: bool = True
+    stroke: str | None = None
 
 
 def gripper_link(
@@ -116,7 +118,7 @@ def _over_modbus(address: Address, registers: RegisterMap, names_unit: bool, nam
         simulated = new_gripper(address.simulation, model)
         shown = f"{address}#{id(simulated):x}"  # every sim:// is a gripper of its own
         make = partial(SimulatedTransport, simulated, registers)
-        return GripperLink(shown, partial(Gripper, shown), make, model=model)
+        return GripperLink(shown, partial(Gripper, shown), make, model=model, stroke=address.stroke)
     # On a gateway each hand has a connection of its own. On a serial line, where replies carry no number, the
     # hands of an event loop share one.
     unit = registers.device_id if names_unit else None
@@ -128,6 +130,7 @@ def _over_modbus(address: Address, registers: RegisterMap, names_unit: bool, nam
         partial(ModbusTransport, address, registers, shares_line=shares_line, log=Log(name or str(address))),
         address.is_rtu,
         model,
+        stroke=address.stroke,
     )
 
 
@@ -140,6 +143,7 @@ def _over_urcap(address: Address, registers: RegisterMap, names_unit: bool, name
         is_slow=True,
         model=model_of(address.model),
         has_current=False,
+        stroke=address.stroke,
     )
 
 

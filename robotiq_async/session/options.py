@@ -19,7 +19,7 @@ from ..link.registers import LAST_BLOCK, check_write_function
 from ..link.transport import Link, Transport
 from ..runtime.log import Log
 from ..values.calibration import ForceCalibration, SpeedCalibration, Units
-from ..values.calibration.csv_tables import read_stroke
+from ..values.calibration.csv_tables import TableError, read_stroke
 from ..values.checks import check_byte, check_flag, check_int, check_seconds, repr_of
 from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..values.model import MODELS, THREE_FINGER, Model, model_of
@@ -177,11 +177,21 @@ def _check_forces(_: str, forces: object) -> ForceCalibration | None:
     return forces
 
 
-def check_stroke(name: str, stroke: object) -> Points | None:
-    """Points that were measured on a gripper, or those of a file; None for nominal openings."""
+def check_stroke(name: str, stroke: object, model: Model | None = None) -> Points | None:
+    """Points that were measured on a gripper, or those of a file; None for nominal openings.
+
+    Raises:
+        TypeError: not points, and not a path.
+        ValueError: no such points or file, or one that was measured on another model than ``model``.
+    """
     if stroke is None:
         return None
-    return read_stroke(stroke) if isinstance(stroke, str | Path) else check_points(name, stroke)
+    if not isinstance(stroke, str | Path):
+        return check_points(name, stroke)
+    try:
+        return read_stroke(stroke, model)
+    except TableError as error:
+        raise ValueError(f"{name}: {error}") from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,7 +333,10 @@ class HandOptions:
         if self.link is None:
             registers = {name: getattr(self, name) for name, each in OPTIONS.items() if each.tcp is not None}
             self._keep("link", gripper_link(self.address, registers, self.given_name, self.model))
+            if self.link.stroke is not None:
+                self._keep("stroke", self._stroke_of_address(self.link.stroke))
         self._keep("model", self.link.model)
+        self._keep("stroke", check_stroke("stroke", self.stroke, self.model))
         if isinstance(self.write_spacing, Usual):
             self._keep("write_spacing", usual_write_spacing(self.model))
         for name, option in OPTIONS.items():
@@ -333,6 +346,11 @@ class HandOptions:
 
     def _keep(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
+
+    def _stroke_of_address(self, file: str) -> Path:
+        if self.stroke is not None:
+            raise ValueError(f"stroke is given twice: by the address {self.link.address}, and beside it")
+        return Path(file)
 
     @property
     def given_name(self) -> str:
@@ -375,9 +393,11 @@ def units_of(
     speeds = _check_speeds("calibration", calibration)
     forces = _check_forces("force_calibration", force_calibration)
     points = check_stroke("stroke", stroke)
+    for name, each in (("calibration", speeds), ("force_calibration", forces)):
+        if each is not None and each.model not in (None, model):
+            raise ValueError(f"{name} ({each.source}) is of a {each.model}, and the gripper is a {model}")
     return Units(
-        # A table of closing times knows no model.
-        replace(speeds, stroke=model.stroke) if speeds else SpeedCalibration.usual(model),
+        replace(speeds, model=model) if speeds else SpeedCalibration.usual(model),
         forces or ForceCalibration.nominal(model),
         model.stroke.measured(points) if points else model.stroke,
     )

@@ -96,13 +96,16 @@ def test_stroke_writes_the_points_of_a_jaw(call: Call, tmp_path: Path) -> None:
     outcome = call(*arguments, "--points", "3")
     outcome.assert_succeeded()
     assert outcome.out.splitlines()[-1] == str(file)
-    points = read_stroke(file)
+    points = read_stroke(file, TWO_FINGER_85)
     assert len(points) == 3
     assert [mm for _, mm in points] == [TWO_FINGER_85.stroke.opening_mm(position) for position, _ in points]
     call(*arguments).assert_failed(2, "exists: choose another --output, or pass --overwrite")
     call(*arguments, "--overwrite").assert_succeeded()
     assert len(read_stroke(file)) == 5
     call("status", "sim://?model=2f85", "--stroke", str(file)).assert_succeeded()
+    call("status", f"sim://?model=2f85&stroke={file}").assert_succeeded()
+    refused = call("status", f"sim://?model=2f140&stroke={file}")
+    refused.assert_failed(2, f"stroke: {file}: it was measured on a 2F-85, and the gripper is a 2F-140")
 
 
 async def test_stroke_asks_for_figures_that_fall_until_the_fingertips_meet(

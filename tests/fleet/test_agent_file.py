@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from robotiq_async import TWO_FINGER_85
 from robotiq_async.fleet.agent.agent_file import (
     AgentFileError,
     AgentSettings,
@@ -116,6 +117,22 @@ def test_the_opening_of_a_jaw_is_points_or_a_file_beside_it(tmp_path: Path) -> N
         assert read(tmp_path, jaw + value).grippers["left"].units.stroke.points == own
     with pytest.raises(AgentFileError, match=r"line 4, in \[grippers.left\]: stroke: positions must rise"):
         read(tmp_path, f"{jaw}[[13, 100], [5, 2.0]]")
+
+
+def test_a_file_of_openings_says_its_model(tmp_path: Path) -> None:
+    own = ((13, 100.0), (213, 2.0))
+    write_stroke(tmp_path / "left.csv", own, TWO_FINGER_85)
+    table = 'site = "lab"\n[grippers.left]\naddress = "tcp://192.168.1.11'
+    for end in (
+        '"\nstroke = "left.csv"\nmodel = "2f85"',
+        f'?stroke={tmp_path / "left.csv"}"\nmodel = "2f85"',
+        f'?model=2f85&stroke={tmp_path / "left.csv"}"',
+    ):
+        assert read(tmp_path, table + end).grippers["left"].units.stroke.points == own
+    with pytest.raises(AgentFileError, match=r"line 4, in \[grippers.left\]: stroke: .* is a Hand-E"):
+        read(tmp_path, table + '"\nstroke = "left.csv"\nmodel = "hand-e"')
+    with pytest.raises(AgentFileError, match=r"line 3, in \[grippers.left\]: .*the absolute path of a file"):
+        read(tmp_path, table + '?stroke=left.csv"\n')
 
 
 @pytest.mark.parametrize(

@@ -202,7 +202,7 @@ def test_a_character_has_ten_to_twelve_bits() -> None:
         ("rtu:///dev/ttyUSB0?modle=2f85", "did you mean model?"),
         (
             "rtu:///dev/ttyUSB0?x=1",
-            "known are: model, baud, parity, stopbits",
+            "known are: model, stroke, baud, parity, stopbits",
         ),
         ("rtu:///dev/ttyUSB0:115200", "the rate of a serial port is ?baud=115200"),
         ("rtu:///dev/ttyUSB0?baud=300", "baud must be an integer in 9600..1000000, got '300'"),
@@ -257,15 +257,43 @@ def test_an_ipv4_address_is_four_numbers(host: str) -> None:
         ("object=1.5", "object must be an integer in 0..255, got '1.5'"),
         ("speedup", "speedup must be given once, as speedup=VALUE"),
         ("object=1&object=2", "object must be given once, as object=VALUE"),
-        ("speed=10", "no option 'speed'; known are: speedup, object, physics"),
-        ("", "no option ''; known are: speedup, object, physics"),
-        ("object=1&", "no option ''; known are: speedup, object, physics"),
+        ("speed=10", "no option 'speed'; known are: model, stroke, speedup, object, physics"),
+        ("", "no option ''; known are: model, stroke, speedup, object, physics"),
+        ("object=1&", "no option ''; known are: model, stroke, speedup, object, physics"),
     ],
 )
 def test_a_malformed_option_of_a_simulated_gripper_is_named_with_its_range(query: str, words: str) -> None:
     message = refusal(f"sim://?{query}")
     assert "malformed address" in message
     assert words in message
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "tcp://host:502?model=2f85",
+        "rtu:///dev/ttyUSB0?baud=500000&model=2f85",
+        "urcap://host:63352?model=2f85",
+        "sim://?speedup=10",
+    ],
+)
+def test_any_address_can_name_the_file_of_its_openings(address: str) -> None:
+    file = str(Path("/cell/left.csv").absolute())
+    parsed = parse_address(f"{address}&stroke={file}")
+    assert (parsed.stroke, str(parsed)) == (file, f"{address}&stroke={file}")
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        ("stroke=left.csv", "stroke must be the absolute path of a file, for an address is the same in any"),
+        ("stroke=", "stroke must be the absolute path of a file"),
+        ("stroke=a.csv&stroke=b.csv", "stroke must be given once, as stroke=FILE"),
+    ],
+)
+def test_a_file_of_openings_has_an_absolute_path(option: str, words: str) -> None:
+    for address in ("sim://", "host", "rtu:///dev/ttyUSB0", "rtu+tcp://host:1", "urcap://host"):
+        assert words in refusal(f"{address}?{option}")
 
 
 @pytest.mark.parametrize("address", [None, 502, b"tcp://host", Path("/dev/ttyUSB0")], ids=repr)

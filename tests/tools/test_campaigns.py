@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from robotiq_async import Finger, RobotiqHand
+from robotiq_async import HAND_E, TWO_FINGER_85, Finger, RobotiqHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.simulator.physics.axis import PRESSING, peak
 from robotiq_async.simulator.physics.scale import SimulatedScale
@@ -26,6 +26,7 @@ from robotiq_async.tools.measure.campaigns import (
     time_closing,
     write_currents,
 )
+from robotiq_async.values.calibration import SpeedCalibration
 from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, TableError, read_table, thesis_table
 from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.errors import MeasuringError
@@ -196,6 +197,23 @@ async def test_an_interrupted_campaign_goes_on_where_it_was(tmp_path: Path) -> N
     assert asked[1:] == [(170, 1), (170, 2), (255, 1), (255, 2)]
     assert sorted(read_table(file, SPEED)) == [0, 85, 170, 255]
     assert speed_campaign(file, step=85, runs=2).left == []
+
+
+async def test_a_table_says_on_which_model_it_was_measured(tmp_path: Path) -> None:
+    file, cut = tmp_path / "table.csv", True
+
+    async def measure(value: int, number: int) -> int:
+        if cut and value > 100:
+            raise PowerCutError
+        return 1000
+
+    with pytest.raises(PowerCutError):
+        await speed_campaign(file, step=85, runs=1).measure(measure, HAND_E)
+    cut = False
+    with pytest.raises(TableError, match="was measured on a Hand-E, and the gripper is a 2F-85"):
+        await speed_campaign(file, step=85, runs=1).measure(measure, TWO_FINGER_85)
+    await speed_campaign(file, step=85, runs=1).measure(measure, HAND_E)
+    assert SpeedCalibration.from_csv(file).model is HAND_E
 
 
 async def test_a_reading_beyond_the_table_is_refused_and_not_written(tmp_path: Path) -> None:

@@ -214,13 +214,12 @@ async def test_health_in_every_condition(server: SimulatorServer) -> None:
 async def test_a_contact_that_is_left_over_is_no_grip(server: SimulatorServer) -> None:
     """After a stop the gripper still shows the contact, and presses no more."""
     server.gripper.place_object(Finger.ABC, 120)
-    async with server:
-        async with RobotiqHand(server.address) as hand:
-            await hand.grasp()
-            assert health(hand).holds == Finger.ABC
-            await hand.halt()
-            assert hand.status.contacts == Finger.ABC
-            assert (health(hand).holds, hand.part) == (Finger(0), None)
+    async with server, RobotiqHand(server.address) as hand:
+        await hand.grasp()
+        assert health(hand).holds == Finger.ABC
+        await hand.halt()
+        assert hand.status.contacts == Finger.ABC
+        assert (health(hand).holds, hand.part) == (Finger(0), None)
 
 
 # -- systemd -----------------------------------------------------------------------------------------------

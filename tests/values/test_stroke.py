@@ -179,6 +179,14 @@ def test_a_file_is_read_as_it_was_written(tmp_path: Path) -> None:
         "228,0",
     ]
     assert read_stroke(path) == points
+    write_stroke(path, points, TWO_FINGER_85)
+    assert path.read_text(encoding="utf-8").splitlines()[:2] == [
+        "position_counts,opening_mm,model",
+        "3,85.25,2f85",
+    ]
+    assert read_stroke(path) == read_stroke(path, TWO_FINGER_85) == points
+    with pytest.raises(TableError, match="it was measured on a 2F-85, and the gripper is a Hand-E"):
+        read_stroke(path, HAND_E)
 
 
 @pytest.mark.parametrize(
@@ -190,7 +198,13 @@ def test_a_file_is_read_as_it_was_written(tmp_path: Path) -> None:
         ("position_counts,opening_mm\n3,-1\n", ", line 2: expected counts and millimetres, got '3,-1'"),
         ("position_counts,opening_mm\n3,85,1\n", ", line 2: expected counts and millimetres, got '3,85,1'"),
         ("position_counts,opening_mm\n300,85\n", ", line 2: position_counts must be an integer in 0..255"),
-        ("position_counts,opening_mm\n3,85\n9,85\n", "stroke: positions must rise and openings fall"),
+        ("position_counts,opening_mm\n3,85\n9,85\n", "left.csv: positions must rise and openings fall"),
+        ("position_counts,opening_mm,model\n3,85,2f85\n9,5\n", ", line 3: expected 3 columns, got 2"),
+        ("position_counts,opening_mm,model\n3,85,2f\n", ", line 2: model must be one of 3f, 2f85"),
+        (
+            "position_counts,opening_mm,model\n3,85,2f85\n9,5,2f140\n",
+            ", line 3: model must be the same in each row, got '2f140'",
+        ),
     ],
 )
 def test_a_file_that_is_no_stroke_is_refused(tmp_path: Path, text: str, words: str) -> None:
@@ -216,6 +230,31 @@ def test_a_hand_has_the_points_it_was_made_with(tmp_path: Path) -> None:
         assert "2..100 mm (measured)" in repr(units)
     with pytest.raises(TypeError, match="stroke must be two or more points"):
         RobotiqHand(stroke=85)  # type: ignore[arg-type]
+
+
+def test_the_address_can_name_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "left.csv"
+    address = f"sim://?model=2f85&stroke={file}"
+    with pytest.raises(ValueError, match=re.escape(f"stroke: {file}: cannot be read: No such file")):
+        RobotiqHand(address)
+    write_stroke(file, OWN, TWO_FINGER_85)
+    assert RobotiqHand(address).units.stroke == TWO_FINGER_85.stroke.measured(OWN)
+    with pytest.raises(ValueError, match=r"stroke is given twice: by the address .*, and beside it"):
+        RobotiqHand(address, stroke=OWN)
+
+
+def test_a_hand_of_another_model_refuses_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "left.csv"
+    write_stroke(file, OWN, TWO_FINGER_85)
+    words = re.escape(f"stroke: {file}: it was measured on a 2F-85, and the gripper is a 2F-140")
+    with pytest.raises(ValueError, match=words):
+        RobotiqHand("sim://?model=2f140", stroke=file)
+    with pytest.raises(ValueError, match=words):
+        RobotiqHand("tcp://host", model="2f140", stroke=str(file))
+    with pytest.raises(ValueError, match=words):
+        RobotiqHand(f"rtu:///dev/ttyUSB0?model=2f140&stroke={file}")
+    write_stroke(file, OWN)
+    assert RobotiqHand("sim://?model=2f140", stroke=file).units.mm(0) == 100, "an older file does not say"
 
 
 def test_a_table_of_closing_times_takes_the_stroke_of_the_model() -> None:

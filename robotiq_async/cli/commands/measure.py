@@ -151,7 +151,7 @@ async def _carry_out(
             return reading
 
         try:
-            await campaign.measure(run)
+            await campaign.measure(run, hand.model)
         except (MeasuringError, TableError, OSError) as error:
             rows = len(campaign.table)
             kept = f"{rows} rows are in {campaign.path}" if rows else "nothing was written"

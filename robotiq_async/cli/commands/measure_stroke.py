@@ -80,7 +80,7 @@ async def _measure(address: str, output: Path, count: int) -> None:
     async with gripper_to_measure(address, 1.0) as hand:
         points = await measured(hand, count, _calliper(address, hand))
     with table_errors():
-        write_stroke(output, points)
+        write_stroke(output, points, hand.model)
     print(output)
 
 

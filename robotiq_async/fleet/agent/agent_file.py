@@ -17,6 +17,7 @@ from ...hand.robotiq_hand import RobotiqHand
 from ...link.address import is_remote
 from ...session.options import HandOptions, Place, offered
 from ...values.checks import check_seconds
+from ...values.model import model_of
 from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
 from ..keys.access import AccessList
 from ..keys.key_folder import ACCESS, check_key_folder
@@ -147,15 +148,17 @@ class _Reader:
         if isinstance(table.get("stroke"), str):
             table = {**table, "stroke": self._path.parent / table["stroke"]}
         address = table["address"]
+        with self._blaming(*path, "model"):
+            model = None if "model" not in table else model_of(table["model"])
         with self._blaming(*path, "address"):
             if not isinstance(address, str):
                 raise TypeError(f"address must be a string, got {address!r}")
             if is_remote(address):
                 raise ValueError(f"address must be of a gripper on this host, got {address!r}")
-            HandOptions(address)
+            HandOptions(address, model=model)  # type: ignore[arg-type]  # None is that of the address
         for key, value in table.items():  # one by one: the error names the line of the key
             with self._blaming(*path, key):
-                HandOptions(**{"address": address, key: value})
+                HandOptions(**{"address": address, "model": model, key: value})
         return HandOptions(name=name, **table)
 
     def _check_keys_of(

@@ -102,11 +102,14 @@ class RemoteHand(Hand):
         self._connect_timeout = check_seconds("connect_timeout", connect_timeout, 0.1, 60.0)
         self._control = control
         units = cache(partial(units_of, calibration, force_calibration))  # loops ask in every cycle
-        units(THREE_FINGER)  # checks the calibrations
+        named = [getattr(each, "model", None) for each in (calibration, force_calibration)]
+        model = next(filter(None, named), THREE_FINGER)  # until the agent says it
+        units(model)  # checks the calibrations
         super().__init__(
             str(self._gripper),
             units=lambda model: units(model, self._points),
             keep_grip=check_flag("keep_grip", keep_grip),
+            model=model,
         )
         if bus is None:
             self._route.configuration()  # a malformed or unprotected route fails here, not at the start

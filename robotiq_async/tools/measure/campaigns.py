@@ -23,15 +23,15 @@ from ...values.calibration.csv_tables import (
     Table,
     TableError,
     integer,
+    read_measured,
     read_rows,
-    read_table,
     write_rows,
     write_table,
 )
 from ...values.calibration.scales import closing_time
 from ...values.enums import Finger
 from ...values.errors import MeasuringError
-from ...values.model import THREE_FINGER
+from ...values.model import THREE_FINGER, Model
 
 REST_S: Final = 0.3
 """Pause between runs, in the gripper's time: a finger that has just stopped may still swing."""
@@ -170,6 +170,7 @@ class Campaign:
     origin: dict[str, str] = field(default_factory=dict)
     """The subject and conditions of the measurement, kept beside the table. Only the same can resume it."""
     table: Table = field(default_factory=dict)  # the measurements so far
+    model: Model | None = None  # on which these were made; None if the file does not say
 
     def __post_init__(self) -> None:
         """Resume the table if the file exists.
@@ -183,7 +184,7 @@ class Campaign:
             raise TableError(self.path, None, f"the folder {self.path.parent} cannot be written to")
         if not self.path.exists():
             return
-        self.table = read_table(self.path, self.layout)
+        self.table, self.model = read_measured(self.path, self.layout)
         for runs in self.table.values():
             if len(runs) != self.runs:
                 raise TableError(self.path, None, f"has {len(runs)} runs instead of {self.runs}")
@@ -203,13 +204,17 @@ class Campaign:
         """The values still to measure, in their order."""
         return [value for value in self.values if value not in self.table]
 
-    async def measure(self, measure_run: Callable[[int, int], Awaitable[int]]) -> None:
+    async def measure(
+        self, measure_run: Callable[[int, int], Awaitable[int]], model: Model = THREE_FINGER
+    ) -> None:
         """Measure the remaining values; ``measure_run`` gets value and run (from 1), and returns the reading.
 
         Raises:
-            TableError: a reading is outside the range of the layout.
+            TableError: a reading is outside the range of the layout, or the file is of another model.
             OSError: the file cannot be written.
         """
+        if self.model not in (None, model):
+            raise TableError(self.path, None, f"was measured on a {self.model}, and the gripper is a {model}")
         for value in self.left:
             readings = []
             for run in range(1, self.runs + 1):
@@ -222,8 +227,8 @@ class Campaign:
             if not origin_beside(self.path).exists():
                 await asyncio.to_thread(write_rows, origin_beside(self.path), sorted(self.origin.items()))
             # In a thread: a slow disk must not hold up polling.
-            await asyncio.to_thread(write_table, self.path, self.layout, table)
-            self.table = table
+            await asyncio.to_thread(write_table, self.path, self.layout, table, model)
+            self.table, self.model = table, model
 
 
 def speed_campaign(path: Path, step: int = 4, runs: int = 3, **origin: str) -> Campaign:

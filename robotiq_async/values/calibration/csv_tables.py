@@ -5,6 +5,7 @@ The layout is that of the thesis's own tables (``data/``)::
     speed_value,run_1_ms,run_2_ms,run_3_ms
     0,10021,10021,10021
 
+A last column ``model`` may say on which model it was measured: a hand of another one refuses the table.
 Reading refuses a bad file with its line and the reason. Writing replaces the file in one step: an interrupted
 program leaves the table of the last complete write.
 """
@@ -22,9 +23,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TextIO
 
+from ..model import Model, model_of
 from ..stroke import Points, check_points
 
 Table = dict[int, tuple[int, ...]]  # for each value, its runs
+Row = tuple[int, list[str]]  # line number and cells
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,9 +73,19 @@ def read_table(path: Path | str, layout: Layout) -> Table:
     Raises:
         TableError: the file cannot be read or does not have this layout.
     """
+    return read_measured(path, layout)[0]
+
+
+def read_measured(path: Path | str, layout: Layout) -> tuple[Table, Model | None]:
+    """Read a table, and the model on which it was measured; None if the file does not say.
+
+    Raises:
+        TableError: as :func:`read_table`.
+    """
     table: Table = {}
     columns = 0
-    for line, cells in read_rows(path):
+    rows, model = _without_model(path, read_rows(path))
+    for line, cells in rows:
         if not columns:
             columns = len(cells)
             expected = layout.header(max(1, columns - 1))
@@ -91,30 +104,36 @@ def read_table(path: Path | str, layout: Layout) -> Table:
         )
     if not columns:
         raise TableError(path, None, "the file is empty")
-    return table
+    return table, model
 
 
-def write_table(path: Path | str, layout: Layout, table: Mapping[int, Sequence[int]]) -> None:
-    """Write a table, rows by rising value, replacing the file in one step.
+def write_table(
+    path: Path | str, layout: Layout, table: Mapping[int, Sequence[int]], model: Model | None = None
+) -> None:
+    """Write a table, rows by rising value, replacing the file in one step; without a model, if it is None.
 
     Raises:
         OSError: the file cannot be written; it stays as it was.
     """
     runs = len(next(iter(table.values()), ()))
-    write_rows(path, [layout.header(runs), *([value, *table[value]] for value in sorted(table))])
+    _write(path, model, [layout.header(runs), *([value, *table[value]] for value in sorted(table))])
 
 
 STROKE: Final = ["position_counts", "opening_mm"]
 """The columns of a stroke: measured points of one gripper, from open to closed."""
 
 
-def read_stroke(path: Path | str) -> Points:
+def read_stroke(path: Path | str, model: Model | None = None) -> Points:
     """Read the measured points of a gripper, as ``robotiq-async measure stroke`` writes them.
 
     Raises:
-        TableError: the file cannot be read, or its points do not make a stroke.
+        TableError: the file cannot be read, its points do not make a stroke, or it says that it was measured
+            on another model than ``model``.
     """
-    rows = iter(read_rows(path))
+    found, measured_on = _without_model(path, read_rows(path))
+    if model is not None and measured_on not in (None, model):
+        raise TableError(path, None, f"it was measured on a {measured_on}, and the gripper is a {model}")
+    rows = iter(found)
     line, header = next(rows, (None, []))
     if header != STROKE:
         raise TableError(
@@ -128,16 +147,16 @@ def read_stroke(path: Path | str) -> Points:
     try:
         return check_points("stroke", points)
     except ValueError as error:
-        raise TableError(path, None, str(error)) from error
+        raise TableError(path, None, str(error).removeprefix("stroke: ")) from error
 
 
-def write_stroke(path: Path | str, points: Points) -> None:
+def write_stroke(path: Path | str, points: Points, model: Model | None = None) -> None:
     """Write measured points, replacing the file in one step.
 
     Raises:
         OSError: the file cannot be written; it stays as it was.
     """
-    write_rows(path, [STROKE, *([position, f"{mm:g}"] for position, mm in points)])
+    _write(path, model, [STROKE, *([position, f"{mm:g}"] for position, mm in points)])
 
 
 def thesis_table(name: str, layout: Layout) -> Table:
@@ -145,10 +164,39 @@ def thesis_table(name: str, layout: Layout) -> Table:
     return read_table(Path(__file__).parents[2] / "data" / f"{name}.csv", layout)
 
 
+# -- the column of the model -------------------------------------------------------------------------------
+
+MODEL: Final = "model"
+
+
+def _without_model(path: Path | str, rows: Sequence[Row]) -> tuple[Sequence[Row], Model | None]:
+    """The rows without their last column, and what it says, if it is that of the model."""
+    if not rows or rows[0][1][-1] != MODEL:
+        return rows, None
+    found = None
+    for line, cells in rows[1:]:
+        if len(cells) != len(rows[0][1]):
+            raise TableError(path, line, f"expected {len(rows[0][1])} columns, got {len(cells)}")
+        try:
+            model = model_of(cells[-1])
+        except ValueError as error:
+            raise TableError(path, line, str(error)) from None
+        if found not in (None, model):
+            raise TableError(path, line, f"model must be the same in each row, got {cells[-1]!r}")
+        found = model
+    return [(line, cells[:-1]) for line, cells in rows], found
+
+
+def _write(path: Path | str, model: Model | None, rows: Sequence[Sequence[object]]) -> None:
+    if model is not None:
+        rows = [[*row, model.name if number else MODEL] for number, row in enumerate(rows)]
+    write_rows(path, rows)
+
+
 # -- for other tables as well ------------------------------------------------------------------------------
 
 
-def read_rows(path: Path | str) -> Iterable[tuple[int, list[str]]]:
+def read_rows(path: Path | str) -> list[Row]:
     """The rows of a CSV file with their line numbers; empty lines are left out.
 
     Raises:

@@ -20,7 +20,7 @@ from typing import Final
 from ..checks import check_byte, check_number
 from ..model import THREE_FINGER, Model
 from ..stroke import Stroke
-from .csv_tables import FORCE, SPEED, Layout, Table, TableError, read_table, thesis_table
+from .csv_tables import FORCE, SPEED, Layout, Table, TableError, read_measured, thesis_table
 
 GRAVITY: Final = 9.81  # m/s2, the thesis's value
 
@@ -37,12 +37,12 @@ class SpeedCalibration:
     Attributes:
         source: of the figures, for people.
         points: rising speed values, each with the seconds of a full closing.
-        stroke: of the gripper.
+        model: of the gripper; None where nobody says. Hands of another model refuse it.
     """
 
     source: str
     points: Points
-    stroke: Stroke = THREE_FINGER.stroke
+    model: Model | None = None
 
     def __post_init__(self) -> None:
         """Check the points.
@@ -60,7 +60,7 @@ class SpeedCalibration:
         """The manual's figures, linear in between; of a 3-Finger 22 mm/s at 0 and 110 mm/s at 255."""
         slow, fast = model.speeds_mm_s
         times = ((value, model.stroke.mm / (slow + (fast - slow) * value / 255)) for value in range(256))
-        return cls("nominal (manual)", tuple(times), model.stroke)
+        return cls("nominal (manual)", tuple(times), model)
 
     @classmethod
     def usual(cls, model: Model) -> SpeedCalibration:
@@ -71,7 +71,7 @@ class SpeedCalibration:
     @cache
     def thesis(cls) -> SpeedCalibration:
         """The thesis's table A1.1: the mean of three runs for every fourth value. Read from its file once."""
-        return cls.from_table("thesis, table A1.1", thesis_table("closing_time_ms", SPEED))
+        return cls.from_table("thesis, table A1.1", thesis_table("closing_time_ms", SPEED), THREE_FINGER)
 
     @classmethod
     def from_csv(cls, path: Path | str) -> SpeedCalibration:
@@ -80,15 +80,20 @@ class SpeedCalibration:
         Raises:
             TableError: the file is not such a table, or has fewer than two rows.
         """
-        table = _read_curve(path, SPEED)
+        table, model = _read_curve(path, SPEED)
         if any(not all(runs) for runs in table.values()):
             raise TableError(path, None, "a closing takes longer than 0 ms")
-        return cls.from_table(str(path), table)
+        return cls.from_table(str(path), table, model)
 
     @classmethod
-    def from_table(cls, source: str, table: Table) -> SpeedCalibration:
+    def from_table(cls, source: str, table: Table, model: Model | None = None) -> SpeedCalibration:
         """The calibration in a table of closing times in milliseconds."""
-        return cls(source, tuple((value, mean(table[value]) / 1000) for value in sorted(table)))
+        return cls(source, tuple((value, mean(table[value]) / 1000) for value in sorted(table)), model)
+
+    @property
+    def stroke(self) -> Stroke:
+        """The nominal stroke of the model; a 3-Finger's where nobody says."""
+        return (self.model or THREE_FINGER).stroke
 
     def closing_time(self, speed: int) -> float:
         """Seconds of a full closing; linear between the points.
@@ -136,10 +141,12 @@ class ForceCalibration:
     Attributes:
         source: of the figures, for people.
         points: rising force values, each with newtons.
+        model: of the gripper; None where nobody says. Hands of another model refuse it.
     """
 
     source: str
     points: Points
+    model: Model | None = None
 
     def __post_init__(self) -> None:
         """Check the points.
@@ -154,7 +161,7 @@ class ForceCalibration:
     def nominal(cls, model: Model = THREE_FINGER) -> ForceCalibration:
         """The manual's two figures joined by a straight line, although it calls the curve not linear."""
         weakest, strongest = model.forces_n
-        return cls("nominal (manual)", ((0, weakest), (255, strongest)))
+        return cls("nominal (manual)", ((0, weakest), (255, strongest)), model)
 
     @classmethod
     def thesis(cls, surface: str) -> ForceCalibration:
@@ -168,7 +175,8 @@ class ForceCalibration:
         """
         if surface not in ("foam", "rigid"):
             raise ValueError(f"surface must be 'foam' or 'rigid', got {surface!r}")
-        return cls.from_table(f"thesis, {surface}", thesis_table(f"force_{surface}_grams", FORCE))
+        table = thesis_table(f"force_{surface}_grams", FORCE)
+        return cls.from_table(f"thesis, {surface}", table, THREE_FINGER)
 
     @classmethod
     def from_csv(cls, path: Path | str) -> ForceCalibration:
@@ -177,12 +185,12 @@ class ForceCalibration:
         Raises:
             TableError: the file is not such a table, or has fewer than two rows.
         """
-        return cls.from_table(str(path), _read_curve(path, FORCE))
+        return cls.from_table(str(path), *_read_curve(path, FORCE))
 
     @classmethod
-    def from_table(cls, source: str, table: Table) -> ForceCalibration:
+    def from_table(cls, source: str, table: Table, model: Model | None = None) -> ForceCalibration:
         """The calibration in a table of scale readings in grams."""
-        return cls(source, tuple((value, newton(mean(table[value]))) for value in sorted(table)))
+        return cls(source, tuple((value, newton(mean(table[value]))) for value in sorted(table)), model)
 
     def newton(self, force: int) -> float:
         """Newtons at a force value; linear between the points.
@@ -205,13 +213,13 @@ class ForceCalibration:
         )
 
 
-def _read_curve(path: Path | str, layout: Layout) -> Table:
-    """Read a table of at least two rows."""
-    table = read_table(path, layout)
+def _read_curve(path: Path | str, layout: Layout) -> tuple[Table, Model | None]:
+    """Read a table of at least two rows, and its model."""
+    table, model = read_measured(path, layout)
     if len(table) < 2:
         values = f"{layout.value.replace('_', ' ')}s"
         raise TableError(path, None, f"at least two {values} are needed, got {len(table)}")
-    return table
+    return table, model
 
 
 def mean(runs: Sequence[int]) -> float:
