@@ -31,7 +31,7 @@ from tests.benchmarks.program import (
     median_of,
 )
 
-PARTS = ("steady", "many", "latency", "readers", "import", "memory")
+PARTS = ("steady", "many", "latency", "commands", "readers", "import", "memory")
 LOOPS = ["asyncio", "uvloop"] if find_spec("uvloop") else ["asyncio"]
 HANDS = {"asyncio": (64, 96, 128), "uvloop": (96, 128, 160, 192)}
 
@@ -121,6 +121,12 @@ class Benchmarks(program.Benchmarks):
                 p50, p99 = (1e6 * percentile(sorted(values), share) for share in (0.5, 0.99))
                 shown = {"p50, us": f"{p50:.0f}", "p99, us": f"{p99:.0f}"}
                 yield {"what": name.replace("_", " "), "loop": loop, **shown}
+
+    def commands(self) -> Iterator[Row]:
+        """What a command takes of the loop, in counts and in other amounts."""
+        turns = {"asyncio": partial(self.contender, "commands", "asyncio", 5.0)}
+        for name, took in median_of(self.in_turns("commands", turns)["asyncio"]).items():
+            yield {"command": name, "a call, us": f"{1e6 * took:.0f}"}
 
     def readers(self) -> Iterator[Row]:
         """The cost of readers of statuses()."""

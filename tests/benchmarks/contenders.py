@@ -229,6 +229,33 @@ async def many_hands(seconds: float, ports: list[int]) -> Figures:
     }
 
 
+AMOUNTS: list[dict[str, Any]] = [
+    {"position": 120, "speed": 90, "force": 40},
+    {"mm": 77.5, "speed": 90, "force": 40},
+    {"open_fraction": 0.52, "speed": 90, "force": 40},
+    {"position": 120, "mm_per_s": 33.5, "force": 40},
+    {"position": 120, "speed": 90, "label_n": 22.5},
+    {"mm": 77.5, "mm_per_s": 33.5, "label_n": 22.5},
+]
+
+
+async def commands(seconds: float, ports: list[int]) -> Figures:
+    """What command() takes of a loop, by the names of its arguments: the quickest of many hundreds."""
+    found: dict[str, float] = {}
+    async with RobotiqHand(f"127.0.0.1:{ports[0]}") as it:
+        began = time.monotonic()
+        while time.monotonic() < began + seconds:
+            for amounts in AMOUNTS:
+                before = time.perf_counter()
+                for _ in range(100):
+                    it.command(**amounts)
+                took = (time.perf_counter() - before) / 100
+                names = ", ".join(amounts)
+                found[names] = min(took, found.get(names, took))
+                await asyncio.sleep(0.01)
+    return found
+
+
 # -- helpers -----------------------------------------------------------------------------------------------
 
 
@@ -248,7 +275,7 @@ def periods(times: list[float]) -> list[float]:
 
 
 CONTENDERS: dict[str, Callable[[float, list[int]], Awaitable[Figures]]] = {
-    **{each.__name__: each for each in (bare, hand, latency, memory, many_bare, many_hands)},
+    **{each.__name__: each for each in (bare, hand, latency, commands, memory, many_bare, many_hands)},
     "readers_10": partial(hand, count=10),
     "readers_100": partial(hand, count=100),
 }

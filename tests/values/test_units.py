@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from robotiq_async import Units
 from robotiq_async.values.calibration import SpeedCalibration
+from robotiq_async.values.calibration.scales import Figures
 
 THESIS = Units()
 NOMINAL = Units(SpeedCalibration.nominal())
@@ -40,6 +41,17 @@ def test_the_value_is_the_closest_one(mm: float, mm_per_s: float, label_n: float
         for other in range(max(speed - 1, 0), min(speed + 2, 256))
     )
     assert THESIS.label_n(force) == pytest.approx(label_n, abs=45 / 255 / 2 + 1e-9)
+
+
+FIGURES = st.dictionaries(VALUES, st.integers(0, 40).map(float), min_size=1)
+
+
+@given(FIGURES, st.integers(0, 80).map(lambda half: half / 2))
+def test_the_lowest_of_the_closest_values_is_taken(figures: dict[int, float], wanted: float) -> None:
+    """Measured figures need not rise: two speeds may take the same time."""
+    least = min(abs(figure - wanted) for figure in figures.values())
+    closest = [value for value, figure in figures.items() if abs(figure - wanted) == least]
+    assert Figures(figures).nearest(wanted) == min(closest)
 
 
 def test_the_figures() -> None:

@@ -10,10 +10,11 @@ between them not linear. Scale readings (thesis, chapter 6) depend more on the o
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from math import ceil, floor
 from pathlib import Path
 from typing import Final
 
@@ -129,9 +130,8 @@ class SpeedCalibration:
             TypeError: not a number.
             ValueError: slower or faster than any value.
         """
-        return nearest_in_range(
-            "mm_per_s", mm_per_s, {value: self.mm_per_s(value) for value in covered(self.points)}
-        )
+        figures = Figures({value: self.mm_per_s(value) for value in covered(self.points)})
+        return figures.nearest(check_number("mm_per_s", mm_per_s, figures.low, figures.high))
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,9 +208,8 @@ class ForceCalibration:
             TypeError: not a number.
             ValueError: weaker or stronger than any value.
         """
-        return nearest_in_range(
-            "newton", newton, {value: self.newton(value) for value in covered(self.points)}
-        )
+        figures = Figures({value: self.newton(value) for value in covered(self.points)})
+        return figures.nearest(check_number("newton", newton, figures.low, figures.high))
 
 
 def _read_curve(path: Path | str, layout: Layout) -> tuple[Table, Model | None]:
@@ -262,15 +261,35 @@ def interpolated(name: str, value: int, points: Sequence[tuple[int, float]]) -> 
     return at_left + (at_right - at_left) * (value - left) / (right - left)
 
 
-def nearest_in_range(name: str, wanted: float, figures: Mapping[int, float]) -> int:
-    """The value with the closest figure, the lowest of several."""
-    figure = check_number(name, wanted, min(figures.values()), max(figures.values()))
-    return nearest(figure, figures)
+class Figures:
+    """The figures of values, in order: control loops ask in every cycle which value is closest.
 
+    Attributes:
+        low: the lowest figure.
+        high: the highest figure.
+        limits: both, rounded outwards to two digits: a limit copied from a message is accepted.
+    """
 
-def nearest(wanted: float, figures: Mapping[int, float]) -> int:
-    """The value with the closest figure, the lowest of several."""
-    return min(figures, key=lambda value: abs(figures[value] - wanted))
+    __slots__ = ("_figures", "_values", "high", "limits", "low")
+
+    def __init__(self, figures: Mapping[int, float]) -> None:
+        lowest: dict[float, int] = {}  # the lowest value of each figure
+        for value in sorted(figures):
+            lowest.setdefault(figures[value], value)
+        self._figures = sorted(lowest)
+        self._values = [lowest[figure] for figure in self._figures]
+        self.low, self.high = self._figures[0], self._figures[-1]
+        self.limits = floor(self.low * 100) / 100, ceil(self.high * 100) / 100
+
+    def nearest(self, wanted: float) -> int:
+        """The value with the closest figure, the lowest of several."""
+        figures, values = self._figures, self._values
+        after = bisect_left(figures, wanted, 1, len(figures) - 1) if len(figures) > 1 else 0
+        before = max(after - 1, 0)
+        nearer = (wanted - figures[before]) - (figures[after] - wanted)
+        if not nearer:
+            return min(values[before], values[after])
+        return values[before] if nearer < 0 else values[after]
 
 
 # Read at import: a program may later run in an event loop, which must not wait for a disk.

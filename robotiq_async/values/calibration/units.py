@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from math import ceil, floor
 from typing import overload
 
 from ..checks import check_number
 from ..model import THREE_FINGER
 from ..stroke import Stroke
-from .scales import ForceCalibration, SpeedCalibration, covered, nearest
+from .scales import Figures, ForceCalibration, SpeedCalibration, covered
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -37,6 +35,9 @@ class Units:
     speeds: SpeedCalibration = field(default_factory=SpeedCalibration.thesis)
     forces: ForceCalibration = field(default_factory=ForceCalibration.nominal)
     stroke: Stroke = THREE_FINGER.stroke
+    _mm_per_s: Figures = field(init=False, repr=False, compare=False)
+    _closing_s: Figures = field(init=False, repr=False, compare=False)
+    _label_n: Figures = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Check the tables.
@@ -51,6 +52,13 @@ class Units:
         ):
             if not isinstance(getattr(self, name), kind):
                 raise TypeError(f"{name} must be a {kind.__name__}, got {getattr(self, name)!r}")
+        keep = object.__setattr__
+        keep(self, "_mm_per_s", _mm_per_s(self.speeds))
+        keep(self, "_closing_s", _closing_s(self.speeds))
+        keep(self, "_label_n", _label_n(self.forces))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return Units, (self.speeds, self.forces, self.stroke)
 
     # -- to counts -------------------------------------------------------------------------------------
 
@@ -101,8 +109,8 @@ class Units:
         if (mm_per_s is None) == (closing_s is None):
             raise TypeError("speed() takes one of mm_per_s and closing_s")
         if closing_s is not None:
-            return _closest("closing_s", closing_s, _closing_times(self.speeds), "seconds")
-        return _closest("mm_per_s", mm_per_s, _mm_per_s(self.speeds), "millimetres a second")
+            return _closest("closing_s", closing_s, self._closing_s, "seconds")
+        return _closest("mm_per_s", mm_per_s, self._mm_per_s, "millimetres a second")
 
     def force(self, *, label_n: float) -> int:
         """The force value, 0..255, with the closest label; the lowest of several.
@@ -114,7 +122,7 @@ class Units:
             TypeError: not a number.
             ValueError: outside the labels; the message uses newtons.
         """
-        return _closest("label_n", label_n, _labels(self.forces), "newton of a label (no measured force)")
+        return _closest("label_n", label_n, self._label_n, "newton of a label (no measured force)")
 
     # -- from counts -----------------------------------------------------------------------------------
 
@@ -172,38 +180,33 @@ class Units:
     def __repr__(self) -> str:
         return (
             f"<Units {self.stroke.closed_mm:g}..{self.stroke.mm:g} mm ({self.stroke.source}), "
-            f"{_words(_mm_per_s(self.speeds))} mm/s ({self.speeds.source}), "
-            f"labels {_words(_labels(self.forces))} N ({self.forces.source})>"
+            f"{_words(self._mm_per_s)} mm/s ({self.speeds.source}), "
+            f"labels {_words(self._label_n)} N ({self.forces.source})>"
         )
 
 
-# Cached: control loops convert in every cycle, and building a table takes a millisecond.
+# Cached: making one takes a millisecond, and most hands have the same.
 
 
 @lru_cache(maxsize=8)
-def _closing_times(speeds: SpeedCalibration) -> Mapping[int, float]:
-    return {value: speeds.closing_time(value) for value in covered(speeds.points)}
+def _closing_s(speeds: SpeedCalibration) -> Figures:
+    return Figures({value: speeds.closing_time(value) for value in covered(speeds.points)})
 
 
 @lru_cache(maxsize=8)
-def _mm_per_s(speeds: SpeedCalibration) -> Mapping[int, float]:
-    return {value: speeds.mm_per_s(value) for value in covered(speeds.points)}
+def _mm_per_s(speeds: SpeedCalibration) -> Figures:
+    return Figures({value: speeds.mm_per_s(value) for value in covered(speeds.points)})
 
 
 @lru_cache(maxsize=8)
-def _labels(forces: ForceCalibration) -> Mapping[int, float]:
-    return {value: forces.newton(value) for value in covered(forces.points)}
+def _label_n(forces: ForceCalibration) -> Figures:
+    return Figures({value: forces.newton(value) for value in covered(forces.points)})
 
 
-def _closest(name: str, wanted: object, figures: Mapping[int, float], unit: str) -> int:
-    return nearest(check_number(name, wanted, *_limits(figures), unit), figures)
+def _closest(name: str, wanted: object, figures: Figures, unit: str) -> int:
+    return figures.nearest(check_number(name, wanted, *figures.limits, unit))
 
 
-def _limits(figures: Mapping[int, float]) -> tuple[float, float]:
-    """The limits, rounded outwards to two digits: one copied from a message is accepted."""
-    return floor(min(figures.values()) * 100) / 100, ceil(max(figures.values()) * 100) / 100
-
-
-def _words(figures: Mapping[int, float]) -> str:
-    low, high = _limits(figures)
+def _words(figures: Figures) -> str:
+    low, high = figures.limits
     return f"{low:g}..{high:g}"
