@@ -25,6 +25,7 @@ except ModuleNotFoundError as error:
     raise ImportError(f"metrics need prometheus-client: {install('metrics')}") from error
 
 from ..hand import Hand
+from ..runtime.concurrency import in_a_thread, wait_shielded
 from ..values.checks import check_int
 from ..values.enums import State
 from ..values.statistics import Statistics
@@ -130,7 +131,11 @@ async def serve_metrics(
     try:
         yield host, server.server_port
     finally:
-        # It may be answering a scrape that waits for this loop: close it in a thread.
-        await asyncio.to_thread(server.shutdown)
-        server.server_close()
-        thread.join()
+
+        def close() -> None:
+            server.shutdown()
+            server.server_close()
+            thread.join()
+
+        # It may be answering a scrape that waits for this loop: close it in a thread, also when cancelled.
+        await wait_shielded(in_a_thread(close))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import urllib.request
 
+import anyio
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
@@ -90,6 +91,16 @@ async def test_it_ends_with_the_block(hand: RobotiqHand) -> None:
             async with serve_metrics(hand, port=where[1]):
                 pass
         await asked(where)
+    with pytest.raises(OSError, match="refused"):
+        await asked(where)
+
+
+async def test_it_ends_with_a_block_that_is_cancelled(hand: RobotiqHand) -> None:
+    """As by stops_on_signals(): in a cancelled scope every await is cancelled again."""
+    with anyio.CancelScope() as scope:
+        async with serve_metrics(hand, port=0) as where:
+            scope.cancel()
+            await asyncio.sleep(60)
     with pytest.raises(OSError, match="refused"):
         await asked(where)
 
