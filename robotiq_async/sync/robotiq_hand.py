@@ -432,3 +432,8 @@ class RobotiqHand:
 
     def _opened(self, open_stream: Callable[[], AsyncStream[T]]) -> Stream[T]:
         return Stream(self._caller.tell(open_stream), self._caller)
+
+
+def caller_of(hand: RobotiqHand) -> Caller:
+    """What makes the calls of a blocking hand, for tools that run in its event loop."""
+    return hand._caller  # noqa: SLF001  # both are the hand

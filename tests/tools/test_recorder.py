@@ -245,13 +245,55 @@ def test_frames_of_any_length_leave_the_numbers_aligned(frame: str) -> None:
     assert [list(message.position), list(message.velocity), list(message.effort)] == numbers
 
 
+# -- of a blocking hand ------------------------------------------------------------------------------------
+
+
+def test_a_blocking_hand_is_recorded_from_its_start_to_its_stop(file: Path) -> None:
+    hand = sync.RobotiqHand("sim://?speedup=20")
+    with Recorder(hand, file) as recorder, hand:
+        recorder.mark("grasp 7", object="cup")
+        hand.close(Finger.A, speed=255)
+        last = hand.status.sequence
+    polls = [fields["sequence"] for fields in statuses(file)]
+    assert polls == list(range(polls[0], polls[-1] + 1))
+    assert polls[-1] >= last
+    assert (recorder.recorded, recorder.missed) == (len(polls), 0)
+    events = [entry.fields for entry in read_recording(file) if entry.topic == "/gripper/event"]
+    assert ("grasp 7", {"object": "cup"}) in [(each.get("label"), each.get("values")) for each in events]
+    assert [each["target"] for each in events if each["kind"] == "transition"][-1] == "SHUTDOWN"
+    with pytest.raises(RecordingError, match="not recording"):
+        recorder.mark("too late")
+
+
+def test_a_recording_of_a_blocking_hand_that_fails_says_so(tmp_path: Path) -> None:
+    file = tmp_path / "polls.csv"
+    file.touch()
+    hand = sync.RobotiqHand("sim://?speedup=20")
+    with pytest.raises(RecordingError, match="File exists"), Recorder(hand, file), hand:
+        pass
+    assert hand.state is not State.RUNNING_IDLE
+    file.unlink()
+    recorder = Recorder(hand, file)
+    with pytest.raises(ValueError, match="finite"), recorder, hand:
+        recorder.mark("grasp", width=float("nan"))
+    assert len(table(file)) == recorder.recorded > 0, "the rest is written, and the error is not replaced"
+
+
 # -- what can go wrong -------------------------------------------------------------------------------------
 
 
-def test_a_blocking_hand_is_refused_before_a_file_is_made(file: Path) -> None:
-    with pytest.raises(TypeError, match=r"hand must be a hand for asyncio .*blocking"):
-        Recorder(sync.RobotiqHand("sim://"), file)  # type: ignore[arg-type]
-    assert not file.exists()
+async def test_the_other_with_is_refused_before_a_file_is_made(file: Path) -> None:
+    with pytest.raises(TypeError, match="a blocking hand is recorded with 'with'"):
+        async with Recorder(sync.RobotiqHand("sim://"), file):
+            pass
+    with (
+        pytest.raises(TypeError, match="a hand for asyncio is recorded with 'async with'"),
+        Recorder(RobotiqHand("sim://"), file),
+    ):
+        pass
+    with pytest.raises(TypeError, match="hand must be a hand, got 'sim://'"):
+        Recorder("sim://", file)  # type: ignore[arg-type]
+    assert not file.exists()  # noqa: ASYNC240  # short
 
 
 async def test_a_file_that_is_there_is_not_overwritten(hand: RobotiqHand, file: Path) -> None:

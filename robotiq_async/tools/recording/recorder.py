@@ -4,7 +4,8 @@
     async with Recorder(hand, "grasp.mcap"), hand:
         ...
 
-In this order the file contains start and stop, and a slow disk does not delay the stop.
+In this order the file contains start and stop, and a slow disk does not delay the stop. A blocking hand is
+recorded with ``with`` in place of ``async with``.
 
 Four channels: ``/gripper/status`` (every poll), ``/gripper/command`` (every request that was written) and
 ``/gripper/event`` (transitions, faults and marks) as JSON with a JSON Schema; ``/joint_states`` as ROS 2
@@ -26,6 +27,8 @@ from typing import Final, Protocol, Self
 
 from ...hand import Hand
 from ...runtime.concurrency import in_a_thread, wait_shielded, write_all
+from ...sync.robotiq_hand import RobotiqHand as BlockingHand
+from ...sync.robotiq_hand import caller_of
 from ...values.errors import RecordingError
 from .feed import JOINTS, Feed, Message
 from .table import CsvFile
@@ -89,7 +92,7 @@ class Recorder:
         saved: polls on the disk; 0 once the file has been deleted. An incomplete write does not count.
     """
 
-    def __init__(self, hand: Hand, path: Path | str, *, ros2: bool = False) -> None:
+    def __init__(self, hand: Hand | BlockingHand, path: Path | str, *, ros2: bool = False) -> None:
         """Prepare; opens nothing.
 
         Args:
@@ -99,13 +102,13 @@ class Recorder:
 
         Raises:
             ImportError: MCAP without the extra ``record``.
-            TypeError: no hand for asyncio; a blocking one cannot be recorded.
+            TypeError: no hand.
             ValueError: ``ros2`` with a table.
         """
+        self._caller = caller_of(hand) if isinstance(hand, BlockingHand) else None
+        hand = self._caller.hand if self._caller else hand
         if not isinstance(hand, Hand):
-            raise TypeError(
-                f"hand must be a hand for asyncio (a blocking one cannot be recorded), got {hand!r}"
-            )
+            raise TypeError(f"hand must be a hand, got {hand!r}")
         if ros2 and is_table(path):
             raise ValueError(f"ros2 is for MCAP files, and {path} is a table")
         self.path = Path(path)
@@ -141,8 +144,15 @@ class Recorder:
         """Create the file and start recording.
 
         Raises:
+            TypeError: the hand is a blocking one.
             RecordingError: the file exists already, or cannot be created.
         """
+        if self._caller is not None:
+            raise TypeError("a blocking hand is recorded with 'with'")
+        await self._begin()
+        return self
+
+    async def _begin(self) -> None:
         loop = asyncio.get_running_loop()
         self._failed = loop.create_future()
         self._over = asyncio.Event()
@@ -161,7 +171,6 @@ class Recorder:
         self._feed.start()
         self._is_open = True
         self._saving = loop.create_task(self._save_again_and_again(), name="robotiq_async recorder")
-        return self
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -174,6 +183,29 @@ class Recorder:
         await wait_shielded(asyncio.ensure_future(self._end()))
         if self._failed.done() and error is None:
             raise self._failed.result()
+
+    def __enter__(self) -> Self:
+        """Create the file and start recording a blocking hand.
+
+        Raises:
+            TypeError: the hand is one for asyncio.
+            RecordingError: the file exists already, or cannot be created.
+        """
+        if self._caller is None:
+            raise TypeError("a hand for asyncio is recorded with 'async with'")
+        self._caller.wait(self._begin)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Write the rest and close the file, as at the end of ``async with``.
+
+        Raises:
+            RecordingError: a write failed; it never replaces another exception.
+        """
+        assert self._caller is not None, "entered"
+        self._caller.wait(lambda: self.__aexit__(kind, error, trace))
 
     def mark(self, label: str, **values: str | float | bool) -> None:
         """Write a mark: everything from now on has this label, until the next mark. Never blocks.
@@ -191,12 +223,18 @@ class Recorder:
             RecordingError: the block is not entered or over, or the recording has joint states only.
         """
         if not self._is_open or self._joints_only:
-            why = "joint states only" if self._joints_only else "not recording: use 'async with'"
+            why = "joint states only" if self._joints_only else "not recording: use 'with' or 'async with'"
             raise RecordingError(f"{self.path}: {why}")
-        self._feed.mark(label, values)
+        if self._caller is None:
+            self._feed.mark(label, values)
+        else:
+            self._caller.tell(lambda: self._feed.mark(label, values))
 
     async def failure(self) -> RecordingError:
-        """Wait until a write fails (a full disk, for example); everything saved before stays readable."""
+        """Wait until a write fails (a full disk, for example); everything saved before stays readable.
+
+        With a blocking hand look at :attr:`has_failed`.
+        """
         return await asyncio.shield(self._failed)
 
     def _make_format(self, *, ros2: bool) -> _Format:
