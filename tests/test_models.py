@@ -176,6 +176,8 @@ def test_a_model_has_a_name() -> None:
 def test_another_name_is_refused() -> None:
     with pytest.raises(ValueError, match="model must be one of 3f, 2f85, 2f140, hand-e, got '2f'"):
         RobotiqHand(model="2f")
+    with pytest.raises(ValueError, match="got '2F-85'; did you mean 2f85"):
+        RobotiqHand("sim://?model=2F-85")
     with pytest.raises(TypeError, match="model must be a Model or one of"):
         RobotiqHand(model=85)  # type: ignore[arg-type]
 
@@ -272,6 +274,8 @@ async def test_from_the_first_start_to_a_grasp_and_back(model: Model) -> None:
         assert grasp.is_held
         assert grasp.holds == JAW
         assert grasp.positions[JAW] == pytest.approx(150, abs=5)
+        assert repr(grasp).endswith(f"; A={grasp.positions[JAW]}, {grasp.width_mm:.1f} mm wide>")
+        assert repr(grasp.move).endswith(f" s, {grasp.width_mm:.1f} mm open>")
         opened = await hand.open()
         assert opened.outcomes == {JAW: ObjectStatus.AT_POSITION}
         assert opened.positions[JAW] <= model.open_reading_max

@@ -6,12 +6,14 @@ import asyncio
 import inspect
 import io
 import os
+import re
 import signal
 import socket
 import sys
 import time
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
+from itertools import pairwise
 from types import FrameType
 from typing import Self
 
@@ -25,6 +27,7 @@ from .failures import CommandError, UsageError
 from .output.messages import forget, forwarded_warnings, tell
 
 SUCCESS, FAILURE, WRONG_USAGE, SIGNALLED = 0, 1, 2, 128
+UNITS = ("mm", "mm/s", "N")
 INSIST_S = 10.0
 """Seconds after the first signal in which a further Ctrl-C is ignored. A stop takes 2 s at most, a report of
 verify a few more."""
@@ -64,6 +67,7 @@ def _mend_streams() -> None:
 
 def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | None]:
     try:
+        _check_units(arguments)
         command, bound, _ = build().parse_args(arguments, print_error=False, exit_on_error=False)
         outcome = command(*bound.args, **bound.kwargs)
         if inspect.iscoroutine(outcome):
@@ -87,6 +91,13 @@ def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | No
     except KeyboardInterrupt:
         return SIGNALLED + (signals.received or signal.SIGINT), "interrupted"
     return SUCCESS, None
+
+
+def _check_units(arguments: Sequence[str]) -> None:
+    """Refuse ``40 mm``: the unit would be taken for the address."""
+    for number, unit in pairwise(arguments):
+        if unit in UNITS and re.fullmatch(r"[0-9.,]+", number):
+            raise UsageError(f"a number and its unit are one word: {number}{unit}")
 
 
 class _Signals:

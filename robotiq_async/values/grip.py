@@ -81,7 +81,8 @@ class GraspResult:
     def __repr__(self) -> str:
         what = "held" if self.is_held else "not held"
         where = ", ".join(f"{axis}={position}" for axis, position in self.positions.items())
-        return f"<GraspResult {what}: contact of {self.holds}, {self.at_least} needed; {where}>"
+        width = "" if self.width_mm is None else f", {self.width_mm:.1f} mm wide"
+        return f"<GraspResult {what}: contact of {self.holds}, {self.at_least} needed; {where}{width}>"
 
 
 class GripChange(Enum):

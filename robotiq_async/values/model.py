@@ -8,6 +8,7 @@ Nothing of this has run on real hardware yet.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from typing import Final
 
 from . import registers as reg
@@ -250,7 +251,9 @@ def model_of(value: object, name: str = "model") -> Model:
     if not isinstance(value, str):
         raise TypeError(f"{name} must be a Model or one of {', '.join(MODELS)}, got {repr_of(value)}")
     if value.lower() not in MODELS:
-        raise ValueError(f"{name} must be one of {', '.join(MODELS)}, got {value!r:.100}")
+        meant = get_close_matches(value.lower(), MODELS, 1, 0.8)
+        hint = f"; did you mean {meant[0]}?" if meant else ""
+        raise ValueError(f"{name} must be one of {', '.join(MODELS)}, got {value!r:.100}{hint}")
     return MODELS[value.lower()]
 
 

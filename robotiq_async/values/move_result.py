@@ -84,4 +84,5 @@ class MoveResult:
             f"{axis}={self.positions.get(axis)} {how.name}{milliampere(self.peak_current_ma.get(axis))}"
             for axis, how in self.outcomes.items()
         )
-        return f"<MoveResult {axes} in {self.duration:.3f} s>"
+        opening = "" if self.opening_mm is None else f", {self.opening_mm:.1f} mm open"
+        return f"<MoveResult {axes} in {self.duration:.3f} s{opening}>"
