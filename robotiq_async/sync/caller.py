@@ -29,7 +29,7 @@ from ..hand.robotiq_hand import RobotiqHand as AsyncRobotiqHand
 from ..runtime.concurrency import LateError
 from ..runtime.log import Log, log
 from ..values.enums import State
-from ..values.errors import NotStartedError, RobotiqError
+from ..values.errors import RobotiqError
 from .loop_thread import LOOP_THREAD, Function
 
 T = TypeVar("T")
@@ -56,7 +56,7 @@ class Caller:
             return LOOP_THREAD.call(function, interrupted=self._hold)
         finally:
             self._calls.discard(call)
-            if not self._calls and not self.is_running:
+            if not self.is_in_use:
                 _IN_USE.discard(self)
 
     def tell(self, function: Callable[[], T]) -> T:
@@ -84,9 +84,10 @@ class Caller:
 
         Objects that are deleted while the interpreter ends stop their hands, and no thread can start then.
         """
-        if self._calls or self.is_running:
+        if self.is_in_use:
             self.wait(function)
             return
+        _IN_USE.discard(self)  # it may have given up between two calls
         stopping = function()
         try:
             stopping.send(None)  # a hand that does not run stops without waiting
@@ -125,16 +126,14 @@ class Caller:
 
     @property
     def is_running(self) -> bool:
-        """Whether the hand was started and not stopped."""
-        if self._is_left_behind or self.hand.state is State.SHUTDOWN:
-            return False
-        try:
-            self.hand.is_activated  # noqa: B018  # read for its exception
-        except NotStartedError:
-            return False
-        except RobotiqError:
-            return True
-        return True
+        """Whether the hand was started, and has neither been stopped nor given up on its link."""
+        session = self.hand._session  # noqa: SLF001  # both are the hand
+        return not (self._is_left_behind or session is None or session.is_over)
+
+    @property
+    def is_in_use(self) -> bool:
+        """Whether the hand runs, or is being called."""
+        return bool(self._calls) or self.is_running
 
     def after_fork(self) -> None:
         """Called in the child: a running hand, and its calls, stay with the parent."""
@@ -157,7 +156,7 @@ _IN_USE: Final[set[Caller]] = set()  # the callers of hands that run, or are bei
 
 def _stop_all() -> None:
     """Stop every hand at the end of the program."""
-    left = list(_IN_USE)
+    left = [each for each in list(_IN_USE) if each.is_in_use]
     for each in left:
         log.warning("%s still running at exit: stopping it", each.hand.address)
 
@@ -171,7 +170,7 @@ def _stop_all() -> None:
     if left and LOOP_THREAD.is_running:
         with contextlib.suppress(LateError):
             LOOP_THREAD.call(stop, limit=EXIT_S)
-    _IN_USE.difference_update(left)
+    _IN_USE.clear()
 
 
 def _after_fork() -> None:

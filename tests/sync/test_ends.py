@@ -11,7 +11,7 @@ import threading
 
 import pytest
 
-from robotiq_async import Finger, NotStartedError, State
+from robotiq_async import Finger, NotStartedError, RobotiqConnectionError, State
 from robotiq_async.sync import RobotiqHand, caller
 from tests.sync.conftest import Wire, run_to_its_end, until
 
@@ -85,6 +85,25 @@ def test_a_hand_in_use_is_forgotten_when_it_ends(wire: Wire) -> None:
         hand.stop()
         assert not caller._IN_USE
         assert not hand._caller.has_commanded
+
+
+def test_a_hand_that_gave_up_on_its_link_is_no_longer_in_use(
+    wire: Wire, caplog: pytest.LogCaptureFixture
+) -> None:
+    """At the end of the program it was called one that still runs."""
+    hand = RobotiqHand(wire, reconnect=False)
+
+    def call() -> None:
+        with pytest.raises(RobotiqConnectionError, match="unplugged"):
+            hand.set_speed(0)
+
+    for end in (call, hand.stop, caller._stop_all):
+        hand.start()
+        wire.breaks = True
+        until(lambda: not hand._caller.is_running)
+        end()
+        assert not caller._IN_USE
+    assert "still running at exit" not in caplog.text
 
 
 def test_an_event_loop_that_stands_still_does_not_keep_the_program_from_ending(
