@@ -123,8 +123,9 @@ class RobotiqHand(Hand):
         request_address: first request register; by default 0 over TCP and 0x03E8 over RTU and of a jaw.
         status_address: first status register; by default 0 over TCP and 0x07D0 over RTU and of a jaw.
         calibration: speeds of this gripper, for default timeouts of moves and for :attr:`units`. None for the
-            thesis's gripper.
-        force_calibration: labels of force values in :attr:`units`. None for the manual's figures.
+            thesis's gripper, or a jaw's manual. One of another model is refused.
+        force_calibration: labels of force values in :attr:`units`. None for the manual's figures. One of
+            another model is refused.
         stroke: points that were measured on this gripper, from open to closed: two or more pairs of a
             position in counts and an opening in millimetres, or the path of a file that
             ``robotiq-async measure stroke`` wrote, which is read when the hand is made and refused if it was

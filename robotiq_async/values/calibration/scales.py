@@ -57,6 +57,7 @@ class SpeedCalibration:
             raise ValueError("points: a closing time must be above 0 s")
 
     @classmethod
+    @cache
     def nominal(cls, model: Model = THREE_FINGER) -> SpeedCalibration:
         """The manual's figures, linear in between; of a 3-Finger 22 mm/s at 0 and 110 mm/s at 255."""
         slow, fast = model.speeds_mm_s
