@@ -109,7 +109,7 @@ def _hand() -> Panel:
             "near": 0.01,
             "far": 100,
         },
-        "topics": {"/robot_description": {"visible": True}},
+        "topics": {name: {"visible": True} for name in ("/robot_description", "/gripper/parts")},
         # Their axes would be metres long, and the hand is not.
         "scene": {"transforms": {"showLabel": False, "axisScale": 0.03}},
         "transforms": {

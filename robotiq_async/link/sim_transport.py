@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
+from weakref import WeakValueDictionary
 
 from ..values.enums import Finger
 from ..values.errors import ConnectFailedError
 from ..values.model import THREE_FINGER, Model
 from ..values.registers import RegisterMap, Registers
-from .address import Simulation, parse_address
+from .address import Address, Simulation, parse_address
 from .modbus import ModbusTransport
 
 if TYPE_CHECKING:
     from ..simulator import SimulatedGripper
+
+
+_GRIPPERS: Final[WeakValueDictionary[str, SimulatedGripper]] = WeakValueDictionary()
 
 
 def new_gripper(simulation: Simulation, model: Model = THREE_FINGER) -> SimulatedGripper:
@@ -32,6 +36,21 @@ def new_gripper(simulation: Simulation, model: Model = THREE_FINGER) -> Simulate
     if simulation.object is not None:
         gripper.place_object(Finger.ABC, simulation.object)
     return gripper
+
+
+def named(gripper: SimulatedGripper, address: Address) -> str:
+    """The address of the hand that has this gripper: every ``sim://`` is a gripper of its own."""
+    name = f"{address}#{id(gripper):x}"
+    _GRIPPERS[name] = gripper
+    return name
+
+
+def simulated(address: str) -> SimulatedGripper | None:
+    """The gripper in this program behind the :attr:`~robotiq_async.hand.Hand.address` of a hand.
+
+    For those who draw it. None for every other address: a real gripper, and a simulated one elsewhere.
+    """
+    return _GRIPPERS.get(address)
 
 
 class SimulatedTransport:

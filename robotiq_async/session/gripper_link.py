@@ -13,7 +13,7 @@ from ..link.address import Address, canonical_address, parse_address
 from ..link.guard import GuardedTransport
 from ..link.modbus import ModbusTransport
 from ..link.registers import check_urcap, registers_of
-from ..link.sim_transport import SimulatedTransport, new_gripper
+from ..link.sim_transport import SimulatedTransport, named, new_gripper
 from ..link.transport import Link, Transport
 from ..link.urcap.transport import UrcapTransport
 from ..runtime.log import Log
@@ -116,7 +116,7 @@ def _over_modbus(address: Address, registers: RegisterMap, names_unit: bool, nam
     model = model_of(address.model)
     if address.kind == "sim":
         simulated = new_gripper(address.simulation, model)
-        shown = f"{address}#{id(simulated):x}"  # every sim:// is a gripper of its own
+        shown = named(simulated, address)
         make = partial(SimulatedTransport, simulated, registers)
         return GripperLink(shown, partial(Gripper, shown), make, model=model, stroke=address.stroke)
     # On a gateway each hand has a connection of its own. On a serial line, where replies carry no number, the

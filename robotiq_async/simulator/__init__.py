@@ -19,6 +19,7 @@ The physics imports neither pymodbus nor asyncio.
 """
 
 from .mechanics.physics import Physics
+from .physics.bodies import Bodies, Body
 from .physics.gripper import SimulatedGripper
 from .physics.habits import Habits
 from .physics.scale import SimulatedScale
@@ -31,6 +32,8 @@ from .troubles.trouble import KINDS, Trouble, parse_troubles
 
 __all__ = [
     "KINDS",
+    "Bodies",
+    "Body",
     "FaultInjector",
     "Habits",
     "Physics",

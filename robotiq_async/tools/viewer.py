@@ -7,15 +7,17 @@
 In this order a slow viewer does not delay the stop of the hand.
 
 The topics are those of a recording (:mod:`.recording.feed`); ``/gripper/state`` with state, fault and
-statistics, once a second and at every event; ``/robot_description`` and ``/tf`` for 3-D panels. Viewers only
-look: there is no password, and nothing here moves the gripper.
+statistics, once a second and at every event; ``/robot_description`` and ``/tf`` for 3-D panels, and
+``/gripper/parts`` with what a simulation with physics has before the gripper. Viewers only look: there is no
+password, and nothing here moves the gripper.
 """
 
 from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, Final, Self
 
 try:
@@ -35,9 +37,10 @@ from ..values.enums import State
 from ..values.errors import ViewerError
 from ..values.model import Model
 from ..values.status import RobotiqStatus
-from .description import hand_model, urdf
+from .description import Pose, Shape, hand_model, urdf
 from .description.joint_states import ENCAPSULATION, add_string
 from .description.kinematics import joint_angles, joint_names
+from .description.simulated import bodies_of, joints_and_parts
 from .recording.feed import EVENT, JOINTS, TOPICS, Feed, Message, Topic, compact, json_topic
 from .recording.payloads import INTEGER, NUMBER, SCHEMAS, STRING, object_schema, state_fields, title
 
@@ -46,19 +49,36 @@ PORT: Final = 8765
 """The default of Foxglove's own dialog."""
 STATE: Final = json_topic("state", SCHEMAS["state"])
 DESCRIPTION: Final = Topic("/robot_description", "cdr", "std_msgs/msg/String", "ros2msg", b"string data\n")
+_TIME: Final = {"title": "time", **object_schema(sec=INTEGER, nsec=INTEGER)}
+_XYZ: Final = object_schema(**dict.fromkeys("xyz", NUMBER))
+_TURN: Final = object_schema(**dict.fromkeys("xyzw", NUMBER))
 _TRANSFORM: Final = object_schema(
-    timestamp={"title": "time", **object_schema(sec=INTEGER, nsec=INTEGER)},
-    parent_frame_id=STRING,
-    child_frame_id=STRING,
-    translation=object_schema(**dict.fromkeys("xyz", NUMBER)),
-    rotation=object_schema(**dict.fromkeys("xyzw", NUMBER)),
+    timestamp=_TIME, parent_frame_id=STRING, child_frame_id=STRING, translation=_XYZ, rotation=_TURN
 )
 _TRANSFORMS_SCHEMA: Final = json.dumps(
     object_schema(transforms={"type": "array", "items": _TRANSFORM})
 ).encode()
 TRANSFORMS: Final = Topic("/tf", "json", "foxglove.FrameTransforms", "jsonschema", _TRANSFORMS_SCHEMA)
 """Viewers expect a schema of this name."""
-SHOWN: Final = (*TOPICS, STATE, DESCRIPTION, TRANSFORMS)
+_SOLID: Final = object_schema(
+    pose=object_schema(position=_XYZ, orientation=_TURN),
+    size=_XYZ,
+    color=object_schema(**dict.fromkeys("rgba", NUMBER)),
+    bottom_scale=NUMBER,
+    top_scale=NUMBER,
+)
+_SOLIDS: Final = {"box": "cubes", "cylinder": "cylinders", "sphere": "spheres"}
+_ENTITY: Final = object_schema(
+    timestamp=_TIME,
+    frame_id=STRING,
+    id=STRING,
+    frame_locked={"type": "boolean"},
+    **{name: {"type": "array", "items": _SOLID} for name in _SOLIDS.values()},
+)
+_SCENE_SCHEMA: Final = json.dumps(object_schema(entities={"type": "array", "items": _ENTITY})).encode()
+PARTS: Final = Topic("/gripper/parts", "json", "foxglove.SceneUpdate", "jsonschema", _SCENE_SCHEMA)
+_YELLOW: Final = {"r": 0.95, "g": 0.76, "b": 0.19, "a": 1.0}
+SHOWN: Final = (*TOPICS, STATE, DESCRIPTION, TRANSFORMS, PARTS)
 TRANSFORMS_S: Final = 0.05
 """Interval of ``/tf``: smooth to the eye, a tenth of the polls."""
 STATE_S: Final = 1.0
@@ -157,8 +177,16 @@ class Viewer:
         is_due = message.nanoseconds - self._transformed_at >= TRANSFORMS_S * 1e9
         if message.topic is JOINTS and is_due:
             self._transformed_at = message.nanoseconds
-            data = compact(transforms(self._hand.status, message.nanoseconds))
-            self._channels[TRANSFORMS].log(data, log_time=message.nanoseconds)
+            self._publish_bodies(message.nanoseconds)
+
+    def _publish_bodies(self, nanoseconds: int) -> None:
+        told = bodies_of(self._hand)
+        joints, parts = ({}, None) if told is None else joints_and_parts(told)
+        data = compact(transforms(self._hand.status, nanoseconds, joints))
+        self._channels[TRANSFORMS].log(data, log_time=nanoseconds)
+        if parts is not None:
+            data = compact(parts_message(hand_model(self._hand.model).root, parts, nanoseconds))
+            self._channels[PARTS].log(data, log_time=nanoseconds)
 
     def _describe(self) -> None:
         self._channels[DESCRIPTION].log(_description_message(self._hand.model))
@@ -192,24 +220,58 @@ def _description_message(model: Model) -> bytes:
     return bytes(body)
 
 
-def transforms(status: RobotiqStatus, nanoseconds: int) -> dict[str, Any]:
-    """The transform of every joint, from parent to child, at the time of the status since 1970."""
-    seconds, rest = divmod(nanoseconds, 1_000_000_000)
+def transforms(
+    status: RobotiqStatus, nanoseconds: int, joints: Mapping[str, float] = MappingProxyType({})
+) -> dict[str, Any]:
+    """The transform of every joint, from parent to child, at a time since 1970.
+
+    ``joints`` has the values that are known otherwise than by the positions of the status.
+    """
     model = hand_model(status.model)
     values = model.completed(dict(zip(joint_names(status.model), joint_angles(status), strict=True)))
     found = []
     for joint in model.joints:
-        pose = joint.pose(values.get(joint.name, 0.0))
+        placed = _placed(joint.pose(joints.get(joint.name, values.get(joint.name, 0.0))))
         found.append(
             {
-                "timestamp": {"sec": seconds, "nsec": rest},
+                "timestamp": _time(nanoseconds),
                 "parent_frame_id": joint.parent,
                 "child_frame_id": joint.child,
-                "translation": dict(zip("xyz", pose.position, strict=True)),
-                "rotation": dict(zip("xyzw", pose.quaternion, strict=True)),
+                "translation": placed["position"],
+                "rotation": placed["orientation"],
             }
         )
     return {"transforms": found}
+
+
+def parts_message(root: str, parts: Sequence[Shape], nanoseconds: int) -> dict[str, Any]:
+    """Parts as a scene of Foxglove: an entity in the frame of the root link, which replaces that before."""
+    solids: dict[str, list[dict[str, Any]]] = {name: [] for name in _SOLIDS.values()}
+    for part in parts:
+        size = dict(zip("xyz", _extent(part), strict=True))
+        solid = {"pose": _placed(part.origin), "size": size, "color": _YELLOW}
+        solids[_SOLIDS[part.kind]].append({**solid, "bottom_scale": 1.0, "top_scale": 1.0})
+    named = {"timestamp": _time(nanoseconds), "frame_id": root, "id": "parts", "frame_locked": True}
+    return {"entities": [named | solids]}
+
+
+def _extent(part: Shape) -> tuple[float, ...]:
+    if part.kind == "box":
+        return part.size
+    across = 2 * part.size[0]
+    return across, across, part.size[1] if part.kind == "cylinder" else across
+
+
+def _placed(pose: Pose) -> dict[str, dict[str, float]]:
+    return {
+        "position": dict(zip("xyz", pose.position, strict=True)),
+        "orientation": dict(zip("xyzw", pose.quaternion, strict=True)),
+    }
+
+
+def _time(nanoseconds: int) -> dict[str, int]:
+    seconds, rest = divmod(nanoseconds, 1_000_000_000)
+    return {"sec": seconds, "nsec": rest}
 
 
 def _channel(topic: Topic, context: Context) -> Channel:

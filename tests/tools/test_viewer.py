@@ -17,6 +17,7 @@ from robotiq_async import Fault, Finger, RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.description import hand_model, urdf
 from robotiq_async.tools.description.kinematics import JOINTS, joint_angles, joint_names
+from robotiq_async.tools.description.simulated import bodies_of
 from robotiq_async.tools.recording.payloads import SCHEMAS
 from robotiq_async.tools.viewer import SHOWN, Viewer
 from robotiq_async.values.errors import ViewerError
@@ -147,6 +148,28 @@ async def test_a_sibling_can_be_drawn(name: str) -> None:
     assert f'<robot name="{model.name}">'.encode() in described
 
 
+async def test_a_simulated_part_is_shown_where_its_simulation_has_it() -> None:
+    pytest.importorskip("mujoco", reason="needs the extra physics")
+    address = "sim://?model=2f85&speedup=5&physics=cylinder:40x60,0.2"
+    async with RobotiqHand(address) as jaw, viewed(jaw) as one:
+        await jaw.activate()
+        await jaw.close()
+        await one.subscribe("/gripper/parts", "/tf")
+        await one.until(lambda: {topic for topic, *_ in one.received} == {"/gripper/parts", "/tf"})
+        bodies = bodies_of(jaw)
+        assert bodies is not None
+        (entity,) = one.objects("/gripper/parts")[-1]["entities"]
+        (cylinder,), (part,) = entity["cylinders"], bodies.parts
+        assert entity["frame_id"] == hand_model(jaw.model).root
+        assert [cylinder["size"][axis] for axis in "xyz"] == pytest.approx([0.04, 0.04, 0.06])
+        assert list(cylinder["pose"]["position"].values()) == pytest.approx(part.position, abs=1e-3)
+        assert entity["cubes"] == entity["spheres"] == []
+        shown = {each["child_frame_id"]: each for each in one.objects("/tf")[-1]["transforms"]}
+    for joint in hand_model(jaw.model).moving:
+        pose = joint.pose(bodies.joints[joint.name])
+        assert list(shown[joint.child]["rotation"].values()) == pytest.approx(pose.quaternion, abs=1e-3)
+
+
 # -- beginning and end--------------------------------------------------------------------------------------
 
 
@@ -247,7 +270,7 @@ def test_the_layout_and_the_description_mean_the_same_hand() -> None:
     assert panel["followTf"] == model.root
     links = {link for kind in MODELS for link in hand_model(kind).links}
     assert set(panel["transforms"]) == {f"frame:{link}" for link in links}
-    assert set(panel["topics"]) == {"/robot_description"}
+    assert set(panel["topics"]) == {"/robot_description", "/gripper/parts"}
 
 
 def test_the_layout_shows_what_there_is() -> None:

@@ -51,6 +51,10 @@ VISIBLE: Final = """
 const scene = window[Object.keys(window).find((key) => key.startsWith('scene_'))];
 return scene.getObjectByName(arguments[0]).visible;
 """
+GEOMETRY: Final = """
+const scene = window[Object.keys(window).find((key) => key.startsWith('scene_'))];
+return scene.getObjectByName(arguments[0]).geometry.parameters;
+"""
 COLORS: Final = """
 const scene = window[Object.keys(window).find((key) => key.startsWith('scene_'))];
 return scene.getObjectByName(arguments[0]).children.map((each) => each.material?.color.getHexString());

@@ -27,6 +27,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import Operator
 from robotiq_async.tools.description import hand_model
 from robotiq_async.tools.description.kinematics import JOINTS, joint_angles, joint_names
+from robotiq_async.tools.description.simulated import bodies_of
 from robotiq_async.tools.web.page.widgets.controls import ROWS
 from robotiq_async.tools.web.server import PageServer
 from robotiq_async.tools.web.settings import PageSettings
@@ -35,7 +36,7 @@ from robotiq_async.values.model import THREE_FINGER
 from tests.conftest import watched
 from tests.fake_hand import FakeHand
 from tests.virtual import HoldWatch
-from tests.web.browser import BROWSER, COLORS, DRIVER, MISSING, SMALL, VISIBLE, Browser, Pace
+from tests.web.browser import BROWSER, COLORS, DRIVER, GEOMETRY, MISSING, SMALL, VISIBLE, Browser, Pace
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
@@ -235,6 +236,30 @@ async def test_the_part_is_drawn_and_touching_pads_glow(browser: Browser, stage:
     assert await browser.says("axes", "contact while closing")
     await stage.hand.open()
     await browser.until(lambda: not browser.driver.execute_script(VISIBLE, "bar"))
+
+
+async def test_a_simulated_part_is_drawn_where_its_simulation_has_it(window: Browser) -> None:
+    """And no guess of what the fingers hold: the part is seen before they meet it."""
+    pytest.importorskip("mujoco", reason="needs the extra physics")
+    size = {"width": 0.03, "height": 0.04, "depth": 0.06}
+    address = "sim://?model=2f85&speedup=5&physics=box:30x40x60,0.3"
+    async with RobotiqHand(address) as jaw, shown(jaw) as page:
+        model = hand_model(jaw.model)
+        await jaw.activate()
+        await window.open(page.url)
+        await window.in_touch()
+        for move in (jaw.open, jaw.close):
+            await move()
+            bodies = bodies_of(jaw)
+            assert bodies is not None
+            (part,), poses = bodies.parts, model.link_poses(bodies.joints)
+            await window.until(partial(is_at, window, "part_0", part.position, model.root))
+            for link in model.touching[JAW]:
+                await window.until(partial(is_at, window, link, poses[link].position, model.root))
+        assert jaw.status.contacts
+        assert size.items() <= (await window.run(GEOMETRY, "part_0")).items()
+        assert await window.run(VISIBLE, "part_0")
+        assert not await window.run(VISIBLE, "bar")
 
 
 async def test_the_page_of_a_gripper_that_is_lost_and_comes_back(browser: Browser, stage: Stage) -> None:

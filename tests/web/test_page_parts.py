@@ -213,6 +213,25 @@ async def test_the_mirror_shows_what_the_hand_is(hand: RobotiqHand, gripper: Sim
     assert len(shown.events) == len(lines), "each event is shown once"
 
 
+@pytest.mark.parametrize(
+    ("query", "parts"), [("&physics=box:30x40x60,0.3", 1), ("&physics=table", 0), ("", None)]
+)
+async def test_what_a_simulation_knows_reaches_the_page(query: str, parts: int | None) -> None:
+    pytest.importorskip("mujoco", reason="needs the extra physics")
+    mirror = Mirror(("here",), control=False, say=lambda _: None)
+    async with RobotiqHand(f"sim://?model=2f85&speedup=10{query}") as jaw:
+        mirrored(HandUpdates(jaw), mirror)
+    joints = mirror.hands[0].joints
+    assert (None if joints is None else len(mirror.hands[0].parts)) == parts
+
+
+async def test_a_gripper_elsewhere_tells_no_more_than_its_registers(hand: RobotiqHand) -> None:
+    mirror = Mirror(("here",), control=False, say=lambda _: None)
+    mirrored(HandUpdates(hand), mirror)
+    assert mirror.hands[0].status is not None
+    assert (mirror.hands[0].joints, mirror.hands[0].parts) == (None, ())
+
+
 async def test_a_peak_of_the_current_is_not_lost_between_two_looks(hand: RobotiqHand) -> None:
     updates = HandUpdates(hand)
     peak = 0

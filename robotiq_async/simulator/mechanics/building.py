@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
     from .scene import Part
 
+OURS: Final = "gripper/"
+"""Before the names of all that belongs to the gripper."""
 _TIMESTEP: Final = 0.002
 _CLEARANCE: Final = 0.006
 """Distance in metres between the table and the lowest point that the fingertips reach."""
@@ -51,7 +53,7 @@ def above_table(text: str, reach: float, part: Part | None) -> Any:
     mount.add_joint(name="mount", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1])
     mount.mass, mount.inertia, mount.explicitinertial = 1.0, [0.001] * 3, True
     frame = mount.add_frame(quat=[0, 1, 0, 0])
-    spec.attach(mujoco.MjSpec.from_string(text), frame=frame, prefix="gripper/")
+    spec.attach(mujoco.MjSpec.from_string(text), frame=frame, prefix=OURS)
     _rename_actuators(spec)
     drive = spec.add_actuator(name="mount", target="mount", trntype=mujoco.mjtTrn.mjTRN_JOINT)
     drive.set_to_position(kp=_MOUNT[0], kv=_MOUNT[1])
@@ -75,7 +77,7 @@ def in_own_world(text: str, file: str) -> Any:
     gripper = mujoco.MjSpec.from_string(text)
     for option in ("timestep", "integrator", "cone", "impratio"):  # those of the file, without a complaint
         setattr(gripper.option, option, getattr(spec.option, option))
-    spec.attach(gripper, site="gripper", prefix="gripper/")
+    spec.attach(gripper, site="gripper", prefix=OURS)
     _rename_actuators(spec)
     return spec
 
@@ -83,7 +85,7 @@ def in_own_world(text: str, file: str) -> Any:
 def _rename_actuators(spec: Any) -> None:
     # The axes are found by their names; a user's own actuators keep theirs.
     for actuator in spec.actuators:
-        actuator.name = actuator.name.removeprefix("gripper/")
+        actuator.name = actuator.name.removeprefix(OURS)
 
 
 def _add_part(spec: Any, part: Part, height: float) -> None:

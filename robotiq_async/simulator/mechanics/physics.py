@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from robotiq_async.values.enums import Finger, ObjectStatus
     from robotiq_async.values.model import Model
 
+    from ..physics.bodies import Bodies
     from .world import World
 
 _WAKES_S: Final = 0.004
@@ -100,6 +101,10 @@ class Physics:
         self._made.step()
         return True
 
+    def bodies(self) -> Bodies:
+        """Places of joints and parts; with a thread, after its last steps: it does not wait for the next."""
+        return self._made.told(self._made.look() if self._run is None else self._run.seen)
+
     # -- changes to the scene ----------------------------------------------------------------------------
 
     def lift(self, millimetres: float) -> None:
@@ -183,12 +188,14 @@ class _Run:
 
     Attributes:
         steps: number of steps it has made.
+        seen: places of joints and parts after them.
     """
 
     def __init__(
         self, world: World, lock: threading.Lock, clock: Callable[[], float], speedup: float
     ) -> None:
         self.steps = 0
+        self.seen = world.look()
         self._world = world
         self._lock = lock
         self._clock = clock
@@ -199,6 +206,7 @@ class _Run:
         began, let_go = self._clock(), 0.0
         while owner() is not None:
             let_go += self._catch_up((self._clock() - began) * self._speedup - let_go)
+            self.seen = self._world.look()
             time.sleep(_WAKES_S)
 
     def _catch_up(self, due: float) -> float:

@@ -22,10 +22,12 @@ from robotiq_async.values.enums import Finger
 from .alone import levers_of, pads, put_at, reach
 from .building import above_table, in_own_world, packaged
 from .drive import MotorDrive
+from .watch import Look, Watch, root_of
 
 if TYPE_CHECKING:
     from robotiq_async.values.model import Model
 
+    from ..physics.bodies import Bodies
     from .scene import Scene
 
 _LIFTING: Final = 0.1
@@ -64,11 +66,14 @@ class World:
         if scene.part is not None and self._touches_part():
             raise ValueError(f"physics: there is no room for a {scene.part} between the open fingers")
         self._start = self._data.qpos.copy()
+        base = self._model.body_rootid[root_of(self._model)]  # of a robot that drives about, perhaps
         self._parts = [
             joint
             for joint in range(self._model.njnt)
             if self._model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
+            and self._model.jnt_bodyid[joint] != base
         ]
+        self._watch = Watch(self._model, {int(self._model.jnt_bodyid[joint]) for joint in self._parts})
         self._sleeps = is_ours and not self._parts
         """Whether nothing moves while the motors rest: no part, and not a user's world."""
         self._collides = self._model.geom_contype.copy(), self._model.geom_conaffinity.copy()
@@ -123,6 +128,14 @@ class World:
         at = self._model.jnt_qposadr[self._parts[0]]
         x, y, z = (1000 * float(each) for each in self._data.qpos[at : at + 3])
         return x, y, z
+
+    def look(self) -> Look:
+        """Copy where everything is: quick, for :meth:`told`."""
+        return self._watch.look(self._data, is_aside=self._is_aside)
+
+    def told(self, look: Look) -> Bodies:
+        """What was seen; any thread may ask for it."""
+        return self._watch.told(look)
 
     def grip_force(self) -> float:
         """The force of the pads on their contacts, in newtons: of the pad with the largest."""

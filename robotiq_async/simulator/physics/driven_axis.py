@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from robotiq_async.values.enums import Finger
     from robotiq_async.values.model import Model
 
+    from .bodies import Bodies
+
 
 class Drive(Protocol):
     """One motor of a mechanism, in counts.
@@ -78,6 +80,9 @@ class Mechanism(Protocol):
 
     def step(self, until: float) -> bool:
         """Make one step if that does not lead beyond a time, in simulated seconds; return whether it did."""
+
+    def bodies(self) -> Bodies:
+        """Where joints and parts are."""
 
 
 class DrivenAxis(Axis):

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from .axis import Axis
+    from .bodies import Bodies
     from .driven_axis import Mechanism
 
 _LONGEST: Final = 1e9
@@ -277,6 +278,14 @@ class SimulatedGripper(Surroundings):
             ValueError: finger is not exactly one axis.
         """
         return self._axis(finger).travel(self._time)
+
+    @property
+    def bodies(self) -> Bodies | None:
+        """Where joints and parts are, for those who draw it; None without physics."""
+        if self._physics is None:
+            return None
+        self._catch_up()
+        return self._physics.bodies()
 
     @property
     def writes(self) -> tuple[Write, ...]:

@@ -27,6 +27,7 @@ from ...runtime.log import log
 from ...values.errors import NotStartedError, ViewerError
 from ...values.status import RobotiqStatus
 from ..actions import Operator
+from ..description.simulated import bodies_of
 from ..recording.feed import Timeline
 from ..recording.payloads import Fields, is_command
 from .commands import PageCommands
@@ -105,6 +106,7 @@ class HandUpdates:
             "timestamp": status.timestamp,
             "sequence": status.sequence,
             "age": max(now() - status.timestamp, 0.0),
+            "bodies": bodies_of(self.hand),
         }
 
     def _statistics(self) -> Iterator[tuple[str, Fields]]:

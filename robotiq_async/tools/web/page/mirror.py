@@ -15,6 +15,8 @@ from ....values.enums import DEFAULT_FORCE, DEFAULT_SPEED, State
 from ....values.model import THREE_FINGER, Model, model_of
 from ....values.status import RobotiqStatus
 from ....values.stroke import Points, Stroke
+from ...description import Shape
+from ...description.simulated import joints_and_parts
 
 HISTORY_S: Final = 30.0
 SAMPLE_S: Final = 0.2
@@ -46,6 +48,8 @@ class HandMirror:
     address: str
     state: State = State.DISCONNECTED
     status: RobotiqStatus | None = None  # the newest; None before the first
+    joints: dict[str, float] | None = None  # what a simulation knows beside the status; None for nothing
+    parts: tuple[Shape, ...] = ()  # the same, of what stands before the gripper
     age: float = 0.0  # seconds since the status was read, at the last update
     problem: str = ""  # why the hand could not be started; empty if it was
     statistics: dict[str, Any] = field(default_factory=dict)  # the newest
@@ -79,6 +83,8 @@ class HandMirror:
                 has_current=update["has_current"],
             )
             self.age = update["age"]
+            told = update["bodies"]
+            self.joints, self.parts = (None, ()) if told is None else joints_and_parts(told)
         self.statistics = update.get("statistics", self.statistics)
         for event in update["events"]:
             self.event_count += 1

@@ -1,12 +1,14 @@
 """The gripper in three dimensions.
 
 The drawing follows from the description of the model. A scene is made before the model is known: until the
-first status it is a 3-Finger.
+first status it is a 3-Finger. A simulation with physics tells where joints and parts are. Of any other
+gripper only the positions are known, and what it holds is a guess (:mod:`.held`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import pi
 from typing import Any, Final
 
@@ -19,6 +21,7 @@ from .....values.status import RobotiqStatus
 from ....description import HandModel, Pose, Shape, hand_model
 from ....description.geometry import turned
 from ....description.kinematics import FINGER_NAMES, joint_names, requested_angles
+from ....description.simulated import PART
 from ..mirror import HandMirror
 from .held import Thing, grasp
 from .words import COLORS
@@ -123,6 +126,51 @@ class Figure:
         self.look(link, GHOST if self._ghost else None, STALE if self._ghost else 1.0)
 
 
+class Parts:
+    """What stands before the gripper, where a simulation has it."""
+
+    def __init__(self, root: Object3D) -> None:
+        self._root = root
+        self._kinds: list[tuple[str, tuple[float, ...]]] = []
+        self._groups: list[Object3D] = []
+        self._poses: list[Pose] = []
+
+    def show(self, parts: Sequence[Shape]) -> Calls:
+        """Draw them where they are now; returns the calls for the browser."""
+        kinds = [(part.kind, part.size) for part in parts]
+        if parts and kinds != self._kinds:
+            self._make(parts)
+            self._kinds = kinds
+        calls: Calls = []
+        for group in self._groups:
+            group.visible(bool(parts))
+        for number, part in enumerate(parts):
+            group, pose = self._groups[number], part.origin
+            if _is_as_near(pose, self._poses[number]):
+                continue
+            self._poses[number] = pose
+            group.x, group.y, group.z = pose.position
+            group.R = [list(row) for row in pose.rotation]
+            calls += [["move", group.id, *pose.position, None], ["rotate", group.id, group.R]]
+        return calls
+
+    def _make(self, parts: Sequence[Shape]) -> None:
+        for group in self._groups:
+            group.delete()
+        self._groups, self._poses = [], []
+        for number, part in enumerate(parts):
+            with self._root, _placed(ui.scene.group(), part.origin) as group:
+                _drawn(replace(part, origin=Pose())).material(HELD).with_name(f"{PART}_{number}")
+            self._groups.append(group)
+            self._poses.append(part.origin)
+
+
+def _is_as_near(one: Pose, other: Pose) -> bool:
+    moved = max(abs(a - b) for a, b in zip(one.position, other.position, strict=True))
+    pairs = zip(one.rotation, other.rotation, strict=True)
+    return moved < MOVED and all(abs(a - b) < TURNED for rows in pairs for a, b in zip(*rows, strict=True))
+
+
 class Drawing:
     """A gripper, its request, and the object that it holds."""
 
@@ -137,6 +185,7 @@ class Drawing:
             if kind is THREE_FINGER:
                 self.bar.rotate(pi / 2, 0, 0)
             self.ball = ui.scene.sphere(1.0).with_name("ball")
+        self.parts = Parts(self.figure.root)
         for each in (self.bar, self.ball):
             each.material(HELD, 0.7).visible(False)
         if kind is THREE_FINGER and not compact:
@@ -167,7 +216,11 @@ class HandScene:
             drawing.figure.look_all(None, STALE)
             return
         angles, thing = grasp(drawing.model, hand.status)
-        calls = drawing.figure.turn(drawing.model.completed(angles))
+        angles = drawing.model.completed(angles)
+        parts: Sequence[Shape] = ()
+        if hand.joints is not None and not hand.is_lost:
+            angles, thing, parts = angles | hand.joints, None, hand.parts
+        calls = drawing.figure.turn(angles) + drawing.parts.show(parts)
         if drawing.ghost is not None:
             calls += self._show_ghost(drawing.model, drawing.ghost, hand, hand.status)
         if calls:

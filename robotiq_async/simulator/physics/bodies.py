@@ -1,0 +1,39 @@
+"""What a mechanism tells of its bodies: where the joints are, and the parts before the gripper.
+
+For people who look at it. No register has any of this, and no real gripper tells it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+Vector = tuple[float, float, float]
+
+
+class Body(NamedTuple):
+    """A box, a cylinder (along z) or a sphere, in the frame of the gripper's root link.
+
+    Attributes:
+        kind: ``box``, ``cylinder`` or ``sphere``.
+        size: in metres: of a box the three edges; of a cylinder radius and length; of a sphere the radius.
+        position: its middle, in metres.
+        rotation: the rows of a matrix whose columns are its axes.
+    """
+
+    kind: str
+    size: tuple[float, ...]
+    position: Vector
+    rotation: tuple[Vector, Vector, Vector]
+
+
+class Bodies(NamedTuple):
+    """Where everything is at one moment.
+
+    Attributes:
+        joints: radians, or metres of one that slides, by the names of the description.
+        parts: what parts consist of; none while they are out of the way, as in an activation.
+    """
+
+    joints: Mapping[str, float]
+    parts: tuple[Body, ...]

@@ -1,0 +1,48 @@
+"""The bodies of a gripper that is simulated with physics, for drawings.
+
+How they get there: the simulated gripper stands in the program of its hand. Whoever shows that hand asks
+:func:`bodies_of` at each update, and sends the answer beside the status. It is no part of the status, for no
+gripper tells it. A page gets it as JSON.
+
+There are none, and a drawing goes by the positions alone, for a real gripper, for one without physics, for
+one in another program (``robotiq-async simulate``) or on another host, and while the link is lost.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from ...link.sim_transport import simulated
+from .geometry import Pose
+from .model import Shape
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ...hand import Hand
+    from ...simulator import Bodies
+
+PART: Final = "part"
+"""Material of the shapes of a part: no link has it."""
+
+
+def bodies_of(hand: Hand) -> Bodies | None:
+    """Where joints and parts of a hand are, if a simulation in this program knows."""
+    gripper = simulated(hand.address)
+    return None if gripper is None else gripper.bodies
+
+
+def joints_and_parts(bodies: Bodies) -> tuple[dict[str, float], tuple[Shape, ...]]:
+    """The values of the joints by name, and what parts consist of, in the frame of the root link.
+
+    ``bodies`` are as :func:`bodies_of` gives them, or what JSON has made of them.
+    """
+    joints, parts = bodies
+    return dict(joints), tuple(
+        Shape(kind, tuple(size), _pose(position, *rotation), PART) for kind, size, position, rotation in parts
+    )
+
+
+def _pose(position: Sequence[float], *rows: Sequence[float]) -> Pose:
+    (x, y, z), ((a, b, c), (d, e, f), (g, h, i)) = position, rows
+    return Pose((x, y, z), ((a, b, c), (d, e, f), (g, h, i)))
