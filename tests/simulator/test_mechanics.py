@@ -8,6 +8,10 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -16,9 +20,11 @@ pytest.importorskip("mujoco", reason="needs the extra physics")
 
 from robotiq_async import Finger, ObjectStatus, RobotiqHand, RobotiqStatus
 from robotiq_async.simulator import Habits, Physics, SimulatedGripper
+from robotiq_async.simulator.mechanics.physics import OrderedDrive
 from robotiq_async.simulator.mechanics.scene import Part, Scene, parse_scene
 from robotiq_async.values.enums import JAW
 from robotiq_async.values.model import HAND_E, MODELS, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
+from tests.patience import patience
 
 JAWS = pytest.mark.parametrize("model", [TWO_FINGER_85, TWO_FINGER_140, HAND_E], ids=str)
 ROOT = Path(__file__).parents[2]
@@ -395,3 +401,50 @@ def test_an_address_has_one_part() -> None:
         RobotiqHand("sim://?object=100&physics=table")
     with pytest.raises(ValueError, match="physics must be table"):
         RobotiqHand("sim://?physics=cone")
+
+
+def test_a_gripper_does_not_wait_for_its_thread_and_moves_until_that_has_its_order() -> None:
+    """It stands in an event loop. A step on a busy machine had held that for 12 ms."""
+    physics = Physics(BOX, threaded=True)
+    gripper = SimulatedGripper(model=TWO_FINGER_85, physics=physics, speedup=10)
+    gripper.write(0, [0x0100, 0, 0])
+    until(lambda: bool(gripper.status_registers()[0] & 0x3000 == 0x3000))
+    physics._lock.acquire()  # the thread stands still in a step
+    try:
+        asked = threading.Thread(target=lambda: gripper.write(0, [0x0900, 255, 0xFFFF]), daemon=True)
+        asked.start()
+        asked.join(patience(5))
+        assert not asked.is_alive()
+        until(lambda: gripper.is_moving)
+        before = gripper.position(JAW)
+        time.sleep(0.05)
+        assert gripper.is_moving
+        assert gripper.position(JAW) == before
+        assert gripper.bodies is not None
+    finally:
+        physics._lock.release()
+    until(lambda: not gripper.is_moving)
+    assert gripper.holds == JAW
+
+
+def test_what_a_motor_tells_before_it_has_its_order_is_not_the_end_of_the_new_motion() -> None:
+    """The thread may make a step between the order and its being taken up."""
+    bench, orders = active("table"), deque[Callable[[], None]]()
+    bench.move(0)
+    motor = bench.physics.drive(JAW)
+    told = OrderedDrive(motor, orders)
+    assert told.outcome is motor.outcome is ObjectStatus.AT_POSITION
+    told.go(200.0, 100.0, 255, clears=False)
+    assert motor.outcome is ObjectStatus.AT_POSITION
+    assert told.outcome is ObjectStatus.IN_MOTION
+    orders.popleft()()
+    bench.run(5)
+    assert told.outcome is ObjectStatus.AT_POSITION
+    assert told.position == pytest.approx(200, abs=1)
+
+
+def until(condition: Callable[[], bool]) -> None:
+    ends = time.monotonic() + patience(10)
+    while not condition():
+        assert time.monotonic() < ends, "in vain"
+        time.sleep(0.005)

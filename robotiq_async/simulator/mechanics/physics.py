@@ -1,20 +1,30 @@
-"""Physics: bodies and contacts behind a simulated gripper, stepped by its user or in a thread of its own."""
+"""Physics: bodies and contacts behind a simulated gripper, stepped by its user or in a thread of its own.
+
+A gripper with a thread stands in an event loop, which waits for nothing here. It reads single numbers that
+the thread leaves behind, and gives orders that the thread takes up before its next step. MuJoCo lets go of
+Python's lock in a step; what the thread does in Python takes some ten microseconds of each.
+"""
 
 from __future__ import annotations
 
 import threading
 import time
 import weakref
+from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Final
+
+from robotiq_async.values.enums import ObjectStatus
 
 from .scene import parse_scene
 
 if TYPE_CHECKING:
-    from robotiq_async.values.enums import Finger, ObjectStatus
+    from robotiq_async.values.enums import Finger
     from robotiq_async.values.model import Model
 
     from ..physics.bodies import Bodies
+    from ..physics.driven_axis import Drive
     from .world import World
 
 _WAKES_S: Final = 0.004
@@ -87,9 +97,10 @@ class Physics:
         """The time it has reached, in simulated seconds."""
         return self._made.time if self._run is None else self._until
 
-    def drive(self, axis: Finger) -> LockedDrive:
+    def drive(self, axis: Finger) -> Drive:
         """The motor of an axis, for the gripper that it moves."""
-        return LockedDrive(self._made, axis, self._lock)
+        drive = self._made.drives[axis]
+        return drive if self._run is None else OrderedDrive(drive, self._run.orders)
 
     def step(self, until: float) -> bool:
         """Make one step, or see whether the thread has; for the gripper that it moves."""
@@ -147,12 +158,21 @@ class Physics:
         return self._world
 
 
-class LockedDrive:
-    """The motor of an axis, for a gripper in another thread than the world."""
+class OrderedDrive:
+    """The motor of an axis, for a gripper in another thread than the world: nobody waits for the other.
 
-    def __init__(self, world: World, axis: Finger, lock: threading.Lock) -> None:
-        self._drive = world.drives[axis]
-        self._lock = lock
+    An order is taken up before the next step. Until then the motor counts as in motion, for what it tells is
+    about the goal before.
+
+    Attributes:
+        taken: how many orders the thread of the world has taken up.
+    """
+
+    def __init__(self, drive: Drive, orders: deque[Callable[[], None]]) -> None:
+        self.taken = 0
+        self._given = 0
+        self._drive = drive
+        self._orders = orders
 
     @property
     def position(self) -> float:
@@ -164,23 +184,28 @@ class LockedDrive:
 
     @property
     def outcome(self) -> ObjectStatus:
-        return self._drive.outcome
+        return self._drive.outcome if self.taken == self._given else ObjectStatus.IN_MOTION
 
     @property
     def is_pressing(self) -> bool:
-        return self._drive.is_pressing
+        return self.taken == self._given and self._drive.is_pressing
 
     def go(self, target: float, rate: float, force: int, *, clears: bool) -> None:
-        with self._lock:
-            self._drive.go(target, rate, force, clears=clears)
+        self._order(partial(self._drive.go, target, rate, force, clears=clears))
 
     def hold(self) -> None:
-        with self._lock:
-            self._drive.hold()
+        self._order(self._drive.hold)
 
     def release(self) -> None:
-        with self._lock:
-            self._drive.release()
+        self._order(self._drive.release)
+
+    def _order(self, what: Callable[[], None]) -> None:
+        self._given += 1
+        self._orders.append(partial(self._take_up, what))
+
+    def _take_up(self, what: Callable[[], None]) -> None:
+        what()
+        self.taken += 1
 
 
 class _Run:
@@ -189,6 +214,7 @@ class _Run:
     Attributes:
         steps: number of steps it has made.
         seen: places of joints and parts after them.
+        orders: changes that are due before the next step.
     """
 
     def __init__(
@@ -196,6 +222,7 @@ class _Run:
     ) -> None:
         self.steps = 0
         self.seen = world.look()
+        self.orders: deque[Callable[[], None]] = deque()
         self._world = world
         self._lock = lock
         self._clock = clock
@@ -214,6 +241,8 @@ class _Run:
         late = max(due - self._world.time - _LATE_S * self._speedup, 0.0)
         due -= late
         while self._world.time + self._world.step_s <= due:
+            while self.orders:
+                self.orders.popleft()()
             with self._lock:
                 self._world.step()
             self.steps += 1
