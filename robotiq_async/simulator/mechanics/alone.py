@@ -11,6 +11,8 @@ import numpy as np
 
 from robotiq_async.values.enums import Finger
 
+Levers = tuple[tuple[float, float], list[float]]
+
 _GRID: Final = 48
 """Positions from open to closed at which a motion is sampled."""
 
@@ -42,8 +44,8 @@ def _half(model: Any, geom: int) -> Any:
 
 
 @cache
-def levers_of(text: str, axis: Finger) -> tuple[Any, Any]:
-    """Values of an axis, and for each the motion of all pads by a small motion of it.
+def levers_of(text: str, axis: Finger) -> Levers:
+    """The ends of an axis, and at even places between them the motion of all pads by a small motion of it.
 
     They convert newtons at the pads to the force of the motor.
     """
@@ -61,8 +63,8 @@ def levers_of(text: str, axis: Finger) -> tuple[Any, Any]:
         moved = after[0] - before[0]
         along = moved if axis is Finger.SCISSOR else (moved * places[number][1]).sum(axis=1, keepdims=True)
         way = values[min(number + 1, _GRID - 1)] - values[max(number - 1, 0)]
-        levers.append(np.linalg.norm(along, axis=1).sum() / way)
-    return values, np.array(levers)
+        levers.append(float(np.linalg.norm(along, axis=1).sum() / way))
+    return (float(low), float(high)), levers
 
 
 def put_at(model: Any, data: Any, drives: Iterable[int], share: float) -> None:

@@ -11,14 +11,14 @@ status reports a lost part. A finger of the 3-Finger locks where it met the part
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
-
-import numpy as np
+from typing import TYPE_CHECKING, Final
 
 from robotiq_async.values.enums import Finger, ObjectStatus
 
 if TYPE_CHECKING:
     from robotiq_async.values.model import Model
+
+    from .alone import Levers
 
 _ENDS: Final = {"finger": (0, 240), "scissor": (240, 15)}
 """Counts at the ends of a drive's range, of a 3-Finger: tools/description/kinematics.py has them from the
@@ -54,18 +54,18 @@ class MotorDrive:
     """
 
     def __init__(
-        self, model: Model, axis: Finger, index: int, levers: tuple[Any, Any], gains: tuple[float, float]
+        self, model: Model, axis: Finger, index: int, levers: Levers, gains: tuple[float, float]
     ) -> None:
         self.index = index
-        self._values, self._levers = levers
+        values, self._levers = levers
         self._gain, self._damping = gains
         self._forces = model.forces_n
         self._locks = model.has_modes
-        first, last = _counts_at_ends(model, axis, self._values)
+        first, last = _counts_at_ends(model, axis, values)
         self._ends = min(first, last), max(first, last)
-        low, high = float(self._values[0]), float(self._values[-1])
-        self._scale = (high - low) / (last - first)
-        self._zero = low - first * self._scale
+        self._low, self._high = values
+        self._scale = (self._high - self._low) / (last - first)
+        self._zero = self._low - first * self._scale
         self.position = float(model.stroke.open_reading)
         if axis is Finger.SCISSOR:
             self.position = (first + last) / 2
@@ -85,8 +85,7 @@ class MotorDrive:
     @property
     def share(self) -> float:
         """Its place between the ends of its actuator, 0..1."""
-        low, high = float(self._values[0]), float(self._values[-1])
-        return (self._zero + self._scale * self.position - low) / (high - low)
+        return (self._value(self.position) - self._low) / (self._high - self._low)
 
     @property
     def is_pressing(self) -> bool:
@@ -154,7 +153,12 @@ class MotorDrive:
         return self._zero + self._scale * counts
 
     def _lever(self) -> float:
-        return float(np.interp(self._value(self.position), self._values, self._levers))
+        """Straight between the places that were looked at, which are evenly apart."""
+        steps = len(self._levers) - 1
+        at = min(max(self.share, 0.0), 1.0) * steps
+        place = min(int(at), steps - 1)
+        before, after = self._levers[place : place + 2]
+        return before + (after - before) * (at - place)
 
     def _limit(self) -> float:
         """The force of the request, in the units of the actuator."""
@@ -208,9 +212,9 @@ class MotorDrive:
                 self._lock(presses=True)
 
 
-def _counts_at_ends(model: Model, axis: Finger, values: Any) -> tuple[int, int]:
+def _counts_at_ends(model: Model, axis: Finger, values: tuple[float, float]) -> tuple[int, int]:
     if model.has_modes:
         return _ENDS["scissor" if axis is Finger.SCISSOR else "finger"]
     open_first = model.stroke.open_reading, model.stroke.closed_reading
     # A Hand-E's joint grows as it opens.
-    return open_first if values[0] == 0 and values[-1] > 0.1 else open_first[::-1]
+    return open_first if values[0] == 0 and values[1] > 0.1 else open_first[::-1]

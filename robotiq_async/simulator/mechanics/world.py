@@ -53,6 +53,9 @@ class World:
             spec = in_own_world(text, scene.file)
         self._model: Any = spec.compile()
         self._data: Any = mujoco.MjData(self._model)
+        # Views of MuJoCo's own numbers: each look at an attribute makes one.
+        self._controls, self._lengths = self._data.ctrl, self._data.actuator_length
+        self._limits = self._model.actuator_forcerange
         is_ours = scene.file is None
         self._mount: int | None = self._model.actuator("mount").id if is_ours else None
         self._lifted = self._height = 0.0
@@ -95,15 +98,15 @@ class World:
         self._set_aside(self._is_taken or any(drive.clears for drive in drives))
         for drive in drives:
             index = drive.index
-            data.ctrl[index], limit = drive.command(self.step_s)
-            self._model.actuator_forcerange[index] = (-limit, limit)
+            self._controls[index], limit = drive.command(self.step_s)
+            self._limits[index] = (-limit, limit)
         if self._mount is not None:
             way = self._height - self._lifted
             self._lifted += min(max(way, -_LIFTING * self.step_s), _LIFTING * self.step_s)
-            data.ctrl[self._mount] = self._lifted
+            self._controls[self._mount] = self._lifted
         mujoco.mj_step(self._model, data)
         for drive in drives:
-            drive.see(float(data.actuator_length[drive.index]), self.step_s)
+            drive.see(float(self._lengths[drive.index]), self.step_s)
         fingers = [drive for axis, drive in self.drives.items() if axis is not Finger.SCISSOR]
         if self._hands and all(drive.outcome.is_contact for drive in fingers):
             self._let_go()
