@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import faulthandler
 import inspect
 import logging
 import os
@@ -17,6 +18,7 @@ from hypothesis import settings
 
 from robotiq_async import RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.patience import patience
 from tests.virtual import VirtualLoop
 
 # The suite tries the same examples every time; HYPOTHESIS_PROFILE=explore tries new ones, and more.
@@ -28,15 +30,38 @@ MADE_ONCE = ("test_replay.py", "test_guard.py", "test_access.py", "test_roles.py
 """Files with fixtures that take long and are made once for all of their tests: these stay together."""
 
 
-def pytest_configure() -> None:
+STDERR = pytest.StashKey[int]()
+"""The one of this process, while what a test writes is captured."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
     """A signal that is ignored here, under nohup or in the background, is heard by what the tests start.
 
     A program inherits what is ignored, and not what is handled.
     """
+    config.stash[STDERR] = os.dup(2)
     for name in ("SIGHUP", "SIGINT"):
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) is signal.SIG_IGN:
             signal.signal(number, lambda *_: None)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """In place of pytest's own limit, which knows nothing of the machine."""
+    end_if_it_hangs(item.config)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_call(item: pytest.Item) -> None:
+    end_if_it_hangs(item.config)
+
+
+def end_if_it_hangs(config: pytest.Config) -> None:
+    """Give what begins now its seconds, and more of them on a busy machine; 0 is no limit."""
+    limit = float(config.getini("faulthandler_timeout") or 0)
+    if limit:
+        faulthandler.dump_traceback_later(patience(limit), exit=True, file=config.stash[STDERR])
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -21,6 +21,8 @@ ACTIVATION: Final = Request(activate=True, axes=_OPEN).registers
 OPENING: Final = Request(activate=True, go=True, axes=_OPEN).registers
 _ACTIVATION_S: Final = 10.0
 """Simulated seconds that are more than enough for one."""
+_SPACING_S: Final = 1.0
+"""More than any gripper needs from one write to the next."""
 
 
 def active_gripper(speedup: float = 4.0, **options: Any) -> SimulatedGripper:
@@ -36,11 +38,14 @@ def active_gripper(speedup: float = 4.0, **options: Any) -> SimulatedGripper:
 
 
 async def activate_beforehand(gripper: SimulatedGripper) -> None:
-    """Leave a gripper active and open, as another client would; in a virtual loop that takes no time."""
+    """Leave a gripper active and open, as another client would; in a virtual loop that takes no time.
+
+    But bodies take some: every simulated second is 500 of their steps.
+    """
     axes = _OPEN[: len(gripper.model.axes)]
     for go in (False, True):
         gripper.write(0, Request(activate=True, go=go, axes=axes, model=gripper.model).registers)
-        await asyncio.sleep(_ACTIVATION_S)
+        await asyncio.sleep(max(_ACTIVATION_S / gripper.speedup, _SPACING_S))
 
 
 async def until(condition: Callable[[], bool], within: float = 20.0) -> None:
