@@ -35,11 +35,15 @@ STDERR = pytest.StashKey[int]()
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    config.stash[STDERR] = os.dup(2)
+    hear_ignored_signals()
+
+
+def hear_ignored_signals() -> None:
     """A signal that is ignored here, under nohup or in the background, is heard by what the tests start.
 
     A program inherits what is ignored, and not what is handled.
     """
-    config.stash[STDERR] = os.dup(2)
     for name in ("SIGHUP", "SIGINT"):
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) is signal.SIG_IGN:

@@ -45,7 +45,7 @@ def ignored() -> Iterator[None]:
 
 @pytest.mark.usefixtures("ignored")
 async def test_processes_started_by_tests_do_not_inherit_ignored_signals(shell: Shell) -> None:
-    conftest.pytest_configure()
+    conftest.hear_ignored_signals()
     process = await shell.python("-c", "import signal; print(*map(signal.getsignal, (1, 2)), sep='\\n')")
     first, second = (await shell.finish(process)).out.splitlines()
     assert (first, "default_int_handler" in second) == (str(signal.SIG_DFL), True)
