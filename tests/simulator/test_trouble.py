@@ -47,7 +47,7 @@ def troubles(draw: st.DrawFn) -> Trouble:
         value = draw(st.none() | st.integers(int(kind.low), int(kind.high)))
     elif kind.value is not None:
         value = draw(
-            st.none() | st.integers(0, int(1000 * kind.high)).map(lambda thousandths: thousandths / 1000)
+            st.none() | st.integers(int(1000 * kind.low), int(1000 * kind.high)).map(lambda each: each / 1000)
         )
     lasts = st.just(INF) | seconds(1, 86000)
     if kind.lasts == 0 or name not in CONDITIONS:

@@ -204,5 +204,5 @@ def _list_troubles() -> None:
     for name, kind in KINDS.items():
         usual = "" if kind.value is None else f" (VALUE: {kind.value:g} unless given)"
         lasts = "" if kind.lasts == 0 else "; lasts for ever unless a duration is given"
-        link = f"; {kind.link} only" if kind.link else "; Modbus only" if kind.is_modbus else ""
-        print(f"{name:19} {kind.meaning}{usual}{lasts}{link}")
+        links = "" if kind.link is None and not kind.is_modbus else f"; over {', '.join(kind.links)}"
+        print(f"{name:19} {kind.meaning}{usual}{lasts}{links}")

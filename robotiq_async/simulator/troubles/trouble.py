@@ -40,7 +40,7 @@ class Kind(NamedTuple):
         high: the greatest value.
         corruption: its change of a reply, if it has one.
         on: the requests whose replies it can be about.
-        link: the only kind of link it fits, if there is only one.
+        link: tcp for a trouble of connections, or of frames of Modbus TCP; rtu for one of frames of a line.
         habit: the habit of the gripper that it changes, if it does.
         is_modbus: whether it concerns functions, registers or checksums, which only Modbus has.
     """
@@ -67,6 +67,11 @@ class Kind(NamedTuple):
             is_about_frames = self.corruption is not None
             return self is not KINDS["strict-silence"] and (self.link != "tcp" or not is_about_frames)
         return self.link in (None, link)
+
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """The kinds of link that it can happen on."""
+        return tuple(link for link in get_args(Link) if self.fits(link))
 
     @property
     def can_hit_once(self) -> bool:

@@ -1,4 +1,4 @@
-"""The diagram of the states is the table; that what is generated is fresh is in test_pages.py."""
+"""The diagram of the states is the table; whether generated pages are fresh is tested in test_pages.py."""
 
 from __future__ import annotations
 
