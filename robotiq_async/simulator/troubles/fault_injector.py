@@ -11,8 +11,8 @@
 #               in any order, so those that last are applied again
 #   on habits   the gripper's own habits are kept from the first such trouble on, and restored at its end
 #
-# A trouble of new connections leaves those alone that exist. end() completes its work even when cancelled, and
-# run() ends every trouble of its plan however it is left.
+# A trouble of new connections leaves those alone that exist. end() completes its work even when cancelled,
+# and run() ends every trouble of its plan however it is left.
 
 from __future__ import annotations
 
