@@ -186,8 +186,11 @@ def parse_address(address: object) -> Address:
             raise ValueError(f"malformed address {address!r}: {error}; accepted: {FORMS}") from None
         return Address("rtu", device, line=line, model=model, stroke=stroke)
     if scheme in _SOCKETS:
-        if any(option.partition("=")[0] in LINE_OPTIONS for option in rest.partition("?")[2].split("&")):
-            what = "baud, parity and stopbits are options of a serial port; a serial server has its own"
+        if "?" in rest:  # model and stroke have been taken out
+            names = [option.partition("=")[0] for option in rest.partition("?")[2].split("&")]
+            what = f"no option {names[0]!r}; known are: {', '.join(GRIPPER_OPTIONS)}"
+            if not set(names).isdisjoint(LINE_OPTIONS):
+                what = "baud, parity and stopbits are options of a serial port; a serial server has its own"
             raise ValueError(f"malformed address {address!r}: {what}; accepted: {FORMS}")
         kind, usual_port = _SOCKETS[scheme]
         host, port = _host_and_port(rest, usual_port)

@@ -200,6 +200,7 @@ def test_a_character_has_ten_to_twelve_bits() -> None:
         ("rtu:///dev/ttyUSB0?baudrate=9600", "no option 'baudrate' of a serial port; did you mean baud?"),
         ("rtu://COM3?baudrate=9600&model=2f85", "did you mean baud?"),
         ("rtu:///dev/ttyUSB0?modle=2f85", "did you mean model?"),
+        ("tcp://host?modle=2f85", "no option 'modle'; known are: model, stroke"),
         (
             "rtu:///dev/ttyUSB0?x=1",
             "known are: model, stroke, baud, parity, stopbits",
