@@ -30,9 +30,7 @@ def agrees(model: Model, request: int, what: ObjectStatus, position: int, direct
     return model.has_reached(request, position)
 
 
-def drifts(
-    axis: Finger, base: Request, status: RobotiqStatus, arrived: Finger, doubtful: Finger = NO_AXES
-) -> bool:
+def drifts(axis: Finger, base: Request, status: RobotiqStatus, doubtful: Finger = NO_AXES) -> bool:
     """Whether an axis moves or is about to, so that a hold must ask for its present position.
 
     An axis in contact keeps its request, and with it its grip; so does one at rest where it was asked to be.
@@ -42,8 +40,6 @@ def drifts(
         axis: the axis.
         base: the image that acts, or is about to.
         status: the newest status.
-        arrived: the axes that have come to rest under their requests. Another axis at rest close to its
-            request may not have begun to move.
         doubtful: the axes that show rest, and may move because of an earlier request.
     """
     if not base.go:
@@ -52,6 +48,4 @@ def drifts(
     if axis in doubtful:
         return base.position(axis) != status.position(axis)
     what, position, request = status.finger_status(axis), status.position(axis), base.position(axis)
-    if what is ObjectStatus.AT_POSITION and axis not in arrived:
-        return request != position
     return what is ObjectStatus.IN_MOTION or not agrees(status.model, request, what, position, direction=0)

@@ -250,14 +250,12 @@ class Controller:
         releases = trigger is Trigger.ASK_RELEASE
         self._procedure, self._stop = Procedure(self._ledger, releases=releases), None
         self._requests.pending.hold_only(NO_AXES)
-        self._ledger.grips.forget()
         self._show(trigger)
 
     def _begin_reset(self, trigger: Trigger, error: RobotiqError) -> None:
         """Reset; ``error`` is what the callers get whose requests end with it."""
         self._fail_all(error)
         self._procedure, self._stop = None, Stop(StopLevel.RESET)
-        self._ledger.grips.forget()
         self._show(trigger)
 
     def _fail_all(self, error: RobotiqError) -> None:
@@ -559,7 +557,6 @@ class Controller:
             pending,
             status,
             gripping=ledger.grips.held(status, base) if pending.positions else NO_AXES,
-            arrived=ledger.resting,
             doubtful=ledger.doubtful(status) if pending.hold else NO_AXES,
         )
         if not pending.has_changes and gate(image, status) == base:

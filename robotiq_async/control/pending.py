@@ -132,7 +132,6 @@ def merged(
     status: RobotiqStatus,
     *,
     gripping: Finger = NO_AXES,
-    arrived: Finger,
     doubtful: Finger = NO_AXES,
 ) -> Request:
     """Merge pending changes into ``base``. Axes that they do not address keep their requests.
@@ -142,7 +141,6 @@ def merged(
         pending: what callers ask for.
         status: the newest status.
         gripping: the axes that were in contact when rGTO was last set.
-        arrived: the axes that have come to rest under their requests.
         doubtful: the axes that show rest and may move all the same.
     """
     if pending.positions and not base.go:
@@ -156,7 +154,7 @@ def merged(
     held = {
         axis: status.position(axis)
         for axis in status.model.axes
-        if axis in pending.hold and drifts(axis, base, status, arrived, doubtful)
+        if axis in pending.hold and drifts(axis, base, status, doubtful)
     }
     positions = held | pending.positions
     return replace(

@@ -134,7 +134,8 @@ class Grips:
     """The contacts when rGTO was last seen set: gDT shows none while it is clear. False while it is empty.
 
     What becomes of a grip at rGTO = 0 is unknown [conceivable]: an axis that has not moved since and is asked
-    to press on is taken to grip still.
+    to press on is taken to grip still. A reset and an activation end the grip: from then on the axis is asked
+    for where it is.
     """
 
     def __init__(self) -> None:
@@ -148,7 +149,7 @@ class Grips:
         self._contacts = {axis: (status.finger_status(axis), status.position(axis)) for axis in contacts}
 
     def forget(self, axes: Finger = Finger.ALL) -> None:
-        """Forget the grips of some axes, which are asked to move or let go."""
+        """Forget the grips of axes that are asked for another position, by us or by another client."""
         self._contacts = {axis: at for axis, at in self._contacts.items() if axis not in axes}
 
     def held(self, status: RobotiqStatus, base: Request) -> Finger:

@@ -210,13 +210,7 @@ class Keeping(Stop):
         if not ledger.is_certain:
             return None
         base = ledger.base
-        held = merged(
-            base,
-            Pending(hold=Finger.ALL),
-            status,
-            arrived=ledger.resting,
-            doubtful=ledger.doubtful(status),
-        )
+        held = merged(base, Pending(hold=Finger.ALL), status, doubtful=ledger.doubtful(status))
         return None if held == base else held
 
     def _trouble(self, ledger: Ledger, status: RobotiqStatus) -> str:

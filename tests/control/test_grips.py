@@ -92,6 +92,39 @@ def test_a_motion_that_was_halted_does_not_come_back_because_the_axis_had_grippe
     assert scan.positions()[A] == 150
 
 
+def test_a_grip_that_was_asked_for_again_and_halted_is_not_taken_up() -> None:
+    """The part may be gone by then, and the finger would close."""
+    scan = started(device_cycle=0.02)
+    scan.gripper.place_object(A, 150)
+    scan.moved(255, A)
+    scan.halted()
+    scan.command(A, position=255)
+    scan.step()
+    scan.gripper.device_cycle = 0  # both writes fall into one tick of the device
+    scan.halted()
+    scan.gripper.remove_object(A)
+    scan.moved(60, B)
+    scan.run(3)
+    assert scan.positions()[A] == 150
+
+
+def test_a_grip_by_the_request_of_another_client_is_not_taken_up(scan: Scan) -> None:
+    """It came in a fault, in which no contact is noted, and was halted before the fault had cleared."""
+    scan.gripper.place_object(A, 150)
+    scan.moved(255, A)
+    scan.gripper.inject_fault(Fault(0x0C), 1.0)
+    scan.run(0.1)
+    scan.gripper.write(0, scan.last_image.with_positions({A: 240}).registers)
+    scan.run(0.1)
+    assert scan.controller.foreign_commands == 1
+    scan.halted()
+    scan.gripper.remove_object(A)
+    scan.until(lambda: scan.state is State.RUNNING_IDLE)
+    scan.moved(60, B)
+    scan.run(3)
+    assert scan.positions()[A] == 150
+
+
 def test_after_another_clients_reset_and_activation_no_old_grip_closes_the_fingers() -> None:
     for link_is_down_meanwhile in (False, True):
         scan = started()

@@ -561,16 +561,6 @@ def test_a_grip_by_a_request_no_longer_in_force_does_not_count(later: History) -
     assert gripping(later) == B | S
 
 
-@pytest.mark.parametrize(("how", "left"), [("moved", B | S), ("adopted", NO_AXES)])
-def test_a_grip_ends(later: History, how: str, left: Finger) -> None:
-    later.update_rest(GRIP)
-    if how == "moved":
-        later.deliver(image(200), 9.0, A)
-    else:
-        later.adopt(GRIP)
-    assert gripping(later) == left
-
-
 def test_an_axis_has_arrived_when_it_was_seen_at_rest_under_what_it_was_asked_last(later: History) -> None:
     assert later.resting & Finger.ALL == Finger.ALL & ~later.unrested
     assert later.unrested == A | B | C | S
