@@ -269,12 +269,15 @@ class Session:
             RobotiqError: refused, or in vain.
         """
         ends = {} if failing is None else {**self._ends, **failing}
+        state: State | None = None
         with self._waiters.watching(states, ends) as reached:
             if ask is not None:
                 self.ask(ask)
             with anyio.move_on_after(timeout):
-                return await reached
-        raise StateTimeoutError(f"{what} within {timeout:g} s (now {self.machine.state.name})")
+                state = await reached
+        if state is None:
+            raise StateTimeoutError(f"{what} within {timeout:g} s (now {self.machine.state.name})")
+        return state
 
     async def activated(self, ask: Callable[[], None] | None = None) -> None:
         """Wait for the end of an activation. One that this hand began must not end in a fault.
