@@ -368,7 +368,7 @@ class Controller:
         elif condition in FOLLOWS:
             self._adopt_other_client(status)
         if self._ledger.match is None and condition not in FOLLOWS:
-            self._ledger.adopt(status)  # after a reset or a power cycle, no image from before it acts
+            self._ledger.adopt(status)  # after a reset or a power cycle no image from before acts [follows]
         return True
 
     def _advance_stop(self, stop: Stop, status: RobotiqStatus) -> None:
@@ -415,14 +415,15 @@ class Controller:
             requests.fail_motions(GripperFaultError(status.fault))
             if status.activation_echo:
                 # A command sent just before may not act yet, and its motion would begin when the fault
-                # clears. Which axes need the hold is decided when it is written.
+                # clears [manual: a minor one clears by itself]. Which axes need the hold is decided when it
+                # is written.
                 requests.hold(ledger.ours, "the fingers are held")
         elif before in FOLLOWS and condition is Trigger.SEEN_RELEASED:
             self._fail_all(GripperFaultError(status.fault))
         elif before in FOLLOWS and condition is not Trigger.SEEN_READY:
             self._fail_all(NotActivatedError("the gripper lost its activation"))
         elif condition in FOLLOWS and before not in FOLLOWS:
-            # Others have reset and activated it, even if its image is equal to one of ours.
+            # Others have reset and activated it, even if its image is equal to one of ours [follows].
             ledger.adopt(status, is_found=True)
         elif ledger.match is None and condition in FOLLOWS:
             self._adopt_other_client(status)

@@ -11,8 +11,9 @@ No I/O and no clock: time is that of the newest status.
 # * acknowledged: it acts within a device cycle. The newest such entry is what the gripper has, or is about to
 #   have: the base of the next image.
 # * shown: a status has repeated its echo. A slow gripper may show an older one again, or skip one [follows].
-# * doubtful: the link went down before the acknowledgement, or another client's image showed first. It may
-#   act, and is not the base. If it shows, it is certain again, and so is what was acknowledged after it.
+# * doubtful: the link went down before the acknowledgement, or another client's image showed first
+#   [follows]. It may act, and is not the base. If it shows, it is certain again, and so is what was
+#   acknowledged after it.
 #
 # A status that shows no entry of the last half second shows another client's image, or a power cycle: that
 # gets an entry of its own, before those that may still act. An entry that was replaced longer ago cannot show
@@ -214,7 +215,7 @@ class Ledger:
     def _note_asked(self, entry: Entry) -> None:
         image, before = entry.image, entry.before
         for axis, old, new in zip(image.model.axes, before.axes, image.axes, strict=True):
-            # More force lets an axis in contact try again; one that moves keeps moving.
+            # More force lets an axis in contact try again [conceivable]; one that moves keeps moving.
             pressed = new.force > old.force
             is_new = image.go is not before.go or new.position != old.position
             if is_new or (pressed and not axis & self.unrested):
@@ -338,7 +339,7 @@ class Ledger:
     def _revive(self, entry: Entry) -> None:
         """An entry in doubt acts after all, and so will those that were acknowledged after it.
 
-        Images act in their order. What these ask is compared with the image that showed until now.
+        Images act in their order [follows]. What these ask is compared with the image that showed until now.
         """
         self._freeze(self.base)
         before = self.shown.image
@@ -409,7 +410,7 @@ class Ledger:
 
         Returns:
             Whether the status shows that image. If not, another client has written since. rATR has no
-            echo, so an image with rATR counts as not shown by a gripper that follows requests.
+            echo [manual], so an image with rATR counts as not shown by a gripper that follows requests.
         """
         image, time = self.base, self.now.time
         self._adoption = None
@@ -462,7 +463,7 @@ class Ledger:
                 self._unproven &= ~axis
 
     def _note_start(self, axis: Finger) -> None:
-        """An axis at rest moves only for a new request: from here on every status is from after it."""
+        """An axis at rest moves only for a new request: every later status is from after it [follows]."""
         self._may_start &= ~axis
         for each in chain(reversed(self._entries), reversed(self._past)):
             if each.rested & axis:

@@ -65,6 +65,7 @@ def activation(image: Image) -> Steps:
         NotActivatedError: the gripper was reset after the activation had begun, or does not show it.
     """
     status = yield None
+    # Only a rising rACT activates [manual]: there is none unless the gripper is reset.
     if classify(status) is not Trigger.SEEN_RESET:
         return
     status = yield replace(image(status), activate=True)
@@ -73,7 +74,7 @@ def activation(image: Image) -> Steps:
         if status.fault.severity is Severity.MAJOR:
             raise GripperFaultError(status.fault)
         # The first statuses may be from before the write: until the activation shows, a reset counts only if
-        # it lasts. The gripper may have forgotten the write, or another client may have taken it back.
+        # it lasts [follows]. The gripper may have forgotten the write, or another client have taken it back.
         is_sure = begun or status.timestamp - asked > WINDOW_S
         if is_sure and classify(status) is Trigger.SEEN_RESET:
             why = "was reset while it activated" if begun else "does not show the activation"
@@ -98,8 +99,8 @@ def automatic_release(image: Image) -> Steps:
     status = yield replace(image(status), activate=True, release=True)
     while status.fault is not Fault.AUTOMATIC_RELEASE_DONE:
         begun = begun or status.fault is Fault.AUTOMATIC_RELEASE
-        # gIMC is 0 during a release. Until the release shows, a status may be from before the write, and its
-        # fault from before the release.
+        # gIMC is 0 during a release [manual]. Until the release shows, a status may be from before the write,
+        # and its fault from before the release [follows].
         still_releases = status.is_reset or status.fault is Fault.AUTOMATIC_RELEASE
         is_sure = begun or (status.timestamp - asked > WINDOW_S and not status.fault.is_serious)
         if classify(status) is Trigger.SEEN_RESET or (is_sure and not still_releases):

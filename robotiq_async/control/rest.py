@@ -102,7 +102,8 @@ def is_doubtful(asked: Iterable[Asked], model: Model, what: ObjectStatus, positi
     """Whether an axis may move, or be about to, although it shows rest.
 
     A contact is doubted only if a request within the lag contradicts it: a needless doubt would cost the
-    grip. An axis close to the request before the last may have some counts to go. ``asked`` as above.
+    grip. An axis close to the request before the last may have some counts to go [conceivable].
+    ``asked`` as above.
     """
     last, *before = [*asked] or [Asked(None)]
     if not before or what is ObjectStatus.IN_MOTION:
