@@ -138,22 +138,13 @@ class Ledger:
         age = self.now.time - entry.time
         if age >= WINDOW_S:
             return True
-        # As long as the entries between have the same echo, no status shows which of them acts. Equal
+        # As long as those before it that wait have the same echo, no status shows which of them acts. Equal
         # images act at once; a speed or a force may take SILENT_S.
-        for each in chain(self._between(entry), (self.shown,)):
-            if each.echo != entry.echo:
-                return False
-            if age < SILENT_S and each.image != entry.image:
-                return False
-        return True
-
-    def _between(self, entry: Entry) -> Iterator[Entry]:
-        """The entries after the one that shows and before another, the newest first."""
-        for each in reversed(self._entries):
-            if each.number <= self.shown.number:
-                return
-            if each.number < entry.number:
-                yield each
+        return not any(
+            each.echo != entry.echo or (age < SILENT_S and each.image != entry.image)
+            for each in (self.shown, *self._waiting())
+            if each.number < entry.number
+        )
 
     @property
     def may_set_go(self) -> bool:
