@@ -9,7 +9,7 @@ import pytest
 from robotiq_async import ConnectionLostError, Finger, State
 from robotiq_async.control.pending import Command
 from robotiq_async.values.request import AxisRequest, Request
-from tests.control.other_client import activated_by_another
+from tests.control.other_client import activated_by_another, image
 from tests.control.scan import POLL_S, Scan, started
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
@@ -283,3 +283,18 @@ def test_a_move_that_was_given_up_after_its_error_was_seen_goes_on(scan: Scan) -
     scan.come_back(0.05)
     scan.run(10)
     assert scan.positions()[A] >= 198
+
+
+def test_an_adopted_axis_gets_the_time_to_show_its_direction_once_more() -> None:
+    """Under simple control B follows A, and its own echo points the other way."""
+    scan = activated_by_another()
+    scan.gripper.write(0, image({A: 255, B: 0, C: 0, S: 137}, individual=False, speed=0))
+    scan.now += 1.0
+    scan.connect(activate=False)
+    scan.run(0.5)
+    scan.blink()
+    scan.command(S, position=100)
+    scan.run(1.0)
+    assert scan.last_image.position(B) == 255
+    scan.until(lambda: not scan.controller.is_moving)
+    assert scan.positions()[B] >= 240
