@@ -101,6 +101,17 @@ def test_another_client_is_counted_and_its_requests_are_taken_over(scan: Scan) -
     }
 
 
+def test_another_client_that_keeps_commanding_is_warned_of_once_a_second(
+    scan: Scan, caplog: pytest.LogCaptureFixture
+) -> None:
+    scan.run(1.0)
+    for position in range(100, 125):
+        scan.gripper.write(0, image({A: position}))
+        scan.run(0.1)
+    assert scan.controller.foreign_commands == 25
+    assert caplog.text.count("another client commands the gripper") == 3
+
+
 def test_a_move_that_another_client_takes_over_is_superseded(scan: Scan) -> None:
     _, taken = scan.move(255, A)
     scan.run(0.3)
