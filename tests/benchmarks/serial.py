@@ -182,12 +182,14 @@ async def followed(hand: RobotiqHand, seconds: float, pause: Callable[[], float]
                     took.append(item.timestamp - when)
                     del pending[target]
 
-    remove, ends, target = hand.add_listener(see), time.monotonic() + seconds, 0
+    remove, due, target = hand.add_listener(see), time.monotonic(), 0
+    ends = due + seconds
     while time.monotonic() < ends:
         target = (target + 1) % 200
         pending[target] = time.monotonic()
         hand.command(axis, position=target)
-        await asyncio.sleep(pause())
+        due += pause()
+        await asyncio.sleep(max(0.0, due - time.monotonic()))
     remove()
     return sorted(took)
 
