@@ -23,6 +23,7 @@ from ..runtime.signals import ending_signals
 from ..session.options import LATE_POLLS
 from ..values.errors import RobotiqError
 from .app import build
+from .commands.ports import with_ports
 from .failures import CommandError, UsageError
 from .output.messages import forget, forwarded_warnings, tell
 
@@ -76,7 +77,9 @@ def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | No
         sys.stdout.flush()
     except (CycloptsError, UsageError) as error:
         return WRONG_USAGE, str(error)
-    except (RobotiqError, CommandError) as error:
+    except RobotiqError as error:
+        return FAILURE, with_ports(error)
+    except CommandError as error:
         return FAILURE, str(error)
     except BrokenPipeError:
         # The reader has closed the pipe (status | head); the flush at exit must not fail.

@@ -315,6 +315,17 @@ def test_ports_are_listed_as_addresses(call: Call, monkeypatch: pytest.MonkeyPat
     assert outcome.out.splitlines() == ["rtu:///dev/ttyS0", "rtu:///dev/ttyUSB1  FT232R USB UART"]
 
 
+@pytest.mark.parametrize("command", ["status", "monitor", "web"])
+def test_the_error_for_a_missing_port_names_those_that_there_are(
+    call: Call, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    ports = listed(("COM7", "USB Serial Port"), ("COM3", "n/a"))
+    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: ports)
+    outcome = call(command, "rtu:///dev/ttyNOWHERE?model=2f85")
+    assert outcome.code == 1
+    assert "there is no such device; is it plugged in? These are: COM3, COM7" in outcome.err
+
+
 def test_a_machine_without_ports(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("serial.tools.list_ports.comports", list)
     outcome = call("ports")

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-from ...link.serial_ports import names_of_adapters
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from ...link.serial_ports import MISSING, names_of_adapters
 from ...runtime.log import printable
+from ...values.errors import RobotiqError
 from ..arguments import need
 from ..failures import CommandError
+
+if TYPE_CHECKING:
+    from serial.tools.list_ports_common import ListPortInfo
 
 
 def ports() -> None:
@@ -20,9 +27,7 @@ def ports() -> None:
         robotiq-async doctor "rtu:///dev/ttyUSB0?model=2f85"
     """
     need("serial", "serial")
-    from serial.tools import list_ports
-
-    found = sorted(list_ports.comports(), key=lambda port: port.device)
+    found = _found()
     if not found:
         raise CommandError("this machine has no serial port: is the adapter plugged in?")
     steady = names_of_adapters()
@@ -32,3 +37,20 @@ def ports() -> None:
         print(f"rtu://{port.device:<{width}}  {printable(what)}".rstrip())
         if port.device in steady:
             print(f"rtu://{steady[port.device]}")
+
+
+def with_ports(error: RobotiqError) -> str:
+    """The message of an error; if a serial port is missing, those that there are belong to it."""
+    message = str(error)
+    if not message.endswith(MISSING):  # it is about something else, or names the adapters
+        return message
+    with suppress(ImportError, OSError):
+        if found := _found():
+            return f"{message} These are: {', '.join(port.device for port in found)}"
+    return message
+
+
+def _found() -> list[ListPortInfo]:
+    from serial.tools import list_ports
+
+    return sorted(list_ports.comports(), key=lambda port: port.device)
