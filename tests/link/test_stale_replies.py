@@ -76,29 +76,19 @@ class Liar:
         return struct.pack(f">{count}H", *[self.numbers[unit]] * count)
 
 
-class SerialLiar(Liar):
-    """A liar at the far end of a line."""
+class RtuLiar(Liar):
+    """A liar with the frames of a serial line."""
 
     def __init__(self, seed: int) -> None:
         super().__init__(seed)
-        self._port: Any = serial.serial_for_url(VirtualLine.FAR)
         self._inbox = b""
-        self._loop.add_reader(self._port.fileno(), self._ready)
-
-    def close(self) -> None:
-        self._loop.remove_reader(self._port.fileno())
-        self._port.close()
-
-    def send(self, data: bytes) -> None:
-        with contextlib.suppress(ValueError, OSError):  # the end of the test
-            self._port.write(data)
 
     def damage(self, reply: bytes) -> bytes:
         at = self.chance.randrange(len(reply))
         return reply[:at] + bytes((reply[at] ^ 1 << self.chance.randrange(8),)) + reply[at + 1 :]
 
-    def _ready(self) -> None:
-        self._inbox += self._port.read(4096)
+    def hear(self, data: bytes) -> None:
+        self._inbox += data
         while len(self._inbox) >= 8:
             size = request_size(self._inbox)
             if len(self._inbox) < size:
@@ -110,6 +100,44 @@ class SerialLiar(Liar):
                 self.answer(with_crc(request[:6]))
             else:
                 self.answer(with_crc(bytes((unit, function, 2 * count)) + self.registers(unit, count)))
+
+
+class SerialLiar(RtuLiar):
+    """At the far end of a line."""
+
+    def __init__(self, seed: int) -> None:
+        super().__init__(seed)
+        self._port: Any = serial.serial_for_url(VirtualLine.FAR)
+        self._loop.add_reader(self._port.fileno(), self._ready)
+
+    def close(self) -> None:
+        self._loop.remove_reader(self._port.fileno())
+        self._port.close()
+
+    def send(self, data: bytes) -> None:
+        with contextlib.suppress(ValueError, OSError):  # the end of the test
+            self._port.write(data)
+
+    def _ready(self) -> None:
+        self.hear(self._port.read(4096))
+
+
+class ServerLiar(RtuLiar, asyncio.Protocol):
+    """A serial server; it answers the connection that is there when the answer comes."""
+
+    def __init__(self, seed: int) -> None:
+        super().__init__(seed)
+        self._transport: Any = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._transport, self._inbox = transport, b""
+
+    def send(self, data: bytes) -> None:
+        if self._transport is not None:
+            self._transport.write(data)
+
+    def data_received(self, data: bytes) -> None:
+        self.hear(data)
 
 
 class TcpLiar(Liar, asyncio.Protocol):
@@ -193,10 +221,18 @@ async def test_a_shared_serial_line(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 async def test_modbus_tcp() -> None:
-    liar = TcpLiar(3)
+    await behind_a_socket(TcpLiar(3), "tcp", TCP_REGISTERS)
+
+
+@pytest.mark.parametrize("registers", [RTU_REGISTERS, TWO_FINGER_85.rtu], ids=["16", "23"])
+async def test_a_serial_server(registers: RegisterMap) -> None:
+    await behind_a_socket(ServerLiar(4), "rtu+tcp", registers)
+
+
+async def behind_a_socket(liar: TcpLiar | ServerLiar, scheme: str, registers: RegisterMap) -> None:
     server = await asyncio.get_running_loop().create_server(lambda: liar, "127.0.0.1", 0)
-    address = parse_address(f"tcp://127.0.0.1:{server.sockets[0].getsockname()[1]}")
-    transport = ModbusTransport(address, TCP_REGISTERS, connect_timeout=1.0, response_timeout=RESPONSE_S)
-    await exchange_at_random(transport, TCP_REGISTERS.device_id, liar, REPLIES)
+    address = parse_address(f"{scheme}://127.0.0.1:{server.sockets[0].getsockname()[1]}")
+    transport = ModbusTransport(address, registers, connect_timeout=1.0, response_timeout=RESPONSE_S)
+    await exchange_at_random(transport, registers.device_id, liar, REPLIES)
     server.close()
     await asyncio.sleep(1)
