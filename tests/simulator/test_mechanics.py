@@ -358,6 +358,22 @@ def test_the_gripper_is_mounted_in_a_world_of_ones_own(tmp_path: Path) -> None:
     assert bench.physics.opening_mm == pytest.approx(40, abs=4)
 
 
+def test_a_part_of_several_bodies_is_out_of_the_way_as_a_whole(tmp_path: Path) -> None:
+    file = tmp_path / "cell.xml"
+    geom = '<geom type="cylinder" size="0.02 0.03" mass="0.1"/>'
+    dumbbell = f'<geom size="0.01" pos="0 0.1 0" mass="0.1"/><body>{geom}</body>'
+    file.write_text(OWN.replace(geom, dumbbell), encoding="utf-8")
+    bench, farthest = Bench(str(file)), 0
+    bench.ask(0, go=False)
+    while not bench.status.is_activated:
+        bench.run(POLL_S)
+        farthest = max(farthest, bench.status.position(JAW))
+        assert bench.now < 10, "it ends"
+    assert farthest == 228, "an activation closes the fingers on nothing"
+    bench.move(255)
+    assert bench.status.finger_status(JAW) is ObjectStatus.CONTACT_CLOSING
+
+
 def test_a_world_that_is_none_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "cell.xml"
     with pytest.raises(ValueError, match="there is no file"):

@@ -25,8 +25,8 @@ ROBOT = """
   <geom type="box" size="0.05 0.05 0.19" pos="-0.15 0 -0.2"/>
   <site name="gripper" pos="0 0 0.02"/></body>
  <body name="hammer" pos="1 0 0.1"><freejoint/><geom type="box" size="0.01 0.02 0.03"/>
-  <geom type="cylinder" size="0.01 0.04" pos="0 0 0.07"/>
-  <geom type="capsule" size="0.01 0.02" pos="0 0 0.2"/></body>
+  <body pos="0 0 0.07"><joint type="hinge" axis="0 1 0" stiffness="100" damping="1"/>
+   <geom type="cylinder" size="0.01 0.04"/><geom type="capsule" size="0.01 0.02" pos="0 0 0.1"/></body></body>
 </worldbody></mujoco>
 """
 

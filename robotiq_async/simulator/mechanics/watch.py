@@ -6,7 +6,7 @@ of it, later and elsewhere, what others understand.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 import mujoco
@@ -35,17 +35,13 @@ class Look(NamedTuple):
 class Watch:
     """Knows which numbers of a world are those of the gripper and of the parts."""
 
-    def __init__(self, model: Any, parts: Collection[int]) -> None:
-        """``parts`` are the bodies that are parts, with all that hangs on them."""
+    def __init__(self, model: Any, parts: Sequence[int]) -> None:
+        """``parts`` are the geoms of all parts."""
         joints = [number for number in range(model.njnt) if model.joint(number).name.startswith(OURS)]
         self._names = [model.joint(number).name.removeprefix(OURS) for number in joints]
         self._at = [int(model.jnt_qposadr[number]) for number in joints]
         self._root = root_of(model)
-        self._geoms = [
-            geom
-            for geom in range(model.ngeom)
-            if model.body_rootid[model.geom_bodyid[geom]] in parts and int(model.geom_type[geom]) in _KINDS
-        ]
+        self._geoms = [geom for geom in parts if int(model.geom_type[geom]) in _KINDS]
         self._shapes = [_shape(model, geom) for geom in self._geoms]
 
     def look(self, data: Any, *, is_aside: bool) -> Look:

@@ -76,7 +76,13 @@ class World:
             if self._model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
             and self._model.jnt_bodyid[joint] != base
         ]
-        self._watch = Watch(self._model, {int(self._model.jnt_bodyid[joint]) for joint in self._parts})
+        bodies = {int(self._model.jnt_bodyid[joint]) for joint in self._parts}
+        self._part_geoms = [
+            geom
+            for geom in range(self._model.ngeom)
+            if self._model.body_rootid[self._model.geom_bodyid[geom]] in bodies
+        ]
+        self._watch = Watch(self._model, self._part_geoms)
         self._sleeps = is_ours and not self._parts
         """Whether nothing moves while the motors rest: no part, and not a user's world."""
         self._collides = self._model.geom_contype.copy(), self._model.geom_conaffinity.copy()
@@ -175,12 +181,9 @@ class World:
         if aside != self._is_aside:
             self._is_aside = aside
             contype, conaffinity = self._collides
-            for joint in self._parts:
-                body = self._model.jnt_bodyid[joint]
-                first = self._model.body_geomadr[body]
-                geoms = slice(first, first + self._model.body_geomnum[body])
-                self._model.geom_contype[geoms] = 0 if aside else contype[geoms]
-                self._model.geom_conaffinity[geoms] = 0 if aside else conaffinity[geoms]
+            geoms = self._part_geoms
+            self._model.geom_contype[geoms] = 0 if aside else contype[geoms]
+            self._model.geom_conaffinity[geoms] = 0 if aside else conaffinity[geoms]
             if not aside:
                 self._put()
         if aside:
