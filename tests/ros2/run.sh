@@ -48,5 +48,5 @@ for distro in "$@"; do
     .venv-ros2/"$distro"/bin/python -m pytest -p tests.ros2.live.fixtures --numprocesses 3 --dist loadfile \
         ${TESTS:-tests/ros2/live/goals.py tests/ros2/live/lifecycle.py tests/ros2/live/topics.py \
         tests/ros2/live/failures.py tests/ros2/live/bridge.py tests/ros2/live/messages.py \
-        tests/ros2/live/installed.py tests/ros2/live/other_host.py}
+        tests/ros2/live/installed.py tests/ros2/live/other_host.py tests/ros2/live/description.py}
 done
