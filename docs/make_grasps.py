@@ -1,16 +1,15 @@
-"""Ten parts in each simulated gripper: the figures of docs/how-to/physics.md, and the pictures. A minute.
+"""Each simulated gripper open, closed and around parts: the table of docs/how-to/physics.md, and pictures.
 
     MUJOCO_GL=egl python docs/make_grasps.py
 
-Needs the extra physics, Pillow, and Debian's libegl1 or libosmesa6. Made by hand when the bodies have
-changed, and looked at.
+It takes a minute. Needs the extra physics, Pillow, and Debian's libegl1 or libosmesa6. Made by hand when the
+bodies have changed, and looked at.
 """
 
 from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,10 +22,11 @@ if __name__ == "__main__":
 
 from robotiq_async import RobotiqStatus  # noqa: E402
 from robotiq_async.simulator import Physics, SimulatedGripper  # noqa: E402
+from robotiq_async.tools.description import hand_model  # noqa: E402
 from robotiq_async.values.enums import Finger  # noqa: E402
 from robotiq_async.values.model import MODELS, THREE_FINGER, Model  # noqa: E402
 
-PICTURE: Final = ROOT / "docs" / "measured" / "grasps.webp"
+PICTURES: Final = ROOT / "docs" / "measured"
 PARTS: Final = (
     ("box:30x40x50,0.2", "box"),
     ("box:45x60x40,0.4", "wide box"),
@@ -43,67 +43,109 @@ FORCE: Final = 128
 LIFT_MM: Final = 60.0
 HEIGHT_3F: Final = 155
 THIN_MM: Final = 50
-SIZE: Final = 150
+SIZE: Final = 180
+BACKGROUND: Final = (226, 230, 236)
+AROUND: Final = {"3f": "rod:60x140,0.3@105"}
+"""What a gripper is shown around, if not the can."""
+CAN: Final = "cylinder:45x60,0.2"
 POLL_S: Final = 0.005
 
 
 def main() -> None:
     """All of them."""
-    sheet = Image.new("RGB", (SIZE * len(PARTS), SIZE * len(MODELS)))
+    sheet = Image.new("RGB", (SIZE * len(PARTS), SIZE * len(MODELS)), BACKGROUND)
     print(f"| | {' | '.join(f'{name} `{scene}`' for scene, name in PARTS)} |")
     print(f"|{' -- |' * (len(PARTS) + 1)}")
     for row, model in enumerate(MODELS.values()):
         cells = []
         for column, (scene, _) in enumerate(PARTS):
-            said, picture = grasp(model, scene)
+            said, shown = grasp(model, scene)
             cells.append(said)
-            if picture is not None:
-                sheet.paste(picture, (column * SIZE, row * SIZE))
+            if shown is not None:
+                sheet.paste(shown, (column * SIZE, row * SIZE))
         print(f"| {model.title} | {' | '.join(cells)} |", flush=True)
-    sheet.save(PICTURE, quality=80)
+    sheet.save(PICTURES / "grasps.webp", quality=80)
+    ends()
+
+
+def ends() -> None:
+    """Each gripper open, closed on nothing, and around a part."""
+    size = 2 * SIZE
+    sheet = Image.new("RGB", (size * len(MODELS), size * 3), BACKGROUND)
+    for column, model in enumerate(MODELS.values()):
+        for row, (scene, position) in enumerate((("table", 0), ("table", 255), (_around(model), 255))):
+            stage = Stage(model, scene)
+            stage.move(position)
+            sheet.paste(stage.picture(size), (column * size, row * size))
+    sheet.save(PICTURES / "bodies.webp", quality=80)
+
+
+def _around(model: Model) -> str:
+    return AROUND.get(model.name, CAN)
+
+
+class Stage:
+    """A gripper that is active, its world and the clock of both."""
+
+    def __init__(self, model: Model, scene: str, pinch: int = 0) -> None:
+        self.model, self.physics = model, Physics(scene)
+        self._now = 0.0
+        self._mode = pinch
+        self._gripper = SimulatedGripper(lambda: self._now, model=model, physics=self.physics)
+        self._gripper.write(0, [0x0100 | pinch, 0, 0])
+        self.wait(6)
+
+    def wait(self, seconds: float) -> RobotiqStatus:
+        """Let time pass; the last status."""
+        for _ in range(round(seconds / POLL_S)):
+            self._now += POLL_S
+            registers = self._gripper.status_registers()
+        return RobotiqStatus.from_registers(registers, model=self.model)
+
+    def move(self, position: int) -> RobotiqStatus:
+        """Go there at half of the speed, and rest."""
+        self._gripper.write(0, [0x0900 | self._mode, position, 128 << 8 | FORCE])
+        return self.wait(6)
+
+    def picture(self, size: int) -> Image.Image:
+        """Seen from the side, a little from above."""
+        world: Any = self.physics._world  # noqa: SLF001
+        model, data = world._model, world._data  # noqa: SLF001
+        palm = data.body(f"gripper/{hand_model(self.model).root}").xpos
+        camera = mujoco.MjvCamera()
+        camera.lookat, camera.distance = [0, 0, palm[2] - 0.095], 0.42
+        camera.azimuth, camera.elevation = 110, -15
+        with mujoco.Renderer(model, size, size) as renderer:
+            renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
+            renderer.update_scene(data, camera)
+            shown = renderer.render().copy()
+            renderer.enable_segmentation_rendering()
+            renderer.update_scene(data, camera)
+            seen, table = renderer.render()[..., 0], model.geom("table").id
+        shown[(seen < 0) | (seen == table)] = BACKGROUND
+        return Image.fromarray(shown)
 
 
 def grasp(model: Model, scene: str) -> tuple[str, Image.Image | None]:
     """Grip a part and lift it: what became of it in words, and a picture."""
     # The tips of a 3-Finger rise by 40 mm as they close, and would pass above low parts: somebody holds them.
-    now, physics = [0.0], Physics(f"{scene}@{HEIGHT_3F}" if model is THREE_FINGER else scene)
-    try:
-        gripper = SimulatedGripper(lambda: now[0], model=model, physics=physics)
-    except ValueError:
-        return "no room", None
-
-    def statuses(seconds: float) -> Iterator[RobotiqStatus]:
-        for _ in range(round(seconds / POLL_S)):
-            now[0] += POLL_S
-            yield RobotiqStatus.from_registers(gripper.status_registers(), model=model)
-
     # Between the basic fingers of a 3-Finger what is thin finds no opposite: it is pinched.
     pinch = 0x0200 if model is THREE_FINGER and float(re.findall(r"[0-9]+", scene)[0]) < THIN_MM else 0
-    gripper.write(0, [0x0100 | pinch, 0, 0])
-    list(statuses(6))
-    gripper.write(0, [0x0900 | pinch, 255, 128 << 8 | FORCE])
-    *_, status = statuses(6)
-    before, opening, position = physics.part, physics.opening_mm, status.position(Finger.A)
-    physics.lift(LIFT_MM)
-    list(statuses(2))
-    after = physics.part
+    try:
+        stage = Stage(model, f"{scene}@{HEIGHT_3F}" if model is THREE_FINGER else scene, pinch)
+    except ValueError:
+        return "no room", None
+    status = stage.move(255)
+    before, opening, position = stage.physics.part, stage.physics.opening_mm, status.position(Finger.A)
+    stage.physics.lift(LIFT_MM)
+    stage.wait(2)
+    after = stage.physics.part
     assert before is not None
     assert after is not None
     is_held = after[2] - before[2] > 0.8 * LIFT_MM
     width = f", {opening:.0f} mm" if len(model.axes) == 1 else ""
     words = "held" if is_held else "slips" if status.contacts else "not met"
-    return f"{words}, {position}{width}", picture(physics)
-
-
-def picture(physics: Physics) -> Image.Image:
-    world: Any = physics._world  # noqa: SLF001
-    camera = mujoco.MjvCamera()
-    camera.lookat, camera.distance = [0, 0, 0.16], 0.5
-    camera.azimuth, camera.elevation = 110, -15
-    with mujoco.Renderer(world._model, SIZE, SIZE) as renderer:  # noqa: SLF001
-        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
-        renderer.update_scene(world._data, camera)  # noqa: SLF001
-        return Image.fromarray(renderer.render())
+    return f"{words}, {position}{width}", stage.picture(SIZE)
 
 
 if __name__ == "__main__":
