@@ -66,6 +66,37 @@ def main() -> None:
         print(f"| {model.title} | {' | '.join(cells)} |", flush=True)
     sheet.save(PICTURES / "grasps.webp", quality=80)
     ends()
+    print("\n| | speed 0 | speed 255 | force 0 | force 128 | force 255 |")
+    print(f"|{' -- |' * 6}")
+    for model in MODELS.values():
+        if len(model.axes) == 1:
+            said = [*speeds(model), *forces(model)]
+            print(f"| {model.title} | {' | '.join(f'{found:.0f} ({table:.0f})' for found, table in said)} |")
+
+
+def speeds(jaw: Model) -> list[tuple[float, float]]:
+    """Of the opening in mm/s, at the lowest and the highest speed, and what the manual has."""
+    found = []
+    for value, nominal in zip((0, 255), jaw.speeds_mm_s, strict=True):
+        stage, curve = Stage(jaw, "table"), []
+        stage.ask(255, speed=value, force=255)
+        while stage.physics.opening_mm > 0.2 * jaw.stroke.mm:
+            stage.wait(POLL_S)
+            curve.append(stage.physics.opening_mm)
+        middle = [each for each in curve if each < 0.8 * jaw.stroke.mm]
+        found.append(((middle[0] - middle[-1]) / (len(middle) - 1) / POLL_S, nominal))
+    return found
+
+
+def forces(jaw: Model) -> list[tuple[float, float]]:
+    """Of a pad on a box in newtons, at three forces, and what lies evenly between those of the manual."""
+    found, (least, most) = [], jaw.forces_n
+    for value in (0, 128, 255):
+        stage = Stage(jaw, PARTS[0][0])
+        stage.ask(255, speed=0, force=value)
+        stage.wait(6)
+        found.append((stage.physics.grip_force, least + (most - least) * value / 255))
+    return found
 
 
 def ends() -> None:
@@ -104,8 +135,12 @@ class Stage:
 
     def move(self, position: int) -> RobotiqStatus:
         """Go there at half of the speed, and rest."""
-        self._gripper.write(0, [0x0900 | self._mode, position, 128 << 8 | FORCE])
+        self.ask(position, speed=128, force=FORCE)
         return self.wait(6)
+
+    def ask(self, position: int, *, speed: int, force: int) -> None:
+        """Send it there."""
+        self._gripper.write(0, [0x0900 | self._mode, position, speed << 8 | force])
 
     def picture(self, size: int) -> Image.Image:
         """Seen from the side, a little from above."""
