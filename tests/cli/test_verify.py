@@ -161,17 +161,13 @@ async def test_a_key_that_answers_no_question_is_refused(tmp_path: Path) -> None
 
 KEYS: dict[str, tuple[int, Callable[[Terminal], object]]] = {
     "space": (1, lambda terminal: terminal.press(" ")),
-    "Enter": (1, lambda terminal: terminal.press("\n")),
     "Ctrl-Z": (1, lambda terminal: terminal.press("\x1a")),
-    "Ctrl-backslash": (1, lambda terminal: terminal.press("\x1c")),
     "Ctrl-S": (1, lambda terminal: terminal.press("\x13")),
-    "Ctrl-D": (1, lambda terminal: terminal.press("\x04")),
-    "Ctrl-C": (130, lambda terminal: terminal.press("\x03")),
     "Ctrl-C, again and again": (130, lambda terminal: terminal.press("\x03" * 5)),
     "SIGTERM": (143, lambda terminal: terminal.kill(signal.SIGTERM)),
     "closed": (129, lambda terminal: terminal.hang_up()),
 }
-"""Each with the exit code."""
+"""Each with the exit code; of keys one for each flag of a terminal (ICANON, ISIG, IXON)."""
 
 
 @pytest.mark.parametrize("key", KEYS)

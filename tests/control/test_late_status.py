@@ -249,10 +249,10 @@ def back_at_100(scan: Scan) -> Scan:
 
 
 def each_short_motion(lag: int, model: Model) -> Iterator[Scan]:
-    """The hand at the end of each short first motion, after each pause."""
+    """The hand after each short first motion and every other pause; the other model has the rest."""
     scan = at_100(lag, model)
-    for counts in SHORT:
-        for pause in PAUSES_S:
+    for number, counts in enumerate(SHORT):
+        for pause in PAUSES_S[(number + len(model.axes)) % 2 :: 2]:
             scan.moved(100 + counts, A)
             scan.run(pause)
             yield scan

@@ -232,6 +232,7 @@ async def test_a_gripper_elsewhere_tells_no_more_than_its_registers(hand: Roboti
     assert (mirror.hands[0].joints, mirror.hands[0].parts) == (None, ())
 
 
+@pytest.mark.virtual_time
 async def test_a_peak_of_the_current_is_not_lost_between_two_looks(hand: RobotiqHand) -> None:
     updates = HandUpdates(hand)
     peak = 0

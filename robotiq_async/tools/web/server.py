@@ -160,16 +160,16 @@ class PageServer:
         Raises:
             ViewerError: the port is taken, there is no such interface, or the process ended.
         """
-        self._process = await _start()
+        self._process, limit = await _start(), _patience()
         try:
             self._write(self._settings.line())
-            async with asyncio.timeout(START_S):
+            async with asyncio.timeout(limit):
                 first = await self._read()
             if first is None or "failed" in first:
                 raise ViewerError(first["failed"] if first else "the process of the page has ended")
         except TimeoutError:
             await self._end_process()
-            raise ViewerError(f"the process of the page did not serve within {START_S:g} s") from None
+            raise ViewerError(f"the process of the page did not serve within {limit:.0f} s") from None
         except BaseException:
             await self._end_process()
             raise
@@ -268,6 +268,12 @@ class PageServer:
         line = await self._process.stdout.readline()
         message: Fields | None = json.loads(line) if line else None
         return message
+
+
+def _patience() -> float:
+    """Seconds that the start may take: its imports are 2 s of a CPU, and on a busy machine others have it."""
+    waiting = os.getloadavg()[0] / (os.cpu_count() or 1) if hasattr(os, "getloadavg") else 1.0
+    return START_S * max(1.0, waiting)
 
 
 async def _start() -> Process:
