@@ -53,6 +53,7 @@ async def main() -> None:
                 await animation(browser, hand, gripper)
                 pace.set(1)
                 await stills(browser, hand, gripper, server)
+        await part(browser)
     finally:
         browser.quit()
 
@@ -71,15 +72,35 @@ async def animation(browser: Browser, hand: RobotiqHand, gripper: SimulatedGripp
 
     await light(browser, dark=False)
     frames, durations = await film(browser, play)
-    await asyncio.to_thread(save, frames, durations)  # the hand is polled meanwhile
+    await asyncio.to_thread(save, "web", frames, durations)  # the hand is polled meanwhile
 
 
-def save(frames: list[Image.Image], durations: list[int]) -> None:
-    """The animation."""
+async def part(browser: Browser) -> None:
+    """A part that bodies grip and let go of."""
+    address = f"sim://?model=2f85&speedup={1 / SLOWER}&physics=box:30x40x60,0.3"
+    async with RobotiqHand(address) as hand:
+        settings = PageSettings(port=0, addresses=("sim://?model=2f85&physics=box:30x40x60,0.3",))
+
+        async def play() -> None:
+            await hand.close(speed=60, force=128, timeout=PATIENCE_S)
+            await asyncio.sleep(SLOWER)
+            await hand.open(speed=60, timeout=PATIENCE_S)
+
+        async with PageServer([hand], settings) as page:
+            await resize(browser, 1040, 600)
+            await browser.open(page.url)
+            await browser.says("statistics", "polls")
+            await light(browser, dark=False)
+            await asyncio.sleep(1.5)
+            await asyncio.to_thread(save, "web_part", *await film(browser, play))
+
+
+def save(name: str, frames: list[Image.Image], durations: list[int]) -> None:
+    """An animation."""
     size = (WIDTH, frames[0].height * WIDTH // frames[0].width)
     first, *others = [frame.resize(size, Image.Resampling.LANCZOS) for frame in frames]
     first.save(
-        FOLDER / "web.webp",
+        FOLDER / f"{name}.webp",
         save_all=True,
         append_images=others,
         duration=durations,
