@@ -106,7 +106,7 @@ class RobotiqHand(Hand):
             source says whether a 3-Finger serves it.
         poll_interval: seconds between polls, 0.001..0.1. On a serial line or over ``urcap://`` a read and a
             write may take longer than the default; the next poll follows at once then, and no poll counts as
-            missed.
+            missed. At least 0.0172 on Windows before Python 3.13, where the clock counts in steps of 15.6 ms.
         write_spacing: seconds from sending a write to the next one, 0..0.1; 0.005 unless given for a jaw.
             Requests made in that time are merged. A gripper may lose writes that come sooner (3-Finger
             manual of 2014: 10 ms; manual of the 2F-85: 5 ms); pass 0 for one that does not. A stop and a

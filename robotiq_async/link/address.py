@@ -7,6 +7,7 @@ import os
 import re
 import socket
 import stat
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -420,6 +421,6 @@ def _serial_port(device: str) -> str:
         return windows[1].upper()
     with contextlib.suppress(OSError):
         found = os.stat(device)
-        if stat.S_ISCHR(found.st_mode):
+        if sys.platform != "win32" and stat.S_ISCHR(found.st_mode):
             return f"device {os.major(found.st_rdev)}:{os.minor(found.st_rdev)}"
     return os.path.realpath(device)

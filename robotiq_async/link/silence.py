@@ -20,6 +20,8 @@ LONG_S: Final = 0.00175
 TIMER_S: Final = 0.001
 """The timers of a loop are no finer: epoll rounds up to whole milliseconds. The rest of a silence is spent
 waiting without giving up the turn."""
+IS_COARSE: Final = time.get_clock_info("monotonic").resolution > TIMER_S
+"""Windows before Python 3.13 counts in steps of 15.6 ms: waiting for the next would hold up the loop."""
 
 
 class Silence:
@@ -54,7 +56,7 @@ class Silence:
         until = self.heard + (max(LONG_S, self.short_s) if self.is_long else self.short_s)
         if (left := until - clock()) <= 0:
             return
-        if clock is not time.monotonic:
+        if clock is not time.monotonic or IS_COARSE:
             await asyncio.sleep(left)  # virtual time passes only in the loop, and its timers are exact
             return
         if left > TIMER_S:

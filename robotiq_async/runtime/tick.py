@@ -6,7 +6,8 @@ watches like a socket. Elsewhere, and in a loop with a clock of its own, the loo
 of a loop share one timer, so those that are due wake together, and many hands do not wake a busy loop more
 often.
 
-Where the clock counts in steps of 15.6 ms (Windows before Python 3.13), ticks come once a step at most.
+Windows waits as finely as fine_waits.py asks for. Where the clock counts in steps of 15.6 ms (Windows before
+Python 3.13), an interval is at least a tenth longer than a step: no tick is promised that cannot come.
 
 A missed tick is counted and not caught up with. The delay of a tick is the time for which the loop was held
 up, whatever the poller task was doing.
@@ -21,29 +22,35 @@ import math
 import time
 from typing import ClassVar, Final, Literal
 
+from . import fine_waits
 from .clock import clock_of, resolution_of
 from .timerfd import TimerFd
 
 Source = Literal["timerfd", "loop timer"]
 
 _GOLDEN: Final = (math.sqrt(5) - 1) / 2
+_STEPS: Final = 1.1
+"""Steps of the clock in an interval, at least. Windows cuts its steps of 15.6 ms to 15 or 16: in an interval
+longer than each no two ticks come in one step."""
 
 
 class Tick:
     """A periodic tick for one task. :meth:`close` it at the end. Making one needs a running event loop.
 
     Attributes:
-        interval: seconds between ticks.
+        interval: seconds between ticks; longer than asked for where the clock cannot tell them apart.
         time: the clock of the deadlines.
         due: the next deadline.
-        late: the longest delay of a tick in seconds, since its reader last set this to 0.
+        late: the longest delay of a tick in seconds, since its reader last set this to 0. What a step of the
+            clock may hide is no delay.
         longest_late: the longest delay so far.
     """
 
     def __init__(self, interval: float) -> None:
         self._loop = asyncio.get_running_loop()
         self._timer: _LoopTimer | None = None
-        self.interval: Final = interval
+        self._step = resolution_of(self._loop)
+        self.interval: Final = max(interval, _STEPS * self._step)
         self.time: Final = clock_of(self._loop)
         self.due = 0.0
         self.late = 0.0
@@ -90,11 +97,11 @@ class Tick:
 
     def expire(self, now: float) -> None:
         """Count the deadline, and any further ones, that have passed; set the next."""
-        late = now - self.due
-        if late > self.late:
-            self.late = late
-            self.longest_late = max(self.longest_late, late)
-        count = 1 + int(late / self.interval)
+        passed = now - self.due
+        if passed - self._step > self.late:
+            self.late = passed - self._step
+            self.longest_late = max(self.longest_late, self.late)
+        count = 1 + int(passed / self.interval)
         self.due += count * self.interval
         self._passed += count
         self._wake()
@@ -129,6 +136,8 @@ class _LoopTimer:
         self._clock = clock_of(loop)
         self._step = resolution_of(loop)
         self._timerfd = self._watched_timerfd()
+        if self._timerfd is None:
+            fine_waits.begin()
 
     @property
     def source(self) -> Source:
@@ -197,6 +206,8 @@ class _LoopTimer:
         self.release()
 
     def release(self) -> None:
-        """Close the descriptor; the loop no longer watches it."""
+        """Close the descriptor, which the loop no longer watches, or end the fine waits."""
         if self._timerfd is not None:
             self._timerfd.close()
+        else:
+            fine_waits.end()

@@ -402,13 +402,14 @@ class Poller:
             self._last_poll = 0.0  # a hurried cycle breaks the period
             return passed
         missed = passed - 1
-        if missed * self._options.poll_interval < LATE_S and self._is_line_the_limit():
+        late = missed * self._tick.interval
+        if late < LATE_S and self._is_line_the_limit():
             missed = 0
         self._counters.longest_stall = self._tick.longest_late
         if missed:
             self._counters.overruns += missed
-            if missed * self._options.poll_interval >= LATE_S:
-                self._warn_late(missed * self._options.poll_interval)
+            if late >= LATE_S:
+                self._warn_late(late)
         return passed
 
     def _is_line_the_limit(self) -> bool:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Awaitable, Callable
+from typing import Any
 
 import pytest
 
 from robotiq_async import Finger, RobotiqHand, State
+from robotiq_async.session.options import LATE_POLLS
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.grippers import activate_beforehand
 from tests.virtual import VirtualLoop
@@ -19,7 +21,7 @@ LOOK_S = 1e-6
 
 
 class CoarseLoop(VirtualLoop):
-    """Its time stands still between the steps; the gripper's runs on."""
+    """Its time stands still between the steps, and is cut to milliseconds; the gripper's runs on."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -28,17 +30,19 @@ class CoarseLoop(VirtualLoop):
 
     def time(self) -> float:
         self._virtual.now += LOOK_S
-        return math.floor(super().time() / STEP_S) * STEP_S
+        return math.floor(1000 * math.floor(super().time() / STEP_S) * STEP_S) / 1000
 
 
-def coarsely(story: Callable[[CoarseLoop, RobotiqHand, SimulatedGripper], Awaitable[None]]) -> None:
+def coarsely(
+    story: Callable[[CoarseLoop, RobotiqHand, SimulatedGripper], Awaitable[None]], **options: Any
+) -> None:
     """Tell a story of an active hand."""
 
     async def main(loop: CoarseLoop) -> None:
         gripper = SimulatedGripper(loop.exact, spread=False)
         await activate_beforehand(gripper)
         async with SimulatorServer(gripper) as server:
-            hand = RobotiqHand(server.address)
+            hand = RobotiqHand(server.address, **options)
             await hand.start()
             await story(loop, hand, gripper)
             await hand.stop()
@@ -81,13 +85,30 @@ def test_a_halt_stops_the_fingers_within_some_steps() -> None:
     coarsely(story)
 
 
-def test_there_is_a_poll_a_step_and_no_busy_waiting_between_them() -> None:
+@pytest.mark.parametrize("interval", [0.005, 0.0156, 0.016])
+def test_the_interval_is_what_the_clock_can_tell_and_no_poll_counts_as_missed(interval: float) -> None:
     async def story(loop: CoarseLoop, hand: RobotiqHand, gripper: SimulatedGripper) -> None:
-        polls, turns, began = hand.statistics.polls, loop.turns, loop.exact()
-        await asyncio.sleep(2.0)
-        steps = (loop.exact() - began) / STEP_S
-        assert hand.statistics.polls - polls == pytest.approx(steps, rel=0.1)
-        assert loop.turns - turns < 20 * steps
-        assert hand.statistics.overruns > 0, "the other polls are counted as missed"
+        before, turns, began = hand.statistics, loop.turns, loop.exact()
+        await hand.move(255, speed=0)
+        await asyncio.sleep(20.0)
+        steps, after = (loop.exact() - began) / STEP_S, hand.statistics
+        assert after.polls - before.polls == pytest.approx(steps / 1.1, rel=0.01)
+        assert loop.turns - turns < 20 * steps, "it waits between the polls"
+        assert after.overruns == 0
+        assert after.longest_stall < 0.002
+
+    coarsely(story, poll_interval=interval)
+
+
+def test_a_loop_that_is_held_up_is_noticed_all_the_same(caplog: pytest.LogCaptureFixture) -> None:
+    async def story(loop: CoarseLoop, hand: RobotiqHand, gripper: SimulatedGripper) -> None:
+        await asyncio.sleep(0.5)
+        assert LATE_POLLS not in caplog.text
+        loop.hold_up(0.2)
+        await asyncio.sleep(0.5)
+        figures = hand.statistics
+        assert figures.overruns == pytest.approx(0.2 / STEP_S / 1.1, abs=1)
+        assert figures.longest_stall == pytest.approx(0.2, abs=2 * STEP_S)
 
     coarsely(story)
+    assert LATE_POLLS in caplog.text
