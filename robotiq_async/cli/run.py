@@ -173,7 +173,7 @@ def _awake(loop: asyncio.AbstractEventLoop) -> Iterator[None]:
         writing.setblocking(False)
         try:
             loop.add_reader(reading, reading.recv, 64)
-        except NotImplementedError:  # Windows, where a loop wakes up often enough
+        except NotImplementedError:  # Windows, whose loop does the same by itself
             yield
             return
         before = signal.set_wakeup_fd(writing.fileno(), warn_on_full_buffer=False)
