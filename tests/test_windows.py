@@ -166,7 +166,7 @@ asyncio.run(main())
 
 
 COMMANDS = """
-import signal, threading
+import io, signal, threading
 from robotiq_async.cli import main
 
 address, folder = sys.argv[1:]
@@ -174,6 +174,14 @@ address, folder = sys.argv[1:]
 def run(*arguments, code=0):
     found = main(arguments)
     assert found == code, f"{arguments} ends with {found}, and not with {code}"
+
+def answered(answer, *arguments, code):
+    streams = sys.stdin, sys.stdout
+    for name in ("stdin", "stdout"):
+        setattr(sys, name, io.TextIOWrapper(io.BytesIO(answer), encoding="utf-8"))
+        getattr(sys, name).isatty = lambda: True
+    run(*arguments, code=code)
+    sys.stdin, sys.stdout = streams
 
 def interrupted(*arguments):
     threading.Timer(1.0, signal.raise_signal, [signal.SIGINT]).start()
@@ -185,7 +193,8 @@ run("--help")
 run("status", address)
 run("status", "--json", address)
 run("move", "200", address, code=2)  # nobody to ask
-run("move", "200", address, "--yes")
+answered(b"n\\r\\n", "move", "200", address, code=1)
+answered(b"y\\r\\n", "move", "200", address, code=0)
 run("status", "127.0.0.1:9", code=1)
 """,
     "looking": """
