@@ -275,6 +275,18 @@ def test_a_move_cancelled_as_its_link_was_lost_is_held_though_it_had_ended(link_
     assert abs(scan.positions()[A] - at) <= 4
 
 
+def test_a_move_cancelled_as_its_link_was_lost_is_not_held_where_another_client_moves_its_axis() -> None:
+    scan = started()
+    move, _ = scan.move(200, A, speed=0)
+    scan.run(0.5)
+    scan.controller.lost(None)
+    scan.gripper.write(0, image({A: 255}, speed=0))
+    scan.come_back(0.05)
+    scan.controller.abandon(move, unseen=True)
+    scan.run(15)
+    assert scan.positions()[A] >= 240
+
+
 def test_a_move_that_was_given_up_after_its_error_was_seen_goes_on(scan: Scan) -> None:
     move, _ = scan.move(200, A, speed=0)
     scan.run(0.5)
