@@ -522,6 +522,16 @@ BYTES = st.one_of(
 )
 
 
+@pytest.mark.parametrize(
+    ("name", "highest"),
+    [("ACT", 1), ("GTO", 1), ("PRE", 255), ("OBJ", 3), ("STA", 3), ("FLT", 255), ("POS", 255)],
+)
+def test_a_value_beyond_what_its_register_holds_is_a_misfit(name: str, highest: int) -> None:
+    assert lines.value_in(f"{name} {highest}\n".encode(), name) == highest
+    with pytest.raises(ProtocolError):
+        lines.value_in(f"{name} {highest + 1}\n".encode(), name)
+
+
 @given(BYTES)
 def test_any_bytes_are_a_value_in_range_a_misfit_or_not_whole(received: bytes) -> None:
     try:
