@@ -30,7 +30,7 @@ def agrees(model: Model, request: int, what: ObjectStatus, position: int, direct
     return model.has_reached(request, position)
 
 
-def drifts(axis: Finger, base: Request, status: RobotiqStatus, doubtful: Finger = NO_AXES) -> bool:
+def drifts(axis: Finger, base: Request, status: RobotiqStatus, may_move: Finger = NO_AXES) -> bool:
     """Whether an axis moves or is about to, so that a hold must ask for its present position.
 
     An axis in contact keeps its request, and with it its grip; so does one at rest where it was asked to be.
@@ -40,12 +40,12 @@ def drifts(axis: Finger, base: Request, status: RobotiqStatus, doubtful: Finger 
         axis: the axis.
         base: the image that acts, or is about to.
         status: the newest status.
-        doubtful: the axes that show rest, and may move because of an earlier request.
+        may_move: the axes that show rest, and may move because of an earlier request.
     """
     if not base.go:
         return False  # rGTO = 0 stops every axis [manual]
     # A needless hold would cost an axis in contact its grip: it would be asked for where it is.
-    if axis in doubtful:
+    if axis in may_move:
         return base.position(axis) != status.position(axis)
     what, position, request = status.finger_status(axis), status.position(axis), base.position(axis)
     return what is ObjectStatus.IN_MOTION or not agrees(status.model, request, what, position, direction=0)

@@ -105,7 +105,7 @@ class Controller:
         # The write that raised rACT, while what it began may go on: stopping the hand takes it back.
         self._activation: Entry | None = None
         # Why a hand that is being stopped must not leave rGTO set.
-        self._doubt = ""
+        self._why_no_grip = ""
         self._written_at = self._warned = NEVER  # when the last image was given to be written, and a warning
 
     # -- what is asked ---------------------------------------------------------------------------------
@@ -114,7 +114,7 @@ class Controller:
         """Add a command to the next write; raises RobotiqError if the hand takes none now."""
         self.machine.ask(Trigger.ASK_COMMAND, self.status)
         self._requests.command(command, waiter)
-        self._show(Trigger.ASK_COMMAND)
+        self._update_state(Trigger.ASK_COMMAND)
 
     def move(self, move: Move, speed: int | None, force: int | None) -> float:
         """Add a move as a command; return its default timeout in seconds."""
@@ -145,7 +145,7 @@ class Controller:
         """
         if self.machine.ask(Trigger.ASK_HOLD, self.status):
             self._requests.hold(axes, "a hold took over", waiter)
-            self._show(Trigger.ASK_HOLD)
+            self._update_state(Trigger.ASK_HOLD)
         else:
             waiter.set_result(None)
 
@@ -164,7 +164,7 @@ class Controller:
         if self._stop is None or self._stop.is_delivered:  # a new halt is sent again
             self._stop = Stop(StopLevel.HALT, [] if self._stop is None else self._stop.waiters)
         self._stop.waiters.append(waiter)
-        self._show(Trigger.ASK_HALT)
+        self._update_state(Trigger.ASK_HALT)
 
     def activate(self) -> None:
         """Begin an activation, unless the gripper is active or activating.
@@ -202,14 +202,14 @@ class Controller:
     def drop_requests(self, error: RobotiqError) -> None:
         """Fail every command and every move, sent or not. Holds and halts remain."""
         self._requests.fail_motions(error)
-        self._show(Trigger.DELIVERED)
+        self._update_state(Trigger.DELIVERED)
 
     def stop(self) -> None:
         """Begin to stop the hand: refuse new requests, and fail those that are not sent."""
         state, stop = self.machine.state, self._stop
         halts = stop is not None and stop.level is StopLevel.HALT and stop.entry is None
         was_elsewhere = "" if state in RUNNING else f"the hand was in {state.name}"
-        self._doubt = "halt() was asked for" if halts else was_elsewhere
+        self._why_no_grip = "halt() was asked for" if halts else was_elsewhere
         if not self._requests.pending.is_empty or halts:
             self.machine.log.info("stopped: requests that were not sent are dropped")
         if self.machine.ask(Trigger.ASK_STOP):
@@ -225,7 +225,7 @@ class Controller:
 
     def keep_no_grip(self, why: str) -> None:
         """Make the stop that has begun clear rGTO after all."""
-        self._doubt = why
+        self._why_no_grip = why
         if isinstance(self._stop, Keeping):
             self._stop = Stop(StopLevel.SHUTDOWN)
 
@@ -238,7 +238,7 @@ class Controller:
         if self._activation is not None:
             self._stop = Stop(StopLevel.RESET)
         elif status is not None and level is StopLevel.KEEP:
-            self._stop = keeping = Keeping(status, self._doubt)
+            self._stop = keeping = Keeping(status, self._why_no_grip)
             self._advance_keeping(keeping)
         elif status is not None:
             self._stop = Stop(StopLevel.SHUTDOWN)
@@ -250,13 +250,13 @@ class Controller:
         releases = trigger is Trigger.ASK_RELEASE
         self._procedure, self._stop = Procedure(self._ledger, releases=releases), None
         self._requests.pending.hold_only(NO_AXES)
-        self._show(trigger)
+        self._update_state(trigger)
 
     def _begin_reset(self, trigger: Trigger, error: RobotiqError) -> None:
         """Reset; ``error`` is what the callers get whose requests end with it."""
         self._fail_all(error)
         self._procedure, self._stop = None, Stop(StopLevel.RESET)
-        self._show(trigger)
+        self._update_state(trigger)
 
     def _fail_all(self, error: RobotiqError) -> None:
         """Fail everything asked so far, halts too. A write may be on the line all the same."""
@@ -319,7 +319,7 @@ class Controller:
         halts = stop is not None and not stop.is_delivered
         return State.RUNNING_CC if halts or self._requests.is_asked else State.RUNNING_IDLE
 
-    def _show(self, trigger: Trigger) -> None:
+    def _update_state(self, trigger: Trigger) -> None:
         state = self._view()
         if state is State.RUNNING_CC and trigger not in _CALLS and self.machine.state is not state:
             state = State.RUNNING_IDLE  # a call begins it, and not a fault that clears while a hold waits
@@ -354,7 +354,7 @@ class Controller:
             if self._requests.moves:
                 self._requests.moves.end_arrived(status, ledger.acts, ledger.resting, ledger.limited)
         if condition is not before:
-            self._show(condition)
+            self._update_state(condition)
 
     def _note_news(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> bool:
         """Take in a new condition, or an image that no entry explains; return whether it is to be shown."""
@@ -390,12 +390,12 @@ class Controller:
         if classify(status) in FOLLOWS:
             ledger.update_rest(status)
         keeping.judge(ledger, status)
-        if keeping.doubt:
+        if keeping.why_no_grip:
             self._stop = stop = Stop(StopLevel.SHUTDOWN)
             if ledger.match is None and classify(status) is Trigger.SEEN_READY:
                 ledger.adopt(status)
             if stop.image(ledger, status) is not None:
-                self.machine.log.warning("rGTO is cleared, and no grip is kept: %s", keeping.doubt)
+                self.machine.log.warning("rGTO is cleared, and no grip is kept: %s", keeping.why_no_grip)
         elif keeping.is_reached(ledger, status):
             self._stop = None
             self.machine.log.info("stopped with rGTO set; in contact: %s", status.contacts or "nothing")
@@ -461,7 +461,7 @@ class Controller:
         """A procedure, a reset or a shutdown is over: the condition counts again."""
         ledger, condition = self._ledger, self._evidence.condition or classify(status)
         is_known = ledger.restart(status) if has_written else ledger.match is not None
-        self._show(condition)
+        self._update_state(condition)
         if condition in FOLLOWS and not is_known and self.machine.state not in _OFF:
             self._adopt_other_client(status)
 
@@ -531,7 +531,7 @@ class Controller:
                 self.machine.log.warning("%s", end)
             if not has_written:  # it had nothing to do, so there is no write to wait for
                 procedure.written(self._ledger.shown)
-                self._show(Trigger.DELIVERED)
+                self._update_state(Trigger.DELIVERED)
             self._procedure = None
             self._finish(status, has_written=has_written)
             return None
@@ -558,13 +558,13 @@ class Controller:
             pending,
             status,
             gripping=ledger.grips.held(status, base) if pending.positions else NO_AXES,
-            doubtful=ledger.doubtful(status) if pending.hold else NO_AXES,
+            may_move=ledger.may_move(status) if pending.hold else NO_AXES,
         )
         if not pending.has_changes and gate(image, status) == base:
             # No axis moves. If an earlier write does not act yet, one may begin to: ask again then.
             if ledger.acts():
                 self._requests.nothing_to_send()
-                self._show(Trigger.DELIVERED)
+                self._update_state(Trigger.DELIVERED)
             return None
         return self._send(image, self._requests.taken(), status, now).image
 
@@ -582,11 +582,11 @@ class Controller:
         """The image that decide() returned was acknowledged."""
         self._ledger.acknowledge(now)
         self._requests.acknowledged()
-        self._show(Trigger.DELIVERED)
+        self._update_state(Trigger.DELIVERED)
 
     def lost(self, why: RobotiqError | None = None) -> None:
         """The link is down: drop what was not acknowledged. No motion is sent again; holds are, on return."""
-        self._doubt = "the link went down"
+        self._why_no_grip = "the link went down"
         error = ConnectionLostError(f"the link went down before this was done: {why}")
         error.__cause__ = why
         if self._stop is not None:
@@ -595,4 +595,4 @@ class Controller:
         self._procedure, self._stop = None, None
         self._evidence.lost()
         self._ledger.lost()
-        self._show(Trigger.LINK_LOST)
+        self._update_state(Trigger.LINK_LOST)

@@ -33,7 +33,7 @@ from ..values.request import AxisRequest, Request
 from ..values.status import RobotiqStatus
 from .adoption import Adoption
 from .entry import Entry, NoLimits
-from .rest import LONG_AGO, Asked, Grips, Moment, Rest, is_doubtful, rest_of
+from .rest import LONG_AGO, Asked, Grips, Moment, Rest, may_move, rest_of
 
 WINDOW_S: Final = 0.5
 """Time after its acknowledgement in which a write shows, if it acts. The slowest device cycle considered is
@@ -161,14 +161,14 @@ class Ledger:
             return self.base.go or len({each.echo for each in self._entries}) > 1
         return bool(self.unrested) and self.base.go and self._adoption is None
 
-    def doubtful(self, status: RobotiqStatus) -> Finger:
+    def may_move(self, status: RobotiqStatus) -> Finger:
         """The axes that may move, or be about to, although the status shows them at rest."""
-        doubtful = NO_AXES
+        moving = NO_AXES
         for axis in self._model.axes if self._unproven else ():
             what, position = status.finger_status(axis), status.position(axis)
-            if is_doubtful(self._asked(axis), self._model, what, position):
-                doubtful |= axis
-        return doubtful
+            if may_move(self._asked(axis), self._model, what, position):
+                moving |= axis
+        return moving
 
     def _asked(self, axis: Finger) -> Iterator[Asked]:
         """The requests that an axis may show, the newest first."""
@@ -424,7 +424,7 @@ class Ledger:
         if status.go_echo and (self.grips or status.contacts):
             contacts = status.contacts
             if contacts & self.unrested:
-                contacts &= ~self.doubtful(status)
+                contacts &= ~self.may_move(status)
             self.grips.remember(status, contacts)
 
     def _note_shown(self) -> None:

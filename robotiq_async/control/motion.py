@@ -69,13 +69,13 @@ class Move:
             status.requested_position(axis) == limited.get(axis, self.position) for axis in self._peak
         )
 
-    def has_arrived(self, status: RobotiqStatus, arrived: Finger, limited: Mapping[Finger, int]) -> bool:
+    def has_arrived(self, status: RobotiqStatus, resting: Finger, limited: Mapping[Finger, int]) -> bool:
         """Whether a status shows the move ended, and its object status is not from before the write.
 
-        ``arrived`` has the axes that are known to rest under their last request.
+        ``resting`` has the axes that are known to rest under their last request.
         """
         # An axis may be known to rest by its position, and move by its gDT, which is then from before.
-        return self.axes in arrived and not status.moving & self.axes and self.is_under(status, limited)
+        return self.axes in resting and not status.moving & self.axes and self.is_under(status, limited)
 
     def end(self, status: RobotiqStatus) -> MoveResult:
         result = self._result(status)
@@ -132,7 +132,7 @@ class LiveMoves:
         self,
         status: RobotiqStatus,
         acts: Callable[[Entry], bool],
-        arrived: Finger,
+        resting: Finger,
         limited: Mapping[Finger, int],
     ) -> None:
         """End the moves that a status shows to have arrived.
@@ -140,14 +140,14 @@ class LiveMoves:
         Args:
             status: the newest one.
             acts: whether a write acts.
-            arrived: the axes that are known to rest under their last request.
+            resting: the axes that are known to rest under their last request.
             limited: the limit that the gripper shows in place of the request, by axis.
         """
         for move in self._moves[:]:
             if move.entry is None:
                 continue
             move.note_currents(status)
-            if acts(move.entry) and move.has_arrived(status, arrived, limited):
+            if acts(move.entry) and move.has_arrived(status, resting, limited):
                 self._moves.remove(move)
                 self._warn_of_unreached(move, move.end(status), limited)
 

@@ -132,7 +132,7 @@ def merged(
     status: RobotiqStatus,
     *,
     gripping: Finger = NO_AXES,
-    doubtful: Finger = NO_AXES,
+    may_move: Finger = NO_AXES,
 ) -> Request:
     """Merge pending changes into ``base``. Axes that they do not address keep their requests.
 
@@ -141,7 +141,7 @@ def merged(
         pending: what callers ask for.
         status: the newest status.
         gripping: the axes that were in contact when rGTO was last set.
-        doubtful: the axes that show rest and may move all the same.
+        may_move: the axes that show rest and may move all the same.
     """
     if pending.positions and not base.go:
         # rGTO starts every axis [manual]: ask each for where it is. An axis that gripped keeps its request,
@@ -154,7 +154,7 @@ def merged(
     held = {
         axis: status.position(axis)
         for axis in status.model.axes
-        if axis in pending.hold and drifts(axis, base, status, doubtful)
+        if axis in pending.hold and drifts(axis, base, status, may_move)
     }
     positions = held | pending.positions
     return replace(

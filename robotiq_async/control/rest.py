@@ -98,7 +98,7 @@ def rest_of(asked: Iterator[Asked], model: Model, what: ObjectStatus, position: 
     return Rest.PROVEN if is_true else Rest.UNKNOWN
 
 
-def is_doubtful(asked: Iterable[Asked], model: Model, what: ObjectStatus, position: int) -> bool:
+def may_move(asked: Iterable[Asked], model: Model, what: ObjectStatus, position: int) -> bool:
     """Whether an axis may move, or be about to, although it shows rest.
 
     A contact is doubted only if a request within the lag contradicts it: a needless doubt would cost the

@@ -170,15 +170,15 @@ class Keeping(Stop):
 
     Args:
         status: the newest one.
-        doubt: why rGTO must be cleared whatever the statuses show; empty for no reason.
+        why_no_grip: why rGTO must be cleared whatever the statuses show; empty for no reason.
 
     Attributes:
-        doubt: why rGTO must be cleared, as far as the statuses so far show; empty for no reason.
+        why_no_grip: why rGTO must be cleared, as far as the statuses so far show; empty for no reason.
     """
 
-    def __init__(self, status: RobotiqStatus, doubt: str) -> None:
+    def __init__(self, status: RobotiqStatus, why_no_grip: str) -> None:
         super().__init__(StopLevel.KEEP)
-        self.doubt = doubt
+        self.why_no_grip = why_no_grip
         # Rest is timed by when a status was asked for, because a busy loop may read the reply late.
         self._until = status.timestamp + KEEP_S
         self._since = math.inf
@@ -187,7 +187,7 @@ class Keeping(Stop):
         """Take in a status. While a hold is on its way nothing is doubted: it overwrites what came before."""
         if self.entry is not None and not ledger.acts(self.entry):
             return
-        self.doubt = self.doubt or self._trouble(ledger, status) or self._unrest(ledger, status)
+        self.why_no_grip = self.why_no_grip or self._trouble(ledger, status) or self._unrest(ledger, status)
         self._since = min(self._since, ledger.now.time) if self.rests(ledger, status) else math.inf
 
     def is_urgent(self, ledger: Ledger, status: RobotiqStatus) -> bool:
@@ -197,7 +197,7 @@ class Keeping(Stop):
     def rests(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether every axis is known to rest under its last request, with rGTO set."""
         rests = not status.moving and not ledger.unrested and ledger.is_certain
-        return rests and status.go_echo and ledger.acts() and not self.doubt
+        return rests and status.go_echo and ledger.acts() and not self.why_no_grip
 
     def is_reached(self, ledger: Ledger, status: RobotiqStatus) -> bool:  # noqa: ARG002
         return ledger.now.time - self._since >= REST_S
@@ -210,7 +210,7 @@ class Keeping(Stop):
         if not ledger.is_certain:
             return None
         base = ledger.base
-        held = merged(base, Pending(hold=Finger.ALL), status, doubtful=ledger.doubtful(status))
+        held = merged(base, Pending(hold=Finger.ALL), status, may_move=ledger.may_move(status))
         return None if held == base else held
 
     def _trouble(self, ledger: Ledger, status: RobotiqStatus) -> str:

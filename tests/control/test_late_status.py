@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from robotiq_async import Finger, MoveResult, MoveSupersededError, ObjectStatus
-from robotiq_async.control.rest import LAG_READS, LAG_S, LONG_AGO, Asked, Moment, Rest, is_doubtful, rest_of
+from robotiq_async.control.rest import LAG_READS, LAG_S, LONG_AGO, Asked, Moment, Rest, may_move, rest_of
 from robotiq_async.values.enums import NO_AXES
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
 from tests.control.other_client import image
@@ -425,7 +425,7 @@ def rest(what: ObjectStatus, position: int, *asked: Asked) -> Rest:
 
 
 def doubted(what: ObjectStatus, position: int, *asked: Asked) -> bool:
-    return is_doubtful(reversed(asked), THREE_FINGER, what, position)
+    return may_move(reversed(asked), THREE_FINGER, what, position)
 
 
 def test_a_status_is_trusted_unless_an_earlier_request_explains_it() -> None:

@@ -36,9 +36,9 @@ def after(
     status: RobotiqStatus = MOVING,
     *,
     gripping: Finger = NO_AXES,
-    doubtful: Finger = NO_AXES,
+    may_move: Finger = NO_AXES,
 ) -> Request:
-    return merged(base, pending, status, gripping=gripping, doubtful=doubtful)
+    return merged(base, pending, status, gripping=gripping, may_move=may_move)
 
 
 def command(
@@ -92,7 +92,7 @@ AT_REST = status_of(0x39, 0xFF, position=(9, 22, 103, 40))
         (GOING, hold(A | B), MOVING, {}, (101, 102, 30, 40)),
         (GOING, hold(Finger.ALL), AT_REST, {}, (10, 20, 103, 40)),
         # One that may be about to go is held however close it stands.
-        (GOING, hold(Finger.ALL), AT_REST, {"doubtful": A | S}, (9, 20, 103, 40)),
+        (GOING, hold(Finger.ALL), AT_REST, {"may_move": A | S}, (9, 20, 103, 40)),
         # One in contact keeps its grip while another is held.
         (GOING, hold(A | B), status_of(0x39, 0b00_00_00_10, position=(5, *AT[1:])), {}, (10, 102, 30, 40)),
         (HALTED, hold(Finger.ALL), RESTING, {}, (10, 20, 30, 40)),
@@ -147,13 +147,13 @@ def test_an_axis_not_addressed_keeps_its_request_or_stays(
     held: Finger,
     status: RobotiqStatus,
     gripping: Finger,
-    doubtful: Finger,
+    may_move: Finger,
 ) -> None:
     pending = Pending()
     pending.merge_hold(held)
     for each in commands:
         pending.merge(Command(*each))
-    image = merged(base, pending, status, gripping=gripping, doubtful=doubtful)
+    image = merged(base, pending, status, gripping=gripping, may_move=may_move)
     assert (image.mode, image.individual_fingers, image.individual_scissor) == (base.mode, True, True)
     assert image.go == (base.go or bool(pending.positions))
     for axis, before, now in zip(THREE_FINGER.axes, base.axes, image.axes, strict=True):
@@ -214,7 +214,7 @@ def test_a_request_agrees_with_what_an_axis_does(
 # -- whether an axis needs a request to stay ---------------------------------------------------------------
 
 
-@pytest.mark.parametrize("doubtful", [NO_AXES, A])
+@pytest.mark.parametrize("may_move", [NO_AXES, A])
 @pytest.mark.parametrize(
     ("request_", "what", "position", "held"),
     [
@@ -232,11 +232,11 @@ def test_a_request_agrees_with_what_an_axis_does(
     ],
 )
 def test_an_axis_that_moves_or_is_about_to_is_asked_to_stay(
-    request_: int, what: ObjectStatus, position: int, held: bool | None, doubtful: Finger
+    request_: int, what: ObjectStatus, position: int, held: bool | None, may_move: Finger
 ) -> None:
     """Close to its request, or in contact (None), it is held only in doubt: it may be about to go."""
     status = status_of(0x39, what, position=position)
     going = Request(activate=True, go=True, axes=(AxisRequest(request_),) * 4)
-    expected = bool(doubtful) if held is None else held
-    assert drifts(A, going, status, doubtful) is (expected and not (doubtful and request_ == position))
-    assert not drifts(A, replace(going, go=False), status, doubtful), "nothing moves while rGTO is clear"
+    expected = bool(may_move) if held is None else held
+    assert drifts(A, going, status, may_move) is (expected and not (may_move and request_ == position))
+    assert not drifts(A, replace(going, go=False), status, may_move), "nothing moves while rGTO is clear"

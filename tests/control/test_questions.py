@@ -89,7 +89,7 @@ def known_to_rest(*, is_asked: bool) -> Finger:
         ledger.update(shows(200, at), at)
         if is_asked:
             for _ in range(2):
-                ledger.doubtful(shows(200, at))
+                ledger.may_move(shows(200, at))
     ledger.update(status := shows(150, at), at)
     ledger.update_rest(status)
     ledger.update_rest(status)
