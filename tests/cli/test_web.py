@@ -26,6 +26,7 @@ pytest.importorskip("nicegui", reason="the page needs the extra web")
 from robotiq_async.cli.commands.web import AGAIN_S, _leave_all, _try_again
 from robotiq_async.tools.web.server import PageServer
 from robotiq_async.tools.web.settings import PageSettings
+from tests.patience import patience
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Call, Shell
@@ -37,7 +38,7 @@ SETTINGS = PageSettings(control=True, addresses=("one", "two"))
 def status(url: str) -> int:
     """The page's answer to a browser with this address."""
     parts = urlsplit(url)
-    connection = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=20)
+    connection = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=patience(20))
     try:
         connection.request("GET", f"{parts.path}?{parts.query}")
         return connection.getresponse().status

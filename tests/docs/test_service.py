@@ -17,6 +17,7 @@ import pytest
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from tests.docs.pages import DOCS, blocks, read
 from tests.grippers import active_gripper, until
+from tests.patience import patience
 
 PAGE = DOCS / "how-to" / "service.md"
 (PROGRAM,) = (each.text for each in blocks(read(PAGE), "python"))
@@ -31,7 +32,7 @@ async def running(address: str, folder: Path) -> AsyncIterator[asyncio.subproces
         sys.executable, str(program), env={"GRIPPER": address}, cwd=folder, stdout=PIPE, stderr=STDOUT
     )
     try:
-        async with asyncio.timeout(60):
+        async with asyncio.timeout(patience(60)):
             yield process
     finally:
         with contextlib.suppress(ProcessLookupError):

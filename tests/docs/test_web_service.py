@@ -68,7 +68,7 @@ async def service(
     """Run it, and wait until it listens."""
     async with launched(gripper, folder, python) as process:
         assert process.stdout is not None
-        async with asyncio.timeout(60):
+        async with asyncio.timeout(patience(60)):
             found = None
             while found is None:
                 line = (await process.stdout.readline()).decode()
@@ -80,7 +80,7 @@ async def service(
 async def stops(here: Service, number: signal.Signals) -> None:
     """Watch a status, pick slowly, send a signal, and see the fingers stop at once."""
     watching, watcher = await here.ask("GET", "/status")
-    async with asyncio.timeout(30):
+    async with asyncio.timeout(patience(30)):
         while not (await watching.readline()).startswith(b"data: {"):
             pass
         _, picker = await here.ask("POST", "/pick?speed=0")
@@ -108,7 +108,7 @@ async def test_a_signal_stops_the_fingers_while_a_client_watches(
 
 async def test_a_signal_during_the_activation_takes_it_back(tmp_path: Path) -> None:
     gripper = SimulatedGripper()
-    async with launched(gripper, tmp_path) as process, asyncio.timeout(30):
+    async with launched(gripper, tmp_path) as process, asyncio.timeout(patience(30)):
         await until(lambda: gripper.is_moving)
         process.send_signal(signal.SIGINT)
         await process.wait()
@@ -116,7 +116,7 @@ async def test_a_signal_during_the_activation_takes_it_back(tmp_path: Path) -> N
 
 
 async def test_a_halt_ends_a_pick_and_a_refused_request_is_a_409(tmp_path: Path) -> None:
-    async with service(active_gripper(1.0), tmp_path) as here, asyncio.timeout(30):
+    async with service(active_gripper(1.0), tmp_path) as here, asyncio.timeout(patience(30)):
         picking, picker = await here.ask("POST", "/pick?speed=0")
         await until(lambda: here.gripper.is_moving)
         halting, halter = await here.ask("POST", "/halt")

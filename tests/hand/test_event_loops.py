@@ -16,6 +16,7 @@ import pytest
 from robotiq_async import Finger, NotStartedError, RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.calls import COMMANDS, called
+from tests.patience import patience
 
 ROOT = Path(__file__).parents[2]
 
@@ -32,7 +33,7 @@ async def test_a_command_from_another_thread_is_an_error_and_asks_for_nothing(
         (lambda: asyncio.run(hand.set_position(255)), "run_coroutine_threadsafe"),
         (lambda: asyncio.run(hand.stop()), "run_coroutine_threadsafe"),
     ):
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(patience(5)):
             with pytest.raises(RuntimeError, match=advice):
                 await asyncio.to_thread(call)
     for _ in range(3):
@@ -78,7 +79,7 @@ async def test_the_advice_works(hand: RobotiqHand, gripper: SimulatedGripper) ->
     loop = asyncio.get_running_loop()
 
     def elsewhere() -> None:
-        result = asyncio.run_coroutine_threadsafe(hand.move(60, Finger.A), loop).result(timeout=10)
+        result = asyncio.run_coroutine_threadsafe(hand.move(60, Finger.A), loop).result(timeout=patience(10))
         assert result.positions[Finger.A] == pytest.approx(60, abs=3)
         loop.call_soon_threadsafe(lambda: hand.command(Finger.B, position=33))
 
@@ -95,7 +96,7 @@ async def test_a_stream_is_neither_opened_nor_read_in_another_loop(hand: Robotiq
 
     stream = getattr(hand, name)()
     for call in (getattr(hand, name), lambda: asyncio.run(read())):
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(patience(5)):
             with pytest.raises(RuntimeError, match="event loop"):
                 await asyncio.to_thread(call)
 
@@ -112,7 +113,7 @@ async def test_a_reader_that_waits_in_another_loop_gets_an_error(server: Simulat
     other = asyncio.create_task(asyncio.to_thread(asyncio.run, read()))
     await asyncio.to_thread(waiting.wait)
     async with hand:
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(patience(5)):
             with pytest.raises(RuntimeError):
                 await other
         await anext(hand.statuses())
@@ -201,7 +202,7 @@ class TestClosedLoop:
         hand = abandoned(place)
 
         async def again() -> None:
-            async with asyncio.timeout(10):
+            async with asyncio.timeout(patience(10)):
                 if stop_first:
                     await hand.stop()
                     assert hand.state is State.SHUTDOWN
@@ -271,7 +272,7 @@ class TestClosedLoop:
 
         async def end() -> None:
             await hand.stop()
-            async with asyncio.timeout(2):
+            async with asyncio.timeout(patience(2)):
                 async for _ in stream:
                     pass
 
@@ -282,7 +283,7 @@ class TestClosedLoop:
         left = abandoned(address)
 
         async def other() -> None:
-            async with asyncio.timeout(5):
+            async with asyncio.timeout(patience(5)):
                 another = RobotiqHand(address)
                 await another.start(activate=False)
                 await another.stop()

@@ -12,6 +12,7 @@ import pytest_asyncio
 from robotiq_async import ConnectionLostError, Finger, RobotiqConnectionError, RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from tests.conftest import Clock
+from tests.patience import patience
 
 A = Finger.A
 FOR_EVER = 1e4
@@ -37,13 +38,13 @@ async def test_a_gateway_that_refuses_to_write_is_named_in_the_error(
     async with RobotiqHand(gateway.address) as hand:
         await gateway.fault_injector.begin(Trouble("exception", code, on="write", lasts=FOR_EVER))
         for call in (lambda: hand.set_position(100), lambda: hand.move(100), lambda: hand.halt()):
-            await hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
+            await hand.wait_for_state(State.RUNNING_IDLE, timeout=patience(5))
             with pytest.raises(ConnectionLostError) as caught:
                 await call()
             for word in ("refuses function 16", means, "all 8 at once", "gateway"):
                 assert word in str(caught.value)
         await gateway.fault_injector.end(gateway.fault_injector.ongoing[0])
-        await hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
+        await hand.wait_for_state(State.RUNNING_IDLE, timeout=patience(5))
         await hand.move(100)
 
 

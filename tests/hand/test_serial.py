@@ -14,6 +14,7 @@ from robotiq_async import ConnectionLostError, Fault, Finger, RobotiqHand, State
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
 from tests.conftest import Clock
 from tests.grippers import until_moving
+from tests.patience import patience
 from tests.serial_line import SerialLine
 
 A = Finger.A
@@ -58,7 +59,7 @@ async def test_a_pulled_line_comes_back(
     with pytest.raises(ConnectionLostError):
         await moving
     line.plug()
-    await serial_hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
+    await serial_hand.wait_for_state(State.RUNNING_IDLE, timeout=patience(5))
     assert len(serial_server.gripper.writes) == writes
     await serial_hand.move(20, A)
 

@@ -15,6 +15,7 @@ from pyrobotiqgripper import RobotiqGripper
 from robotiq_async import JAW, TWO_FINGER_85, RobotiqStatus
 from robotiq_async.simulator import RtuOverTcpSimulatorServer, SerialSimulatorServer, SimulatedGripper
 from robotiq_async.simulator.troubles.like_hardware import like_hardware, own_habits
+from tests.patience import patience
 from tests.serial_line import SerialLine, with_crc
 
 
@@ -143,18 +144,24 @@ CLOSING, HELD = "09 03 06 39 00 00 FF", "09 03 06 B9 00 00 FF"
 OPENING, OPENED = "09 03 06 39 00 00 00", "09 03 06 F9 00 00 00"
 
 
-async def test_the_frames_of_the_manual(gripper: SimulatedGripper, port: str) -> None:
+async def test_the_frames_of_the_manual(tmp_path: Path) -> None:
     """Manual of the 2F-85 and 2F-140, a grasp over RTU: the requests, and the replies that it prints.
 
-    Position and current, the last two bytes of a status, depend on the part.
+    Position and current, the last two bytes of a status, depend on the part. Time passes with the exchanges:
+    a busy machine sees each motion, too.
     """
+    moment = 0.0
+    gripper = SimulatedGripper(lambda: moment, speedup=20, spread=False, model=TWO_FINGER_85)
 
-    def play() -> None:
-        with serial.Serial(port, 115200, timeout=2) as line:
+    def play(port: Path) -> None:
+        with serial.Serial(str(port), 115200, timeout=patience(2)) as line:
 
             def replied(request: str, size: int) -> str:
+                nonlocal moment
                 line.write(bytes.fromhex(request))
-                return str(line.read(size).hex(" ").upper())
+                reply = str(line.read(size).hex(" ").upper())
+                moment += 0.005
+                return reply
 
             assert replied(RESET, 8) == WRITTEN
             assert replied(ACTIVATE, 8) == WRITTEN
@@ -170,5 +177,6 @@ async def test_the_frames_of_the_manual(gripper: SimulatedGripper, port: str) ->
                     seen.add(replied(READ_THREE, 11)[: len(moving)])
                 assert moving in seen
 
-    async with asyncio.timeout(10):
-        await asyncio.to_thread(play)
+    with SerialLine(tmp_path) as line:
+        async with SerialSimulatorServer(line.far, gripper), asyncio.timeout(patience(10)):
+            await asyncio.to_thread(play, line.near)

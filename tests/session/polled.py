@@ -19,6 +19,7 @@ from robotiq_async.values.events import SentRequest
 from robotiq_async.values.statistics import Counters
 from robotiq_async.values.status import RobotiqStatus
 from tests.fake_transport import Wire
+from tests.patience import patience
 from tests.session.sessions import options
 from tests.virtual import VirtualLoop
 
@@ -71,7 +72,7 @@ class Polled:
     async def polls(self, count: int = 1) -> None:
         """Wait until so many more statuses have come."""
         until = len(self.statuses) + count
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(patience(30)):
             while len(self.statuses) < until:  # noqa: ASYNC110  # there is no event to wait for
                 await asyncio.sleep(0.0001)
 

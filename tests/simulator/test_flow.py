@@ -17,6 +17,7 @@ pytest.importorskip("pty")
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.simulator.server.connection import MOST_UNREAD, MOST_WAITING
 from robotiq_async.simulator.server.serial_server import MOST_UNSENT
+from tests.patience import patience
 from tests.serial_line import with_crc
 from tests.simulator.conftest import simulator
 from tests.simulator.test_serial_server import Line
@@ -54,7 +55,7 @@ async def narrow(server: SimulatorServer) -> AsyncIterator[RawClient]:
 
 async def until_held(server: SimulatorServer) -> None:
     """Wait until a client is no longer read from."""
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(patience(20)):
         while all(each.transport.is_reading() for each in server.connections):  # noqa: ASYNC110
             await asyncio.sleep(0.001)
 
@@ -80,7 +81,7 @@ async def test_a_client_that_goes_away_while_it_has_to_wait() -> None:
         async with narrow(server) as client:
             client.writer.write(writes(client, REQUESTS))
             await until_held(server)
-        async with asyncio.timeout(5), raw_client(server) as other:
+        async with asyncio.timeout(patience(5)), raw_client(server) as other:
             assert (await other.read_status()).is_reset
             while len(server.connections) > 1:  # noqa: ASYNC110
                 await asyncio.sleep(0)

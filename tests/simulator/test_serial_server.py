@@ -10,6 +10,7 @@ import pytest
 
 from robotiq_async.simulator import SerialSimulatorServer
 from robotiq_async.simulator.server.framing import take_rtu
+from tests.patience import patience
 from tests.serial_line import with_crc
 from tests.simulator.test_serial_frames import READ, RESET_READING
 
@@ -46,7 +47,7 @@ class Line:
         loop.add_reader(self.master, arrived.set)
         data = b""
         try:
-            async with asyncio.timeout(5):
+            async with asyncio.timeout(patience(5)):
                 while len(data) < size:
                     arrived.clear()
                     await arrived.wait()

@@ -16,6 +16,7 @@ from robotiq_async.simulator.troubles.corruption import unchanged
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
+from tests.patience import patience
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator
@@ -37,7 +38,7 @@ class RawClient:
 
     async def reply(self) -> tuple[int, int, bytes]:
         """Transaction id, unit id and PDU of the next reply."""
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(patience(5)):
             header = await self.reader.readexactly(7)
             transaction, protocol, length, unit = struct.unpack(">HHHB", header)
             assert protocol == 0
@@ -211,7 +212,7 @@ async def test_a_request_in_single_bytes(client: RawClient) -> None:
 @pytest.mark.parametrize("junk", ["0001 0001 0006 02 04 0000 0008", "0001 0000 0000 02", "0001 0000 ffff 02"])
 async def test_bytes_that_are_not_modbus_end_the_connection(client: RawClient, junk: str) -> None:
     client.writer.write(bytes.fromhex(junk))
-    async with asyncio.timeout(5):
+    async with asyncio.timeout(patience(5)):
         assert await client.reader.read() == b""
 
 
@@ -316,7 +317,7 @@ async def test_a_policy_decides_on_every_reply(server: SimulatorServer, client: 
     assert (await client.reply())[0] == client.transaction
     server.policy = lambda _: None
     client.writer.write(client.frame(b"\x04\x00\x00\x00\x01"))
-    async with asyncio.timeout(5):
+    async with asyncio.timeout(patience(5)):
         assert await client.reader.read() == b""
 
 
@@ -335,7 +336,7 @@ async def test_refuse_and_accept(server: SimulatorServer, client: RawClient) -> 
 async def test_power_cycle(server: SimulatorServer, client: RawClient) -> None:
     await client.write(ACTIVE)
     cycle = asyncio.create_task(server.power_cycle(off_time=10.0))
-    async with asyncio.timeout(5):
+    async with asyncio.timeout(patience(5)):
         assert await client.reader.read() == b""
     with pytest.raises(ConnectionRefusedError):
         await asyncio.open_connection("127.0.0.1", server.port)
@@ -410,7 +411,7 @@ async def test_connections_are_cut_and_new_ones_welcome_afterwards(
     async with raw_client(server) as other:
         await client.read_status()
         await other.read_status()
-        async with server.fault_injector.making(Trouble(kind)), asyncio.timeout(5):
+        async with server.fault_injector.making(Trouble(kind)), asyncio.timeout(patience(5)):
             for each in (client, other):
                 if kind == "close":
                     assert await each.reader.read() == b"", "closed in order"

@@ -109,7 +109,7 @@ async def run_to_its_end(program: str) -> tuple[SimulatedGripper, str]:
             *(sys.executable, "-c", program, server.address), cwd=ROOT, stdout=PIPE, stderr=STDOUT
         )
         try:
-            async with asyncio.timeout(20):
+            async with asyncio.timeout(patience(20)):
                 printed, _ = await process.communicate()
         finally:
             with contextlib.suppress(ProcessLookupError):

@@ -215,7 +215,7 @@ def test_it_may_be_started_and_stopped_at_any_moment() -> None:
 
     begun = [in_a_thread(lambda hand=hand: again_and_again(hand)) for hand in hands]  # type: ignore[misc]
     for thread, outcome in begun:
-        thread.join(20)
+        thread.join(patience(20))
         assert outcome == [None]
 
 

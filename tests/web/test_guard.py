@@ -22,6 +22,7 @@ from robotiq_async.tools.web.settings import PageSettings
 from robotiq_async.values.errors import ViewerError
 from tests.conftest import watched
 from tests.fake_hand import FakeHand
+from tests.patience import patience
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
@@ -50,7 +51,7 @@ async def nothing_left_running(page: PageServer, caplog: pytest.LogCaptureFixtur
 class Answer:
     def __init__(self, url: str, path: str, method: str, body: str, headers: dict[str, str]) -> None:
         parts = urlsplit(url)
-        connection = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=20)
+        connection = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=patience(20))
         try:
             connection.request(method, path, body, headers)
             response = connection.getresponse()
@@ -130,7 +131,7 @@ async def test_headers_without_end_are_not_kept(page: PageServer) -> None:
     _, writer = await asyncio.open_connection(parts.hostname, parts.port)
     writer.write(b"GET / HTTP/1.1\r\n")
     with contextlib.suppress(ConnectionError):
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(patience(20)):
             for _ in range(1000):
                 writer.write(b"X: " + b"x" * 10_000 + b"\r\n")
                 await writer.drain()

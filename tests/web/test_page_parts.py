@@ -30,6 +30,7 @@ from robotiq_async.tools.wording import refusal_words
 from robotiq_async.values.enums import Trigger
 from tests.fake_hand import FakeHand
 from tests.grippers import active_gripper, shows, until
+from tests.patience import patience
 
 # -- commands ----------------------------------------------------------------------------------------------
 
@@ -298,7 +299,7 @@ async def test_a_process_that_dies_is_noticed_and_its_motions_are_held() -> None
             page._hear({"do": {**asked, "arguments": {}}})
             await shows(hand, lambda status: status.is_moving)
             page._process.kill()
-            async with asyncio.timeout(20):
+            async with asyncio.timeout(patience(20)):
                 await page.ended()
             stood = await shows(hand, lambda status: not status.is_moving)
             assert stood.position(Finger.A) < 200
