@@ -77,6 +77,22 @@ def test_importing_the_library_imports_neither_simulator_nor_extras() -> None:
         assert name not in modules
 
 
+def test_a_maintainer_of_the_core_reads_what_the_page_says() -> None:
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    found = re.search(r"\*\*To maintain it, read\*\*(.*?)\n\n", page, re.DOTALL)
+    assert found is not None
+    lines, words = (int(each.replace(",", "")) for each in re.findall(r"([\d,]+) (?:lines|words)", found[1]))
+    left_out = re.findall(r"`([\w-]+)`", found[1])
+    rooms = re.findall(r"`(\w+)`", page.partition("## The edge of the core")[2])[:6]
+    sources = [path for room in rooms for path in (PACKAGE / room).rglob("*.py")]
+    pages = [ROOT / "docs" / name for name in ("architecture.md", "state-machine.md", "what-happens-when.md")]
+    decisions = {path.stem: path for path in (ROOT / "docs" / "decisions").glob("*.md")}
+    assert set(left_out) <= decisions.keys()
+    pages += [path for name, path in decisions.items() if name not in left_out]
+    assert sum(len(each.read_text(encoding="utf-8").split()) for each in pages) < 1.05 * words
+    assert sum(len(each.read_text(encoding="utf-8").splitlines()) for each in sources) < 1.05 * lines
+
+
 def test_the_tests_of_the_core_run_without_what_stands_around_it() -> None:
     """``make test-core``: a change of the core waits for no page and no other host."""
     folders = (ROOT / "tests" / "core.txt").read_text(encoding="utf-8").split()
