@@ -30,9 +30,11 @@ def test_one_version() -> None:
     assert found["version"] == version
     assert "version" not in PROJECT
     assert f"<version>{version}</version>" in (ROOT / "ros2" / "package.xml").read_text()
-    assert f"## [{version}]" in (ROOT / "CHANGELOG.md").read_text()
+    changes = (ROOT / "CHANGELOG.md").read_text()
+    assert f"## [{version}]" in changes
     # As long as nothing is released there is none to cite.
-    assert "\nversion:" not in (ROOT / "CITATION.cff").read_text()
+    released = re.findall(r"^## \[(.+)\] - \d{4}-\d\d-\d\d$", changes, re.MULTILINE)
+    assert re.findall(r"^version: (.+)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE) == released[:1]
 
 
 def test_the_script_is_the_command_line() -> None:
