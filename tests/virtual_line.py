@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 import serial
+from pymodbus.transport.serialtransport import SerialTransport
 
 
 class VirtualLine:
@@ -24,6 +25,8 @@ class VirtualLine:
         self._is_plugged = True
         # pyserial is below the code under test; pymodbus requests a port of it and gets one of ours.
         patch.setattr(serial, "serial_for_url", self._open)
+        # On Windows pymodbus looks at its ports again and again: they cannot be watched there. Ours can.
+        patch.setattr(SerialTransport, "force_poll", False)
 
     def pull(self) -> None:
         """Pull the near port out, as one pulls a USB adapter."""

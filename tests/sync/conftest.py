@@ -158,6 +158,8 @@ class Striker:
 
 @pytest.fixture
 def interrupt() -> Iterator[Striker]:
+    if not hasattr(signal, "SIGUSR1"):
+        pytest.skip("Windows has no signals from thread to thread")
     striker = Striker()
     before = signal.signal(signal.SIGUSR1, striker.handle)
     yield striker
