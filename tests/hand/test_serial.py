@@ -18,6 +18,8 @@ from tests.patience import patience
 from tests.serial_line import SerialLine
 
 A = Finger.A
+TIMEOUT_S = 0.4
+"""Long enough for a busy machine, on which the two ends of the line wait for a core in turns."""
 
 
 @pytest_asyncio.fixture
@@ -34,7 +36,7 @@ async def serial_server(line: SerialLine, clock: Clock) -> AsyncIterator[SerialS
 
 @pytest_asyncio.fixture
 async def serial_hand(line: SerialLine, serial_server: SerialSimulatorServer) -> AsyncIterator[RobotiqHand]:
-    async with RobotiqHand(f"rtu://{line.near}", response_timeout=0.1) as hand:
+    async with RobotiqHand(f"rtu://{line.near}", response_timeout=TIMEOUT_S) as hand:
         yield hand
 
 
@@ -64,7 +66,7 @@ async def test_a_pulled_line_comes_back(
     await serial_hand.move(20, A)
 
 
-@pytest.mark.parametrize("held_s", [0.05, 0.12, 0.3])
+@pytest.mark.parametrize("held_s", [0.05, 0.5, 0.9])
 async def test_replies_held_back_never_become_a_status(
     serial_hand: RobotiqHand, serial_server: SerialSimulatorServer, line: SerialLine, held_s: float
 ) -> None:
@@ -77,6 +79,6 @@ async def test_replies_held_back_never_become_a_status(
     async for status in statuses:
         # A reply within the timeout may be as old as that; then it was requested at that time, too.
         age = status.timestamp - changed_at
-        assert status.fault or age < 0.1, f"{age:.3f} s old: {status!r}"
-        if age > 0.3:
+        assert status.fault or age < TIMEOUT_S, f"{age:.3f} s old: {status!r}"
+        if age > 2 * TIMEOUT_S:
             break
