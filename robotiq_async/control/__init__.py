@@ -18,7 +18,7 @@
 # One write. A change is merged with others until the next cycle, then taken out and sent once, because it
 # may move an axis. Its acknowledgement answers its callers. It acts within a device cycle; a status shows it;
 # a later one supersedes it. If the link goes down before the acknowledgement, its callers get an error, the
-# entry is in doubt, and nothing but a stop is written for the time in which it may act. A speed or a force
+# entry is in doubt, and no command or hold is written for the time in which it may act. A speed or a force
 # has no echo: it counts as acting after a time, and is known to be the gripper's if it was acknowledged.
 #
 # Holds only stop an axis, and are decided when they are written: an axis at rest or in contact keeps its

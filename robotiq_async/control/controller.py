@@ -407,11 +407,13 @@ class Controller:
             self._activation = None
 
     def _follow_change(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
-        """The condition is another than before: all that follows from that is here."""
+        """The condition is another than before: what ends with that, whose image acts, what is held."""
         ledger, requests = self._ledger, self._requests
         if before is None:
             self._resume_or_adopt(condition, status)
         elif before in FOLLOWS and condition is Trigger.SEEN_FAULT:
+            if ledger.match is None:
+                self._adopt_other_client(status)  # first, or the hold would undo what it wrote
             requests.fail_motions(GripperFaultError(status.fault))
             if status.activation_echo:
                 # A command sent just before may not act yet, and its motion would begin when the fault
@@ -584,7 +586,7 @@ class Controller:
         self._requests.acknowledged()
         self._update_state(Trigger.DELIVERED)
 
-    def lost(self, why: RobotiqError | None = None) -> None:
+    def lost(self, why: RobotiqError | None = None, now: float = NEVER) -> None:
         """The link is down: drop what was not acknowledged. No motion is sent again; holds are, on return."""
         self._why_no_grip = "the link went down"
         error = ConnectionLostError(f"the link went down before this was done: {why}")
@@ -594,5 +596,5 @@ class Controller:
         self._requests.lost(error)
         self._procedure, self._stop = None, None
         self._evidence.lost()
-        self._ledger.lost()
+        self._ledger.lost(now)
         self._update_state(Trigger.LINK_LOST)

@@ -22,7 +22,8 @@ class Entry:
         before: the image that it replaces.
         echo: what a status repeats of it.
         is_ours: whether this hand has written it.
-        sent: when, in monotonic seconds.
+        sent: when, in monotonic seconds; of a write that was lost with the link, the latest time at which it
+            may have arrived.
         acknowledged: when; None before that.
         shown: the first status that showed that it acts, as far as that was needed.
         is_doubtful: whether it may or may not act.

@@ -224,12 +224,13 @@ class Ledger:
         """The last image was acknowledged."""
         self._entries[-1].acknowledged = now
 
-    def lost(self) -> None:
-        """The link is down: a write without acknowledgement may or may not have arrived."""
+    def lost(self, now: float = NEVER) -> None:
+        """The link is down: a write without acknowledgement may have arrived at any time until now."""
         self._freeze(self.base)
         last = self._entries[-1]
         if last.is_in_flight:
             last.is_doubtful = self._has_doubtful = True
+            last.sent = max(last.sent, now)
 
     def _freeze(self, base: Request) -> None:
         """End the adoption: the base is settled."""

@@ -1,4 +1,4 @@
-"""Stops: a halt, a reset, and what ends a hand. Each is a level, and a stronger one replaces a weaker.
+"""Stops: a halt, a reset, and what ends a hand. Each is a level; a new one replaces the one before.
 
 A stop differs from all else that is written. It is written before the read of its cycle: a gripper may obey
 and not answer. It may be written again, because it only ends motion: a gripper may acknowledge a write that
@@ -11,7 +11,7 @@ acts and a status shows it: what shows may be from before the write.
 # RESET     at once               while gACT shows                 the gripper shows reset
 # HALT      at once               once, if gGTO shows              gGTO = 0 and nothing that waits sets it; or
 #                                                                  after two writes: then halt() fails
-# SHUTDOWN  at once               by its time, if nothing shows    the echo is that of the image, or reset; at
+# SHUTDOWN  at once               each WINDOW_S, until it shows    the echo is that of the image, or reset; at
 #                                                                  once if there is nothing to stop
 # KEEP      after write_spacing,  never: replaced by SHUTDOWN      every axis rests for REST_S
 #           only what moves
@@ -60,7 +60,8 @@ class Stop:
         self.is_early = False
         self._entries: Final[list[Entry]] = []
         self._times = 0
-        self._was_ready = False
+        # Whether the gripper was active before it: an activation that runs already is not ours to take back.
+        self._was_active = False
 
     @property
     def entry(self) -> Entry | None:
@@ -77,7 +78,7 @@ class Stop:
         self._entries.append(entry)
         self.is_early = is_early
         self._times += not is_early
-        self._was_ready = classify(status) is Trigger.SEEN_READY
+        self._was_active = status.activation_echo and status.is_activated
 
     def is_urgent(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether it is to be written before the next read."""
@@ -157,7 +158,7 @@ class Stop:
             return False
         if self.level is StopLevel.HALT:
             return classify(status) is Trigger.SEEN_RESET or is_activating(status)
-        return self._was_ready and ledger.acts(entry) and is_activating(status)
+        return self._was_active and ledger.acts(entry) and is_activating(status)
 
 
 class Keeping(Stop):

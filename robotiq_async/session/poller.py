@@ -173,7 +173,9 @@ class Poller:
                 with anyio.CancelScope() as self._polling:
                     await self._poll()
                 if self._polling.cancelled_caught:
-                    self._controller.lost(ResponseTimeoutError("no answer until the hand was stopped"))
+                    self._controller.lost(
+                        ResponseTimeoutError("no answer until the hand was stopped"), self._tick.time()
+                    )
         except Exception as error:
             bug = error
             raise
@@ -222,7 +224,7 @@ class Poller:
         self._log.warning("link lost: %s", why)
         self.lost_since = strftime("%H:%M:%S")
         self._note_why_lost(why)
-        self._controller.lost(why)
+        self._controller.lost(why, self._tick.time())
         self._channels.publish_changes()
         policy, since = self._options.policy, self._loop.time()
         if policy is None:
@@ -477,7 +479,7 @@ class Poller:
                 if not failed:
                     self._log.warning("the stop was not delivered, trying again: %s", error)
                 failed = True
-                self._controller.lost(error)
+                self._controller.lost(error, self._tick.time())
                 self._channels.publish_changes()
             await asyncio.sleep(SHUTDOWN_PAUSE_S)
 

@@ -122,11 +122,16 @@ class Scan:
             self.controller.see(self.status())
         self.controller.activates = False
 
-    def step(self, *, answer: bool = True, poll: float = POLL_S) -> None:
-        """One cycle; without an answer the write arrives and the link goes down before it is known."""
+    def step(
+        self, *, answer: bool = True, poll: float = POLL_S, arrives: float = 0.0, lost: float = 0.0
+    ) -> None:
+        """One cycle; without an answer the write arrives and the link goes down before it is known.
+
+        ``arrives`` and ``lost`` are the seconds from the write to that.
+        """
         self.now += poll
         self.controller.see(self.status())
-        self._write(answer=answer)
+        self._write(answer=answer, arrives=arrives, lost=lost)
 
     def hurry(self) -> None:
         """Write what is urgent before the next read, as the poller does."""
@@ -134,10 +139,11 @@ class Scan:
         if due is not None and due.is_urgent and not due.wait:
             self._write(answer=True)
 
-    def _write(self, *, answer: bool) -> None:
+    def _write(self, *, answer: bool, arrives: float = 0.0, lost: float = 0.0) -> None:
         request = self.controller.decide(self.now)
         if request is not None:
             self.written.append(request.registers)
+            self.now += arrives
             if self.forgets:
                 self.forgets -= 1
             else:
@@ -145,7 +151,8 @@ class Scan:
             if answer:
                 self.controller.acknowledged(self.now)
             else:
-                self.controller.lost(None)
+                self.now += lost - arrives
+                self.controller.lost(None, self.now)
 
     def run(self, seconds: float) -> None:
         for _ in range(round(seconds / POLL_S)):
@@ -161,7 +168,7 @@ class Scan:
 
     def blink(self, away: float = 0.05) -> None:
         """The link is lost and comes back."""
-        self.controller.lost(None)
+        self.controller.lost(None, self.now)
         self.come_back(away)
 
     def come_back(self, away: float) -> None:

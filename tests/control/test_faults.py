@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from robotiq_async import Fault, Finger, GripperFaultError, NotActivatedError, State
 from robotiq_async.control.evidence import LASTS_READS
 from robotiq_async.values.enums import Trigger
 from robotiq_async.values.request import Request
-from tests.control.other_client import moved_by_another
+from tests.control.other_client import image, moved_by_another
 from tests.control.scan import POLL_S, Scan, started
 
 UNKNOWN = Fault(0x0C)
@@ -102,6 +104,27 @@ def test_nothing_resumes_when_a_fault_clears_that_began_while_the_link_was_down(
     at = scan.positions()[A]
     scan.run(10)
     assert scan.positions()[A] <= at + 4
+
+
+def test_a_halt_of_another_client_in_the_status_of_a_fault_stays_a_halt() -> None:
+    """The hold for the fault was made of our image, with rGTO set: B moved on when the fault cleared."""
+    scan = started()
+    scan.gripper.write(0, image({A: 6, B: 200, C: 6}, speed=0))
+    scan.run(0.5)
+    scan.command(A, position=250, speed=0)
+    scan.run(0.3)
+    halted = replace(scan.last_image, go=False)
+    scan.gripper.write(0, halted.registers)
+    scan.now += 0.006
+    scan.gripper.inject_fault(Fault.SCISSOR_INTERFERENCE, 1.0)
+    scan.step()
+    assert scan.state is State.FAULT
+    at = scan.gripper.position(B)
+    scan.run(3.0)
+    assert scan.state is State.RUNNING_IDLE
+    assert scan.controller.foreign_commands == 2
+    assert not scan.latest.go_echo
+    assert scan.gripper.position(B) == at
 
 
 def test_an_axis_that_the_fault_keeps_from_starting_is_held() -> None:

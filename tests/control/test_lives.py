@@ -66,13 +66,13 @@ class Watched(Scan):
     motions: Counter[tuple[Finger, int]]
     """Number of images that set an axis in motion to a position."""
 
-    def _write(self, *, answer: bool) -> None:
+    def _write(self, *, answer: bool, arrives: float = 0.0, lost: float = 0.0) -> None:
         written, state, shown = len(self.written), self.state, self.latest
         before = Request.from_registers(self.written[-1]) if self.written else Request()
         at = {axis: self.gripper.position(axis) for axis in AXES}
         in_force = Request.from_registers(self.gripper.request_registers)
         holds = self.gripper.holds
-        super()._write(answer=answer)
+        super()._write(answer=answer, arrives=arrives, lost=lost)
         if len(self.written) == written:
             return
         now = self.last_image

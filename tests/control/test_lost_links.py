@@ -47,6 +47,20 @@ def test_a_write_that_arrived_unacknowledged_is_ours_when_it_shows(scan: Scan) -
     assert len(scan.written) == writes + 1
 
 
+@pytest.mark.parametrize("device_cycle", [0.1, 0.2])
+def test_a_write_that_comes_late_before_the_link_goes_is_not_undone(device_cycle: float) -> None:
+    """Its doubt was over when the link was found lost, and the command for B sent A back to where it was."""
+    scan = started(device_cycle)
+    scan.run(1)
+    scan.command(A, position=200, speed=255)
+    scan.step(answer=False, arrives=0.3, lost=0.4)
+    scan.come_back(0.02)
+    scan.command(B, position=50)
+    scan.run(4)
+    assert scan.gripper.position(A) == pytest.approx(200, abs=2)
+    assert scan.controller.foreign_commands == 0
+
+
 def test_a_second_lost_link_brings_back_nothing_that_was_replaced(scan: Scan) -> None:
     """A write echoed after the first loss was taken for lost at the second: B went back to 200."""
     scan.move(200, B)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from robotiq_async import Finger, Mode, NotStartedError, State
+from robotiq_async import Fault, Finger, Mode, NotStartedError, State
 from robotiq_async.values.request import Request
 from tests.control.other_client import activated_by_another, asked, image
 from tests.control.scan import POLL_S, Scan, started
@@ -50,6 +50,26 @@ def test_the_shutdown_takes_back_an_activation_of_ours() -> None:
     assert scan.gripper.is_moving
     scan.stop()
     assert not scan.gripper.is_moving
+
+
+@pytest.mark.parametrize("device_cycle", [0.005, 0.05])
+@pytest.mark.parametrize("keep_grip", [False, True])
+def test_a_stop_in_a_fault_takes_back_the_activation_that_it_began(
+    device_cycle: float, keep_grip: bool
+) -> None:
+    """Another client reset the gripper because of the fault, just before our image with rACT."""
+    scan = started(device_cycle)
+    scan.command(A, position=255, speed=0)
+    scan.run(1.0)
+    scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    scan.run(1.0)
+    before = scan.gripper.travel(B)
+    scan.gripper.write(0, [0x0000])
+    scan.now += device_cycle / 2
+    scan.stop(keep_grip=keep_grip)
+    scan.now += 20
+    assert not scan.status().activation_echo
+    assert scan.gripper.travel(B) - before < 20
 
 
 def test_the_shutdown_takes_back_an_activation_of_ours_that_began_after_the_link_was_back() -> None:
