@@ -455,6 +455,7 @@ def test_a_page_shows_the_axis_that_there_is() -> None:
         "peaks": [150],
         "model": "hand-e",
         "has_current": True,
+        "bodies": None,
         "age": 0.0,
     }
     mirror.hear(message | {"registers": registers(0xF9, 0, 0, 255, 228), "timestamp": 1.0, "sequence": 3})

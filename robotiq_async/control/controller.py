@@ -162,7 +162,7 @@ class Controller:
             self._begin_reset(Trigger.ASK_HALT, MoveSupersededError("a halt took over"))
         self._requests.supersede(Finger.ALL, MoveSupersededError("a halt stopped the fingers"))
         if self._stop is None or self._stop.is_delivered:  # a new halt is sent again
-            self._stop = Stop(StopLevel.HALT, [] if self._stop is None else self._stop.waiters)
+            self._stop = Stop(StopLevel.HALT, self._stop)
         self._stop.waiters.append(waiter)
         self._update_state(Trigger.ASK_HALT)
 
@@ -263,7 +263,7 @@ class Controller:
         self._requests.fail(error)
         stop = self._stop
         if stop is not None:
-            fail(stop.waiters, error)
+            fail(stop.callers, error)
             self._stop = None if stop.level is StopLevel.HALT else stop
 
     # -- what is known ---------------------------------------------------------------------------------
@@ -372,6 +372,7 @@ class Controller:
         return True
 
     def _advance_stop(self, stop: Stop, status: RobotiqStatus) -> None:
+        stop.fail_overdue(self._ledger, status, self.machine.log)
         if stop.has_activated(self._ledger, status):
             error = NotActivatedError("the gripper was reset as it was stopped: its activation is taken back")
             self.machine.log.warning("%s", error)
@@ -446,7 +447,6 @@ class Controller:
     def _adopt_other_client(self, status: RobotiqStatus) -> None:
         """Another client commands the gripper: adopt its requests, or our next write would undo them."""
         ledger = self._ledger
-        limited = dict(ledger.limited)
         self.foreign_commands += 1
         if status.timestamp - self._warned >= WARNING_S:
             self._warned = status.timestamp
@@ -456,7 +456,7 @@ class Controller:
         self._requests.pending.hold_only(ledger.ours)
         self._requests.moves.fail(
             MoveSupersededError("another client commands the gripper"),
-            lambda move: move.entry is not None and not move.is_under(status, limited),
+            lambda move: move.entry is not None and not move.is_under(status, ledger.limited),
         )
 
     def _finish(self, status: RobotiqStatus, *, has_written: bool) -> None:
@@ -592,7 +592,7 @@ class Controller:
         error = ConnectionLostError(f"the link went down before this was done: {why}")
         error.__cause__ = why
         if self._stop is not None:
-            fail(self._stop.waiters, error)
+            fail(self._stop.callers, error)
         self._requests.lost(error)
         self._procedure, self._stop = None, None
         self._evidence.lost()

@@ -31,7 +31,7 @@ from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .entry import Entry
 from .evidence import classify, is_activating
-from .ledger import Ledger
+from .ledger import WINDOW_S, Ledger
 from .pending import Pending, at_rest, merged
 from .waiters import Waiter, fail, resolve
 
@@ -50,13 +50,14 @@ class Stop:
 
     Attributes:
         level: its level. A new level is a new stop.
-        waiters: the callers of halt().
+        waiters: the callers of halt(); beside them are those of the halts that it replaces.
         is_early: whether its last write came within write_spacing, so that it is due again.
     """
 
-    def __init__(self, level: StopLevel, waiters: list[Waiter[None]] | None = None) -> None:
+    def __init__(self, level: StopLevel, before: Stop | None = None) -> None:
         self.level: Final = level
-        self.waiters: Final = waiters or []
+        self.waiters: Final[list[Waiter[None]]] = []
+        self._older: Final = [] if before is None else before.asked_since()
         self.is_early = False
         self._entries: Final[list[Entry]] = []
         self._times = 0
@@ -137,16 +138,37 @@ class Stop:
         # about to change.
         return is_reset or status.echo == entry.echo
 
+    def asked_since(self) -> list[tuple[Waiter[None], float]]:
+        """The callers of halt(), each with the time at which a halt was first acknowledged for it."""
+        first = self._entries[0].acknowledged if self._entries else None
+        return [*self._older, *((waiter, math.inf if first is None else first) for waiter in self.waiters)]
+
+    def fail_overdue(self, ledger: Ledger, status: RobotiqStatus, log: Log) -> None:
+        """Fail callers whose halt does not show, however often it has been replaced since."""
+        since = ledger.now.time - MOST_HALTS * WINDOW_S
+        overdue = [waiter for waiter, first in self._older if first <= since]
+        if overdue and status.go_echo:
+            self._older[:] = [each for each in self._older if each[0] not in overdue]
+            self._fail(overdue, log)
+
     def answer(self, status: RobotiqStatus, log: Log) -> None:
         """Answer the callers of halt(): it is reached, or was sent as often as it may be."""
         if self.level is StopLevel.HALT and status.go_echo:
-            error = StateTimeoutError(
-                f"the gripper does not show that it has stopped after {MOST_HALTS} halts: the fingers may "
-                "still move (another client commands it, or it forgets writes)"
-            )
-            log.warning("%s", error)
-            fail(self.waiters, error)
-        resolve(self.waiters)
+            self._fail(self.callers, log)
+        resolve(self.callers)
+
+    @property
+    def callers(self) -> list[Waiter[None]]:
+        """The callers of halt() that have no answer yet."""
+        return [*self.waiters, *(waiter for waiter, _ in self._older)]
+
+    def _fail(self, callers: list[Waiter[None]], log: Log) -> None:
+        error = StateTimeoutError(
+            f"the gripper does not show that it has stopped after {MOST_HALTS} halts: the fingers may "
+            "still move (another client commands it, or it forgets writes)"
+        )
+        log.warning("%s", error)
+        fail(callers, error)
 
     def has_activated(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether its rACT activates a gripper that another client has reset just before.

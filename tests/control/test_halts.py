@@ -195,6 +195,36 @@ def test_a_halt_that_never_shows_fails(scan: Scan, caplog: pytest.LogCaptureFixt
     assert str(halted.error) in caplog.text
 
 
+@pytest.mark.parametrize("pause", [0.3, 0.6, 0.9])
+def test_a_halt_that_never_shows_fails_although_it_is_repeated(scan: Scan, pause: float) -> None:
+    """Each call began to count anew, so none had an answer."""
+    scan.move(255, speed=0)
+    scan.run(0.5)
+    scan.forgets = 1000
+    halts = []
+    for _ in range(5):
+        halts.append(scan.halt())
+        scan.run(pause)
+    scan.run(1.5)
+    assert scan.gripper.is_moving
+    assert [type(each.error) for each in halts] == [StateTimeoutError] * 5
+
+
+def test_the_first_of_two_halts_fails_in_its_time(scan: Scan) -> None:
+    scan.move(255, speed=0)
+    scan.run(0.5)
+    scan.forgets = 1000
+    first = scan.halt()
+    scan.run(0.8)
+    second = scan.halt()
+    scan.run(0.3)
+    assert isinstance(first.error, StateTimeoutError)
+    assert not second.is_answered, "its own writes have their time"
+    scan.forgets = 0
+    scan.run(0.7)
+    assert second.answers == [None]
+
+
 @pytest.mark.parametrize("how", ["halt", "stop"])
 def test_a_stop_in_a_change_of_mode_of_another_client_resets_nothing(how: str) -> None:
     """It is busy as an activation is; a reset would drop the part."""

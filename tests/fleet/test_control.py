@@ -18,7 +18,9 @@ from robotiq_async.fleet.control.lease import Holder, Lease
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import Call
 from robotiq_async.fleet.wire.names import GripperName
+from robotiq_async.values.calibration.scales import SpeedCalibration
 from robotiq_async.values.errors import AgentError, ControlLostError
+from robotiq_async.values.model import TWO_FINGER_85
 from robotiq_async.values.request import Request as Image
 from tests.fleet.cell import ending
 from tests.fleet.lab import LEFT, Garbling, Lab, Spoiling, lab
@@ -68,6 +70,35 @@ async def test_a_lease_that_comes_back_after_its_release_is_not_held(here: Lab, 
     assert not hand.is_in_control
     with pytest.raises(ControlLostError):
         await hand.move(30)
+
+
+@inside(lab)
+@pytest.mark.parametrize("how", ["acquire", "take", "move"])
+async def test_a_lease_that_is_granted_after_a_release_moves_nothing(here: Lab, how: str) -> None:
+    """The motion began after release() had returned."""
+    here.network.delay("client", "agent", 0.05)
+    async with here.client(control=None) as hand:
+        calling = asyncio.create_task(hand.move(200, speed=0) if how == "move" else getattr(hand, how)())
+        lease = here.lease
+        await until(lambda: here.lease > lease)
+        await hand.release()
+        with pytest.raises(ControlLostError, match="released while it was acquired"):
+            await calling
+        await asyncio.sleep(2)
+        assert not hand.is_in_control
+        assert not here.gripper.is_moving
+
+
+@inside(lab)
+async def test_a_calibration_of_another_model_is_refused_before_anything_moves(here: Lab) -> None:
+    here.gripper.write(0, [0x0000])
+    await asyncio.sleep(0.5)
+    travel = here.gripper.travel(Finger.A)
+    jaw = SpeedCalibration("a jaw", ((0, 4.0), (255, 1.0)), TWO_FINGER_85)
+    with pytest.raises(ValueError, match="2F-85"):
+        await here.client(calibration=jaw).start()
+    await asyncio.sleep(2)
+    assert here.gripper.travel(Finger.A) == travel
 
 
 @inside(lab)

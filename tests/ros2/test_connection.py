@@ -9,8 +9,15 @@ from collections.abc import AsyncIterator, Awaitable
 
 import pytest
 
-from robotiq_async import Fault, Finger, RobotiqError, RobotiqHand, RobotiqStatus, State
-from robotiq_async.ros2.gripper.connection import COMMANDS, MOST_CALLS, PENDING_S, Connection, RefusedError
+from robotiq_async import Fault, Finger, RobotiqError, RobotiqHand, RobotiqStatus, State, StateTimeoutError
+from robotiq_async.ros2.gripper.connection import (
+    COMMANDS,
+    MOST_CALLS,
+    PENDING_S,
+    Connection,
+    PendingStop,
+    RefusedError,
+)
 from robotiq_async.ros2.gripper.goals import Ending, Outcome
 from robotiq_async.ros2.translation.diagnosis import Level, diagnose, status_text
 from robotiq_async.ros2.translation.joints import Targets
@@ -334,3 +341,22 @@ async def test_without_a_link_nothing_is_known(connection: Connection, server: S
     fresh = RobotiqHand("tcp://192.0.2.1")
     assert diagnose(fresh, 0.0)[1].level is Level.STALE
     assert "fault" not in json.loads(status_text(fresh, takes_commands=False))
+
+
+class Disobedient(FakeHand):
+    """A gripper that does not show a halt."""
+
+    async def _halt(self) -> None:
+        raise StateTimeoutError("the fingers may still move")
+
+
+async def test_a_late_halt_that_does_not_show_is_an_error_in_the_log(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """It was taken for one that came too late, and nothing said that the fingers may move."""
+    async with Disobedient() as hand:
+        pending = PendingStop(hand)
+        pending.schedule(hand.halt)
+        while pending.is_pending:  # noqa: ASYNC110  # there is no event to wait for
+            await asyncio.sleep(POLL_S)
+    assert "the link is back, and the fingers MAY STILL MOVE" in caplog.text

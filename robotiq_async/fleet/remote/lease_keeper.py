@@ -32,6 +32,7 @@ class LeaseKeeper:
         self._lease = client.lease
         self._agents = agents
         self._acquiring = asyncio.Lock()
+        self._releases = 0
         self._reacquiring: asyncio.Task[Any] | None = None
         self._checking: asyncio.Task[Any] | None = None
         self._release: Release | None = None
@@ -47,18 +48,24 @@ class LeaseKeeper:
 
     async def acquire(self, *, take: bool = False) -> None:
         """Get the lease, with ``take`` also from another client; errors as of :meth:`RemoteHand.acquire`."""
+        before = self._releases
         async with self._acquiring:
             if self._lease.is_held:
                 await self._renew()  # it may have been lost unnoticed
             if self._lease.is_held:
                 return  # a new lease would end the motions under this one
-            self._lease.grant(*await self._acquire({"what": "take" if take else "acquire"}))
+            granted = await self._acquire({"what": "take" if take else "acquire"})
+            if self._releases != before:  # the lease expires
+                raise ControlLostError(f"{self._client.name}: released while it was acquired", "released")
+            self._lease.grant(*granted)
 
     def release(self, level: StopLevel) -> None:
         """Release the lease, if this client holds it; the request is sent within this call.
 
-        Called again before the release is acknowledged, the strongest level applies.
+        Called again before the release is acknowledged, the strongest level applies. An acquire() that waits
+        for its answer fails.
         """
+        self._releases += 1
         if self._lease.is_held:
             self._release = Release(self._client)
         elif self._release is not None and self._release.is_done:

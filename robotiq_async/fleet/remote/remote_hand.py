@@ -139,6 +139,7 @@ class RemoteHand(Hand):
         try:
             with no_answer_as_lost_connection():
                 await session.connect(max(self._connect_timeout, wait))
+            _ = self.units  # a calibration of another model fails here, before anything moves
             activates = activate and self._control
             if activates and self.state in (State.RESET, State.DO_ACTIVATION, State.WF_ACTIVATION):
                 await self.activate()

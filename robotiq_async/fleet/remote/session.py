@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any, Final
 
 from ...runtime.clock import now
@@ -154,9 +155,11 @@ class RemoteSession:
         try:
             await self.keeper.released()
         except RobotiqError as error:
-            self.log.warning("the release was not acknowledged (%s): the agent holds what moves", error)
+            self.log.warning("the release was not acknowledged (%s): the agent is to hold what moves", error)
         finally:
             await self.stops.halted()
+            with suppress(RobotiqError):  # a stronger one may have been sent meanwhile
+                await self.keeper.released()
             self._undo()
             self.agents.end()
             await self.client.close()

@@ -247,12 +247,15 @@ class PendingStop:
     async def _send(self, stop: Callable[[], Awaitable[None]], until: float) -> None:
         while (left := until - now()) > 0:
             try:
-                await self._hand.wait_for_state(*_REACHED, timeout=left)
+                try:
+                    await self._hand.wait_for_state(*_REACHED, timeout=left)
+                except StateTimeoutError:
+                    return  # it is too late
                 await stop()
             except RobotiqConnectionError:
                 await asyncio.sleep(RETRY_S)
-            except (NotStartedError, StateTimeoutError, ControlLostError):
-                return  # the hand or its lease has ended, which stops the fingers; or it is too late
+            except (NotStartedError, ControlLostError):
+                return  # the hand or its lease has ended, which stops the fingers
             except RobotiqError as error:
                 Log(self._hand.name).error("the link is back, and the fingers MAY STILL MOVE: %s", error)
                 return

@@ -208,7 +208,9 @@ class Recorder:
         self._caller.wait(lambda: self.__aexit__(kind, error, trace))
 
     def mark(self, label: str, **values: str | float | bool) -> None:
-        """Write a mark: everything from now on has this label, until the next mark. Never blocks.
+        """Write a mark: everything from now on has this label, until the next mark.
+
+        It never waits for the file. With a blocking hand it waits for a turn of the hand's event loop.
 
         Every row of a table has the label as of its poll; the values are with the events. ``mark("")`` ends
         the last one.

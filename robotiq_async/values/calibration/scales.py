@@ -53,6 +53,7 @@ class SpeedCalibration:
             ValueError: fewer than two, not rising, or outside 0..255 and 0..600 s.
         """
         object.__setattr__(self, "points", checked_points(self.points, LONGEST_S))
+        _check_model(self.model)
         if not all(seconds for _, seconds in self.points):
             raise ValueError("points: a closing time must be above 0 s")
 
@@ -157,6 +158,7 @@ class ForceCalibration:
             ValueError: fewer than two, not rising, or outside 0..255 and 0..1000 N.
         """
         object.__setattr__(self, "points", checked_points(self.points, STRONGEST_N))
+        _check_model(self.model)
 
     @classmethod
     def nominal(cls, model: Model = THREE_FINGER) -> ForceCalibration:
@@ -230,6 +232,11 @@ def mean(runs: Sequence[int]) -> float:
 def newton(grams: float) -> float:
     """The force, in newtons, that a scale shows as a mass: F = m g."""
     return grams / 1000 * GRAVITY
+
+
+def _check_model(model: object) -> None:
+    if model is not None and not isinstance(model, Model):
+        raise TypeError(f"model must be a Model or None, got {model!r}")
 
 
 def checked_points(given: Iterable[tuple[int, float]], high: float) -> Points:
