@@ -234,7 +234,7 @@ def models() -> str:
             "speed",
             "force",
             "reads open, closed",
-            "unit",
+            "unit id: TCP, serial",
             "tried on hardware",
         ],
         (
@@ -246,7 +246,7 @@ def models() -> str:
                 "{:g}-{:g} mm/s".format(*each.speeds_mm_s),
                 "{:g}-{:g} N".format(*each.forces_n),
                 f"{each.stroke.open_reading}, {each.stroke.closed_reading}",
-                f"{each.rtu.device_id}",
+                f"{each.tcp.device_id}, {each.rtu.device_id}",
                 "no",
             ]
             for each in MODELS.values()
