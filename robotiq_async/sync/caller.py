@@ -58,6 +58,8 @@ class Caller:
             self._calls.discard(call)
             if not self.is_in_use:
                 _IN_USE.discard(self)
+                if self.is_in_use:  # another thread began a call in between
+                    _IN_USE.add(self)
 
     def tell(self, function: Callable[[], T]) -> T:
         """Make a call that does not wait. Listeners may make one, too."""

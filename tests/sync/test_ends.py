@@ -5,14 +5,13 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
-import signal
-import sys
 import threading
 
 import pytest
 
 from robotiq_async import Finger, NotStartedError, RobotiqConnectionError, State
 from robotiq_async.sync import RobotiqHand, caller
+from tests.forks import in_the_child
 from tests.sync.conftest import Wire, run_to_its_end, until
 
 SCRIPT = """
@@ -119,23 +118,6 @@ def test_an_event_loop_that_stands_still_does_not_keep_the_program_from_ending(
     caller._stop_all()
     remove()
     goes_on.set()
-
-
-def in_the_child(check: object) -> int:
-    """The exit code of a forked process: 0 when the check passed there."""
-    assert callable(check)
-    pid = os.fork()
-    if pid == 0:
-        code = 1
-        signal.alarm(10)  # one that hangs is killed
-        try:
-            check()
-            code = 0
-        except BaseException as error:  # noqa: BLE001
-            sys.stderr.write(f"{error!r}\n")
-        finally:
-            os._exit(code)
-    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
 
 
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")

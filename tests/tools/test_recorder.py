@@ -29,6 +29,7 @@ from robotiq_async.tools.recording.recorder import Recorder
 from robotiq_async.tools.recording.recordings import read_recording, recover
 from robotiq_async.tools.recording.table import export
 from robotiq_async.values.errors import RecordingError
+from tests.forks import in_the_child
 from tests.grippers import until
 
 ROOT = Path(__file__).parents[2]
@@ -459,3 +460,20 @@ async def test_recovering_what_is_whole_changes_nothing(
     assert list(read_recording(tmp_path / "again.mcap")) == list(read_recording(file))
     with pytest.raises(RecordingError, match="File exists"):
         recover(file, tmp_path / "again.mcap")
+
+
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+def test_a_recorder_stays_with_the_process_that_began_it(file: Path) -> None:
+    """Marks that were made in a child went nowhere, and nothing said so."""
+    hand = sync.RobotiqHand("sim://?speedup=50")
+    with Recorder(hand, file) as recorder, hand:
+
+        def check() -> None:
+            with pytest.raises(RuntimeError, match="stays with the parent"):
+                recorder.mark("grasp 1")
+            with pytest.raises(RuntimeError, match="stays with the parent"):
+                recorder.__exit__(None, None, None)
+
+        assert in_the_child(check) == 0
+        recorder.mark("grasp 1")

@@ -180,9 +180,12 @@ class Recorder:
         Raises:
             RecordingError: a write failed; it never replaces another exception.
         """
-        await wait_shielded(asyncio.ensure_future(self._end()))
-        if self._failed.done() and error is None:
-            raise self._failed.result()
+        ending = asyncio.ensure_future(self._end())
+        await wait_shielded(ending)
+        if error is None:
+            ending.result()  # a mistake of ours would be lost
+            if self._failed.done():
+                raise self._failed.result()
 
     def __enter__(self) -> Self:
         """Create the file and start recording a blocking hand.
@@ -193,6 +196,7 @@ class Recorder:
         """
         if self._caller is None:
             raise TypeError("a hand for asyncio is recorded with 'async with'")
+        self._caller.check_process()
         self._caller.wait(self._begin)
         return self
 
@@ -205,6 +209,7 @@ class Recorder:
             RecordingError: a write failed; it never replaces another exception.
         """
         assert self._caller is not None, "entered"
+        self._caller.check_process()
         self._caller.wait(lambda: self.__aexit__(kind, error, trace))
 
     def mark(self, label: str, **values: str | float | bool) -> None:
@@ -230,6 +235,7 @@ class Recorder:
         if self._caller is None:
             self._feed.mark(label, values)
         else:
+            self._caller.check_process()
             self._caller.tell(lambda: self._feed.mark(label, values))
 
     async def failure(self) -> RecordingError:
