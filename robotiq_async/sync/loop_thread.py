@@ -36,6 +36,9 @@ T = TypeVar("T")
 Function = Callable[[], Coroutine[Any, Any, T]]
 
 NAME: Final = "robotiq_async"  # of the thread
+HOLD_AFTER_S: Final = 0.1
+"""Seconds that an interrupted call has to end before the fingers are held: most calls hold what they moved
+themselves, and one that waits for a disk does not keep them moving."""
 LOOK_S: Final = 0.1  # between two checks that the loop still exists; on Windows Ctrl-C arrives only then
 GIVE_UP_S: Final = 3.0  # for an interrupted call to end: stop() takes up to 2 s, a hold up to 1 s
 
@@ -209,13 +212,15 @@ class _Server:
             call.begin()
 
     def give_up(self, call: _Call[Any], then: Function[None] | None, settled: SimpleQueue[None]) -> None:
-        """Cancel a call if it has begun, call ``then``, and signal ``settled``."""
+        """Cancel a call if it has begun, call ``then``, and signal ``settled`` when both have ended."""
 
         async def give_up() -> None:
+            call.cancel()
             try:
-                await call.cancelled()
+                await call.ended(HOLD_AFTER_S)
                 if then is not None:
                     await then()
+                await call.ended()
             finally:
                 settled.put(None)
 
@@ -247,12 +252,15 @@ class _Call(Generic[T]):
     async def _run(self) -> T:
         return await self._function()
 
-    async def cancelled(self) -> None:
-        """Cancel it and wait for its end; its exception is dropped."""
+    def cancel(self) -> None:
         if self._task is not None:
             self._task.cancel()
-            await asyncio.wait({self._task})
-            if not self._task.cancelled():
+
+    async def ended(self, timeout: float | None = None) -> None:
+        """Wait for its end; its exception is dropped."""
+        if self._task is not None:
+            done, _ = await asyncio.wait({self._task}, timeout=timeout)
+            if done and not self._task.cancelled():
                 self._task.exception()
 
     def wait(self, loop: asyncio.AbstractEventLoop, until: float | None) -> asyncio.Task[T] | None:

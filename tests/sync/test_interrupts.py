@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import itertools
 import random
@@ -64,6 +65,33 @@ def test_moving_axes_are_held_in_every_wait(hand: RobotiqHand, wire: Wire, inter
     hand.set_position(255, B)
     wait_and_be_struck(hand, interrupt)
     until(lambda: not wire.is_moving())
+    assert wire.targets()[1] < 100
+
+
+def test_a_call_that_does_not_end_keeps_no_finger_moving(
+    hand: RobotiqHand, wire: Wire, interrupt: Striker
+) -> None:
+    """A recorder that closed its file on a slow disk: the fingers were held only after it."""
+    hand.set_speed(0)
+    hand.set_position(255, B)
+    held = threading.Event()
+
+    async def close_the_file() -> None:
+        while not held.is_set():
+            with contextlib.suppress(asyncio.CancelledError):
+                await asyncio.sleep(0.01)
+
+    def watch() -> None:
+        until(lambda: bool(hand._caller._calls))
+        polled(hand)
+        interrupt()
+        until(lambda: not wire.is_moving())
+        held.set()
+
+    in_a_thread(watch)
+    with pytest.raises(Interrupt):
+        hand._caller.wait(close_the_file)
+    assert held.is_set()
     assert wire.targets()[1] < 100
 
 
