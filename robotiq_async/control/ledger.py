@@ -36,10 +36,11 @@ from .entry import Entry, NoLimits
 from .rest import LONG_AGO, Asked, Grips, Moment, Rest, may_move, rest_of
 
 WINDOW_S: Final = 0.5
-"""Time after its acknowledgement in which a write shows, if it acts. The slowest device cycle considered is
-0.2 s [conceivable]."""
+"""Time after its acknowledgement in which a write shows, if it acts: the slowest device cycle considered is
+0.2 s [conceivable], and the poll that could show it may come late. It bounds what an echo can tell."""
 SILENT_S: Final = 0.25
-"""Time in which a change without an echo (speed, force) acts: the slowest device cycle and 0.05 s."""
+"""Time in which a write acts where no echo can tell (speed, force; one that was lost with the link): the
+slowest device cycle and 0.05 s."""
 NEVER: Final = float("-inf")
 
 
@@ -80,7 +81,9 @@ class Ledger:
         self._past: deque[Entry] = deque()
         # Follows the entry of another client as long as that is the last.
         self._adoption: Adoption | None = None
-        # The masks and the flag spare a poll the questions whose answers are known.
+        # The masks and the flag spare a poll the questions whose answers are known. A write that changes the
+        # request of an axis puts it into unrested and _unproven; a status at rest takes it out of the one,
+        # and a status that cannot be from before the write out of the other.
         # The axes that may still show a status from before their last request; all those unrested.
         self._unproven = NO_AXES
         # The axes that rested before an entry, as noted there, and that have not moved since.

@@ -51,7 +51,8 @@ class Stop:
     Attributes:
         level: its level. A new level is a new stop.
         waiters: the callers of halt(); beside them are those of the halts that it replaces.
-        is_early: whether its last write came within write_spacing, so that it is due again.
+        is_early: whether its last write came within write_spacing of another: the gripper may have forgotten
+            it, and it is due again.
     """
 
     def __init__(self, level: StopLevel, before: Stop | None = None) -> None:
