@@ -46,7 +46,7 @@ THIN_MM: Final = 50
 SIZE: Final = 180
 BACKGROUND: Final = (226, 230, 236)
 AROUND: Final = {"3f": "rod:60x140,0.3@105"}
-"""What a gripper is shown around, if not the can."""
+"""Parts for the grippers for which the can is not the one that is shown."""
 CAN: Final = "cylinder:45x60,0.2"
 POLL_S: Final = 0.005
 
@@ -162,7 +162,7 @@ class Stage:
 
 
 def grasp(model: Model, scene: str) -> tuple[str, Image.Image | None]:
-    """Grip a part and lift it: what became of it in words, and a picture."""
+    """Grip a part and lift it: a sentence and a picture of the outcome."""
     # The tips of a 3-Finger rise by 40 mm as they close, and would pass above low parts: somebody holds them.
     # Between the basic fingers of a 3-Finger what is thin finds no opposite: it is pinched.
     pinch = 0x0200 if model is THREE_FINGER and float(re.findall(r"[0-9]+", scene)[0]) < THIN_MM else 0

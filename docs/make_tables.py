@@ -72,7 +72,7 @@ FAMILIES: Final = {
     Trigger.ASK_RESET: State.DO_RESET,
     Trigger.ASK_HALT: State.DO_RESET,
 }
-"""What leads from nearly every state to the same one."""
+"""Triggers that lead from nearly every state to the same one."""
 
 
 def diagram() -> str:
@@ -99,7 +99,7 @@ def is_on_the_way(state: State) -> bool:
 
 
 def asked() -> str:
-    """What each state answers to each call, but for start() and stop(), of which a sentence tells."""
+    """The answer of each state to each call, except for start() and stop(), which a sentence describes."""
     told = (Trigger.ASK_START, Trigger.ASK_STOP)
     triggers = [trigger for trigger in Trigger if trigger.name.startswith("ASK_") and trigger not in told]
 
@@ -162,7 +162,7 @@ def _bits(field: Field) -> str:
 
 
 def links() -> str:
-    """Where the blocks lie on either link."""
+    """The addresses of the blocks on either link."""
     maps = (TCP_REGISTERS, RTU_REGISTERS)
     return table(
         ["", "Modbus TCP", "Modbus RTU"],

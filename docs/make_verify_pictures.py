@@ -51,7 +51,7 @@ def verify(folder: str, *arguments: str) -> Terminal:
 
 
 async def reading(folder: str) -> None:
-    """How it begins, and how a run ends in which nothing moved."""
+    """The beginning, and the end of a run in which nothing moved."""
     terminal = verify(folder, "--up-to", "2")
     for stage in (b"Stage 0", b"Stage 1", b"Stage 2"):
         if stage == b"Stage 2":

@@ -140,7 +140,7 @@ async def stills(
 
 
 async def film(browser: Browser, play: Callable[[], Awaitable[None]]) -> tuple[list[Image.Image], list[int]]:
-    """What is to be seen while something happens, and for how many milliseconds each."""
+    """The frames of an animation, and the milliseconds of each."""
     frames, durations = [], []
     playing, loop = asyncio.ensure_future(play()), asyncio.get_running_loop()
     while not playing.done():
@@ -153,7 +153,7 @@ async def film(browser: Browser, play: Callable[[], Awaitable[None]]) -> tuple[l
 
 
 async def shot(browser: Browser) -> Image.Image:
-    """What the window shows."""
+    """A picture of the window."""
     data = await browser.do(browser.driver.get_screenshot_as_png)
     return Image.open(io.BytesIO(data)).convert("RGB")
 

@@ -26,7 +26,7 @@ if sys.platform == "win32":
 
 
 async def on_windows(program: str, *arguments: str, coarse: bool = False) -> str:
-    """What a program prints there; it must end well, and complain of nothing but late polls."""
+    """The output of a program there; it must end well, and complain of nothing but late polls."""
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-X", "warn_default_encoding"),
         *("-c", BEGIN.format(coarse) + program, *arguments),

@@ -1,4 +1,4 @@
-"""What is wrong with a built site: dead links, and what a browser would fetch from another host."""
+"""Mistakes of a built site: dead links, and files that a browser would fetch from another host."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ FETCHED: Final = {
     "use": ("href", "xlink:href"),
     "video": ("src", "poster"),
 }
-"""What a browser loads without being asked, by element."""
+"""Attributes that a browser loads by itself, by element."""
 NOT_FETCHED: Final = {"alternate", "author", "canonical", "license", "next", "prev", "search"}
 """Relations of a ``<link>`` that only point somewhere."""
 _IN_STYLES: Final = re.compile(r"""(?:@import\s+(?:url\(\s*)?|url\(\s*)["']?([^"')\s;]+)""")
 
 
 class _Page(HTMLParser):
-    """What a page links to, what it fetches, and the anchors it has."""
+    """The links, the fetched files and the anchors of a page."""
 
     def __init__(self, text: str) -> None:
         super().__init__()

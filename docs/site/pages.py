@@ -31,14 +31,14 @@ _DESCRIBED: Final = re.compile(r"^::: (\S+)", re.MULTILINE)
 
 
 def places() -> dict[str, str]:
-    """Where each file of the project is on the site; both paths from their roots."""
+    """The place of each file of the project on the site; both paths from their roots."""
     files = sorted(path for path in DOCS.rglob("*") if path.is_file() and not _is_code(path))
     found = {path.relative_to(ROOT).as_posix(): path.relative_to(DOCS).as_posix() for path in files}
     return found | PROJECT
 
 
 def _is_code(path: Path) -> bool:
-    """What makes the pages: it is no part of them."""
+    """Programs that make the pages: they are no part of them."""
     return path.suffix in (".py", ".pyc") or path.is_relative_to(DOCS / "site")
 
 

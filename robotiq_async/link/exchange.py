@@ -58,7 +58,7 @@ class Exchange(ABC, Generic[T]):
 
 
 class Echo:
-    """What is known of the echo of a line.
+    """The echo of a line, as far as it is known.
 
     Attributes:
         is_on: whether the line brings back what is sent; None until the first exchange of a connection tells.

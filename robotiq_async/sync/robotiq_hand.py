@@ -435,5 +435,5 @@ class RobotiqHand:
 
 
 def caller_of(hand: RobotiqHand) -> Caller:
-    """What makes the calls of a blocking hand, for tools that run in its event loop."""
+    """The caller of a blocking hand, for tools that run in its event loop."""
     return hand._caller  # noqa: SLF001  # both are the hand

@@ -54,7 +54,7 @@ TROUBLES = [
     *(Trouble(kind, lasts=0.0) for kind in ("garbled", "seven-bits")),
     *(Trouble(kind) for kind in ("echo", "strict-silence")),
 ]
-"""What can go wrong; of these, what fits the link and the gripper does."""
+"""Troubles; those that fit the link and the gripper happen."""
 MOVES_EVERYTHING = ("foreign", "release")
 OF_A_SCISSOR = "interference"
 

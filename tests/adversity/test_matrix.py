@@ -65,7 +65,7 @@ def expected(cell: Cell, model: Model) -> str:
 
 
 def usual(cell: Cell) -> str:
-    """What the page says, unless the gripper has habits."""
+    """The outcome on the page, unless the gripper has habits."""
     place = cell.link, cell.phase.name, cell.trouble
     others = (WITH_HABIT.get(habit.kind, {}).get(place) for habit in HABITS)
     return next(filter(None, others), cell.outcome)

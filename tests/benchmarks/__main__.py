@@ -123,7 +123,7 @@ class Benchmarks(program.Benchmarks):
                 yield {"what": name.replace("_", " "), "loop": loop, **shown}
 
     def commands(self) -> Iterator[Row]:
-        """What a command takes of the loop, in counts and in other amounts."""
+        """The time that a command takes of the loop, in counts and in other amounts."""
         turns = {"asyncio": partial(self.contender, "commands", "asyncio", 5.0)}
         for name, took in median_of(self.in_turns("commands", turns)["asyncio"]).items():
             yield {"command": name, "a call, us": f"{1e6 * took:.0f}"}

@@ -240,7 +240,7 @@ AMOUNTS: list[dict[str, Any]] = [
 
 
 async def commands(seconds: float, ports: list[int]) -> Figures:
-    """What command() takes of a loop, by the names of its arguments: the quickest of many hundreds."""
+    """The time that command() takes of a loop, by the names of its arguments: the least of many hundreds."""
     found: dict[str, float] = {}
     async with RobotiqHand(f"127.0.0.1:{ports[0]}") as it:
         began = time.monotonic()

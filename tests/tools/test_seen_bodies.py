@@ -1,4 +1,4 @@
-"""Where bodies are, as those are told who draw them."""
+"""The places of bodies, for a drawing."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def told(gripper: SimulatedGripper) -> Bodies:
 
 
 def pads_mm(bench: Bench) -> list[float]:
-    """How far the face of each pad of a jaw is from the middle of the part, towards it."""
+    """The distance of the face of each pad of a jaw from the middle of the part, towards it."""
     hand = hand_model(bench.gripper.model)
     joints, (part,) = joints_and_parts(told(bench.gripper))
     assert joints.keys() == {joint.name for joint in hand.moving}

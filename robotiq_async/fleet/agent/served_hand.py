@@ -16,7 +16,7 @@
 # is down then, they wait in _to_hold until the gripper is reached, unless the next holder moves them first.
 #
 # run() starts the hand again every RETRY_S while the gripper cannot be reached. Fingers that move at a start
-# are held: no client is there for them. At its end the hand is stopped, whoever holds the lease.
+# are held: no client is there for them. At its end the hand is stopped, whichever client holds the lease.
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ class LeaseEvent(Enum):
     """Events for the client's side of the lease; the order is that of the columns of the table."""
 
     GRANTED = auto()
-    LOST = auto()  # silence, or a reason that nobody intended
+    LOST = auto()  # silence, or another reason without intention
     OVERRULED = auto()  # another client, a halt, or a new run of the agent
     RELEASED = auto()
     DOUBTED = auto()  # a second agent was seen

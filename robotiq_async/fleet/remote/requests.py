@@ -264,7 +264,7 @@ class Requests:
 
 
 def label() -> str:
-    """What this client calls itself for people: user, host, process."""
+    """The name of this client for people: user, host, process."""
     try:
         user = getpass.getuser()
     except (OSError, KeyError):

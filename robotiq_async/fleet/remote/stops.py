@@ -44,7 +44,7 @@ class Stops:
         return self._begin(self._halts, until_answered(self._halt_once, HALT_S))
 
     async def halted(self) -> None:
-        """Wait until halts under way have ended, successfully or not."""
+        """Wait until the present halts have ended, successfully or not."""
         await asyncio.gather(*self._halts, return_exceptions=True)
 
     def cancel_command(self, name: str, call: Call) -> asyncio.Task[Any] | None:

@@ -102,7 +102,7 @@ def is_acknowledged(received: bytes) -> bool:
 
 
 def without_ends(received: bytes) -> bytes:
-    """What is left without empty lines before it: an ``ack`` may have had an end of line after all."""
+    """The rest without empty lines before it: an ``ack`` may have had an end of line after all."""
     return received.lstrip(_END)
 
 

@@ -41,7 +41,7 @@ SHOWS_S: Final = 0.5
 SLOW: Final = ("GTO", "STA", "FLT", "ACT")
 """Asked for in turn, one in each read."""
 LATEST: Final = 4
-"""Written positions that may still show as echo: a write or two are under way, in a fast stream."""
+"""Written positions that may still show as echo: a write or two in flight, in a fast stream."""
 TRIES: Final = 4
 """Of reading activation, go and echo of one moment. Both change at a stop or a start, not all the time."""
 
@@ -183,7 +183,7 @@ class UrcapTransport:
     # -- a status ----------------------------------------------------------------------------------------
 
     async def _read_some(self, by: float) -> None:
-        """What changes in a motion, and one of the slow variables."""
+        """The variables that change in a motion, and one of the slow ones."""
         if await self._is_new("PRE", by) and self._values["PRE"] not in self._positions:
             self._changes = True
             return

@@ -159,7 +159,7 @@ class Physics:
 
 
 class OrderedDrive:
-    """The motor of an axis, for a gripper in another thread than the world: nobody waits for the other.
+    """The motor of an axis, for a gripper in another thread than the world: neither waits for the other.
 
     An order is taken up before the next step. Until then the motor counts as in motion, for what it tells is
     about the goal before.

@@ -51,7 +51,7 @@ class Watch:
         return Look(data.qpos[self._at], root, parts, is_aside)
 
     def told(self, look: Look) -> Bodies:
-        """What was seen, in the frame of the gripper's root link."""
+        """Joints and parts as they were seen, in the frame of the gripper's root link."""
         joints = dict(zip(self._names, look.joints.tolist(), strict=True))
         if look.is_aside:
             return Bodies(joints, ())

@@ -143,7 +143,7 @@ class World:
         return self._watch.look(self._data, is_aside=self._is_aside)
 
     def told(self, look: Look) -> Bodies:
-        """What was seen; any thread may ask for it."""
+        """Joints and parts as they were seen; for any thread."""
         return self._watch.told(look)
 
     def grip_force(self) -> float:

@@ -1,4 +1,4 @@
-"""What a mechanism tells of its bodies: where the joints are, and the parts before the gripper.
+"""The bodies of a mechanism: places of the joints, and of the parts before the gripper.
 
 For people who look at it. No register has any of this, and no real gripper tells it.
 """
@@ -28,7 +28,7 @@ class Body(NamedTuple):
 
 
 class Bodies(NamedTuple):
-    """Where everything is at one moment.
+    """The places of all bodies at one moment.
 
     Attributes:
         joints: radians, or metres of one that slides, by the names of the description.

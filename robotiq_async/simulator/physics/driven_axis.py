@@ -82,7 +82,7 @@ class Mechanism(Protocol):
         """Make one step if that does not lead beyond a time, in simulated seconds; return whether it did."""
 
     def bodies(self) -> Bodies:
-        """Where joints and parts are."""
+        """Places of joints and parts."""
 
 
 class DrivenAxis(Axis):

@@ -281,7 +281,7 @@ class SimulatedGripper(Surroundings):
 
     @property
     def bodies(self) -> Bodies | None:
-        """Where joints and parts are, for those who draw it; None without physics."""
+        """Places of joints and parts, for a drawing; None without physics."""
         if self._physics is None:
             return None
         self._catch_up()

@@ -27,7 +27,7 @@ PART: Final = "part"
 
 
 def bodies_of(hand: Hand) -> Bodies | None:
-    """Where joints and parts of a hand are, if a simulation in this program knows."""
+    """Places of joints and parts of a hand, if a simulation in this program knows them."""
     gripper = simulated(hand.address)
     return None if gripper is None else gripper.bodies
 

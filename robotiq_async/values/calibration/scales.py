@@ -38,7 +38,7 @@ class SpeedCalibration:
     Attributes:
         source: of the figures, for people.
         points: rising speed values, each with the seconds of a full closing.
-        model: of the gripper; None where nobody says. Hands of another model refuse it.
+        model: of the gripper; None where it is not known. Hands of another model refuse it.
     """
 
     source: str
@@ -95,7 +95,7 @@ class SpeedCalibration:
 
     @property
     def stroke(self) -> Stroke:
-        """The nominal stroke of the model; a 3-Finger's where nobody says."""
+        """The nominal stroke of the model; a 3-Finger's where it is not known."""
         return (self.model or THREE_FINGER).stroke
 
     def closing_time(self, speed: int) -> float:
@@ -143,7 +143,7 @@ class ForceCalibration:
     Attributes:
         source: of the figures, for people.
         points: rising force values, each with newtons.
-        model: of the gripper; None where nobody says. Hands of another model refuse it.
+        model: of the gripper; None where it is not known. Hands of another model refuse it.
     """
 
     source: str

@@ -127,7 +127,7 @@ class Figure:
 
 
 class Parts:
-    """What stands before the gripper, where a simulation has it."""
+    """The parts before the gripper, where a simulation has them."""
 
     def __init__(self, root: Object3D) -> None:
         self._root = root
