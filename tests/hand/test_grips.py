@@ -209,7 +209,7 @@ PROBES: dict[str, Callable[[Bench], Awaitable[str]]] = {
     "`async with` is left": left,
     "it is left while another axis moves": left_while_another_moves,
     "it is left by an exception": left_by_an_exception,
-    "the program is cancelled: Ctrl-C, SIGTERM": cancelled,
+    "the program is cancelled: Ctrl-C, SIGTERM with `stops_on_signals`": cancelled,
     "the process is killed, or crashes": killed,
     "the link is lost and comes back": link_lost_and_back,
     "`stop()` while the link is down": stopped_while_the_link_is_down,
@@ -221,7 +221,7 @@ PROBES: dict[str, Callable[[Bench], Awaitable[str]]] = {
     "the power goes": power_lost,
     "the next program connects": next_connects,
     "the next program moves another axis": next_moves_another,
-    "the next program ends": next_ends,
+    "the next program ends, without its own `keep_grip=True`": next_ends,
 }
 
 
