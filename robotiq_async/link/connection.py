@@ -13,9 +13,7 @@ ends for all users.
 from __future__ import annotations
 
 import asyncio
-import math
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from collections.abc import Callable
 from typing import Any, Final, TypeVar
 from weakref import WeakKeyDictionary, WeakValueDictionary
 
@@ -72,6 +70,19 @@ class StillOpenError(Exception):
         self.error = error
 
 
+class Turn:
+    """The turn of one user, which ends with the block: ``with await connection.turn(user):``."""
+
+    # A generator would cost a poll as much as its request does.
+    def __init__(self, lock: asyncio.Lock) -> None:
+        self._lock = lock
+
+    def __enter__(self) -> None: ...
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+
+
 class Connection:
     """A connection, TCP or serial, with its users.
 
@@ -84,10 +95,12 @@ class Connection:
     def __init__(self, address: Address, strays: Strays = strays) -> None:
         """Keep the address; opens nothing."""
         self._turns = asyncio.Lock()
+        self._turn = Turn(self._turns)
         self.silence = Silence(address.line.character_s)
         self.keeps_silence = not address.is_socket
         self.echo = Echo()
         self._address = address
+        self._is_rtu = address.is_rtu
         self._strays = strays
         self._users: set[object] = set()
         self._rests: WeakKeyDictionary[object, float] = WeakKeyDictionary()
@@ -142,9 +155,9 @@ class Connection:
     async def _connect(self, seconds: float) -> None:
         self._loop = loop = asyncio.get_running_loop()
         self.clock = clock_of(loop)
-        self._watchdog = Watchdog(loop, math.inf, lambda: self._is_waiting, self._on_timeout)
+        self._watchdog = Watchdog(loop, lambda: self._is_waiting, self._on_timeout)
         self._failure, self._is_disturbed = None, False
-        self.echo.is_on = None if self._address.is_rtu else False
+        self.echo.is_on = None if self._is_rtu else False
         try:
             with anyio.fail_after(seconds):
                 client = await connected_client(self._address, self._on_data, self._on_connection, seconds)
@@ -184,15 +197,18 @@ class Connection:
 
     # -- one exchange, by the user whose turn it is -----------------------------------------------------
 
-    @asynccontextmanager
-    async def turn(self, user: object) -> AsyncIterator[None]:
-        """Have the connection alone during a block."""
+    async def turn(self, user: object) -> Turn:
+        """Wait until this user has the connection alone."""
         if self.is_shared and (rest := self._rests.get(user, 0.0) - self.clock()) > 0:
             await asyncio.sleep(rest)
-        async with self._turns:
-            if self._is_disturbed and user in self._users:
+        await self._turns.acquire()
+        if self._is_disturbed and user in self._users:
+            try:
                 await self.hush(user)
-            yield
+            except BaseException:
+                self._turns.release()
+                raise
+        return self._turn
 
     async def pause(self, user: object) -> None:
         """Keep the silence between frames: what follows sooner may be taken for part of the last frame."""
@@ -232,7 +248,8 @@ class Connection:
             by: when it must be over even so, in the loop's time.
             bears: whether the connection stays open after an error, and StillOpenError is raised.
         """
-        await self.pause(user)
+        if self.keeps_silence:
+            await self.pause(user)
         failure = self._failure
         if failure is not None and bears(failure):
             self._failure = None
@@ -288,7 +305,7 @@ class Connection:
 
     def is_noise(self, error: RobotiqConnectionError) -> bool:
         """Whether a lost or damaged byte of a serial line can be the cause."""
-        return self._address.is_rtu and isinstance(error, NOISE)
+        return self._is_rtu and isinstance(error, NOISE)
 
     def _drop(self, user: object, error: RobotiqConnectionError) -> None:
         if isinstance(error, ConnectionLostError):
@@ -315,7 +332,7 @@ class Connection:
 
     def _on_data(self, data: bytes) -> None:
         """Take what has arrived; the last byte of the reply ends the exchange, or the first wrong one."""
-        if self._address.is_rtu:
+        if self._is_rtu:
             self.silence.heard = self.clock()
             if self._is_hushing:
                 return

@@ -68,15 +68,31 @@ class Echo:
         self.is_on: bool | None = False
 
 
-class ModbusExchange(Exchange[bytes]):
-    """A request frame and the check of its reply, byte by byte."""
+class TcpExchange(Exchange[bytes]):
+    """A request over Modbus TCP. Every byte of its reply is checked as it comes."""
 
-    def __init__(self, frame: bytes, echo: Echo, *, serial: bool) -> None:
+    def __init__(self, frame: bytes) -> None:
+        super().__init__(frame)
+        self._expected = expected_reply(frame, serial=False)
+
+    def take(self, data: bytes) -> ProtocolError | None:
+        self._received += data
+        try:
+            if self._expected.is_complete(self._received):
+                self.answer.set_result(self._received)
+        except ProtocolError as error:
+            self.fail(error)
+        return None
+
+
+class SerialExchange(Exchange[bytes]):
+    """A request on a serial line. Every byte of its reply is checked as it comes, the checksum at its end."""
+
+    def __init__(self, frame: bytes, echo: Echo) -> None:
         """An exchange that is not sent; it notes in ``echo`` what it learns."""
         super().__init__(frame)
         self._echo = echo
-        self._serial = serial
-        self._expected = expected_reply(frame, serial=serial)
+        self._expected = expected_reply(frame, serial=True)
 
     def take(self, data: bytes) -> ProtocolError | None:
         """Take bytes; the error is for those after an acknowledgement, which counts all the same."""
@@ -98,15 +114,11 @@ class ModbusExchange(Exchange[bytes]):
         try:
             is_whole = self._expected.is_complete(reply)
         except RefusedError:
-            self._check_sum(reply)  # a damaged reply refuses nothing
+            check_sum(reply)  # a damaged reply refuses nothing
             raise
         if is_whole:
-            self._check_sum(reply)
-        return is_whole
-
-    def _check_sum(self, reply: bytes) -> None:
-        if self._serial:
             check_sum(reply)
+        return is_whole
 
     def _without_echo(self, received: bytes) -> bytes:
         """The part of the bytes that belongs to the reply."""
@@ -123,13 +135,12 @@ class ModbusExchange(Exchange[bytes]):
         return received[size:]
 
     def _beyond_acknowledgement(self, reply: bytes) -> bytes:
-        """The bytes after a whole acknowledgement on a serial line.
+        """The bytes after a whole acknowledgement.
 
         A floating line makes up a byte when the device stops sending. The write is acknowledged nonetheless,
         and reporting it as in doubt would end the motion. For a read it costs nothing to read again.
         """
-        size = self._expected.size
-        return reply[size:] if self._serial and is_write(self.frame) else b""
+        return reply[self._expected.size :] if is_write(self.frame) else b""
 
 
 def strays(data: bytes) -> MisfitError:

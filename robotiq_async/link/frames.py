@@ -96,6 +96,8 @@ def check_sum(frame: bytes) -> None:
 def registers_in(reply: bytes, *, serial: bool) -> Registers:
     """The registers in a complete reply to a read; those that it did not ask for are 0."""
     at = 3 if serial else 9
+    if reply[at - 1] == _BLOCK.size:
+        return _BLOCK.unpack_from(reply, at)  # the usual case
     return _BLOCK.unpack(reply[at : at + reply[at - 1]].ljust(_BLOCK.size, b"\0"))
 
 

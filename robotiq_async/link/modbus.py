@@ -25,7 +25,7 @@ import logging
 import math
 import secrets
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from typing import Final
 
 from ..runtime.log import Log, log
@@ -33,7 +33,7 @@ from ..values.errors import ResponseTimeoutError, RobotiqConnectionError
 from ..values.registers import REGISTER_COUNT, RegisterMap, Registers
 from .address import Address
 from .connection import Bears, Connection, StillOpenError, bears_nothing, plain, shared_connection
-from .exchange import ModbusExchange
+from .exchange import SerialExchange, TcpExchange
 from .frames import (
     MisfitError,
     RefusedError,
@@ -142,7 +142,7 @@ class ModbusTransport:
 
     async def read(self) -> Registers:
         try:
-            async with self._connection.turn(self):
+            with await self._connection.turn(self):
                 answer = await self._ask(self._poll, bears=self._can_repeat)
         except StillOpenError as borne:
             answer = await self._read_again(plain(borne.error))
@@ -158,7 +158,7 @@ class ModbusTransport:
         Raises:
             RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
         """
-        async with self._connection.turn(self):
+        with await self._connection.turn(self):
             await self._prepare_write()
             registers = decide()
             if registers is None:
@@ -184,7 +184,7 @@ class ModbusTransport:
         Raises:
             RobotiqConnectionError: no clean answer in time, and no status after it; the transport is closed.
         """
-        async with self._connection.turn(self):
+        with await self._connection.turn(self):
             await self._prepare_write()
             registers = decide()
             if registers is None:
@@ -222,7 +222,7 @@ class ModbusTransport:
         Raises:
             RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
         """
-        async with self._connection.turn(self):
+        with await self._connection.turn(self):
             await self._ask(write_request(self._map, registers))
 
     async def close(self) -> None:
@@ -231,7 +231,7 @@ class ModbusTransport:
 
     # -- one exchange ----------------------------------------------------------------------------------
 
-    async def _ask(self, request: bytes, *, by: float = math.inf, bears: Bears = bears_nothing) -> bytes:
+    def _ask(self, request: bytes, *, by: float = math.inf, bears: Bears = bears_nothing) -> Awaitable[bytes]:
         """Send one request and return its reply, in a turn of this gripper.
 
         Args:
@@ -239,9 +239,12 @@ class ModbusTransport:
             by: when it must be over, in the loop's time, even if the response timeout is longer.
             bears: whether the connection stays open after an error, and StillOpenError is raised.
         """
-        frame = serial_frame(request) if self._rtu else tcp_frame(self._next_number(), request)
-        exchange = ModbusExchange(frame, self._connection.echo, serial=self._rtu)
-        return await self._connection.exchange(self, exchange, self._response_timeout, by, bears)
+        exchange = (
+            SerialExchange(serial_frame(request), self._connection.echo)
+            if self._rtu
+            else TcpExchange(tcp_frame(self._next_number(), request))
+        )
+        return self._connection.exchange(self, exchange, self._response_timeout, by, bears)
 
     def _can_repeat(self, error: RobotiqConnectionError) -> bool:
         """Whether a read can be asked again after this error."""
@@ -272,12 +275,12 @@ class ModbusTransport:
         asks_for_rest = not self._probe and self._map.count < REGISTER_COUNT
         bears = self._can_do_without if asks_for_rest else self._can_repeat
         try:
-            async with self._connection.turn(self):
+            with await self._connection.turn(self):
                 await self._resynchronise(bears=bears)
         except StillOpenError as borne:
             why = plain(borne.error)
             try:
-                async with self._connection.turn(self):
+                with await self._connection.turn(self):
                     await self._bring_in_step(self._repeat_by())
             except RobotiqConnectionError as again:
                 raise why from again
@@ -287,13 +290,13 @@ class ModbusTransport:
     async def _try_short_silence(self) -> None:
         """Read a few times after 3.5 characters of silence; take the longer one if an answer is missing."""
         try:
-            async with self._connection.turn(self):
+            with await self._connection.turn(self):
                 for _ in range(SHORT_READS):
                     await self._resynchronise(bears=self._can_repeat)
         except StillOpenError as borne:
             if self._connection.is_noise(borne.error):
                 self._keep_long_silence(borne.error)
-            async with self._connection.turn(self):
+            with await self._connection.turn(self):
                 await self._bring_in_step(math.inf)
 
     def _note_unanswered(self, why: RobotiqConnectionError) -> None:
@@ -347,7 +350,7 @@ class ModbusTransport:
             RobotiqConnectionError: ``why``, if there is again no clean answer; the connection is closed.
         """
         try:
-            async with self._connection.turn(self):
+            with await self._connection.turn(self):
                 by = self._repeat_by()
                 with self._connection.silence.long():  # the shorter one may be why there was no answer
                     await self._bring_in_step(by)

@@ -22,12 +22,10 @@ class Watchdog:
     def __init__(
         self,
         loop: asyncio.AbstractEventLoop,
-        seconds: float,
         is_waiting: Callable[[], bool],
         on_timeout: Callable[[], None],
     ) -> None:
         self._loop = loop
-        self._seconds = seconds
         self._is_waiting = is_waiting
         self._on_timeout = on_timeout
         self._due = 0.0
@@ -36,9 +34,9 @@ class Watchdog:
         self._timer: asyncio.Handle | None = None
         self._timer_due = math.inf
 
-    def watch(self, by: float = math.inf) -> None:
+    def watch(self, by: float) -> None:
         """Start watching an exchange; ``by`` is its latest end, in the loop's time."""
-        self._due = min(self._loop.time() + self._seconds, by)
+        self._due = by
         self._has_grace = False
         if self._timer is not None and self._timer_due > self._due:
             self.stop()

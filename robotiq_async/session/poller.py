@@ -157,7 +157,7 @@ class Poller:
 
     def hurry(self) -> None:
         """Begin the next cycle at once, and not with the tick, if it may begin with a write."""
-        due = self._due()
+        due = self._controller.due(self._tick.time())
         if due is not None and (due.is_urgent or (self._options.link.is_slow and due.wait <= SOON_S)):
             self._tick.hurry()
 
@@ -263,7 +263,7 @@ class Poller:
 
     async def _cycle(self) -> None:
         """Read, decide, write. Write a stop before reading, too: a gripper may execute it and not reply."""
-        due = self._due()
+        due = self._controller.due(self._tick.time())
         if due is not None and not self._is_held_up():
             if due.is_urgent and await self._is_soon(due, LONGEST_SPACING_S):
                 await self._write()
@@ -274,16 +274,13 @@ class Poller:
                 return
         for _ in range(READS):
             await self._poll_once()
-            due = self._due()
+            due = self._controller.due(self._tick.time())
             if due is None or not await self._is_soon(due, SOON_S):
                 return  # most cycles end here
             if not self._is_held_up():
                 await self._write_and_read()
                 return
         await self._write()
-
-    def _due(self) -> Due | None:
-        return self._controller.due(self._tick.time())
 
     def _is_fresh_for(self, due: Due) -> bool:
         """Whether it is a command for a slow link, and the newest status is new enough to decide on."""
@@ -301,7 +298,7 @@ class Poller:
 
     async def _write_and_read(self) -> bool:
         """Write, and read in the same exchange if link and request allow that; whether a status was read."""
-        link, due = self._cyclic, self._due()
+        link, due = self._cyclic, self._controller.due(self._tick.time())
         if link is None or not link.reads_with_writes or due is None or not due.is_command:
             await self._write()
             return False

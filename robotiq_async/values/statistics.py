@@ -93,8 +93,8 @@ class Counters:
     round_trips: deque[float] = field(default_factory=lambda: deque(maxlen=SAMPLES))
     status_ages: deque[float] = field(default_factory=lambda: deque(maxlen=SAMPLES))
     _busy: float = 0.0  # seconds spent in exchanges since the last period began
-    _shares: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=SAMPLES))
-    """The seconds of each period, and those spent in exchanges."""
+    _busy_times: deque[float] = field(default_factory=lambda: deque(maxlen=SAMPLES))
+    """The seconds of each period that were spent in exchanges."""
 
     def note_poll(self, asked: float, answered: float, period: float | None) -> None:
         """Count a poll; ``period`` is the time since the one before it, None if that is not to be counted."""
@@ -102,7 +102,7 @@ class Counters:
         self.round_trips.append(answered - asked)
         if period is not None:
             self.periods.append(period)
-            self._shares.append((period, min(self._busy, period)))
+            self._busy_times.append(self._busy)
         self._busy = answered - asked
 
     def note_write(self, took: float, age: float) -> None:
@@ -131,7 +131,8 @@ class Counters:
     def snapshot(self, foreign_commands: int, passing_faults: int = 0) -> Statistics:
         periods, round_trips = sorted(self.periods), sorted(self.round_trips)
         ages = sorted(self.status_ages)
-        time, busy = (sum(each) for each in zip(*self._shares, strict=True)) if self._shares else (1.0, 0.0)
+        time = sum(periods)
+        busy = sum(min(each) for each in zip(self.periods, self._busy_times, strict=False))
         return Statistics(
             polls=self.polls,
             writes=self.writes,
@@ -147,7 +148,7 @@ class Counters:
             faults=self.faults,
             moves=self.moves,
             passing_faults=passing_faults,
-            link_use=busy / time,
+            link_use=busy / time if time else 0.0,
             status_age_p50=percentile(ages, 0.50),
             status_age_p99=percentile(ages, 0.99),
         )
