@@ -231,7 +231,7 @@ class Connection:
             failure, self._failure = self._failure, None
             self._drop(user, failure)
             raise plain(failure)
-        if not self.is_open_for(user):
+        if user not in self._users:
             raise ConnectionLostError(f"not connected to {self._address}")
 
     async def exchange(

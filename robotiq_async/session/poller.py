@@ -101,6 +101,7 @@ class Poller:
         self._options = options
         self._model = options.model
         self._stroke = options.units.stroke
+        self._has_current = options.link.has_current
         self._log = options.log
         self._loop = asyncio.get_running_loop()
         self.connected: asyncio.Future[None] = self._loop.create_future()
@@ -372,8 +373,8 @@ class Poller:
         self._take(self._status(registers, answered), asked)
 
     def _status(self, registers: Registers, answered: float) -> RobotiqStatus:
-        number, has_current = next(self._channels.numbers), self._options.link.has_current
-        return RobotiqStatus(registers, answered, number, self._model, self._stroke, has_current)
+        number = next(self._channels.numbers)
+        return RobotiqStatus(registers, answered, number, self._model, self._stroke, self._has_current)
 
     def _take(self, status: RobotiqStatus, asked: float) -> None:
         """Pass on a status that was asked for at ``asked``."""
@@ -400,20 +401,19 @@ class Poller:
         if not passed:
             self._last_poll = 0.0  # a hurried cycle breaks the period
             return passed
-        missed = passed - 1
-        late = missed * self._tick.interval
-        if late < LATE_S and self._is_line_the_limit():
-            missed = 0
         self._counters.longest_stall = self._tick.longest_late
-        if missed:
-            self._counters.overruns += missed
-            if late >= LATE_S:
-                self._warn_late(late)
+        if passed > 1:
+            self._note_missed(passed - 1)
         return passed
 
-    def _is_line_the_limit(self) -> bool:
-        """Whether a cycle that outlasts the interval is the line's doing, and not that of a loop held up."""
-        return self._options.link.is_slow and self._tick.late <= HELD_S
+    def _note_missed(self, missed: int) -> None:
+        late = missed * self._tick.interval
+        # A slow line outlasts the interval without a loop that was held up, and misses nothing.
+        if late < LATE_S and self._options.link.is_slow and self._tick.late <= HELD_S:
+            return
+        self._counters.overruns += missed
+        if late >= LATE_S:
+            self._warn_late(late)
 
     def _warn_late(self, late: float) -> None:
         self._late.append(late)
