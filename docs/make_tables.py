@@ -18,7 +18,6 @@ from typing import Final
 
 from robotiq_async import ReconnectPolicy, RobotiqHand
 from robotiq_async.control.state_machine import SEQUENCES, TABLE, Verdict
-from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values import registers
 from robotiq_async.values.enums import (
     Fault,
@@ -99,7 +98,10 @@ def is_on_the_way(state: State) -> bool:
 
 
 def asked() -> str:
-    """The answer of each state to each call, except for start() and stop(), which a sentence describes."""
+    """The answers to each call, except for start() and stop(), which a sentence describes.
+
+    States that answer alike share a row.
+    """
     told = (Trigger.ASK_START, Trigger.ASK_STOP)
     triggers = [trigger for trigger in Trigger if trigger.name.startswith("ASK_") and trigger not in told]
 
@@ -108,12 +110,13 @@ def asked() -> str:
             return to.value
         return "stays" if source is to else to.name
 
+    alike: dict[tuple[str, ...], list[str]] = {}
+    for state, row in TABLE.items():
+        answers = tuple(cell(state, row[trigger]) for trigger in triggers)
+        alike.setdefault(answers, []).append(f"**{state.name}**")
     return table(
         ["state", *(trigger.value for trigger in triggers)],
-        (
-            [f"**{state.name}**", *(cell(state, row[trigger]) for trigger in triggers)]
-            for state, row in TABLE.items()
-        ),
+        ([", ".join(states), *answers] for answers, states in alike.items()),
     )
 
 
@@ -176,26 +179,14 @@ def links() -> str:
     )
 
 
-def axis_codes() -> str:
-    """The codes of gDT."""
-    meanings = {
-        ObjectStatus.IN_MOTION: "moving; meaningful only while gGTO = 1",
-        ObjectStatus.CONTACT_OPENING: "stopped by a contact while opening",
-        ObjectStatus.CONTACT_CLOSING: "stopped by a contact while closing",
-        ObjectStatus.AT_POSITION: "at the requested position",
-    }
-    return table(
-        ["gDT", "`ObjectStatus`", "meaning"],
-        ([str(int(code)), f"`{code.name}`", meanings[code]] for code in ObjectStatus),
+def codes() -> str:
+    """The names of the codes of gDT, gIMC and gMOD."""
+    kinds = {"gDT": ObjectStatus, "gIMC": Initialization, "gMOD": Mode}
+    named = (
+        f"{field} as `{kind.__name__}`: {', '.join(f'{int(code)} `{code.name}`' for code in kind)}"
+        for field, kind in kinds.items()
     )
-
-
-def progress_codes() -> str:
-    """The codes of gIMC and rMOD."""
-    return table(
-        ["code", "gIMC: `Initialization`", "rMOD, gMOD: `Mode`"],
-        ([str(n), f"`{Initialization(n).name}`", f"`{Mode(n).name}`"] for n in range(4)),
-    )
+    return textwrap.fill("; ".join(named) + ".", 120, break_on_hyphens=False)
 
 
 def faults() -> str:
@@ -235,7 +226,6 @@ def models() -> str:
             "force",
             "reads open, closed",
             "unit id: TCP, serial",
-            "tried on hardware",
         ],
         (
             [
@@ -247,7 +237,6 @@ def models() -> str:
                 "{:g}-{:g} N".format(*each.forces_n),
                 f"{each.stroke.open_reading}, {each.stroke.closed_reading}",
                 f"{each.tcp.device_id}, {each.rtu.device_id}",
-                "no",
             ]
             for each in MODELS.values()
         ),
@@ -262,14 +251,6 @@ def options() -> str:
 def reconnect_policy() -> str:
     """The fields of ReconnectPolicy."""
     return _arguments(ReconnectPolicy, "Attributes")
-
-
-# -- simulator -----------------------------------------------------------------------------------------
-
-
-def troubles() -> str:
-    """The names of what can go wrong with the simulator; ``simulate --troubles`` says more of each."""
-    return _listed(KINDS)
 
 
 def _arguments(documented: Callable[..., object], section: str) -> str:
@@ -302,12 +283,10 @@ PAGES: Final[dict[str, dict[str, Callable[[], str]]]] = {
         "request": request_fields,
         "status": status_fields,
         "links": links,
-        "gDT": axis_codes,
-        "gIMC": progress_codes,
+        "codes": codes,
         "gFLT": faults,
     },
     "how-to/models.md": {"models": models},
-    "how-to/simulator.md": {"troubles": troubles},
     "reference.md": {"options": options, "reconnect": reconnect_policy},
 }
 """The tables of each page."""

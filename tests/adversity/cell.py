@@ -18,7 +18,7 @@ from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values.registers import Registers
 from tests.adversity.phases import PHASES, TARGET, Call, Phase
 from tests.adversity.world import World
-from tests.docs.pages import table
+from tests.docs.pages import read, table
 
 LINE_PULLED = "line pulled"
 """A trouble that is not the simulator's: the serial port is gone."""
@@ -217,19 +217,33 @@ def cells() -> Iterator[Cell]:
                     continue
                 if link == "tcp" and is_of_lines(troubles):
                     continue
-                yield from (Cell(words, link, phase, ends) for phase, ends in outcomes)
+                yield from (Cell(words, link, phase, ends[link == "rtu"]) for phase, ends in outcomes)
 
 
 def cells_of_a_urcap() -> Iterator[Cell]:
-    """Every cell of a jaw behind the text port of a UR."""
-    for troubles, outcomes in _rows("## Behind Robotiq's URCap"):
+    """Every cell of a jaw behind the text port of a UR: those of its table, and those like cells above it."""
+    heading = "## Behind Robotiq's URCap"
+    for troubles, outcomes in _rows(heading):
         for trouble in words_in(troubles):
             for words in forms(trouble):
-                yield from (Cell(words, "urcap", phase, ends) for phase, ends in outcomes)
+                yield from (Cell(words, "urcap", phase, ends) for phase, (ends, _) in outcomes)
+    said = re.search(r" s\. (.*?) end as over TCP above; (.*?) end as on a serial line\.", section(heading))
+    assert said is not None
+    for link, troubles in zip(("tcp", "rtu"), said.groups(), strict=True):
+        alike = {words for trouble in words_in(troubles) for words in forms(trouble)}
+        yield from (
+            cell._replace(link="urcap") for cell in cells() if cell.link == link and cell.trouble in alike
+        )
 
 
-def _rows(heading: str) -> Iterator[tuple[str, list[tuple[Phase, str]]]]:
-    """The rows of a table: the troubles, and what comes of them in each phase."""
+def section(heading: str) -> str:
+    """The section of a heading, its lines joined."""
+    text = read("under-fault.md").partition(f"\n{heading}\n")[2].partition("\n#")[0]
+    return " ".join(text.split())
+
+
+def _rows(heading: str) -> Iterator[tuple[str, list[tuple[Phase, tuple[str, str]]]]]:
+    """The rows of a table: the troubles, and the outcome in each phase over TCP and on a serial line."""
     head, (_, *rests_in), *rows = table("under-fault.md", heading)
     phases = {phase.name: phase for phase in PHASES}
     assert head[1:] == list(phases), "a column for each phase"
@@ -237,10 +251,17 @@ def _rows(heading: str) -> Iterator[tuple[str, list[tuple[Phase, str]]]]:
         yield (
             troubles,
             [
-                (phases[name], outcome if "→" in outcome else f"{outcome} → {state}")
+                (phases[name], _ends(outcome, state))
                 for name, outcome, state in zip(head[1:], outcomes, rests_in, strict=True)
             ],
         )
+
+
+def _ends(outcome: str, rests_in: str) -> tuple[str, str]:
+    """What a cell says about TCP and about a serial line, each with the state that follows."""
+    tcp, _, line = outcome.partition(" / ")
+    tcp, line = (each if "→" in each else f"{each} → {rests_in}" for each in (tcp, line or tcp))
+    return tcp, line
 
 
 def is_of_lines(troubles: str) -> bool:

@@ -15,11 +15,13 @@ from robotiq_async.fleet.wire.envelope import Call, unpack_answer
 from robotiq_async.values.errors import ControlLostError
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
-from tests.docs.pages import table
+from tests.docs.pages import read, table
 from tests.fleet.lab import LEFT, instantly
 from tests.fleet.world import PROMPT_S, WINDOW_S, Client, World, motions
 
 Trouble = Callable[[World], Coroutine[Any, Any, None]]
+NAMED = re.compile(r"`(.+?)`")
+GRADUAL = re.compile(r"(`[^`]+`(?: and `[^`]+`)*) end like (`[^`]+`(?:(?:, | or )`[^`]+`)*)")
 TARGET = 130
 RATE_S = 0.01
 SETTLE_S = 2.5
@@ -417,13 +419,22 @@ class Cell(NamedTuple):
 
 
 def cells() -> Iterator[Cell]:
-    """Every cell."""
+    """Every cell of the table; and of the gradual troubles, which end like one of several rows."""
     head, *rows = table("fleet-under-fault.md")
+    told: dict[str, list[str]] = {}
     for troubles, *outcomes, limit in rows:
         held_after = None if limit == "-" else float(limit.removesuffix(" s"))
-        for trouble in re.findall(r"`(.+?)`", troubles):
+        for trouble in NAMED.findall(troubles):
+            told[trouble] = outcomes
             for phase, outcome in zip(head[1:-1], outcomes, strict=True):
-                yield Cell(trouble, phase, tuple(outcome.split(" or ")), held_after)
+                yield Cell(trouble, phase, (outcome,), held_after)
+    gradual = GRADUAL.findall(" ".join(read("fleet-under-fault.md").split()))
+    assert len(gradual) == 2, "the sentences about gradual troubles"
+    for troubles, others in gradual:
+        alike = [told[each] for each in NAMED.findall(others)]
+        for trouble in NAMED.findall(troubles):
+            for phase, *each in zip(head[1:-1], *alike, strict=True):
+                yield Cell(trouble, phase, tuple(each), None)
 
 
 # -- a motion that lasts, and requests by hand -------------------------------------------------------------

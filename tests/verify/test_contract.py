@@ -17,7 +17,7 @@ from tests import contract
 from tests.contract.bench import HABIT, LOCAL
 from tests.verify.matrix import HABITS, options
 
-ROWS = [(trouble, option) for trouble, _, option, _ in HABITS if option != "-"] + [("write-spacing", "-")]
+ROWS = [(trouble, option) for trouble, _, option in HABITS if option != "-"] + [("write-spacing", "-")]
 FORGOTTEN = "the write that the gripper forgets is the other client's"
 IMPATIENT = "the test itself waits for less"
 SLOWER = "the test counts polls or milliseconds at 200 Hz"
