@@ -47,4 +47,5 @@
 #
 # Evidence stands beside each rule: [manual] and [thesis] are printed, [seen] is from real grippers, [vendor]
 # from the maker's examples, [follows] from Modbus and two clients alone, [conceivable] from nothing but care.
-# A rule without one is a promise of ours, and needs no fact about the gripper.
+# A rule without one is a promise of ours, and needs no fact about the gripper. [manual 2014, p. 50] is a page
+# as printed in that edition of the 3-Finger's instruction manual; of [manual] alone no page was noted.

@@ -84,7 +84,7 @@ class Adoption:
         status = self._latest
         position = status.position(axis)
         if not status.go_echo:
-            return position  # rGTO = 0: the axis stands, and its next rGTO = 1 must not move it [manual]
+            return position  # it stands [manual 2014, p. 50], and the next rGTO = 1 must not move it
         requested = self._requested(axis)
         if requested is not None:
             return requested
@@ -100,7 +100,7 @@ class Adoption:
         """The echo that agrees with what an axis shows, if one does."""
         status = self._latest
         candidates = [status.requested_position(axis)]
-        # Under simple control the fingers B and C follow the registers of A [manual].
+        # Under simple control the fingers B and C follow the registers of A [manual 2014, pp. 45, 47].
         if axis in Finger.B | Finger.C:
             candidates.append(status.requested_position(Finger.A))
         return next((each for each in candidates if self._agrees(axis, each)), None)

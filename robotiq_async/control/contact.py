@@ -18,8 +18,8 @@ def agrees(model: Model, request: int, what: ObjectStatus, position: int, direct
         position: where it is, in counts.
         direction: above 0 closing, below 0 opening, 0 unknown; used only while it moves.
     """
-    # gDT says that an axis has stopped before its request, and in which direction it was going [manual]. One
-    # at its request may be off by the tolerance of the model [manual: positions differ by up to 2 counts].
+    # gDT says that an axis has stopped before its request, and in which direction it was going [manual 2014,
+    # p. 51; 2018, p. 39]. One at its request may be off by the model's tolerance [manual: up to 2 counts].
     match what:
         case ObjectStatus.CONTACT_CLOSING:
             return request > position
@@ -43,7 +43,7 @@ def drifts(axis: Finger, base: Request, status: RobotiqStatus, may_move: Finger 
         may_move: the axes that show rest, and may move because of an earlier request.
     """
     if not base.go:
-        return False  # rGTO = 0 stops every axis [manual]
+        return False  # rGTO = 0 stops every axis [manual 2014, p. 50]
     # A needless hold would cost an axis in contact its grip: it would be asked for where it is.
     if axis in may_move:
         return base.position(axis) != status.position(axis)

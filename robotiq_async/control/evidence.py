@@ -21,7 +21,7 @@ LASTS_READS: Final = 3
 """Reads that must show it. A gripper shows it in one; a second read may see the same registers."""
 LASTS_S: Final = 0.01
 """Seconds between the first and the last of these reads. A gripper renews its registers at 100 Hz or faster
-(manual of 2014, Modbus TCP), so three reads over this time show it more than once. It must not be longer:
+[manual 2014, p. 75], so three reads over this time show it more than once. It must not be longer:
 fingers that must stop move on in this time, a count or two at full speed."""
 SILENCE_S: Final = 0.9
 """After this time without a read a gripper may show it again, and the count begins again. One second is what
@@ -35,7 +35,8 @@ _CODE: Final = int(Fault.COMMUNICATION_NOT_READY)
 def classify(status: RobotiqStatus) -> Trigger:
     """The condition that a status shows, one of five.
 
-    A serious fault comes first: gIMC = 0 with a fault is an automatic release and not a reset [manual].
+    A serious fault comes first: gIMC = 0 with a fault is an automatic release and not a reset
+    [manual 2014, p. 50; 2018, p. 39].
     """
     # Only gACT, gIMC and gFLT decide. They rarely change and this runs at every poll, so it is cached.
     registers = status.registers

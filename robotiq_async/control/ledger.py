@@ -3,9 +3,9 @@
 No I/O and no clock: time is that of the newest status.
 """
 
-# The gripper's requests cannot be read back whole: speed and force have no echo [manual], a write shows a
-# device cycle late, and another client may write at any time. So each image is an entry, in the order in
-# which they act:
+# The gripper's requests cannot be read back whole: speed and force have no echo [manual 2014, pp. 50-56], a
+# write shows a device cycle late, and another client may write at any time. So each image is an entry, in the
+# order in which they act:
 #
 # * sent: on the line. It may act already, or never.
 # * acknowledged: it acts within a device cycle. The newest such entry is what the gripper has, or is about to
@@ -405,7 +405,8 @@ class Ledger:
 
         Returns:
             Whether the status shows that image. If not, another client has written since. rATR has no
-            echo [manual], so an image with rATR counts as not shown by a gripper that follows requests.
+            echo [manual 2014, p. 50], so an image with rATR counts as not shown by a gripper that follows
+            requests.
         """
         image, time = self.base, self.now.time
         self._adoption = None
@@ -423,7 +424,7 @@ class Ledger:
         """Find out which axes have come to rest. Not in a fault: it keeps axes from starting."""
         if self._unproven:  # usually none is
             self._note_shown()
-            if status.go_echo:  # gDT has no meaning without rGTO [manual]
+            if status.go_echo:  # gDT has no meaning without rGTO [manual 2014, p. 51; 2018, p. 39]
                 self._find_rest(status)
         if status.go_echo and (self.grips or status.contacts):
             contacts = status.contacts

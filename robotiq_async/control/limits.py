@@ -1,8 +1,8 @@
 """Software limits that a gripper echoes in place of the request.
 
-By the manual a limit replaces a request beyond it; which of the two the gripper echoes is not in it. If it
-echoes the limit [conceivable], the status looks as if another client had written just after us. It counts as
-a limit only if
+A limit replaces a request beyond it [manual 2014, p. 45; 2018, p. 36]; which of the two the gripper echoes is
+not said. If it echoes the limit [conceivable], the status looks as if another client had written just after
+us. It counts as a limit only if
 
 * the only differences are positions that this write has changed;
 * each echoed value lies between the axis and its request;

@@ -64,7 +64,7 @@ class Move:
 
     def is_under(self, status: RobotiqStatus, limited: Mapping[Finger, int]) -> bool:
         """Whether a status echoes the target for every axis of the move, or the limit in place of it."""
-        # rGTO = 0 echoes positions, too, and none of them is followed [manual].
+        # rGTO = 0 echoes positions, too, and none of them is followed [manual 2014, pp. 50, 54].
         return status.go_echo and all(
             status.requested_position(axis) == limited.get(axis, self.position) for axis in self._peak
         )

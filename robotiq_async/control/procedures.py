@@ -99,8 +99,8 @@ def automatic_release(image: Image) -> Steps:
     status = yield replace(image(status), activate=True, release=True)
     while status.fault is not Fault.AUTOMATIC_RELEASE_DONE:
         begun = begun or status.fault is Fault.AUTOMATIC_RELEASE
-        # gIMC is 0 during a release [manual]. Until the release shows, a status may be from before the write,
-        # and its fault from before the release [follows].
+        # gIMC is 0 during a release [manual 2014, p. 50]. Until the release shows, a status may be from
+        # before the write, and its fault from before the release [follows].
         still_releases = status.is_reset or status.fault is Fault.AUTOMATIC_RELEASE
         is_sure = begun or (status.timestamp - asked > WINDOW_S and not status.fault.is_serious)
         if classify(status) is Trigger.SEEN_RESET or (is_sure and not still_releases):

@@ -1,7 +1,7 @@
 """Whether an axis rests under its last request, by an object status (gDT) that may be late.
 
-By the manual gDT and gSTA are valid once the echo shows. In the vendor's own software for the two-finger
-grippers they trail the echo by some exchanges [vendor]. So a gDT that is read just after a request
+gDT and gSTA are valid once the echo shows [manual 2014, pp. 70, 84]. In the vendor's own software for the
+two-finger grippers they trail the echo by some exchanges [vendor]. So a gDT that is read just after a request
 acts may be from before it. It counts at once only if it can result from no other request than the last, or if
 no request contradicts it since it was true; and in any case when the lag is over. docs/decisions/
 late-status.md has the reasons. The functions here are questions about the last requests of one axis.
@@ -49,7 +49,7 @@ class Asked(NamedTuple):
     """One request of an axis.
 
     Attributes:
-        position: in counts; None while rGTO is clear, where gDT has no meaning [manual].
+        position: in counts; None while rGTO is clear, where gDT has no meaning [manual 2014, p. 51].
         again: whether it makes an axis in contact try again: it sets rGTO or raises the force.
         shown: the first status that showed that it acts; None before that.
     """

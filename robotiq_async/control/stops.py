@@ -2,8 +2,8 @@
 
 A stop differs from all else that is written. It is written before the read of its cycle: a gripper may obey
 and not answer. It may be written again, because it only ends motion: a gripper may acknowledge a write that
-comes soon after another one and forget it (manual of 2014: space them by 10 ms). It is reached when its write
-acts and a status shows it: what shows may be from before the write.
+comes soon after another one and forget it [manual 2014, pp. 58, 75: space them by 10 ms]. It is reached when
+its write acts and a status shows it: what shows may be from before the write.
 """
 
 # Level     First write           Written again                    Over when
@@ -109,7 +109,7 @@ class Stop:
         if entry is None or entry.acknowledged is None:
             return None
         if self.is_early:
-            return entry.image  # whatever shows: the gripper may have taken it and lose it [manual of 2014]
+            return entry.image  # whatever shows: the gripper may yet forget it [manual 2014, p. 75]
         if not ledger.acts(entry):
             return None
         match self.level:

@@ -32,7 +32,7 @@ FORMS: Final = (
     "measured openings, ?baud=500000 for a serial port with another rate than 115200"
 )
 
-BAUD: Final = 115200  # the rate of a serial line, 8N1, as a gripper comes out of the box (manual)
+BAUD: Final = 115200  # the rate of a serial line, 8N1, as a gripper is shipped (manual 2014, p. 59)
 SLOWEST_BAUD: Final = 9600
 FASTEST_BAUD: Final = 1_000_000
 """No manual lists the rates that the vendor's tool can set; users have named 125000, 250000 and 500000."""

@@ -46,11 +46,10 @@ class NoAddress(str):
 NO_ADDRESS: Final = NoAddress("sim://")
 """A program runs without hardware: its first start warns that nothing real moves."""
 POLL_INTERVAL_S: Final = 0.005
-"""200 Hz, as the thesis polled; the manual names 200 Hz for RTU and 100 Hz for TCP. On a serial line, where a
-read and a write take longer, the next cycle begins later, and that is no miss."""
+"""200 Hz, as the thesis polled; the manual of 2014 has 100 Hz (pp. 58, 75), with function 23 200 Hz (p. 64).
+On a serial line, where a read and a write take longer, the next cycle begins later, and that is no miss."""
 WRITE_SPACING_S: Final = Usual(0.01)
-"""3-Finger manual of 2014 (chapters on TCP and RTU): registers are renewed at 100 Hz; leave 10 ms, or some
-writes are lost."""
+"""3-Finger manual of 2014 (pp. 58, 75): registers are renewed at 100 Hz; leave 10 ms between commands."""
 JAW_WRITE_SPACING_S: Final = 0.005
 """Manual of the 2F-85 and 2F-140: commands may come every 5 ms, at 200 Hz (function 23)."""
 

@@ -52,9 +52,9 @@ SPEED_MIN: Final = 0
 SPEED_MAX: Final = 255
 """Fastest: 110 mm/s nominal (manual), full closing in 2.1 s (thesis, table A1.1)."""
 FORCE_MIN: Final = 0
-"""Weakest, not nothing: 15 N nominal (manual)."""
+"""Weakest, not nothing: 15 N nominal (manual 2014, p. 47)."""
 FORCE_MAX: Final = 255
-"""Strongest: 60 N nominal (manual)."""
+"""Strongest: 60 N nominal (manual 2014, p. 47)."""
 
 DEFAULT_SPEED: Final = 128
 """Used until ``set_speed()``, ``set_force()`` or an argument sets another."""

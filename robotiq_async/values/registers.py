@@ -89,12 +89,13 @@ gCU: Final = tuple(Field(5 + 3 * n, doc=f"current of {name}, 10 mA a count") for
 STATUS_RESERVED: Final = (Field(2, 4, 4), Field(15))  # bits without a meaning in the manual: they read 0
 
 MILLIAMPERE_PER_COUNT: Final = 10
-"""gCU: the manual's worked example reads 0x0F as 150 mA; two editions print the relation upside down."""
+"""gCU: the manual's worked example reads 0x0F as 150 mA (2014, p. 69); where it describes the register, the
+relation is upside down (2014, p. 54; 2018, p. 41)."""
 
 
 @dataclass(frozen=True, slots=True)
 class RegisterMap:
-    """Addresses and functions of the two blocks on one kind of link (manual, communication chapter).
+    """Addresses and functions of the two blocks on one kind of link (manual 2014, pp. 59, 75).
 
     Attributes:
         request: address of the first request register.

@@ -22,13 +22,14 @@ this time; it is ten polls."""
 
 # The current of an axis's motor, in counts of 10 mA.
 #
-# Published are the frames of the manual's worked grasp: at full speed A, B and C close with 0x0F, 0x10 and
-# 0x0F and open with 0x0B, 0x0E and 0x0B; at rest they draw nothing, be they open or holding something with
-# full force, for they lock themselves.
+# Published are the frames of the manual's worked grasp (2014, pp. 69-74): at full speed A, B and C close with
+# 0x0F, 0x10 and 0x0F and open with 0x0B, 0x0E and 0x0B; at rest they draw nothing, be they open or holding
+# something with full force, for they lock themselves.
 #
 # The rest is made up to fit: the current of a slower motion, the scissor (taken for finger A), and the peak
-# of a contact. By the manual the force fixes the highest current of a motion; by the thesis (figures 13 to
-# 15, without numbers) the peak grows with the force, at once on something rigid and bit by bit in foam.
+# of a contact. By the manual the force fixes the highest current of a motion (2014, p. 47); by the thesis
+# (figures 13 to 15, without numbers) the peak grows with the force, at once on something rigid and bit by bit
+# in foam.
 _SHARE_OF_FRICTION: Final = 0.5
 # Above what the fastest motion draws, or it would stop itself; three fingers at once stay within the 1.5 A
 # that the manual lets the whole gripper take.

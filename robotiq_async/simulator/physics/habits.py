@@ -31,9 +31,9 @@ class Habits:
         silence_fault: after so many seconds without a message gFLT is 0x09 in the first status that is read,
             and in no other (siblings: 1 s). A write that comes first takes it away.
         write_spacing: a write that comes less than so many seconds after the last one that was kept is
-            acknowledged and forgotten (manual 2014: leave 10 ms, or some are lost).
+            acknowledged and forgotten (manual 2014, pp. 58, 75: leave 10 ms between commands).
         echoes_limits: a request beyond a software limit is echoed as the limit. By the manual it is
-            replaced by the limit; which of the two gPR has is open.
+            replaced by the limit (2014, p. 45; 2018, p. 36); which of the two gPR has is open.
         lets_go_on_halt: clearing rGTO, or a fault, releases the part. By the vendor's article on
             protective stops it stays held, and by the manual fingers lock themselves; no one has measured it.
         keeps_status_on_halt: with rGTO = 0 an axis in a contact or at its request keeps its gDT;

@@ -1,7 +1,7 @@
 """Differences of one gripper from another, and of each from the ideal one.
 
-Figures in the sources: an open hand reads 7, 6, 6, and one object is held at 188, 193 and 189 (manual, worked
-grasp); a closed finger reads 240 or more, and others stop within 1 to 2 counts (manual); 111 and 208 were
+Figures in the sources: an open hand reads 7, 6, 6, and one object is held at 188, 193 and 189 (manual 2014,
+pp. 70-74); a closed finger reads 240 or more, and others stop within 1 to 2 counts (manual); 111 and 208 were
 requested and 112 and 210 reached (poses that TAMS recorded); a contact is precise to some millimetres only
 (manual), of which a count is 0.66.
 

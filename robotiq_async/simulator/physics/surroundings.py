@@ -72,7 +72,7 @@ class Surroundings(ABC):
         """Remove the obstacles of some axes.
 
         Those it has stopped stay in their contact until a position on the other side is requested, the force
-        is raised or rGTO goes from 0 to 1 (manual).
+        is raised or rGTO goes from 0 to 1 (manual 2014, p. 51).
 
         Raises:
             TypeError: fingers is not an int.

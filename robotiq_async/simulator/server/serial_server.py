@@ -81,7 +81,7 @@ class _RtuEndpoint(SimulatorEndpoint):
         return take_rtu(inbox)
 
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
-        """The parts to send for a reply; none for an exception (manual), and none to a broadcast."""
+        """The parts to send for a reply; none for an exception, and none to a broadcast."""
         is_exception = bool(reply[1] & 0x80)
         return () if is_exception or reply[0] == _BROADCAST else super().deliver(reply)
 
@@ -100,9 +100,9 @@ class SerialSimulatorServer(_RtuEndpoint):
     to a millisecond, and never shorter.
 
     Serves what :class:`~robotiq_async.simulator.SimulatorServer` serves, and FC23, which writes before it
-    reads. The RTU gripper has no exception replies (manual), so a bad request gets no answer. Broadcasts
-    (unit 0) are carried out and not answered, requests to other units are left to them, as Modbus has it;
-    no source covers a real gripper's answer to a broadcast.
+    reads. The RTU gripper has no exception replies (manual 2014, p. 59), so a bad request gets no answer.
+    Broadcasts (unit 0) are carried out and not answered, requests to other units are left to them, as Modbus
+    has it; no source covers a real gripper's answer to a broadcast.
     """
 
     link = "rtu"

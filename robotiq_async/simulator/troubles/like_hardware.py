@@ -10,7 +10,7 @@ activation of 4.2 s     2F, Hand-E     pyRobotiqGripper gives up after 5 s, and 
 no ``status-lag``       2F, Hand-E     pyRobotiqGripper's and the vendor's example loop end with the first
                                        gOBJ after a write; only by the SDK's text gOBJ trails
 ``silence-fault``       all            the manual of a sibling, two recordings of 2F in normal operation
-``write-spacing``       3-Finger       the manual of 2014, in its chapters on TCP and on RTU
+``write-spacing``       3-Finger       the manual of 2014, pp. 58 and 75
 no ``write-spacing``    2F, Hand-E     the vendor's loop writes 100 times a second, and up to 250 times
 ======================  =============  ====================================================================
 

@@ -4,8 +4,9 @@ Three sources, named by :attr:`SpeedCalibration.source`: the manual's nominal fi
 measurements (the default), and your own tables from ``robotiq-async measure``. Moves and statuses use counts;
 these helpers convert.
 
-A force value is a label, not a measured force: the manual gives 15 N at 0 and 60 N at 255 and calls the curve
-between them not linear. Scale readings (thesis, chapter 6) depend more on the object than on the value.
+A force value is a label, not a measured force: the manual gives 15 N at 0 and 60 N at 255 (2014, p. 47) and
+calls the curve between them not linear. Scale readings (thesis, chapter 6) depend more on the object than on
+the value.
 """
 
 from __future__ import annotations
