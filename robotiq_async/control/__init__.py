@@ -36,7 +36,7 @@
 # its end shows: stopping the hand takes it back.
 #
 # Another client is seen by a status that shows none of our images. It is adopted: its image becomes the base,
-# the moves whose request is gone fail, the others go on, and our writes on their way are in doubt. An
+# the moves whose request is gone fail, the others continue, and our writes on their way are in doubt. An
 # adopted axis that moves gets time to show where to. Nothing is written to a gripper for finding it.
 #
 # Each question "is it reached" asks two things: does the write act, and does a status show it. What shows may

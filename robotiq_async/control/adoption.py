@@ -88,7 +88,7 @@ class Adoption:
         requested = self._requested(axis)
         if requested is not None:
             return requested
-        # No echo explains the contact: press on in its direction, so that the grip is not given up [ours].
+        # No echo explains the contact: press on in its direction, so that the grip is not given up.
         match status.finger_status(axis):
             case ObjectStatus.CONTACT_CLOSING:
                 return CLOSED

@@ -1,4 +1,4 @@
-"""Which request an axis may be following, by its position, contact and motion."""
+"""Requests that an axis may be following, by its position, contact and motion."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ class Controller:
         self._requests: Final = OpenRequests(machine.log)
         self._stop: Stop | None = None
         self._procedure: Procedure | None = None
-        # The write that raised rACT, while what it began may go on: stopping the hand takes it back.
+        # The write that raised rACT, until what it began has ended: stopping the hand takes it back.
         self._activation: Entry | None = None
         # Why a hand that is being stopped must not leave rGTO set.
         self._why_no_grip = ""
@@ -434,7 +434,7 @@ class Controller:
             requests.pending.hold_only(NO_AXES)
 
     def _resume_or_adopt(self, condition: Trigger, status: RobotiqStatus) -> None:
-        """The link is back: go on from the image of ours that the gripper shows, or adopt it."""
+        """The link is back: continue from our image if the gripper shows one, or adopt it."""
         ledger, pending = self._ledger, self._requests.pending
         if condition not in FOLLOWS:
             return

@@ -37,9 +37,9 @@ from .rest import LONG_AGO, Asked, Grips, Moment, Rest, may_move, rest_of
 
 WINDOW_S: Final = 0.5
 """Time after its acknowledgement in which a write shows, if it acts: the slowest device cycle considered is
-0.2 s [conceivable], and the poll that could show it may come late. It bounds what an echo can tell."""
+0.2 s [conceivable], and the poll that could show it may come late. It bounds what an echo can show."""
 SILENT_S: Final = 0.25
-"""Time in which a write acts where no echo can tell (speed, force; one that was lost with the link): the
+"""Time in which a write acts where no echo shows it (speed, force; one that was lost with the link): the
 slowest device cycle and 0.05 s."""
 NEVER: Final = float("-inf")
 

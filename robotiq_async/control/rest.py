@@ -1,4 +1,4 @@
-"""Whether an axis rests under its last request, by an object status (gDT) that may be late.
+"""Rest of an axis under its last request, by an object status (gDT) that may be late.
 
 gDT and gSTA are valid once the echo shows [manual 2014, pp. 70, 84]. In the vendor's own software for the
 two-finger grippers they trail the echo by some exchanges [vendor]. So a gDT that is read just after a request

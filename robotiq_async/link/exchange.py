@@ -61,7 +61,7 @@ class Echo:
     """The echo of a line, as far as it is known.
 
     Attributes:
-        is_on: whether the line brings back what is sent; None until the first exchange of a connection tells.
+        is_on: whether the line brings back what is sent; None until the first exchange of a connection.
     """
 
     def __init__(self) -> None:

@@ -251,7 +251,7 @@ class ModbusTransport:
         return error.is_passing if isinstance(error, RefusedError) else self._connection.is_noise(error)
 
     def _leaves_doubt(self, error: RobotiqConnectionError) -> bool:
-        """Whether the connection can go on after this end of a write with function 23."""
+        """Whether the connection stays usable after this end of a write with function 23."""
         return isinstance(error, RefusedError) or self._connection.is_noise(error)
 
     def _can_do_without(self, error: RobotiqConnectionError) -> bool:

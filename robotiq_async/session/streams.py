@@ -240,7 +240,7 @@ class Listeners:
         return lambda: self._remove(key)
 
     def tell(self, item: object) -> None:
-        """Call every listener. What a listener itself brings about comes after the present item."""
+        """Call every listener. What a listener itself causes comes after the present item."""
         if not self._listeners:
             return  # the common case, at every poll
         self._items.append(item)

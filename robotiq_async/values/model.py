@@ -232,11 +232,11 @@ _ARC_140: Final = (0.868, 0.70)
 
 # Manual of the 2F-85 and 2F-140, specifications; manual of the Hand-E, the 130 N are those of its example.
 TWO_FINGER_85: Final = _with_jaw("2f85", "2F-85", 85.0, (20.0, 150.0), (20.0, 235.0), _ARC_85)
-"""The 2F-85."""
+"""The gripper with two fingers that opens by 85 mm."""
 TWO_FINGER_140: Final = _with_jaw("2f140", "2F-140", 140.0, (30.0, 250.0), (10.0, 125.0), _ARC_140)
-"""The 2F-140."""
+"""The gripper with two fingers that opens by 140 mm."""
 HAND_E: Final = _with_jaw("hand-e", "Hand-E", 50.0, (20.0, 150.0), (20.0, 130.0))
-"""The Hand-E."""
+"""The parallel gripper Hand-E, which opens by 50 mm."""
 
 MODELS: Final = {model.name: model for model in (THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, HAND_E)}
 """The models by name."""

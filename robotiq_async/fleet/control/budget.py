@@ -31,7 +31,7 @@ class _Bucket:
 
 
 class Budget:
-    """The budget of one agent."""
+    """Questions that one agent may still answer, in all and of each client."""
 
     def __init__(self) -> None:
         self._all = _Bucket(ALL, 0.0)

@@ -1,4 +1,4 @@
-"""LeaseState: what this client has of the lease, and what each event makes of it."""
+"""LeaseState: this client's part of the lease, and how each event changes it."""
 
 # The agent decides who holds the lease. This is the client's view of it, which may be late: a lease that has
 # ended unnoticed is refused with the next request. A client must not get a lease back by itself that people

@@ -210,7 +210,7 @@ class Mirror:
         )
 
     def receive_points(self, summary: Mapping[str, Any]) -> None:
-        """Take over the points that were measured on the gripper; an older agent tells none."""
+        """Take over the points that were measured on the gripper; an older agent sends none."""
         points = check_points("stroke", summary["stroke"]) if summary.get("stroke") else ()
         if points != self.points:
             self.points = points

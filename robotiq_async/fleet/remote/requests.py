@@ -40,9 +40,9 @@ LAST_ANSWER_S: Final = 0.5  # seconds for the answer to a command whose lease ha
 class Settings:
     """The last speed and force of each axis.
 
-    They have no echo in the status. A restarted agent has its own, and a client that held the lease meanwhile
-    may have set others: the next motion could be faster and stronger than the program asked for. So all of
-    them are sent with each request for the lease.
+    They have no echo in the status. A restarted agent has its own, and another holder of the lease may have
+    set others: the next motion could be faster and stronger than the program asked for. So all of them are
+    sent with each request for the lease.
     """
 
     def __init__(self) -> None:

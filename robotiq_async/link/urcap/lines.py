@@ -32,9 +32,9 @@ def question(name: str) -> bytes:
 
 
 def command(image: Sequence[int], activation: int | None) -> bytes:
-    """The one line that sets what an image of a jaw says.
+    """The one line that sets the variables as an image of a jaw has them.
 
-    Nothing tells whether the URCap takes the variables of a line at once or one by one. So they stand in the
+    No source says whether the URCap takes the variables of a line at once or one by one. So they stand in the
     order that is right for both. What stops the fingers comes first; what starts them comes last, when
     position, speed and force are set.
 

@@ -9,7 +9,7 @@ translation). What the port makes different is decided here:
 * Echo, activation and go belong together: a go that is newer than the echo beside it would look like the
   request of another client. So everything is read when a part of it changes, and after a write that changes
   activation or go until they show it; then PRE lies between two equal answers to ACT and GTO, and was true
-  together with them. A new PRE that this link has written is no surprise: a stream of positions goes on with
+  together with them. A new PRE that this link has written is no surprise: a stream of positions keeps
   the short read.
 * Answers carry no number. There is one question at a time, and after whatever is not the one whole answer, in
   time, the connection is closed. A new connection begins with a silence, and with another question than the

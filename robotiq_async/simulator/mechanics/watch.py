@@ -20,7 +20,7 @@ _KINDS: Final = {
     int(mujoco.mjtGeom.mjGEOM_CYLINDER): ("cylinder", (1.0, 2.0)),
     int(mujoco.mjtGeom.mjGEOM_SPHERE): ("sphere", (1.0,)),
 }
-"""The geoms that are told, and by how much each of MuJoCo's sizes is too small. Others are left out."""
+"""The geoms that are reported, and by how much each of MuJoCo's sizes is too small. Others are left out."""
 
 
 class Look(NamedTuple):
@@ -45,7 +45,7 @@ class Watch:
         self._shapes = [_shape(model, geom) for geom in self._geoms]
 
     def look(self, data: Any, *, is_aside: bool) -> Look:
-        """Copy what it takes to tell where everything is now."""
+        """Copy the places of everything as they are now."""
         root = data.xpos[self._root].copy(), data.xmat[self._root].copy()
         parts = data.geom_xpos[self._geoms], data.geom_xmat[self._geoms]
         return Look(data.qpos[self._at], root, parts, is_aside)

@@ -1,6 +1,6 @@
 """The bodies of a mechanism: places of the joints, and of the parts before the gripper.
 
-For people who look at it. No register has any of this, and no real gripper tells it.
+For people who look at it. No register has any of this, and no real gripper reports it.
 """
 
 from __future__ import annotations

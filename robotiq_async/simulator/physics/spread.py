@@ -5,8 +5,8 @@ pp. 70-74); a closed finger reads 240 or more, and others stop within 1 to 2 cou
 requested and 112 and 210 reached (poses that TAMS recorded); a contact is precise to some millimetres only
 (manual), of which a count is 0.66.
 
-No random numbers are drawn in passing: a figure follows from the seed, the axis and its request. So it does
-not depend on how often it is read, and a repeated motion ends in the same way.
+No random numbers are drawn while it runs: a figure follows from the seed, the axis and its request. So it
+does not depend on how often it is read, and a repeated motion ends in the same way.
 """
 
 from __future__ import annotations

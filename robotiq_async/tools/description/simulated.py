@@ -2,7 +2,7 @@
 
 How they get there: the simulated gripper stands in the program of its hand. Whoever shows that hand asks
 :func:`bodies_of` at each update, and sends the answer beside the status. It is no part of the status, for no
-gripper tells it. A page gets it as JSON.
+gripper reports it. A page gets it as JSON.
 
 There are none, and a drawing goes by the positions alone, for a real gripper, for one without physics, for
 one in another program (``robotiq-async simulate``) or on another host, and while the link is lost.

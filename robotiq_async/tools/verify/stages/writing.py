@@ -68,7 +68,7 @@ async def _same(bench: Bench, watch: Watch, image: Request) -> None:
 
 
 def _lasting(status: RobotiqStatus) -> tuple[object, ...]:
-    """The part that must not change; a position may waver by a count, and 0x09 may be there in passing."""
+    """The part that must not change; a position may vary by a count, and 0x09 may show once."""
     return status.activation_echo, status.initialization, status.mode, status.echo
 
 
