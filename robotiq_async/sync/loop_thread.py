@@ -174,7 +174,7 @@ class LoopThread:
         try:
             settled.get(timeout=GIVE_UP_S)
         except Empty:
-            log.warning("a call that was interrupted did not end within %g s, and goes on", GIVE_UP_S)
+            log.warning("a call that was interrupted did not end within %g s, and still runs", GIVE_UP_S)
 
 
 class _Server:
