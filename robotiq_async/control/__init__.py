@@ -24,7 +24,7 @@
 # Holds only stop an axis, and are decided when they are written: an axis at rest or in contact keeps its
 # request, and with it its grip. So they may be sent again. They survive a lost link, unless another client
 # has moved the axis since. A fault puts a hold on all axes that may move because of us: a minor fault clears
-# by itself [manual], and nothing must resume then.
+# without a reset [manual 2012, 4.7], and nothing must resume then.
 #
 # A stop goes before all else: a halt, a reset, the end of the hand. It is written at once, again until it is
 # seen, and is over when its write acts and a status shows it; stops.py has what that is for each level. A
@@ -48,4 +48,5 @@
 # Evidence stands beside each rule: [manual] and [thesis] are printed, [seen] is from real grippers, [vendor]
 # from the maker's examples, [follows] from Modbus and two clients alone, [conceivable] from nothing but care.
 # A rule without one is a promise of ours, and needs no fact about the gripper. [manual 2014, p. 50] is a page
-# as printed in that edition of the 3-Finger's instruction manual; of [manual] alone no page was noted.
+# as printed in that edition of the 3-Finger's instruction manual; the edition of 2012, for firmware 3.0, is
+# cited by section. Of [manual] alone the place was not noted.

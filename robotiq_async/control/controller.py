@@ -418,7 +418,7 @@ class Controller:
             requests.fail_motions(GripperFaultError(status.fault))
             if status.activation_echo:
                 # A command sent just before may not act yet, and its motion would begin when the fault
-                # clears [manual: a minor one clears by itself]. Which axes need the hold is decided when it
+                # clears [manual 2012, 4.7: if it is minor]. Which axes need the hold is decided when it
                 # is written.
                 requests.hold(ledger.ours, "the fingers are held")
         elif before in FOLLOWS and condition is Trigger.SEEN_RELEASED:

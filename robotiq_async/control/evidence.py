@@ -1,9 +1,9 @@
 """Evidence: the condition that a status shows, without a fault that only passes.
 
-Fault 0x09 may pass. The 3-Finger's manual calls it "communication chip not ready (may be booting)". The
-two-finger and vacuum grippers of the same family, whose older manuals use the same words, show it in the
-first read after a second of silence and not again [seen on real ones]. So 0x09 counts as a fault only when it
-lasts.
+Fault 0x09 may pass. The 3-Finger's manual calls it "communication chip not ready (may be booting)" (2012,
+4.7). The two-finger and vacuum grippers of the same family, whose older manuals use the same words, show it
+in the first read after a second of silence and not again [seen on real ones]. So 0x09 counts as a fault only
+when it lasts.
 """
 
 from __future__ import annotations

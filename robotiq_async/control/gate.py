@@ -1,9 +1,9 @@
 """The gate through which every image leaves: the one place that decides about rACT and rATR.
 
-A rising rACT moves all fingers to their stops, and rATR releases the part (manual: activation, automatic
-release). An image is made from an older one, so either could be carried along by accident: by a command after
-another client's reset, by a stop that crosses a power cycle, by a hold after a release. So an image has rACT
-only if the gripper shows it, and rATR never; an activation may raise rACT, and a release rATR.
+A rising rACT moves all fingers to their stops, and rATR releases the part [manual 2012, 4.6]. An image is
+made from an older one, so either could be carried along by accident: by a command after another client's
+reset, by a stop that crosses a power cycle, by a hold after a release. So an image has rACT only if the
+gripper shows it, and rATR never; an activation may raise rACT, and a release rATR.
 """
 
 from __future__ import annotations

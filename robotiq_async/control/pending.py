@@ -144,8 +144,8 @@ def merged(
         may_move: the axes that show rest and may move all the same.
     """
     if pending.positions and not base.go:
-        # rGTO starts every axis [manual]: ask each for where it is. An axis that gripped keeps its request,
-        # or it would lose its grip.
+        # rGTO starts every axis [manual 2012, 4.6]: ask each for where it is. An axis that gripped keeps its
+        # request, or it would lose its grip.
         base = base.with_positions(
             {axis: status.position(axis) for axis in status.model.axes if axis not in gripping}
         )

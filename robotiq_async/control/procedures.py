@@ -65,7 +65,7 @@ def activation(image: Image) -> Steps:
         NotActivatedError: the gripper was reset after the activation had begun, or does not show it.
     """
     status = yield None
-    # Only a rising rACT activates [manual]: there is none unless the gripper is reset.
+    # Only a rising rACT activates [manual 2012, 4.6]: there is none unless the gripper is reset.
     if classify(status) is not Trigger.SEEN_RESET:
         return
     status = yield replace(image(status), activate=True)

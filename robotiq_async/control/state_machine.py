@@ -103,7 +103,7 @@ TABLE: Final[dict[State, Row]] = {
     State.RUNNING_CC: _row(
         _RUNNING | {Trigger.SEEN_READY: State.RUNNING_CC, Trigger.DELIVERED: State.RUNNING_IDLE}
     ),
-    # Holds and halts are sent in a fault, too: when a minor one clears [manual], no motion may resume.
+    # Holds and halts are sent in a fault: no motion may resume when a minor one clears [manual 2012, 4.7].
     State.FAULT: _row(_FAULTY | _all(_STOPS, State.FAULT) | {Trigger.ASK_RELEASE: State.DO_ATR}),
     State.DO_ATR: _row({Trigger.DELIVERED: State.WF_ATR}),
     State.WF_ATR: _row(_SEEN),

@@ -92,7 +92,7 @@ class Stop:
         """The image to write first; None if there is nothing to stop."""
         base = ledger.base
         match self.level:
-            case StopLevel.RESET:  # rACT = 0 clears faults and ends an activation or a release [manual]
+            case StopLevel.RESET:  # rACT = 0 clears faults and ends what runs [manual 2012, 4.6]
                 return replace(at_rest(base, status), activate=False)
             case StopLevel.HALT:  # positions and speeds stay as they were asked
                 return replace(base, go=False)

@@ -48,9 +48,9 @@ WIDTH_WIDE: Final = 0
 WIDTH_PINCH: Final = 255
 """Scissor request with B and C together."""
 SPEED_MIN: Final = 0
-"""Slowest, not standing: 22 mm/s nominal (manual), full closing in 10.0 s (thesis, table A1.1)."""
+"""Slowest, not standing: 22 mm/s nominal (manual 2012, 4.6), full closing in 10.0 s (thesis, table A1.1)."""
 SPEED_MAX: Final = 255
-"""Fastest: 110 mm/s nominal (manual), full closing in 2.1 s (thesis, table A1.1)."""
+"""Fastest: 110 mm/s nominal (manual 2012, 4.6), full closing in 2.1 s (thesis, table A1.1)."""
 FORCE_MIN: Final = 0
 """Weakest, not nothing: 15 N nominal (manual 2014, p. 47)."""
 FORCE_MAX: Final = 255

@@ -60,7 +60,7 @@ def requested(request: Request, readings: Sequence[int]) -> Goals:
     """The goals of the axes under a request while rGTO = 1.
 
     Simple control (rICF = 0, rICS = 0) lets A's registers drive all fingers, or in the scissor mode the
-    scissor alone while the fingers stay at their readings, rICF = 1 or not (manual).
+    scissor alone while the fingers stay at their readings, rICF = 1 or not (manual 2012, 4.6).
     """
     own = tuple(Goal(axis.position, axis.speed, axis.force) for axis in request.axes)
     if not request.model.has_modes:

@@ -8,7 +8,7 @@ from typing import Final
 from robotiq_async.values.enums import Fault, Severity
 
 BLOCKED_AFTER: Final = 20.0
-"""Seconds of interference on the scissor after which the minor fault becomes a major one (manual)."""
+"""Seconds of interference on the scissor until the minor fault becomes a major one (manual 2012, 4.7)."""
 
 _RANK: Final = {Severity.NONE: 0, Severity.PRIORITY: 1, Severity.MINOR: 2, Severity.MAJOR: 3}
 

@@ -3,7 +3,7 @@
 Figures in the sources: an open hand reads 7, 6, 6, and one object is held at 188, 193 and 189 (manual 2014,
 pp. 70-74); a closed finger reads 240 or more, and others stop within 1 to 2 counts (manual); 111 and 208 were
 requested and 112 and 210 reached (poses that TAMS recorded); a contact is precise to some millimetres only
-(manual), of which a count is 0.66.
+(manual 2012, 4.7), of which a count is 0.66.
 
 No random numbers are drawn while it runs: a figure follows from the seed, the axis and its request. So it
 does not depend on how often it is read, and a repeated motion ends in the same way.

@@ -49,9 +49,9 @@ class Surroundings(ABC):
             opening: it is met when opening (gDT = 1) instead of closing (gDT = 2).
             soft: counts by which a force of 255 presses the axis into it, 0..255.
             thin: it is a thin object between fingertips, which the gripper may hold without ever reporting a
-                contact (manual). Here it never does: the axes continue to their request or their stops.
-            fixed: it stays there in an activation, which then fails with fault 0x0D (manual: see that nothing
-                interferes). Anything else is taken out for an activation, and put back after it.
+                contact (manual 2012, 4.7). Here it never does: the axes continue to their request or stops.
+            fixed: it stays there in an activation, which then fails with fault 0x0D (manual 2012, 4.7: see
+                that nothing interferes). Anything else is taken out for an activation, and put back after it.
 
         Raises:
             TypeError: an argument is not an int.
