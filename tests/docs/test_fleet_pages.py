@@ -87,8 +87,8 @@ EXAMPLES: Final = [
     json.loads(
         failure(MOVE, EPOCH, ControlLostError("the lease has ended (taken), ...", "taken")).pack(),
     ),
-    json.loads(call(1, 0, what="acquire", label=LABEL).pack()),
-    json.loads(Answer(NAME.base, 1, EPOCH, {"lease": 3, "window": 1.0}).pack()),
+    json.loads(call(1, 0, what="acquire", label=LABEL).pack())["arguments"],
+    json.loads(Answer(NAME.base, 1, EPOCH, {"lease": 3, "window": 1.0}).pack())["value"],
 ]
 """The objects in the order of the page."""
 
