@@ -119,7 +119,7 @@ class LeaseKeeper:
             async with self._acquiring:
                 lost = {"again": self._lease.number, "run": self._lease.run}
                 granted = await self._acquire({"what": "acquire", **lost})
-                if self._lease.state is LeaseState.SEEKS:  # else it was released in that time, and expires
+                if self._lease.state is LeaseState.SEEKS:  # else it was released meanwhile, and expires
                     self._lease.grant(*granted)
         except ControlLostError as error:
             if error.reason in OVERRULING:

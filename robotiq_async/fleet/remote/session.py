@@ -158,7 +158,7 @@ class RemoteSession:
             self.log.warning("the release was not acknowledged (%s): the agent is to hold what moves", error)
         finally:
             await self.stops.halted()
-            with suppress(RobotiqError):  # a stronger one may have been sent since
+            with suppress(RobotiqError):  # a stronger one may have been sent meanwhile
                 await self.keeper.released()
             self._undo()
             self.agents.end()
@@ -276,7 +276,7 @@ class RemoteSession:
             due = now() + interval
             await asyncio.sleep(interval)
             woken = now()
-            # After a delay of this loop, messages that arrived in it are handled first.
+            # After a delay of this loop, messages that arrived meanwhile are handled first.
             if woken - due < interval and woken - self.mirror.received_at > self.client.window:
                 self._fall_silent(woken)
             if self.mirror.is_silent and woken - self._arrived_at < interval:

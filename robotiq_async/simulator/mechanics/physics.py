@@ -161,8 +161,8 @@ class Physics:
 class OrderedDrive:
     """The motor of an axis, for a gripper in another thread than the world: neither waits for the other.
 
-    An order is taken up before the next step. Until then the motor counts as in motion, for it reports about
-    the goal before.
+    An order is taken up before the next step. Until then the motor counts as in motion, for what it tells is
+    about the goal before.
 
     Attributes:
         taken: how many orders the thread of the world has taken up.
