@@ -424,7 +424,7 @@ class Ledger:
         """Find out which axes have come to rest. Not in a fault: it keeps axes from starting."""
         if self._unproven:  # usually none is
             self._note_shown()
-            if status.go_echo:  # gDT has no meaning without rGTO [manual 2014, p. 51; 2018, p. 39]
+            if status.go_echo:  # gDT has no meaning without rGTO [manual]
                 self._find_rest(status)
         if status.go_echo and (self.grips or status.contacts):
             contacts = status.contacts
