@@ -360,7 +360,8 @@ def first_cells(heading: str) -> list[str]:
 def test_the_page_names_every_key_ending_and_check() -> None:
     keys = [key for cell in first_cells("### report.json") for key in re.findall(r"\w+", cell)]
     assert keys == list(report_with().as_dict())
-    assert first_cells("### How a run ends") == list(ENDINGS)
+    _, *stops = table("how-to/first-hour.md", "## When it stops")
+    assert {"done", *re.findall(r"`(\w+)`", " ".join(reasons for reasons, _ in stops))} == ENDINGS.keys()
     assert first_cells("## What is checked") == list(CATALOGUE)
     files = {"report.json", "report.md", "recording.mcap"}
     named = set(re.findall(r"`([a-z]+\.[a-z_0-9]+)`", HARDWARE)) - files
