@@ -143,7 +143,7 @@ class Poller:
             if level is StopLevel.SHUTDOWN:
                 self._controller.keep_no_grip("a stop() without keep_grip came meanwhile")
         elif level < self._level:
-            self._log.warning("a stop that is under way is stronger: the fingers are %s", self._level.done)
+            self._log.warning(self._level.prevails)
         self._opener.end()
 
     def _refuse_requests(self) -> None:

@@ -354,3 +354,8 @@ class StopLevel(IntEnum):
     def done(self) -> str:
         """The participle for messages: the fingers are ..."""
         return {StopLevel.LEAVE: "left as they are", StopLevel.KEEP: "held"}.get(self, "stopped")
+
+    @property
+    def prevails(self) -> str:
+        """The warning about a weaker stop that comes later."""
+        return f"a stronger stop has begun: the fingers are {self.done}"

@@ -109,7 +109,7 @@ async def test_a_weaker_stop_hears_that_a_stronger_one_counts(
 ) -> None:
     with caplog.at_level(logging.WARNING, logger="robotiq_async"):
         await asyncio.gather(hand.stop(), hand.stop(keep_grip=True))
-    assert "a stop that is under way is stronger: the fingers are stopped" in caplog.text
+    assert "a stronger stop has begun: the fingers are stopped" in caplog.text
 
 
 @inside(lab)

@@ -163,9 +163,7 @@ class Release:
             # After a stronger release, callers wait for that one, so the error of this one may go unread.
             self._answering.add_done_callback(lambda task: task.cancelled() or task.exception())
         elif level < self._level:
-            self._client.log.warning(
-                "a stop that is under way is stronger: the fingers are %s", self._level.done
-            )
+            self._client.log.warning(self._level.prevails)
 
     async def acknowledged(self) -> None:
         """Wait for the answer to the strongest request."""
