@@ -7,7 +7,6 @@ from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from typing import Any, Final
 
-from ...runtime.log import Log
 from ...values.checks import check_seconds
 from ...values.errors import AgentError, ControlLostError, MoveTimeoutError, NotStartedError, RobotiqError
 from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
@@ -46,7 +45,7 @@ class Client:
         """``receive`` takes the status that comes with an answer, and the time of the question."""
         self.name = name
         self.loop = asyncio.get_running_loop()
-        self.log = Log(str(name))
+        self.log = mirror.log
         self.mirror = mirror
         self.lease = lease
         self.requests = Requests(name, bus)

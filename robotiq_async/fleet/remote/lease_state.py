@@ -69,8 +69,8 @@ class ClientLease:
         lost: why the client lost control; None while it is in control, and if it never was.
     """
 
-    def __init__(self, name: str, *, is_wanted: bool) -> None:
-        self.state = LeaseState.SEEKS if is_wanted else LeaseState.READS
+    def __init__(self, name: str) -> None:
+        self.state = LeaseState.READS
         self.number = 0
         self.run = 0
         self.lost: ControlLostError | None = None

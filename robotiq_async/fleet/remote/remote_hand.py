@@ -121,7 +121,7 @@ class RemoteHand(Hand):
 
     async def _start(self, activate: bool, wait: float) -> None:
         before = self._session
-        if self._opening is not None or (before is not None and not before.has_ended):
+        if self._opening is not None or (before is not None and not before.client.has_ended):
             raise InvalidStateError(
                 "this hand is started already: stop() it first",
                 self.state,
@@ -132,13 +132,12 @@ class RemoteHand(Hand):
             self._gripper,
             bus,
             self._channels,
-            wants_control=self._control is True,
             owns_bus=bus is not self._shared_bus,
             before=None if before is None else before.mirror,
         )
         try:
             with no_answer_as_lost_connection():
-                await session.connect(max(self._connect_timeout, wait))
+                await session.connect(max(self._connect_timeout, wait), acquires=self._control is True)
             _ = self.units  # a calibration of another model fails here, before anything moves
             activates = activate and self._control
             if activates and self.state in (State.RESET, State.DO_ACTIVATION, State.WF_ACTIVATION):
@@ -150,7 +149,7 @@ class RemoteHand(Hand):
     async def _stop(self, halt: bool, keep_grip: bool) -> None:
         self._opening = None
         session = self._session
-        if session is not None and not session.has_ended:
+        if session is not None and not session.client.has_ended:
             session.check_loop()
             session.outbox.drop()
             await session.close(StopLevel.of(halt=halt, keep_grip=keep_grip))

@@ -56,16 +56,13 @@ class RemoteSession:
         bus: Bus,
         channels: Channels,
         *,
-        wants_control: bool,
         owns_bus: bool = False,
         before: Mirror | None = None,
     ) -> None:
         """Subscribe to the gripper. The channels outlive the run; ``before`` is the mirror of the last."""
-        self.name = name
-        self.log = Log(str(name))
         self.waiters = StateWaiters()
-        self.mirror = Mirror(name.mark, channels, self.waiters.reached, before, self.log)
-        lease = ClientLease(str(name), is_wanted=wants_control)
+        self.mirror = Mirror(name.mark, channels, self.waiters.reached, before, Log(str(name)))
+        lease = ClientLease(str(name))
         self.client = Client(name, bus, self.mirror, lease, receive=self._receive_answer)
         self.agents = Agents(name, bus, lease.doubt)
         self.keeper = LeaseKeeper(self.client, self.agents)
@@ -74,7 +71,6 @@ class RemoteSession:
         self.statistics: Statistics = Counters().snapshot(0)
         self._bus = bus
         self._channels = channels
-        self._wants_control = wants_control
         self._owns_bus = owns_bus
         self._closing: asyncio.Task[None] | None = None
         self._arrived_at = 0.0  # arrival of the last message, current or not
@@ -82,21 +78,21 @@ class RemoteSession:
         self._querying: asyncio.Task[Any] | None = None
         channels.reopen(self.client.loop)
         self.mirror.begin(now())
-        self._unreadable, self._misrouted = LimitedLog(self.log), LimitedLog(self.log)
+        self._unreadable, self._misrouted = LimitedLog(self.mirror.log), LimitedLog(self.mirror.log)
         # One wildcard, not a subscription for each key: with those, zenoh has delivered samples under wrong
         # keys (docs/decisions/fleet.md). So every payload identifies its gripper, too.
         self._undo: Undo = bus.subscribe(name.key("*"), self._receive)
 
     # -- start and end ---------------------------------------------------------------------------------
 
-    async def connect(self, timeout: float) -> None:
-        """Wait for the agent, and acquire the lease if wanted; errors as of :meth:`RemoteHand.start`."""
+    async def connect(self, timeout: float, *, acquires: bool) -> None:
+        """Wait for the agent, and acquire the lease if that is asked for; errors as of RemoteHand.start()."""
         deadline = now() + timeout
         while not await self._ask_info(deadline):
             if now() >= deadline:
                 await self._give_up()
             await asyncio.sleep(0.05)
-        if self._wants_control:
+        if acquires:
             await self.keeper.begin(deadline)
         self.client.spawn(self._supervise())
         await self._wait_for_gripper(deadline)
@@ -114,7 +110,7 @@ class RemoteSession:
             except TimeoutError:
                 problem = (await self.client.ask("info", timeout=ANSWER_S))["problem"]
                 raise ConnectFailedError(
-                    str(self.name), f"its agent cannot reach the gripper: {problem or 'the link is down'}"
+                    str(self.client.name), f"its agent cannot reach the gripper: {problem or 'the link is down'}"
                 ) from None
 
     async def _ask_info(self, deadline: float) -> bool:
@@ -129,11 +125,11 @@ class RemoteSession:
         return True
 
     async def _give_up(self) -> None:
-        keys = await self._bus.announced(self.name.key("alive", "*"), timeout=ANSWER_S)
-        if keys:
-            raise NotAllowedError(f"{self.name}: the agent is running, but does not answer: access denied")
+        name = self.client.name
+        if await self._bus.announced(name.key("alive", "*"), timeout=ANSWER_S):
+            raise NotAllowedError(f"{name}: the agent is running, but does not answer: access denied")
         why = "no agent was found: none is running, or the network or a certificate prevents the connection"
-        raise ConnectFailedError(str(self.name), why)
+        raise ConnectFailedError(str(name), why)
 
     async def close(self, level: StopLevel) -> None:
         """End the run within 2 s, also if the caller is cancelled; every caller waits for the end.
@@ -155,7 +151,7 @@ class RemoteSession:
         try:
             await self.keeper.released()
         except RobotiqError as error:
-            self.log.warning("the release was not acknowledged (%s): the agent is to hold what moves", error)
+            self.client.log.warning("the release was not acknowledged (%s): the agent is to hold what moves", error)
         finally:
             await self.stops.halted()
             with suppress(RobotiqError):  # a stronger one may have been sent meanwhile
@@ -178,11 +174,6 @@ class RemoteSession:
         """Whether the run has ended, or is ending."""
         return self.client.is_over
 
-    @property
-    def has_ended(self) -> bool:
-        """Whether all of the run has ended."""
-        return self.client.has_ended
-
     def check_running(self) -> None:
         self.client.check_running()
 
@@ -192,11 +183,11 @@ class RemoteSession:
     @property
     def lost_its_loop(self) -> bool:
         """Whether its event loop was closed: its tasks can never end then."""
-        return not self.has_ended and self.client.loop.is_closed()
+        return not self.client.has_ended and self.client.loop.is_closed()
 
     def abandon(self) -> None:
         """Give up a run whose event loop was closed. Without renewals the agent holds what moves."""
-        self.log.warning("the event loop was closed before stop()")
+        self.client.log.warning("the event loop was closed before stop()")
         self.client.lease.end()
         self.waiters = StateWaiters()
         self._end()
@@ -229,7 +220,7 @@ class RemoteSession:
                         mirror.receive_events(events)
                 await asyncio.sleep(PAUSE_S)
         except RobotiqError as error:
-            self.log.info("missed events could not be fetched: %s", error)
+            self.client.log.info("missed events could not be fetched: %s", error)
         finally:
             self._is_fetching = False
 
@@ -292,12 +283,12 @@ class RemoteSession:
     def _fall_silent(self, at: float) -> None:
         if self.mirror.is_silent:
             return
-        self.log.warning("the agent is silent")
+        self.client.log.warning("the agent is silent")
         self.mirror.fall_silent(at)
         self.client.lose_lease("expired", "the agent is silent")
         self.client.requests.fall_silent()
 
     def check_control(self) -> None:
         if self.mirror.is_silent:
-            raise ConnectionLostError(f"{self.name}: the agent is silent: nothing was asked")
+            raise ConnectionLostError(f"{self.client.name}: the agent is silent: nothing was asked")
         self.client.lease.check()
