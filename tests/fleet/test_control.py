@@ -90,6 +90,35 @@ async def test_a_lease_that_is_granted_after_a_release_moves_nothing(here: Lab, 
 
 
 @inside(lab)
+async def test_a_lease_that_is_granted_after_a_release_is_free_for_others(here: Lab) -> None:
+    """They heard for a second that this client commanded."""
+    here.network.delay("client", "agent", 0.05)
+    async with here.client(control=False) as hand, here.client("other", control=False) as other:
+        acquiring, lease = asyncio.create_task(hand.acquire()), here.lease
+        await until(lambda: here.lease > lease)
+        await hand.release()
+        with pytest.raises(ControlLostError, match="released while it was acquired"):
+            await acquiring
+        await asyncio.sleep(0.1)
+        await other.acquire()
+
+
+@inside(lab, window=5.0)
+async def test_a_hand_is_not_held_up_by_its_own_last_run(here: Lab, hand: RemoteHand) -> None:
+    """Its release had been lost: started again, it heard that this very program commanded."""
+    await here.moving(hand)
+    stream = here.network.stream("client", "agent")
+    stream.is_cut, stream.keeps = True, False
+    await hand.stop()
+    assert here.gripper.is_moving
+    here.network.mend(stream)
+    await hand.start()
+    await asyncio.sleep(0.1)
+    assert not here.gripper.is_moving, "what its last run had set in motion is held"
+    await hand.move(30, Finger.A)
+
+
+@inside(lab)
 async def test_a_calibration_of_another_model_is_refused_before_anything_moves(here: Lab) -> None:
     here.gripper.write(0, [0x0000])
     await asyncio.sleep(0.5)

@@ -9,14 +9,17 @@ from typing import Any
 
 import pytest
 
-from robotiq_async import Finger, RobotiqError, State
+from robotiq_async import Finger, RobotiqError, State, StateTimeoutError
 from robotiq_async.fleet.fleet import Fleet
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.remote.requests import NoAnswerError
 from robotiq_async.fleet.remote.stops import until_answered
 from robotiq_async.fleet.wire.envelope import Answer, Call
 from robotiq_async.fleet.wire.names import GripperName
+from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.values import registers as reg
 from robotiq_async.values.errors import AgentError, NotAllowedError, NotAllStoppedError, RobotiqStateError
+from robotiq_async.values.registers import Registers
 from tests.fleet.cell import ask, ending, move_slowly
 from tests.fleet.lab import LEFT, Garbling, Lab, Spoiling, lab
 from tests.fleet.world import World, motions, world
@@ -282,6 +285,26 @@ async def test_a_grip_is_kept_when_the_lease_is_given_back(here: Lab, hand: Remo
     await hand.acquire()
     await hand.release()
     assert not here.gripper.grips
+
+
+class Unstoppable(SimulatedGripper):
+    """Its rGTO is always set, if it is to be believed."""
+
+    def status_registers(self) -> Registers:
+        block = list(super().status_registers())
+        reg.gGTO.write(block, 1)
+        return tuple(block)
+
+
+@inside(lab, kind=Unstoppable)
+async def test_a_release_whose_halt_does_not_show_says_so(here: Lab, hand: RemoteHand) -> None:
+    """It gave up before the agent did, and said that there was no answer."""
+    with pytest.raises(StateTimeoutError):
+        await hand.release()
+    await hand.acquire()
+    before = here.network.loop.time()
+    await hand.stop()
+    assert here.network.loop.time() - before < 2.0, "the promise of a stop"
 
 
 @inside(lab, kind=Restless)

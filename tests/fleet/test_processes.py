@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from robotiq_async import ConnectionLostError, Finger, State
+from robotiq_async import ConnectionLostError, Finger, RobotiqError, State
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.fleet import cuts
@@ -104,6 +104,22 @@ async def test_a_client_is_frozen_and_goes_on(site: Site) -> None:
     async with asyncio.timeout(patience(LIMIT_S)):
         await mover.wait()
     assert site.gripper.position(Finger.A) == stood
+
+
+async def test_a_stop_beside_a_halt_ends_in_its_time_although_the_agent_is_frozen(site: Site) -> None:
+    """It waited for the halt, for the release and for the end of the session: 3.3 s."""
+    agent = await site.start_agent()
+    hand = site.hand()
+    await hand.start()
+    agent.send_signal(signal.SIGSTOP)
+    halting = asyncio.ensure_future(hand.halt())
+    await asyncio.sleep(0)
+    began = asyncio.get_running_loop().time()
+    await hand.stop()
+    assert asyncio.get_running_loop().time() - began < patience(2)
+    with pytest.raises(RobotiqError):
+        await halting
+    agent.send_signal(signal.SIGCONT)
 
 
 async def test_an_agent_is_killed_and_the_next_one_holds(site: Site) -> None:

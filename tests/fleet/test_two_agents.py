@@ -83,6 +83,26 @@ async def test_control_does_not_come_back_by_itself_from_the_one_to_the_other(
 
 
 @inside(lab)
+async def test_a_lease_that_was_granted_while_a_second_agent_came_does_not_come_back_by_itself(
+    here: Lab, reader: RemoteHand
+) -> None:
+    """It was forgotten that the second one had come: the client had no lease at that moment."""
+    here.network.delay("reader", "agent", 0.05)
+    acquiring, lease = asyncio.create_task(reader.acquire()), here.lease
+    await until(lambda: here.lease > lease)
+    gone = here.network.bus("other agent").announce(LEFT.key("alive", "7"))
+    await acquiring
+    assert reader.is_in_control
+    here.network.cut(("reader", "agent"), ("agent", "reader"))
+    await asyncio.sleep(2)
+    gone()
+    here.network.mend(*here.network.both("reader", "agent"))
+    await asyncio.sleep(3)
+    assert reader.state is State.RUNNING_IDLE, "it reads on"
+    assert not reader.is_in_control
+
+
+@inside(lab)
 async def test_a_halt_stops_both_and_says_so_only_then(here: Lab, reader: RemoteHand) -> None:
     async with another(here) as other:
         for hand in (here.local, other.local):

@@ -27,10 +27,14 @@ class Agents:
         self._log = LimitedLog(Log(str(name)))
         self.end: Undo = bus.watch(name.key("alive", "*"), self._update_token)
 
+    @property
+    def are_several(self) -> bool:
+        return len(self._tokens) > 1
+
     async def check_one(self) -> None:
-        if len(self._tokens) > 1:  # one may be gone, and its sign-off lost
+        if self.are_several:  # one may be gone, and its sign-off lost
             self._tokens = set(await self._bus.announced(self._name.key("alive", "*"), timeout=LOOK_S))
-        if len(self._tokens) > 1:
+        if self.are_several:
             raise AgentError(f"{self._name}: {TWO_AGENTS}; nothing was done")
 
     def _update_token(self, token: str, is_there: bool) -> None:

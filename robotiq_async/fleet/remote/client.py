@@ -10,7 +10,6 @@ from typing import Any, Final
 from ...values.checks import check_seconds
 from ...values.errors import AgentError, ControlLostError, MoveTimeoutError, NotStartedError, RobotiqError
 from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
-from ..network.bus import Bus
 from ..wire.envelope import Call
 from ..wire.names import GripperName
 from ..wire.values import Fields
@@ -36,7 +35,7 @@ class Client:
     def __init__(
         self,
         name: GripperName,
-        bus: Bus,
+        requests: Requests,
         mirror: Mirror,
         lease: ClientLease,
         *,
@@ -48,7 +47,7 @@ class Client:
         self.log = mirror.log
         self.mirror = mirror
         self.lease = lease
-        self.requests = Requests(name, bus)
+        self.requests = requests
         self.window = WINDOW_S
         self.is_over = False
         self.has_ended = False

@@ -7,6 +7,8 @@ gripper in the meantime, which must not be overruled. The agent decides that, by
 from __future__ import annotations
 
 import asyncio
+from contextlib import suppress
+from dataclasses import replace
 from typing import Any, Final
 
 from ...runtime.clock import now
@@ -20,8 +22,8 @@ from .requests import NoAnswerError, label
 
 RENEWALS: Final = 5  # renewals, and checks for silence, per window
 ANSWER_S: Final = 0.5  # seconds for an answer that the agent gives at once; callers with more time ask again
-RELEASE_S: Final = 0.9
-"""Seconds for the answer to a release. Closing a session of zenoh may take 1 s, and a stop 2 s in total."""
+RELEASE_S: Final = 2.0
+"""Seconds for the answer to a release. It may have to report a halt that the gripper did not show for 1 s."""
 
 
 class LeaseKeeper:
@@ -55,9 +57,10 @@ class LeaseKeeper:
             if self._lease.is_held:
                 return  # a new lease would end the motions under this one
             granted = await self._acquire({"what": "take" if take else "acquire"})
-            if self._releases != before:  # the lease expires
+            if self._releases != before:
+                self._client.spawn(self._give_back(*granted))
                 raise ControlLostError(f"{self._client.name}: released while it was acquired", "released")
-            self._lease.grant(*granted)
+            self._take_over(*granted)
 
     def release(self, level: StopLevel) -> None:
         """Release the lease, if this client holds it; the request is sent within this call.
@@ -119,13 +122,26 @@ class LeaseKeeper:
             async with self._acquiring:
                 lost = {"again": self._lease.number, "run": self._lease.run}
                 granted = await self._acquire({"what": "acquire", **lost})
-                if self._lease.state is LeaseState.SEEKS:  # else it was released meanwhile, and expires
-                    self._lease.grant(*granted)
+                if self._lease.state is LeaseState.SEEKS:
+                    self._take_over(*granted)
+                else:  # it was released in the meantime, or a second agent has come
+                    await self._give_back(*granted)
         except ControlLostError as error:
             if error.reason in OVERRULING:
                 self._lease.refuse(error)
         except RobotiqError:
             pass  # the next maintain() tries again
+
+    def _take_over(self, number: int, run: int) -> None:
+        self._lease.grant(number, run)
+        if self._agents.are_several:  # the second has come since the request
+            self._lease.doubt()
+
+    async def _give_back(self, number: int, run: int) -> None:
+        # Otherwise other clients are refused until it expires. Nothing has moved under it.
+        call = self._client.call({"what": "release", "halt": False})
+        with suppress(RobotiqError):
+            await self._client.send(replace(call, lease=number, epoch=run), "lease", timeout=ANSWER_S)
 
     async def _renew(self) -> None:
         await self._client.ask_quietly("lease", {"what": "renew"}, self._client.window)

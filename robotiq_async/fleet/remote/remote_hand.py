@@ -133,7 +133,7 @@ class RemoteHand(Hand):
             bus,
             self._channels,
             owns_bus=bus is not self._shared_bus,
-            before=None if before is None else before.mirror,
+            before=None if before is None else before.client,
         )
         try:
             with no_answer_as_lost_connection():

@@ -76,14 +76,17 @@ class Requests:
     """Numbers requests, repeats each until it is answered, and ends the wait when the agent falls silent.
 
     Attributes:
+        client: identifies the hand to the agent, in all its runs: a lease of an earlier one is its own.
+        number: of the newest request.
         settings: the speeds and forces that were asked for.
     """
 
-    def __init__(self, name: GripperName, bus: Bus) -> None:
+    def __init__(self, name: GripperName, bus: Bus, before: Requests | None) -> None:
+        """``before`` has the requests of the hand's last run, if there was one."""
         self._name = name
         self._bus = bus
-        self._client = secrets.token_hex(8)
-        self._number = 0
+        self.client: str = secrets.token_hex(8) if before is None else before.client
+        self.number: int = 0 if before is None else before.number
         self._loop = asyncio.get_running_loop()
         self._silence: asyncio.Future[None] = self._loop.create_future()
         self._received: asyncio.Future[None] = self._loop.create_future()
@@ -135,8 +138,8 @@ class Requests:
         await asyncio.gather(*(posted.ended() for posted in pending))
 
     def make(self, mirror: Mirror, lease: int, arguments: Fields) -> Call:
-        self._number += 1
-        return Call(self._name.base, self._client, mirror.epoch, lease, self._number, mirror.stamp, arguments)
+        self.number += 1
+        return Call(self._name.base, self.client, mirror.epoch, lease, self.number, mirror.stamp, arguments)
 
     def post(
         self, call: Call, verb: str, *, timeout: float, urgency: Urgency = Urgency.COMMAND

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Mapping
-from contextlib import suppress
 from typing import Any, Final
 
 from ...runtime.clock import now
@@ -33,12 +32,14 @@ from .lease_keeper import ANSWER_S, RENEWALS, LeaseKeeper
 from .lease_state import ClientLease
 from .mirror import Mirror
 from .outbox import Outbox
-from .requests import NoAnswerError
+from .requests import NoAnswerError, Requests
 from .stops import Stops
 
 PAUSE_S: Final = 0.02
 """Seconds between two questions for events: 50 a second, half of what an agent answers to one client."""
 CONNECT_S: Final = 5.0  # seconds to find the agent
+END_S: Final = 1.9  # seconds for the end of a run: a stop promises 2 s
+BUS_S: Final = 1.0  # of END_S: seconds that closing a session of zenoh may take
 
 
 class RemoteSession:
@@ -56,14 +57,17 @@ class RemoteSession:
         bus: Bus,
         channels: Channels,
         *,
-        owns_bus: bool = False,
-        before: Mirror | None = None,
+        owns_bus: bool,
+        before: Client | None,
     ) -> None:
-        """Subscribe to the gripper. The channels outlive the run; ``before`` is the mirror of the last."""
+        """Subscribe to the gripper. The channels outlive the run; ``before`` is the last one's client."""
         self.waiters = StateWaiters()
-        self.mirror = Mirror(name.mark, channels, self.waiters.reached, before, Log(str(name)))
+        mirror, requests = (None, None) if before is None else (before.mirror, before.requests)
+        self.mirror = Mirror(name.mark, channels, self.waiters.reached, mirror, Log(str(name)))
         lease = ClientLease(str(name))
-        self.client = Client(name, bus, self.mirror, lease, receive=self._receive_answer)
+        self.client = Client(
+            name, Requests(name, bus, requests), self.mirror, lease, receive=self._receive_answer
+        )
         self.agents = Agents(name, bus, lease.doubt)
         self.keeper = LeaseKeeper(self.client, self.agents)
         self.stops = Stops(self.client)
@@ -110,7 +114,8 @@ class RemoteSession:
             except TimeoutError:
                 problem = (await self.client.ask("info", timeout=ANSWER_S))["problem"]
                 raise ConnectFailedError(
-                    str(self.client.name), f"its agent cannot reach the gripper: {problem or 'the link is down'}"
+                    str(self.client.name),
+                    f"its agent cannot reach the gripper: {problem or 'the link is down'}",
                 ) from None
 
     async def _ask_info(self, deadline: float) -> bool:
@@ -149,13 +154,15 @@ class RemoteSession:
 
     async def _close(self) -> None:
         try:
-            await self.keeper.released()
-        except RobotiqError as error:
-            self.client.log.warning("the release was not acknowledged (%s): the agent is to hold what moves", error)
-        finally:
-            await self.stops.halted()
-            with suppress(RobotiqError):  # a stronger one may have been sent meanwhile
+            async with asyncio.timeout(END_S - BUS_S if self._owns_bus else END_S):
+                await self.stops.halted()
                 await self.keeper.released()
+        except (RobotiqError, TimeoutError) as error:
+            why = str(error) or "no answer in time"
+            self.client.log.warning(
+                "the release was not acknowledged (%s): the agent is to hold what moves", why
+            )
+        finally:
             self._undo()
             self.agents.end()
             await self.client.close()
