@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from robotiq_async import Finger
+from robotiq_async import Finger, State
 from robotiq_async.fleet.keys.access import Role
 from robotiq_async.fleet.keys.certificates import issue, make_authority
 from robotiq_async.fleet.network.bus import Query, Urgency
@@ -24,10 +24,11 @@ from robotiq_async.simulator import SimulatorServer
 from robotiq_async.tools.doctor import Finding, Level, examine_remote
 from robotiq_async.tools.doctor.findings import GiveUpError
 from robotiq_async.tools.doctor.fleet import examine_keys
+from robotiq_async.values.model import TWO_FINGER_85
 from tests.fleet.lab import LEFT, Lab, lab
 from tests.fleet.network import MemoryBus, Network
 from tests.fleet.sessions import line
-from tests.virtual import inside, virtual
+from tests.virtual import inside, until, virtual
 
 HEALTHY = [
     "address",
@@ -124,6 +125,25 @@ async def test_an_ailment(here: Lab, ail: Callable[[Lab], object], what: str, wo
     found = (await examined(here))[what]
     assert found.level is Level.BAD
     assert words in found.found + found.advice
+
+
+@inside(lab)
+async def test_a_gripper_whose_link_was_lost_later(here: Lab, reader: RemoteHand) -> None:
+    """It was well, "in DISCONNECTED", and its last status was taken for the present one."""
+    await until(lambda: reader.state is State.RUNNING_IDLE)
+    out_of_reach(here)
+    await until(lambda: here.local.state is State.DISCONNECTED)
+    found = await examined(here)
+    assert found["gripper"].level is Level.BAD
+    assert "the link is down" in found["gripper"].found
+    assert "activation" not in found
+
+
+@inside(lab, model=TWO_FINGER_85)
+async def test_the_fault_of_a_jaw_is_one_of_a_jaw(here: Lab) -> None:
+    """It had a scissor that met something."""
+    here.gripper.inject_fault(0x0A)
+    assert "UNDER_VOLTAGE" in (await examined(here))["fault"].found
 
 
 @inside(lab)

@@ -16,6 +16,7 @@ from ...fleet.wire.status_message import StatusMessage, unpack
 from ...fleet.wire.values import Fields
 from ...runtime.clock import now
 from ...runtime.version import __version__
+from ...values.enums import State
 from ...values.errors import AgentError, NotAllowedError, ProtocolError, RobotiqError
 from ...values.statistics import percentile
 from ...values.status import RobotiqStatus
@@ -190,7 +191,7 @@ def _report_statuses(listener: _Listener, seconds: float, info: Fields, report: 
 
 def _report_gripper(listener: _Listener, info: Fields, report: Report) -> None:
     problem, state = info["problem"], str(info["state"])
-    if problem or state == "disconnected":
+    if problem or state == State.DISCONNECTED.name:
         found = f"its agent cannot reach it: {problem or 'the link is down'}"
         advice = f"On that host: robotiq-async doctor {info['address']}, while the agent is stopped."
         report(Finding(Level.BAD, "gripper", found, advice))
@@ -198,4 +199,4 @@ def _report_gripper(listener: _Listener, info: Fields, report: Report) -> None:
     report(Finding(Level.GOOD, "gripper", f"{info['address']} in {state}"))
     newest = listener.statuses[-1] if listener.statuses else None
     if newest is not None and newest.registers is not None:
-        report_state(RobotiqStatus.from_registers(newest.registers), report)
+        report_state(RobotiqStatus.from_registers(newest.registers, model=newest.model), report)
