@@ -11,12 +11,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import threading
 from collections import Counter
 from collections.abc import AsyncIterator, Iterable, Iterator
-from typing import Final
+from socketserver import TCPServer, ThreadingMixIn
+from typing import Any, Final
 
 try:
-    from prometheus_client import CollectorRegistry, start_http_server
+    from prometheus_client import CollectorRegistry, MetricsHandler
     from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
     from prometheus_client.registry import Collector
 except ModuleNotFoundError as error:
@@ -26,6 +28,8 @@ except ModuleNotFoundError as error:
 
 from ..hand import Hand
 from ..runtime.concurrency import in_a_thread, wait_shielded
+from ..runtime.log import log
+from ..runtime.sockets import listen
 from ..values.checks import check_int
 from ..values.enums import State
 from ..values.statistics import Statistics
@@ -33,6 +37,8 @@ from ..values.statistics import Statistics
 LOOPBACK: Final = "127.0.0.1"
 TIMEOUT_S: Final = 5.0
 """Seconds for which a scrape waits for an event loop that is blocked."""
+IDLE_S: Final = 2.0  # seconds for which a connection may send nothing
+MOST: Final = 16  # scrapes at a time; further connections are closed
 
 _COUNTERS: Final = {
     "polls": "Statuses read.",
@@ -105,6 +111,41 @@ class HandCollector(Collector):
         return {hand.name: (hand.state, hand.statistics) for hand in self._hands}
 
 
+class _Handler(MetricsHandler):
+    timeout = IDLE_S
+
+
+class _Server(ThreadingMixIn, TCPServer):
+    """Answers scrapes, each in a thread.
+
+    It runs in the process of the hands. So it limits the threads and files that strangers can use up, which
+    the server of prometheus_client does not, and asks no name server in the event loop, as http.server does.
+    """
+
+    daemon_threads = True
+
+    def __init__(self, host: str, port: int, registry: CollectorRegistry) -> None:
+        super().__init__((host, port), _Handler.factory(registry), bind_and_activate=False)
+        self.socket.close()
+        self.socket = listen(host, port)
+        self._free = threading.Semaphore(MOST)
+
+    def process_request(self, request: Any, client_address: Any) -> None:  # noqa: ANN401  # as in the base
+        if self._free.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:  # noqa: ANN401
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._free.release()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ANN401, ARG002
+        log.debug("a scrape failed", exc_info=True)
+
+
 @contextlib.asynccontextmanager
 async def serve_metrics(
     *hands: Hand, port: int = 9100, host: str = LOOPBACK
@@ -127,9 +168,11 @@ async def serve_metrics(
     port = check_int("port", port, 0, 65535)
     registry = CollectorRegistry()
     registry.register(HandCollector(hands))
-    server, thread = start_http_server(port, addr=host, registry=registry)
+    server = _Server(host, port, registry)
+    thread = threading.Thread(target=server.serve_forever, daemon=True, name="robotiq_async metrics")
+    thread.start()
     try:
-        yield host, server.server_port
+        yield host, int(server.socket.getsockname()[1])
     finally:
 
         def close() -> None:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import socket
+import threading
 import urllib.request
 
 import anyio
@@ -11,7 +14,8 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from robotiq_async import Finger, GripperFaultError, MoveSupersededError, RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper
-from robotiq_async.tools.metrics import serve_metrics
+from robotiq_async.tools.metrics import MOST, serve_metrics
+from tests.patience import patience
 
 Samples = dict[tuple[str, str], float]
 
@@ -83,6 +87,31 @@ async def test_each_hand_has_its_name() -> None:
     assert labels == {"left", right.address}
     samples = [sample for family in families for sample in family.samples]
     assert len({(each.name, *each.labels.items()) for each in samples}) == len(samples)
+
+
+async def test_connections_that_ask_nothing_use_up_neither_threads_nor_files(hand: RobotiqHand) -> None:
+    """Each kept a thread and a file of the program that polls, for ever: then no link could be opened again."""
+    async with serve_metrics(hand, port=0) as where, asyncio.timeout(patience(20)):
+        threads = threading.active_count()
+        opened = [await asyncio.open_connection(*where) for _ in range(2 * MOST)]
+        opened[0][1].write(b"GET /metr")
+        assert threading.active_count() <= threads + MOST
+        for reader, writer in opened:
+            with contextlib.suppress(ConnectionResetError):
+                assert not await reader.read()
+            writer.close()
+        await asked(where)
+
+
+async def test_no_name_server_is_asked_for_the_name_of_this_machine(
+    hand: RobotiqHand, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """http.server asks for it, in the event loop: one that did not answer held up the polling for seconds."""
+    names: list[str] = []
+    monkeypatch.setattr(socket, "getfqdn", lambda name="": names.append(name) or name)
+    async with serve_metrics(hand, host="127.0.0.1", port=0) as where:
+        await asked(where)
+    assert not names
 
 
 async def test_it_ends_with_the_block(hand: RobotiqHand) -> None:
