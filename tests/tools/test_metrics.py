@@ -90,7 +90,7 @@ async def test_each_hand_has_its_name() -> None:
 
 
 async def test_connections_that_ask_nothing_use_up_neither_threads_nor_files(hand: RobotiqHand) -> None:
-    """Each kept a thread and a file of the program that polls, for ever: then no link could be opened again."""
+    """Each kept a thread and a file of the program that polls: then no link could be opened again."""
     async with serve_metrics(hand, port=0) as where, asyncio.timeout(patience(20)):
         threads = threading.active_count()
         opened = [await asyncio.open_connection(*where) for _ in range(2 * MOST)]
@@ -108,7 +108,7 @@ async def test_no_name_server_is_asked_for_the_name_of_this_machine(
 ) -> None:
     """http.server asks for it, in the event loop: one that did not answer held up the polling for seconds."""
     names: list[str] = []
-    monkeypatch.setattr(socket, "getfqdn", lambda name="": names.append(name) or name)
+    monkeypatch.setattr(socket, "getfqdn", names.append)
     async with serve_metrics(hand, host="127.0.0.1", port=0) as where:
         await asked(where)
     assert not names

@@ -17,6 +17,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.typing import Origin
 
 from robotiq_async.tools.actions import ACTIONS
+from robotiq_async.tools.web.page.serve import MOST
 from robotiq_async.tools.web.server import PageServer
 from robotiq_async.tools.web.settings import PageSettings
 from robotiq_async.values.errors import ViewerError
@@ -140,6 +141,24 @@ async def test_headers_without_end_are_not_kept(page: PageServer) -> None:
     writer.close()
     with contextlib.suppress(ConnectionError):
         await writer.wait_closed()
+
+
+async def test_connections_that_ask_nothing_keep_nobody_out(page: PageServer) -> None:
+    """A thousand of them took the files of the page, and browsers that were there lost their connection."""
+    folder, cookie = await let_in(page)
+    parts = urlsplit(page.url)
+    async with asyncio.timeout(patience(30)):
+        opened = [await asyncio.open_connection(parts.hostname, parts.port) for _ in range(2 * MOST)]
+        opened[0][1].write(b"GET / HTTP/1.1\r\n")
+        answer, stranger = opened[1]
+        stranger.write(f"GET / HTTP/1.1\r\nHost: {parts.netloc}\r\n\r\n".encode())
+        await answer.readuntil(b"holds the token")
+        stranger.write(b"GET")
+        for reader, writer in opened:
+            with contextlib.suppress(ConnectionError):
+                await reader.read()
+            writer.close()
+    assert (await ask(page.url, folder, Cookie=cookie)).status == 200
 
 
 async def test_a_password_is_asked_for() -> None:

@@ -111,6 +111,7 @@ async def _answer(send: Send, status: int, words: str, more: dict[str, str] | No
     fields = {
         "content-type": "text/html; charset=utf-8",
         "cache-control": "no-store",
+        "connection": "close",  # else a stranger keeps it with half a second request
         **HEADERS,
         **(more or {}),
     }

@@ -12,6 +12,7 @@ from typing import Final
 import uvicorn
 from fastapi import FastAPI
 from nicegui import ui
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from ..settings import PageSettings
 from .access import Access
@@ -21,8 +22,26 @@ from .pages import register
 from .pipes import Pipes
 
 BEAT_S: Final = 0.25
+HEAD_S: Final = 5.0  # seconds for the head of the first request of a connection
+MOST: Final = 200
+"""Connections at a time: half of what fits into the usual limit of files, and enough for thirty browsers."""
 MESSAGE_MAX: Final = 65_536
 """Limit of a websocket message in bytes."""
+
+
+class _Connection(H11Protocol):
+    """A connection that has to ask something soon. Strangers must not keep those of the browsers away."""
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as in the base
+        super().connection_made(transport)
+        if len(self.connections) > MOST:
+            transport.abort()
+        else:
+            self.loop.call_later(HEAD_S, self._close_if_silent)
+
+    def _close_if_silent(self) -> None:
+        if self.cycle is None and self in self.connections:  # else it is another protocol's, or lost
+            self.transport.abort()
 
 
 class _Server(uvicorn.Server):
@@ -61,7 +80,7 @@ def run(settings: PageSettings, listening: socket.socket, pipes: Pipes) -> None:
     port = listening.getsockname()[1]
     config = uvicorn.Config(
         Guard(_application(settings, mirror), Access(settings, port)),
-        http="h11",  # httptools accepts any number of headers
+        http=_Connection,  # h11: httptools accepts any number of headers
         proxy_headers=False,
         log_level="critical",
         access_log=False,
