@@ -139,6 +139,7 @@ def test_a_file_of_openings_says_its_model(tmp_path: Path) -> None:
     ("text", "words"),
     [
         ("", ["site", "missing"]),
+        (LEFT + 'site = "lab"\n', ["line 3", "'site'", "above [grippers.left]"]),
         ('site = "lab"', ["[grippers.NAME]", "missing"]),
         ('site = "lab"\n[grippers]', ["line 2", "[grippers.left]"]),
         ('site = "lab"\ngrippers = 3', ["line 2", "3"]),
@@ -188,6 +189,10 @@ def test_a_bad_file_is_reported_in_one_line(text: str, words: list[str], tmp_pat
     assert "\n" not in message
     for word in ("FLEET.toml", *words):
         assert word in message
+
+
+def test_the_mark_that_editors_on_windows_put_first_is_none_of_the_text(tmp_path: Path) -> None:
+    assert read(tmp_path, f"\ufeff{GOOD}").host == "cell-1"
 
 
 def test_a_gripper_on_a_serial_line_is_polled_as_often_as_any(tmp_path: Path) -> None:

@@ -65,7 +65,7 @@ def read_agent_file(path: str | Path) -> AgentSettings:
     """Read and check a FLEET.toml; AgentFileError if it cannot be read, or its content is invalid."""
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # editors on Windows may begin it with a mark
     except OSError as error:
         raise AgentFileError(f"cannot read {path}: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
@@ -80,6 +80,7 @@ class _Reader:
 
     def settings(self) -> AgentSettings:
         table = self._table()
+        self._check_place_of_keys(table.get(_GRIPPERS))
         self._check_keys_of(table, (), _OF_AGENT, needed=("site", _GRIPPERS))
         with self._blaming("site"):
             site = check_name("site", table["site"])
@@ -177,6 +178,15 @@ class _Reader:
             if key not in table:
                 what = "[grippers.NAME], a table for each gripper" if key == _GRIPPERS else key
                 raise self._error(path, f"missing: {what}")
+
+    def _check_place_of_keys(self, tables: object) -> None:
+        # In TOML a key after the header of a table belongs to that table.
+        for name, table in tables.items() if isinstance(tables, dict) else ():
+            for key in _OF_AGENT if isinstance(table, dict) else ():
+                if key in table:
+                    raise self._error(
+                        (_GRIPPERS, name, key), f"{key!r} is the agent's: put it above [grippers.{name}]"
+                    )
 
     @contextmanager
     def _blaming(self, *path: str) -> Iterator[None]:
