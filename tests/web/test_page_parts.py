@@ -277,6 +277,17 @@ def test_an_answer_goes_to_the_page_that_asked() -> None:
     assert answers == [(True, "A")]
 
 
+def test_what_a_browser_sends_at_length_ends_no_page() -> None:
+    """The other process took the line for an invalid message, and ignored all commands from then on."""
+    said: list[dict[str, Any]] = []
+    answers: list[tuple[bool, str]] = []
+    mirror = Mirror(("here",), control=True, say=said.append)
+    many = {"position": "\u00e9" * 20_000}
+    mirror.ask("page", 0, "move", many, lambda ok, words: answers.append((ok, words)), at=1.0)
+    assert not said
+    assert answers == [(False, "a command is not that long")]
+
+
 # -- the process -------------------------------------------------------------------------------------------
 
 

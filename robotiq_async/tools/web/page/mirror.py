@@ -22,6 +22,7 @@ HISTORY_S: Final = 30.0
 SAMPLE_S: Final = 0.2
 """Interval of the points of a curve: 150 points."""
 EVENTS: Final = 100
+LONGEST: Final = 4096  # characters of the arguments of a command, as JSON
 QUIET_S: Final = 1.5
 """Seconds without updates after which the other process counts as silent."""
 
@@ -162,6 +163,9 @@ class Mirror:
 
         ``at`` is the time of this process that the browser had received.
         """
+        if len(json.dumps(arguments)) > LONGEST:  # a browser may send anything
+            answered(False, "a command is not that long")
+            return
         number = next(self._numbers)
         self._answers[number] = answered
         asked = {"page": page, "number": number, "at": at, "hand": hand, "name": name, "arguments": arguments}
