@@ -119,6 +119,24 @@ async def test_a_hand_is_not_held_up_by_its_own_last_run(here: Lab, hand: Remote
 
 
 @inside(lab)
+@pytest.mark.parametrize(
+    ("verb", "arguments"),
+    [("cmd/move", {"position": 250}), ("lease", {"what": "take"}), ("lease", {"what": "release"})],
+)
+async def test_a_late_request_of_the_last_run_does_nothing_in_the_next(
+    here: Lab, hand: RemoteHand, verb: str, arguments: dict[str, Any]
+) -> None:
+    assert hand._session is not None
+    late = hand._session.client.call(arguments)
+    await hand.stop()
+    await hand.start()
+    lease = here.lease
+    assert (await here.answer(verb, late.pack())).error
+    await asyncio.sleep(0.1)
+    assert (here.lease, here.gripper.is_moving, hand.is_in_control) == (lease, False, True)
+
+
+@inside(lab)
 async def test_a_calibration_of_another_model_is_refused_before_anything_moves(here: Lab) -> None:
     here.gripper.write(0, [0x0000])
     await asyncio.sleep(0.5)
