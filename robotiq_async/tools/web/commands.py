@@ -1,12 +1,8 @@
-"""Carries out the commands of the pages, and holds the axes when a page has gone.
-
-A command is a service: called by name, with arguments in a JSON object.
-"""
+"""Carries out the commands of the pages, and holds the axes when a page has gone."""
 
 from __future__ import annotations
 
 import asyncio
-import json
 import reprlib
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +11,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from ...values.checks import parse_fingers
-from ...values.enums import Finger, State
+from ...values.enums import State
 from ...values.errors import RobotiqError
 from ..actions import ACTIONS, Action, Operator
 from ..recording.payloads import Fields
@@ -33,103 +29,68 @@ BUTTONS: Final = {
 FRESH_S: Final = 1.5
 """Maximum age of a command; a halt is never too old."""
 Arguments = Mapping[str, Any]
-
-_BYTE: Final = {"type": "integer", "minimum": 0, "maximum": 255}
-_FINGERS: Final = {"type": "string", "description": "ABC, or A,B, or scissor, or all"}
-RESPONSE: Final = {"type": "object", "properties": {"outcome": {"type": "string"}}}
-"""JSON Schema of every response: a description of the outcome."""
+Run = Callable[[Operator, Arguments], Awaitable[str]]
+"""Carries out a command; returns a description of the outcome."""
 
 
 @dataclass(frozen=True, slots=True)
-class Service:
-    """A command that other programs can call."""
+class Command:
+    """A command of a page."""
 
-    name: str  # for example /gripper/move
-    arguments: Mapping[str, object]  # each with its JSON Schema
-    required: tuple[str, ...]  # names of the required arguments
-    run: Callable[[Operator, Arguments], Awaitable[str]]  # returns a description of the outcome
-
-    @property
-    def schema(self) -> dict[str, object]:
-        """JSON Schema of a request."""
-        return {
-            "type": "object",
-            "properties": dict(self.arguments),
-            "required": list(self.required),
-            "additionalProperties": False,
-        }
-
-    async def call(self, operator: Operator, payload: bytes) -> str:
-        """Carry out a request; returns a description of the outcome.
-
-        The payload is a JSON object with the arguments; empty for none.
-
-        Raises:
-            ValueError: malformed, or an argument that is missing, unknown or outside its range.
-            TypeError: an argument of the wrong type.
-            RobotiqError: it could not be carried out.
-        """
-        return await self.run(operator, self._checked(payload))
-
-    def _checked(self, payload: bytes) -> Arguments:
-        try:
-            arguments = json.loads(payload.strip() or b"{}")
-        except (ValueError, RecursionError) as error:
-            raise ValueError(f"{self.name} takes a JSON object: {error}") from None
-        if not isinstance(arguments, dict):
-            raise ValueError(f"{self.name} takes a JSON object, got {reprlib.repr(arguments)}")
-        for name in arguments:
-            if name not in self.arguments:
-                known = ", ".join(self.arguments) or "none"
-                raise ValueError(f"{self.name} has no argument {reprlib.repr(name)}; it has: {known}")
-        for name in self.required:
-            if name not in arguments:
-                raise ValueError(f"{self.name} needs the argument {name!r}")
-        return arguments
+    run: Run
+    takes: frozenset[str] = frozenset()  # names of the arguments, all of which are needed
 
 
-def _of(action: Action) -> Service:
+async def call(operator: Operator, name: str, arguments: Arguments) -> str:
+    """Carry out a command; returns a description of the outcome.
+
+    Raises:
+        ValueError: an unknown command, other arguments than its own, or one outside its range.
+        TypeError: an argument of the wrong type.
+        RobotiqError: it could not be carried out.
+    """
+    command = COMMANDS.get(name)
+    if command is None:
+        raise ValueError(f"there is no command {reprlib.repr(name)}")
+    if arguments.keys() != command.takes:
+        takes = ", ".join(sorted(command.takes)) or "no arguments"
+        raise ValueError(f"{name} takes {takes}, got {reprlib.repr(dict(arguments))}")
+    return await command.run(operator, arguments)
+
+
+def _of(action: Action) -> Command:
     async def run(operator: Operator, arguments: Arguments) -> str:
         if action.warning and arguments["confirm"] is not True:
             raise ValueError(f"{action.name} needs confirm = true: {action.warning}")
         return await operator.act(action)
 
-    confirm = {"confirm": {"type": "boolean", "description": action.warning}} if action.warning else {}
-    return Service(f"/gripper/{action.name}", confirm, tuple(confirm), run)
+    return Command(run, frozenset({"confirm"} if action.warning else ()))
 
 
 async def _move(operator: Operator, arguments: Arguments) -> str:
-    axes = _fingers(arguments, "ABC")
-    speed, force = arguments.get("speed"), arguments.get("force")
-    return await operator.move(arguments["position"], axes, speed=speed, force=force)
+    fingers = arguments["fingers"]
+    if not isinstance(fingers, str):
+        raise TypeError(f"fingers must be a text like ABC, or scissor, got {reprlib.repr(fingers)}")
+    return await operator.move(arguments["position"], parse_fingers("fingers", fingers))
 
 
-async def _set_speed(operator: Operator, arguments: Arguments) -> str:
-    await operator.hand.set_speed(arguments["value"], _fingers(arguments, "ALL"))
-    return "set"
+def _set(setting: Callable[[Operator, int], Awaitable[str]]) -> Run:
+    async def run(operator: Operator, arguments: Arguments) -> str:
+        await setting(operator, arguments["value"])
+        return "set"
+
+    return run
 
 
-async def _set_force(operator: Operator, arguments: Arguments) -> str:
-    await operator.hand.set_force(arguments["value"], _fingers(arguments, "ALL"))
-    return "set"
-
-
-def _fingers(arguments: Arguments, usual: str) -> Finger:
-    words = arguments.get("fingers", usual)
-    if not isinstance(words, str):
-        raise TypeError(f"fingers must be a text like ABC, or scissor, got {reprlib.repr(words)}")
-    return parse_fingers("fingers", words)
-
-
-_MOVE: Final = {"position": _BYTE, "fingers": _FINGERS, "speed": _BYTE, "force": _BYTE}
-_ALL: Final = (
-    *(_of(action) for action in ACTIONS.values()),
-    Service("/gripper/move", _MOVE, ("position",), _move),
-    Service("/gripper/set_speed", {"value": _BYTE, "fingers": _FINGERS}, ("value",), _set_speed),
-    Service("/gripper/set_force", {"value": _BYTE, "fingers": _FINGERS}, ("value",), _set_force),
+COMMANDS: Final = MappingProxyType(
+    {
+        **{name: _of(action) for name, action in ACTIONS.items()},
+        "move": Command(_move, frozenset({"position", "fingers"})),
+        "set_speed": Command(_set(Operator.set_speed), frozenset({"value"})),
+        "set_force": Command(_set(Operator.set_force), frozenset({"value"})),
+    }
 )
-SERVICES: Final = MappingProxyType({service.name: service for service in _ALL})
-"""The services by name."""
+"""The commands by name."""
 
 
 class PageCommands:
@@ -157,7 +118,7 @@ class PageCommands:
     def do(self, request: Fields) -> None:
         """Start a command; its answer comes later.
 
-        A request has ``page``, ``number``, ``hand``, ``name`` and ``arguments`` of a service, and ``at``: the
+        A request has ``page``, ``number``, ``hand``, ``name`` and ``arguments`` of a command, and ``at``: the
         moment when the user gave it, in ``time.monotonic()`` of this machine, the same in every process.
         """
         page, name = str(request["page"]), str(request["name"])
@@ -203,11 +164,9 @@ class PageCommands:
             raise ValueError("this arrived too late and was not carried out: the connection was delayed")
         if name != HALT and len(self._tasks.get(page, ())) > MAX_COMMANDS:
             raise ValueError(f"{MAX_COMMANDS} commands of this page are already under way")
-        service = SERVICES.get(f"/gripper/{name}")
-        if service is None or not 0 <= request["hand"] < len(self._operators):
-            raise ValueError(f"there is no {name} of hand {request['hand']}")
-        operator = self._operators[request["hand"]]
-        return await service.call(operator, json.dumps(request["arguments"]).encode())
+        if not 0 <= request["hand"] < len(self._operators):
+            raise ValueError(f"there is no hand {request['hand']}")
+        return await call(self._operators[request["hand"]], name, request["arguments"])
 
 
 def _outcome(task: asyncio.Task[str]) -> tuple[bool, str]:
