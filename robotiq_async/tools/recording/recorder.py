@@ -45,7 +45,7 @@ DISK_S: Final = 10.0
 """Seconds that the last write may take."""
 
 
-class _Outbox:
+class Outbox:
     """Buffers the bytes of the file until a thread writes them to the disk."""
 
     def __init__(self) -> None:
@@ -116,7 +116,7 @@ class Recorder:
         self.saved = 0
         self._hand = hand
         self._feed = Feed(hand, self._take)
-        self._outbox = _Outbox()
+        self._outbox = Outbox()
         self._joints_only = ros2
         self._is_open = False
         self._format = self._make_format(ros2=ros2)

@@ -24,12 +24,12 @@ from ...values.request import Request
 from ...values.status import RobotiqStatus
 from ..recording.feed import COMMAND, EVENT, STATUS, Message, Topic, compact
 from ..recording.payloads import Fields
+from ..recording.recorder import FLUSH_S, Outbox
 from ..recording.recordings import McapFile
 from .catalogue import STAGE
 from .recorded_link import Frame
 from .report import Report, page
 
-FLUSH_S: Final = 0.5
 NAME: Final = "recording.mcap"
 
 
@@ -39,27 +39,14 @@ class Recording:
     def __init__(self, folder: Path, clean: Callable[[str], str], model: Model) -> None:
         self.failure = ""  # why writing has ended; empty while it runs
         self._file = FileIO(folder / NAME, "x")
-        self._waiting: list[bytes] = []
-        self._count = 0
-        self._format = McapFile(self, name="verify", address="")
+        self._outbox = Outbox()
+        self._format = McapFile(self._outbox, name="verify", address="")
         self._clean = clean
         self._model = model
         self._epoch = time.time() - asyncio.get_running_loop().time()
         self._counts = {STATUS: 0, COMMAND: 0, EVENT: 0}
         self._over = asyncio.Event()
         self._saving = asyncio.ensure_future(self._keep_saving())
-
-    # The file, for the MCAP writer.
-
-    def write(self, data: bytes) -> int:
-        self._waiting.append(bytes(data))
-        self._count += len(data)
-        return len(data)
-
-    def tell(self) -> int:
-        return self._count
-
-    def flush(self) -> None: ...
 
     # The frames of a run.
 
@@ -110,7 +97,7 @@ class Recording:
                 pass
 
     async def _save(self) -> None:
-        data, self._waiting = b"".join(self._waiting), []
+        data = self._outbox.take()
         try:
             await in_a_thread(lambda: self._write(data))
         except OSError as error:
