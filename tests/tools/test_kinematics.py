@@ -85,11 +85,3 @@ def test_velocities() -> None:
     assert set(velocities.values()) == {0.0}
     with pytest.raises(ValueError, match="after must be later than before"):
         joint_velocities(before, before)
-
-
-@pytest.mark.parametrize("position", [-1, 256])
-def test_positions_that_there_are_not_are_refused(position: int) -> None:
-    with pytest.raises(ValueError, match=r"0\.\.255"):
-        finger_angles(position)
-    with pytest.raises(ValueError, match=r"0\.\.255"):
-        palm_angle(position)

@@ -23,7 +23,6 @@ from math import radians
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from ...values.checks import check_byte
 from ...values.enums import JAW, Finger
 from ...values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
 from ...values.status import RobotiqStatus
@@ -99,37 +98,17 @@ def joint_names(model: Model) -> tuple[str, ...]:
     return JOINTS if model is THREE_FINGER else (JAW_JOINTS[model].name,)
 
 
-def finger_angles(position: int) -> tuple[float, float, float]:
-    """The three joints of a finger in radians, from the palm on.
-
-    Args:
-        position: counts, 0..255.
-
-    Raises:
-        TypeError: position is not an int.
-        ValueError: position is outside 0..255.
-    """
-    return _finger_angles(check_byte("position", position))
-
-
 @cache
-def _finger_angles(counts: int) -> tuple[float, float, float]:
+def finger_angles(position: int) -> tuple[float, float, float]:
+    """The three joints of a finger in radians, from the palm on, at a position in counts."""
     # Cached, 256 of them: a recording needs nine fingers at every poll.
-    base, middle, tip = (radians(_between(counts, points)) for points in (BASE, MIDDLE, TIP))
+    base, middle, tip = (radians(_between(position, points)) for points in (BASE, MIDDLE, TIP))
     return base, middle, tip
 
 
 def palm_angle(scissor: int) -> float:
-    """The palm joint of finger_1 in radians; that of finger_2 is its negative.
-
-    Args:
-        scissor: position of the scissor in counts, 0 (wide) .. 255 (pinch).
-
-    Raises:
-        TypeError: scissor is not an int.
-        ValueError: scissor is outside 0..255.
-    """
-    return radians(_between(check_byte("scissor", scissor), PALM))
+    """The palm joint of finger_1 in radians at a position of the scissor; that of finger_2 is minus that."""
+    return radians(_between(scissor, PALM))
 
 
 def joint_angles(status: RobotiqStatus) -> tuple[float, ...]:
@@ -152,7 +131,7 @@ def _angles_at(model: Model, position: Callable[[Finger], int]) -> tuple[float, 
 def _joint_angles(scissor: int, *fingers: int) -> tuple[float, ...]:
     # Cached, because the fingers rest most of the time.
     palm = palm_angle(scissor)
-    one, two, middle = map(_finger_angles, fingers)
+    one, two, middle = map(finger_angles, fingers)
     return (palm, *one, -palm, *two, *middle)
 
 
