@@ -19,7 +19,6 @@ SPEEDS: Final = (0, 64, 255)
 STROKE_S: Final = 20.0  # twice the time of the slowest one
 SCISSOR_SPEED: Final = 64
 SHARE: Final = 0.2
-CLOSED_AT_LEAST: Final = 240
 PART_OF_STROKE: Final = 0.9
 
 
