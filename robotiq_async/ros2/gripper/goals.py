@@ -101,9 +101,9 @@ class GoalRunner:
             return Outcome(ending, stalled=False, reached=False, reason=reason)
         return _judge(results, allow_stalling=allow_stalling)
 
-    def cancel(self, key: bytes, reason: str = "canceled by its client") -> None:
+    def cancel(self, key: bytes) -> None:
         if self._newest is not None and self._newest.key == key:
-            self._newest.end(Ending.CANCELED, reason)
+            self._newest.end(Ending.CANCELED, "canceled by its client")
 
     def abort(self, reason: str) -> None:
         if self._newest is not None:
