@@ -124,6 +124,38 @@ async def test_a_hold_that_is_not_acknowledged_aborts_the_goal(caplog: pytest.Lo
     assert "the hold was not acknowledged: the link went down" in caplog.text
 
 
+class LingeringHand(FakeHand):
+    """A move that is cancelled takes a second to end."""
+
+    async def _move(self, axes: Finger, target: int, *_: Any) -> MoveResult:
+        self.command(axes, position=target)
+        try:
+            await asyncio.Event().wait()
+        finally:
+            await asyncio.sleep(1)
+        raise AssertionError
+
+
+async def test_a_goal_that_is_given_up_while_it_waits_keeps_none_waiting() -> None:
+    """The next one waited for it for ever."""
+    loop = asyncio.get_running_loop()
+    async with LingeringHand() as hand:
+        runner, requests = GoalRunner(hand), hand.requests()
+        first = begin(runner)
+        await anext(requests)
+        second = begin(runner, key=b"2")
+        await asyncio.sleep(0.1)
+        began = loop.time()
+        second.cancel()
+        third = begin(runner, key=b"3")
+        async with asyncio.timeout(5):
+            await anext(requests)
+            assert loop.time() - began > 0.8, "the axes of the first one are free then"
+            runner.abort("the end")
+            assert [(await each).ending for each in (first, third)] == [Ending.ABORTED] * 2
+        assert second.cancelled()
+
+
 async def test_a_new_goal_holds_the_axes_that_it_does_not_address(hand: RobotiqHand) -> None:
     runner, first = await moving(hand)
     second = begin(runner, Targets(((60, A),)), b"2")

@@ -9,6 +9,7 @@ from enum import Enum
 from typing import Final
 
 from ...hand import Hand
+from ...runtime.concurrency import wait_shielded
 from ...runtime.log import Log
 from ...values.enums import Finger
 from ...values.errors import RobotiqConnectionError, RobotiqError
@@ -85,7 +86,11 @@ class GoalRunner:
         if before is not None:
             before.end(Ending.ABORTED, "another goal took over")
             # By then its holds have been passed to the hand, and the new targets replace them.
-            await before.is_over.wait()
+            try:
+                await wait_shielded(asyncio.ensure_future(before.is_over.wait()))
+            except asyncio.CancelledError:
+                goal.is_over.set()
+                raise
         try:
             results = await self._move_axes(goal, targets, speed, force, feedback)
         except RobotiqError as error:
