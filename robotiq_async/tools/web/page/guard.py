@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections import Counter
 from collections.abc import Awaitable, Callable, MutableMapping
 from contextlib import suppress
 from html import escape
@@ -19,6 +20,7 @@ App = Callable[[Message, Receive, Send], Awaitable[None]]
 
 TRY_S: Final = 1.0
 """Duration of a wrong attempt; the next one from the same address waits for it."""
+WAITING: Final = 8  # attempts of one address at a time: each keeps a connection of the page
 FORM_S: Final = 10.0
 MAX_FORM: Final = 4096
 
@@ -49,6 +51,7 @@ class Guard:
         self._access = access
         self._trying: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
         """Locks by address: many attempts from one do not delay those from others."""
+        self._waiting: Counter[str] = Counter()  # attempts by address
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
         if scope["type"] == "lifespan":
@@ -72,10 +75,18 @@ class Guard:
             await _answer(send, 200, _FORM)
             return
         password = parse_qs((await _body(receive)).decode("utf-8", "replace")).get("password", [""])[0]
-        async with self._trying.setdefault(scope["client"][0], asyncio.Lock()):
-            right = self._access.knows(password)
-            if not right:
-                await asyncio.sleep(TRY_S)
+        address = scope["client"][0]
+        if self._waiting[address] >= WAITING:
+            await _answer(send, 429, f"<p>Too many attempts at a time: try again.</p>{_FORM}")
+            return
+        self._waiting[address] += 1
+        try:
+            async with self._trying.setdefault(address, asyncio.Lock()):
+                right = self._access.knows(password)
+                if not right:
+                    await asyncio.sleep(TRY_S)
+        finally:
+            self._waiting -= Counter([address])  # that also forgets one without attempts
         if right:
             await self._let_in(send)
         else:
