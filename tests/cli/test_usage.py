@@ -196,6 +196,18 @@ async def test_without_the_extra_one_line_names_it(shell: Shell) -> None:
     outcome.assert_failed(1, "cyclopts", "pip install 'cyclopts")
 
 
+@pytest.mark.parametrize("command", ["status", "doctor", "agent"])
+async def test_a_simulation_with_physics_names_the_extra_that_it_needs(
+    shell: Shell, command: str, tmp_path: Path
+) -> None:
+    """The doctor and the agent ended with a traceback."""
+    address, file = "sim://?physics=box:30x40x60,0.3", tmp_path / "FLEET.toml"
+    file.write_text(f'site = "lab"\n[grippers.left]\naddress = "{address}"\n', encoding="utf-8")
+    arguments = ["agent", "--check", str(file)] if command == "agent" else [command, address]
+    outcome = await shell.finish(await shell.python("-c", WITHOUT.format("mujoco", arguments)))
+    outcome.assert_failed(2 if command == "agent" else 1, "pip install 'mujoco")
+
+
 async def test_another_missing_module_is_not_taken_for_the_extra(shell: Shell) -> None:
     outcome = await shell.finish(await shell.python("-c", WITHOUT.format("json", [])))
     assert outcome.code == 1

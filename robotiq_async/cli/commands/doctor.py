@@ -66,6 +66,9 @@ async def doctor(
     if is_remote(address):
         await examine_remote(address, report)
     else:
-        await examine(parse_address(address), report, device_id=device_id)
+        try:
+            await examine(parse_address(address), report, device_id=device_id)
+        except ImportError as error:  # the extra of a simulation with physics
+            raise CommandError(str(error)) from error
     if bad:
         raise CommandError(f"{full}: {', '.join(bad)}: see above")

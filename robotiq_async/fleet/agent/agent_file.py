@@ -193,7 +193,7 @@ class _Reader:
         # Adds file and line of the key to the error of a check.
         try:
             yield
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, ImportError) as error:  # the last of a simulation with physics
             raise self._error(path, str(error)) from error
 
     def _error(self, path: Names, message: str) -> AgentFileError:
