@@ -21,6 +21,7 @@ except ModuleNotFoundError as error:
 from ...runtime.log import printable
 from ...values.calibration.csv_tables import Table
 from ...values.calibration.scales import ForceCalibration, SpeedCalibration, mean, newton
+from ..recording.payloads import is_command
 from ..recording.table import CURRENT
 from ..wording import JAW_NAME
 from .campaigns import Currents, peak_currents
@@ -262,8 +263,7 @@ def _colour(is_fault: bool) -> str:
 
 
 def _event(fields: dict[str, Any]) -> tuple[str, bool] | None:
-    # Every command of a control loop goes to RUNNING_CC and back: too many to plot.
-    if "RUNNING_CC" in (fields.get("source"), fields.get("target")):
+    if is_command(fields):
         return None
     is_fault = fields["kind"] == "fault"
     if fields["kind"] == "mark":
