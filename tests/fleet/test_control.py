@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import os
 import stat
 from pathlib import Path
 from typing import Any
@@ -116,6 +117,21 @@ async def test_a_hand_is_not_held_up_by_its_own_last_run(here: Lab, hand: Remote
     await asyncio.sleep(0.1)
     assert not here.gripper.is_moving, "what its last run had set in motion is held"
     await hand.move(30, Finger.A)
+
+
+@inside(lab, window=5.0)
+async def test_a_forked_process_is_another_client(here: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both have the same hand, and the second would take the lease unseen."""
+    hand = here.client()
+    await hand.start()
+    stream = here.network.stream("client", "agent")
+    stream.is_cut, stream.keeps = True, False
+    await hand.stop()
+    here.network.mend(stream)
+    process = os.getpid()
+    monkeypatch.setattr(os, "getpid", lambda: process + 1)
+    with pytest.raises(ControlLostError, match="commands the gripper"):
+        await hand.start()
 
 
 @inside(lab)

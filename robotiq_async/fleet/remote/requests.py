@@ -77,6 +77,7 @@ class Requests:
 
     Attributes:
         client: identifies the hand to the agent, in all its runs: a lease of an earlier one is its own.
+        process: of the run. After a fork, parent and child have the same hand, and are two clients.
         number: of the newest request.
         settings: the speeds and forces that were asked for.
     """
@@ -85,8 +86,11 @@ class Requests:
         """``before`` has the requests of the hand's last run, if there was one."""
         self._name = name
         self._bus = bus
-        self.client: str = secrets.token_hex(8) if before is None else before.client
-        self.number: int = 0 if before is None else before.number
+        self.process: int = os.getpid()
+        self.client: str = secrets.token_hex(8)
+        self.number: int = 0
+        if before is not None and before.process == self.process:
+            self.client, self.number = before.client, before.number
         self._loop = asyncio.get_running_loop()
         self._silence: asyncio.Future[None] = self._loop.create_future()
         self._received: asyncio.Future[None] = self._loop.create_future()
