@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import threading
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from datetime import UTC, datetime, timedelta
@@ -17,9 +18,11 @@ from robotiq_async.fleet.keys.access import CLIENTS, AccessList, Role, access_co
 from robotiq_async.fleet.keys.authority import Authority, Pair
 from robotiq_async.fleet.keys.certificates import HERE, issue, make_authority
 from robotiq_async.fleet.keys.key_folder import ACCESS
+from robotiq_async.fleet.network import zenoh_bus
 from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.network.configuration import agent_configuration, client_configuration
 from robotiq_async.fleet.network.route import Route
+from robotiq_async.fleet.network.zenoh_bus import open_bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.errors import ConnectFailedError, NotAllowedError
@@ -318,6 +321,27 @@ async def test_endpoints_that_are_not_reached() -> None:
         await agent.close()
         while await client.unreached() != endpoints[1:]:  # noqa: ASYNC110
             await asyncio.sleep(0.05)
+
+
+async def test_a_report_of_endpoints_waits_for_all_names_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a name server that did not answer, the outcome of a halt of all came a second later for each."""
+    names = [f"cell-{number}.invalid" for number in range(4)]
+    asked = threading.Barrier(len(names))
+
+    def resolve(host: str, *_: object, **__: object) -> list[object]:
+        assert host in names
+        asked.wait(PATIENCE)
+        raise socket.gaierror("no name server")
+
+    monkeypatch.setattr(zenoh_bus, "RESOLVED_S", PATIENCE)
+    monkeypatch.setattr(socket, "getaddrinfo", resolve)
+    endpoints = [f"tcp/{name}:7447" for name in names]
+    bus = await open_bus(client_configuration(endpoints, insecure=True), "the fleet")
+    try:
+        async with asyncio.timeout(PATIENCE / 2):
+            assert await bus.unreached() == endpoints
+    finally:
+        await bus.close()
 
 
 # -- uvloop ------------------------------------------------------------------------------------------------

@@ -217,7 +217,8 @@ class ZenohBus:
 
     async def unreached(self) -> list[str]:
         there = {str(link.dst) for link in self._session.info.links()}
-        return [each for each in self._endpoints if there.isdisjoint(await locators(each))]
+        where = await asyncio.gather(*map(locators, self._endpoints))  # a name may take RESOLVED_S
+        return [each for each, known in zip(self._endpoints, where, strict=True) if there.isdisjoint(known)]
 
     async def close(self) -> None:
         if self._closing is None:
