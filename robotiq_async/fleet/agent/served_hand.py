@@ -216,9 +216,11 @@ class ServedHand:
         label = label_of(call)
         if take:
             self._lease.intervene(call.client, "taken")
-        if holder is not None and (take or holder.client == call.client):
+        if holder is not None and holder.client == call.client:
             # The holder itself acquires again: it lost track, so its earlier requests must not continue.
-            self.end_lease("expired" if holder.client == call.client else "taken", label)
+            self.end_lease("expired")
+        elif take:
+            self.end_lease("taken", label)
         number = self._admission.acquire(call, label)
         self._settings.restore(settings)
         self._log.info("%s commands the gripper", label)
