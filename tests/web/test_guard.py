@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import http.client
 from collections.abc import AsyncIterator
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
@@ -159,6 +160,21 @@ async def test_connections_that_ask_nothing_keep_nobody_out(page: PageServer) ->
                 await reader.read()
             writer.close()
     assert (await ask(page.url, folder, Cookie=cookie)).status == 200
+
+
+def files_of(process: int) -> list[str]:
+    """The soft and the hard limit of a process."""
+    limits = Path(f"/proc/{process}/limits")
+    if not limits.exists():
+        pytest.skip("needs /proc")
+    (line,) = (each for each in limits.read_text().splitlines() if each.startswith("Max open files"))
+    return line.removeprefix("Max open files").split()[:2]
+
+
+async def test_the_page_may_have_all_the_files_that_there_are(page: PageServer) -> None:
+    """Connections that do not shake hands for https are counted nowhere else."""
+    soft, hard = files_of(page._process.pid)
+    assert soft == hard
 
 
 async def test_a_password_is_asked_for() -> None:

@@ -6,6 +6,7 @@ import os
 import signal
 import ssl
 import sys
+from contextlib import suppress
 from tempfile import TemporaryDirectory
 
 from ....runtime.sockets import listen
@@ -21,6 +22,7 @@ def main() -> int:
             signal.signal(getattr(signal, name), signal.SIG_IGN)
     if hasattr(os, "nice"):
         os.nice(5)  # the hand comes first
+    _take_files()
     pipes = Pipes()
     line = pipes.first_line()
     if not line:
@@ -29,6 +31,15 @@ def main() -> int:
     with TemporaryDirectory(prefix="robotiq_async-", ignore_cleanup_errors=True) as folder:
         os.environ["NICEGUI_STORAGE_PATH"] = folder
         return _serve(PageSettings.read(line), pipes)
+
+
+def _take_files() -> None:
+    # A connection that has not shaken hands for https counts for no limit of ours, but has a file for 60 s.
+    with suppress(ImportError, OSError, ValueError):
+        import resource  # noqa: PLC0415  # Windows has none
+
+        _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
 def _serve(settings: PageSettings, pipes: Pipes) -> int:
