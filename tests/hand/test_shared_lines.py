@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
-from contextlib import AsyncExitStack, asynccontextmanager
-from typing import Any
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 
 import pytest
 
@@ -14,123 +13,35 @@ from robotiq_async import (
     Finger,
     InvalidStateError,
     NotStartedError,
-    ReconnectPolicy,
     RobotiqHand,
     State,
 )
-from robotiq_async.simulator import (
-    RtuOverTcpSimulatorServer,
-    SerialSimulatorServer,
-    SimulatedGripper,
-    Trouble,
-)
+from robotiq_async.simulator import SimulatedGripper, Trouble
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
 from tests.grippers import activate_beforehand
+from tests.shared_line import RESPONSE_S, Bus, Kind, serial_bus, socket_bus
 from tests.virtual import until
-from tests.virtual_line import VirtualLine
 
 pytestmark = pytest.mark.virtual_time
 
 A = Finger.A
 LEFT, RIGHT = 9, 12
-RESPONSE_S = 0.25
-
-
-class Bus:
-    """A line with two grippers."""
-
-    def __init__(self, address: str, servers: dict[int, Any], pull: Callable[[], None]) -> None:
-        self.address = address
-        self.servers = servers
-        self.pull = pull
-
-    def gripper(self, unit: int) -> SimulatedGripper:
-        gripper: SimulatedGripper = self.servers[unit].gripper
-        return gripper
-
-    def hand(self, unit: int | None, address: str = "", **options: Any) -> RobotiqHand:
-        """A hand for a unit of the line; a lost one is looked for every half second at least."""
-        usual: dict[str, Any] = {"model": TWO_FINGER_85, "response_timeout": RESPONSE_S, "device_id": unit}
-        policy = ReconnectPolicy(first_delay=0.1, max_delay=0.5)
-        return RobotiqHand(address or self.address, reconnect=policy, **usual | options)
 
 
 @asynccontextmanager
-async def serial_bus(patch: pytest.MonkeyPatch, models: dict[int, Model]) -> AsyncIterator[Bus]:
-    """An adapter with two devices at the far end of its cable."""
-    clock, line = asyncio.get_running_loop().time, VirtualLine(patch)
-
-    def pull() -> None:
-        line.pull()
-        asyncio.get_running_loop().call_later(0.5, line.plug)
-
-    async with AsyncExitStack() as stack:
-        servers = {}
-        for unit, model in models.items():
-            gripper = SimulatedGripper(clock, model=model)
-            await activate_beforehand(gripper)
-            server = SerialSimulatorServer(VirtualLine.FAR, gripper, device_id=unit)
-            servers[unit] = await stack.enter_async_context(server)
-        yield Bus(f"rtu://{VirtualLine.NEAR}", servers, pull)
-
-
-class Tee(asyncio.Protocol):
-    """The client's end of a serial server with two devices behind it."""
-
-    def __init__(self, ports: list[int]) -> None:
-        self._ports = ports
-        self._behind: list[Any] = []
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self.transport: Any = transport
-        loop: Any = asyncio.get_running_loop()
-        self._behind = [loop.connect(lambda: Branch(self), port) for port in self._ports]
-
-    def data_received(self, data: bytes) -> None:
-        for each in self._behind:
-            each.write(data)
-
-    def connection_lost(self, _: Exception | None) -> None:
-        for each in self._behind:
-            each.close()
-
-
-class Branch(asyncio.Protocol):
-    """The bytes from one of the devices."""
-
-    def __init__(self, tee: Tee) -> None:
-        self._tee = tee
-
-    def data_received(self, data: bytes) -> None:
-        self._tee.transport.write(data)
-
-
-@asynccontextmanager
-async def socket_bus(_: pytest.MonkeyPatch, models: dict[int, Model]) -> AsyncIterator[Bus]:
-    """A serial server with two devices on its line."""
-    loop = asyncio.get_running_loop()
-    tees: list[Tee] = []
-
-    def tee() -> Tee:
-        tees.append(Tee([server.port for server in servers.values()]))
-        return tees[-1]
-
-    async with AsyncExitStack() as stack:
-        servers = {}
-        for unit, model in models.items():
-            gripper = SimulatedGripper(loop.time, model=model)
-            await activate_beforehand(gripper)
-            server = RtuOverTcpSimulatorServer(gripper, device_id=unit)
-            servers[unit] = await stack.enter_async_context(server)
-        listener = await loop.create_server(tee, "127.0.0.1", 0)
-        port = listener.sockets[0].getsockname()[1]
-        yield Bus(f"rtu+tcp://127.0.0.1:{port}", servers, lambda: tees[-1].transport.abort())
-        listener.close()
+async def pair(kind: Kind, patch: pytest.MonkeyPatch, left: Model, right: Model) -> AsyncIterator[Bus]:
+    """A line with two grippers that are active."""
+    clock = asyncio.get_running_loop().time
+    grippers = {unit: SimulatedGripper(clock, model=model) for unit, model in ((LEFT, left), (RIGHT, right))}
+    for gripper in grippers.values():
+        await activate_beforehand(gripper)
+    async with kind(patch, grippers) as bus:
+        yield bus
 
 
 @pytest.fixture(params=[serial_bus, socket_bus], ids=["rtu", "rtu+tcp"])
 async def bus(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Bus]:
-    async with request.param(monkeypatch, {LEFT: TWO_FINGER_85, RIGHT: TWO_FINGER_85}) as bus:
+    async with pair(request.param, monkeypatch, TWO_FINGER_85, TWO_FINGER_85) as bus:
         yield bus
 
 
@@ -238,6 +149,8 @@ async def test_an_end_of_the_connection_is_the_end_for_both(bus: Bus) -> None:
         bus.pull()
         for hand in (left, right):
             await hand.wait_for_state(State.DISCONNECTED, timeout=1)
+        await asyncio.sleep(0.5)
+        await bus.plug()
         for hand in (left, right):
             await hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
             assert hand.statistics.reconnects == 1
@@ -272,10 +185,10 @@ async def test_the_units_of_a_line_are_claimed(bus: Bus) -> None:
                 await bus.hand(unit).start()
 
 
-@pytest.mark.parametrize("line", [serial_bus, socket_bus])
-async def test_different_models_on_a_line(line: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("kind", [serial_bus, socket_bus])
+async def test_different_models_on_a_line(kind: Kind, monkeypatch: pytest.MonkeyPatch) -> None:
     async with (
-        line(monkeypatch, {LEFT: THREE_FINGER, RIGHT: TWO_FINGER_85}) as bus,
+        pair(kind, monkeypatch, THREE_FINGER, TWO_FINGER_85) as bus,
         bus.hand(LEFT, model=THREE_FINGER) as left,
         bus.hand(RIGHT) as right,
     ):
@@ -285,7 +198,7 @@ async def test_different_models_on_a_line(line: Any, monkeypatch: pytest.MonkeyP
 
 async def test_a_line_has_one_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     async with (
-        serial_bus(monkeypatch, {LEFT: TWO_FINGER_85, RIGHT: TWO_FINGER_85}) as bus,
+        pair(serial_bus, monkeypatch, TWO_FINGER_85, TWO_FINGER_85) as bus,
         bus.hand(LEFT),
     ):
         with pytest.raises(ConnectFailedError, match="the port is in use as rtu:///dev/ttyNEAR"):

@@ -46,8 +46,8 @@ EXCEPT: dict[str, dict[str, str]] = {
 
 FILES = sorted(file.stem for file in Path(contract.__path__[0]).glob("test_*.py"))
 """Of the contract. Each is a test of its own: all in one would be half a minute on a busy machine."""
-OF_OTHERS = ("test_differences", "test_physics", "test_units")
-"""Hands on other hosts, and what has no scene."""
+OF_OTHERS = ("test_differences", "test_physics", "test_shared_line", "test_units")
+"""Hands on other hosts, and what has no scene of its own."""
 ASKING = [file for file in FILES if file not in ("test_arguments", *OF_OTHERS)]
 """All but what is refused before the gripper is asked anything."""
 
