@@ -15,7 +15,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from typing import Any, Final, TypeVar
-from weakref import WeakKeyDictionary, WeakValueDictionary
+from weakref import WeakKeyDictionary, WeakSet, WeakValueDictionary
 
 import anyio
 
@@ -103,6 +103,8 @@ class Connection:
         self._is_rtu = address.is_rtu
         self._strays = strays
         self._users: set[object] = set()
+        self._holders: WeakSet[object] = WeakSet()
+        """Who opens it again after a loss: those whose line it is, whether they are users at this moment."""
         self._rests: WeakKeyDictionary[object, float] = WeakKeyDictionary()
         """The time of the next turn of a user whose gripper did not answer, by the clock of the loop."""
         self._client: Client | None = None
@@ -130,6 +132,11 @@ class Connection:
     def is_shared(self) -> bool:
         """Whether it has several users now."""
         return len(self._users) > 1
+
+    @property
+    def is_held(self) -> bool:
+        """Whether somebody will open it again."""
+        return bool(self._holders)
 
     def is_open_for(self, user: object) -> bool:
         return user in self._users
@@ -182,6 +189,15 @@ class Connection:
         self._users.discard(user)
         if not self._users:
             self._disconnect()
+
+    def hold(self, user: object) -> None:
+        """Keep the line at this rate until :meth:`release`, also while the connection is down."""
+        self._holders.add(user)
+
+    def release(self, user: object) -> None:
+        """End the use of the connection for good."""
+        self._holders.discard(user)
+        self.leave(user)
 
     def _abandon(self, user: object) -> None:
         """End the use of a connection to which a reply may still come."""
@@ -351,18 +367,21 @@ class Connection:
 _shared: WeakValueDictionary[tuple[asyncio.AbstractEventLoop, str], Connection] = WeakValueDictionary()
 
 
-def shared_connection(address: Address) -> Connection:
+def shared_connection(address: Address, user: object) -> Connection:
     """The connection to a serial line, which all its users in the running event loop share.
 
+    Held for ``user`` from here on.
+
     Raises:
-        ConnectFailedError: it is in use with another rate, parity or number of stop bits.
+        ConnectFailedError: others hold it with another rate, parity or number of stop bits.
     """
     place = asyncio.get_running_loop(), canonical_address(address)
     connection = _shared.get(place)
-    if connection is None:
+    if connection is None or (connection.address.line != address.line and not connection.is_held):
         _shared[place] = connection = Connection(address)
     elif connection.address.line != address.line:
         raise ConnectFailedError(str(address), f"the port is in use as {connection.address}")
+    connection.hold(user)
     return connection
 
 

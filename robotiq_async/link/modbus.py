@@ -132,9 +132,9 @@ class ModbusTransport:
             ConnectionLostError: the connection was closed at once.
             ResponseTimeoutError: the connection is open, but no answer comes.
         """
-        await self.close()
+        self._connection.leave(self)
         if self._shares_line:
-            self._connection = shared_connection(self._address)
+            self._connection = shared_connection(self._address, self)
         await self._connection.open(self, self._connect_timeout)
         await self._greet()
         if self._connection.keeps_silence and not self._connection.silence.is_long:
@@ -227,7 +227,7 @@ class ModbusTransport:
 
     async def close(self) -> None:
         """Disconnect; does nothing when closed."""
-        self._connection.leave(self)
+        self._connection.release(self)
 
     # -- one exchange ----------------------------------------------------------------------------------
 

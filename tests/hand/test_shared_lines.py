@@ -196,10 +196,27 @@ async def test_different_models_on_a_line(kind: Kind, monkeypatch: pytest.Monkey
         assert [end.positions[A] for end in ends] == pytest.approx([120, 50], abs=3)
 
 
+async def test_a_line_that_nobody_uses_takes_another_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with pair(serial_bus, monkeypatch, TWO_FINGER_85, TWO_FINGER_85) as bus:
+        kept = bus.hand(LEFT)
+        async with kept:
+            pass
+        async with bus.hand(RIGHT, f"{bus.address}?baud=57600") as right:
+            await right.move(40)
+            with pytest.raises(ConnectFailedError, match=r"the port is in use as .*baud=57600"):
+                await kept.start()
+        async with kept:
+            await kept.move(60)
+
+
 async def test_a_line_has_one_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     async with (
         pair(serial_bus, monkeypatch, TWO_FINGER_85, TWO_FINGER_85) as bus,
-        bus.hand(LEFT),
+        bus.hand(LEFT) as left,
     ):
-        with pytest.raises(ConnectFailedError, match="the port is in use as rtu:///dev/ttyNEAR"):
-            await bus.hand(RIGHT, f"{bus.address}?baud=57600").start()
+        for is_there in (True, False):  # a hand that looks for its gripper keeps the line at its rate
+            if not is_there:
+                bus.pull()
+                await left.wait_for_state(State.DISCONNECTED)
+            with pytest.raises(ConnectFailedError, match="the port is in use as rtu:///dev/ttyNEAR"):
+                await bus.hand(RIGHT, f"{bus.address}?baud=57600").start()
