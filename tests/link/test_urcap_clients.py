@@ -1,4 +1,7 @@
-"""Clients of others for the URCap's text port, which drive real grippers on a UR, on the simulated one."""
+"""A client of others for the URCap's text port, which drives real grippers on a UR, on the simulated one.
+
+Those that need an environment of their own are in tests/urcap.
+"""
 
 from __future__ import annotations
 
@@ -49,24 +52,3 @@ async def test_pyrobotiqur_beside_a_hand_is_another_client(server: UrcapSimulato
         assert hand.status.requested_position(JAW) == 80
         assert hand.statistics.foreign_commands >= 1
         await hand.close()
-
-
-async def test_airo_robots(gripper: SimulatedGripper, server: UrcapSimulatorServer) -> None:
-    """It opens a connection for each line, cuts one character off each answer, and writes two blanks."""
-    module = "airo_robots.grippers.hardware.robotiq_2f85_urcap"
-    airo = pytest.importorskip(
-        module, reason="needs airo-robots, which brings scipy and more: pip install it"
-    )
-
-    def use() -> tuple[float, bool, float]:
-        driver = airo.Robotiq2F85("127.0.0.1", server.port)
-        driver.move(0.04).wait()
-        width = driver.get_current_width()
-        gripper.place_object(JAW, 200)
-        driver.close().wait()
-        return width, driver.is_an_object_grasped(), driver.get_current_width()
-
-    width, is_held, held = await asyncio.to_thread(use)
-    assert width == pytest.approx(0.04, abs=0.002)
-    assert is_held
-    assert held == pytest.approx(0.085 * 30 / 230, abs=0.002)
