@@ -235,7 +235,7 @@ def _without_options_of_a_gripper(text: str) -> tuple[str, Model | None, str | N
 
 
 def _without(name: str, text: str, form: str) -> tuple[str, str | None]:
-    place, _, query = text.partition("?")
+    place, _, query = _split(text)
     options = query.split("&") if query else []
     given = [option.removeprefix(f"{name}=") for option in options if option.startswith(f"{name}=")]
     if not given:
@@ -246,19 +246,39 @@ def _without(name: str, text: str, form: str) -> tuple[str, str | None]:
     return place + (f"?{others}" if others else ""), given[0]
 
 
+def _split(text: str) -> tuple[str, str, str]:
+    """A place, the question mark after it if there is one, and the options."""
+    begin = _WINDOWS_PATH if text.startswith(_WINDOWS_PATH) else ""
+    place, mark, query = text.removeprefix(begin).partition("?")
+    return begin + place, mark, query
+
+
+_WINDOWS_PATH: Final = "\\\\?\\"
+"""How the path of a serial port may begin there."""
+
+
 def _device_and_line(text: str) -> tuple[str, Line]:
-    """Split DEVICE?baud=...&parity=...&stopbits=...; a device may have a question mark in its name."""
-    device, _, query = text.partition("?")
-    if "=" not in query:
-        if rate := re.search(r":([0-9]+)$", text):
-            raise ValueError(f"the rate of a serial port is ?baud={rate[1]}")
-        return text, USUAL_LINE
-    given = _options(query, LINE_OPTIONS, _no_option_of_a_line)
+    """Split DEVICE?baud=...&parity=...&stopbits=..."""
+    device, mark, query = _split(text)
+    if meant := _meant_by_port(device):
+        raise ValueError(meant)
+    given = _options(query if mark else None, LINE_OPTIONS, _no_option_of_a_line)
     return device, Line(
         baud=_baud(given["baud"]) if "baud" in given else BAUD,
-        parity=_one_of("parity", given.get("parity", "N").upper(), "N", "E", "O"),
+        parity=_one_of("parity", given.get("parity", "N"), "N", "E", "O"),
         stopbits=int(_one_of("stopbits", given.get("stopbits", "1"), "1", "2")),
     )
+
+
+def _meant_by_port(device: str) -> str:
+    """A guess at a serial port that is none; empty if it may be one."""
+    if host := re.fullmatch(r"([0-9]{1,3}(?:\.[0-9]{1,3}){3})(?::([0-9]+))?", device):
+        return f"a serial line behind a TCP socket is rtu+tcp://{host[1]}:{host[2] or 'PORT'}"
+    if rate := re.search(r":([0-9]+)$", device):
+        return f"the rate of a serial port is ?baud={rate[1]}"
+    if device.startswith("dev/"):
+        return f"a serial port is rtu:///{device}"
+    return "options follow a question mark" if re.search("&.*=", device) else ""
 
 
 def _no_option_of_a_line(name: str) -> str:
@@ -280,9 +300,9 @@ def _baud(text: str) -> int:
 
 
 def _one_of(name: str, given: str, *known: str) -> str:
-    if given not in known:
+    if given.upper() not in known:
         raise ValueError(f"{name} must be {', '.join(known[:-1])} or {known[-1]}, got {given!r}")
-    return given
+    return given.upper()
 
 
 def _host_and_port(text: str, usual: int | None) -> tuple[str, int | None]:

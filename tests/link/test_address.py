@@ -174,13 +174,15 @@ PORTS_THAT_ARE_NONE = ["", "0", "65536", "-1", "+502", " 502", "502 ", "5_02", "
         ("rtu:///dev/ttyUSB0?baud=500000", Line(500000, "N", 1)),
         ("rtu://COM3?baud=9600&parity=E&stopbits=2", Line(9600, "E", 2)),
         ("rtu://COM3?model=2f85&parity=o", Line(115200, "O", 1)),
+        (r"rtu://\\?\COM10?baud=9600", Line(9600)),
+        (r"rtu://\\?\COM10", Line()),
     ],
 )
 def test_how_a_serial_port_sends(text: str, line: Line) -> None:
     parsed = parse_address(text)
     assert parsed.line == line
     assert parse_address(str(parsed)) == parsed
-    assert parsed.host in ("/dev/ttyUSB0", "COM3")
+    assert parsed.host in ("/dev/ttyUSB0", "COM3", r"\\?\COM10")
 
 
 def test_a_character_has_ten_to_twelve_bits() -> None:
@@ -206,9 +208,18 @@ def test_a_character_has_ten_to_twelve_bits() -> None:
             "known are: model, stroke, baud, parity, stopbits",
         ),
         ("rtu:///dev/ttyUSB0:115200", "the rate of a serial port is ?baud=115200"),
+        ("rtu:///dev/ttyUSB0?baud", "baud must be given once, as baud=VALUE"),
+        ("rtu:///dev/ttyUSB0?", "no option '' of a serial port"),
+        ("rtu:///dev/ttyUSB0?115200", "no option '115200' of a serial port"),
+        (r"rtu://\\?\COM10?2f85", "no option '2f85' of a serial port"),
+        ("rtu:///dev/ttyUSB0&model=2f85", "options follow a question mark"),
+        ("rtu://192.168.1.20:54321", "a serial line behind a TCP socket is rtu+tcp://192.168.1.20:54321"),
+        ("rtu://192.168.1.20", "a serial line behind a TCP socket is rtu+tcp://192.168.1.20:PORT"),
+        ("rtu://dev/ttyUSB0", "a serial port is rtu:///dev/ttyUSB0"),
         ("rtu:///dev/ttyUSB0?baud=300", "baud must be an integer in 9600..1000000, got '300'"),
         ("rtu:///dev/ttyUSB0?baud=1e6", "baud must be an integer"),
         ("rtu:///dev/ttyUSB0?parity=M", "parity must be N, E or O, got 'M'"),
+        ("rtu:///dev/ttyUSB0?parity=even", "parity must be N, E or O, got 'even'"),
         ("rtu:///dev/ttyUSB0?stopbits=3", "stopbits must be 1 or 2, got '3'"),
         ("rtu:///dev/ttyUSB0?baud=9600&baud=9600", "baud must be given once"),
         ("rtu+tcp://192.168.1.20:54321?baud=9600", "a serial server has its own"),
