@@ -31,6 +31,7 @@ from .address import Address, canonical_address
 from .connecting import Client, connected_client, disconnect
 from .exchange import Echo, Exchange, strays
 from .frames import MisfitError, RefusedError
+from .serial_ports import GONE
 from .silence import Silence
 from .watchdog import Watchdog
 
@@ -361,7 +362,8 @@ class Connection:
 
     def _on_connection(self, connected: bool) -> None:
         if not connected:
-            self._fail(ConnectionLostError(f"{self._address} closed the connection"))
+            why = " closed the connection" if self._address.is_socket else f": {GONE}"
+            self._fail(ConnectionLostError(f"{self._address}{why}"))
 
 
 _shared: WeakValueDictionary[tuple[asyncio.AbstractEventLoop, str], Connection] = WeakValueDictionary()

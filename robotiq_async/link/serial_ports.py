@@ -12,6 +12,7 @@ MISSING: Final = "there is no such device; is it plugged in?"
 FORBIDDEN: Final = "not allowed to open it; is this user in its group (ls -l; on Linux often dialout)?"
 TAKEN: Final = "another program has opened it"
 NO_PORT: Final = "it is not a serial port"
+GONE: Final = "the port is gone, or another program reads from it"
 
 USB_SERIAL: Final = Path("/sys/bus/usb-serial/devices")  # where Linux has a folder for each USB adapter
 BY_ID: Final = Path("/dev/serial/by-id")  # where Linux has a link to each USB adapter, by its name

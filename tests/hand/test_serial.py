@@ -58,7 +58,7 @@ async def test_a_pulled_line_comes_back(
     await until_moving(serial_server, serial_hand)
     writes = len(serial_server.gripper.writes)
     line.pull()
-    with pytest.raises(ConnectionLostError):
+    with pytest.raises(ConnectionLostError, match="the port is gone, or another program reads from it"):
         await moving
     line.plug()
     await serial_hand.wait_for_state(State.RUNNING_IDLE, timeout=patience(5))

@@ -33,6 +33,7 @@ from robotiq_async.values.request import AxisRequest, Request
 from tests.patience import patience
 from tests.serial_line import SerialLine, with_crc
 from tests.virtual import run
+from tests.virtual_line import VirtualLine
 
 pytestmark = pytest.mark.virtual_time  # names and serial lines run loops of their own, in real time
 REACHED = ["name", "port", "Modbus", "unit id", "registers", "round trip", "rate"]
@@ -511,6 +512,30 @@ async def test_a_link_that_is_lost_in_the_middle() -> None:
         asyncio.get_running_loop().call_later(1.0, go_away)
         found = await findings(server.address)
     assert found["link"].level is Level.BAD
+
+
+@pytest.mark.parametrize("what", ["slow", "pulled out", "read by another program"])
+async def test_a_serial_port_is_no_network(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    line, loop = VirtualLine(monkeypatch), asyncio.get_running_loop()
+
+    def lost(frame: bytes) -> list[tuple[float, bytes]]:
+        line.pull()
+        line.plug()
+        return [(0.0, frame)]
+
+    async with SerialSimulatorServer(line.FAR, SimulatedGripper(loop.time)) as server:
+        match what:
+            case "slow":
+                server.policy = lambda frame: [(0.01, frame)]
+            case "pulled out":
+                loop.call_later(1.0, line.pull)
+            case _:
+                server.policy = lost
+        found = await findings(f"rtu://{line.NEAR}", seconds=120)
+    finding = found[{"slow": "round trip", "pulled out": "link"}.get(what, "Modbus")]
+    assert finding.level is not Level.GOOD
+    assert ("poll_interval" if what == "slow" else "fuser -v") in finding.advice
+    assert not re.search("network|switch|client|connection", finding.advice)
 
 
 def test_a_serial_line(tmp_path: Path) -> None:

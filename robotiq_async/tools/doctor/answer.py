@@ -35,6 +35,9 @@ TRIES: Final = 3  # attempts with the usual unit id and registers, before others
 UNITS: Final = (2, 9, 1, 0, 255)
 """Unit ids to try when the usual one does not answer; 0 and 255 are not valid on a serial line."""
 ALONE: Final = "It may serve one client at a time"
+LOST_PORT: Final = (
+    "Is the plug firm? fuser -v DEVICE shows who else has the port: ModemManager, brltty or a terminal."
+)
 
 
 class Answering(NamedTuple):
@@ -78,7 +81,7 @@ async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> 
             (link, status, seconds), registers, tries = again, usual, tries + 1
         if _echoes(link):
             report(Finding(Level.GOOD, "echo", "the line echoes what is sent, and the echo is dropped"))
-        report(_answers(failure if registers == usual else None, tries, seconds))
+        report(_answers(address, failure if registers == usual else None, tries, seconds))
         _report_place(usual, registers, report)
         report_silence(status, report)
         return Answering(link, registers)
@@ -215,7 +218,7 @@ def _advice_for_opening(address: Address, why: str) -> str:
 # -- no answer, or a late one ------------------------------------------------------------------------------
 
 
-def _answers(failure: RobotiqConnectionError | None, tries: int, seconds: float) -> Finding:
+def _answers(address: Address, failure: RobotiqConnectionError | None, tries: int, seconds: float) -> Finding:
     if seconds > ANSWER_S:
         advice = f"Pass response_timeout={long_enough(seconds):g}; a write, and a stop, take as long."
         return Finding(Level.DOUBT, "Modbus", f"answers, after {seconds:.1f} s", advice)
@@ -223,6 +226,9 @@ def _answers(failure: RobotiqConnectionError | None, tries: int, seconds: float)
         return Finding(Level.GOOD, "Modbus", "answers")
     if isinstance(failure, ConnectionLostError):
         advice = f"It closed the connection without an answer. {ALONE}: is another program connected?"
+        advice = LOST_PORT if address.kind == "rtu" else advice
+    elif address.kind == "rtu":
+        advice = "Replies get lost or damaged: check cable, shield, ground and termination."
     else:
         advice = (
             "Replies get lost or damaged: check cable and switch, and look for another client. "
@@ -245,6 +251,8 @@ def _advice_for_silence(address: Address, error: RobotiqConnectionError, echoes:
         )
     if isinstance(error, ProtocolError):
         return "What answers is not this gripper: its registers are elsewhere, or it does not speak Modbus."
+    if address.kind == "rtu":
+        return LOST_PORT
     return f"It closes the connection when asked. {ALONE}, or not speak Modbus."
 
 

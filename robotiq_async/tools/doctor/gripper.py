@@ -23,7 +23,7 @@ from ...values.model import MODELS, Model, model_of, names_that_fit
 from ...values.registers import Registers
 from ...values.statistics import percentile
 from ...values.status import RobotiqStatus
-from .answer import REACH_S, find_gripper, long_enough
+from .answer import LOST_PORT, REACH_S, find_gripper, long_enough
 from .findings import Finding, GiveUpError, Level, Report
 from .urcap import find_urcap
 
@@ -51,7 +51,7 @@ async def examine(address: Address, report: Report, *, device_id: int | None = N
         try:
             if address.kind == "rtu":
                 report_adapter(address, report)
-            await _timing(link, report)
+            await _timing(address, link, report)
             _check_model(model, await link.read(), report)
             report_state(RobotiqStatus.from_registers(await link.read(), model=model), report)
             await _others(link, report)
@@ -63,6 +63,7 @@ async def examine(address: Address, report: Report, *, device_id: int | None = N
         advice = "Check cable, switch and power: something on the way to the gripper drops packets."
         if isinstance(error, ConnectionLostError):
             advice = "It closed the connection: it serves one client and another came, or it lost power."
+            advice = LOST_PORT if address.kind == "rtu" else advice
         report(Finding(Level.BAD, "link", f"lost during the examination: {error}", advice))
 
 
@@ -91,7 +92,7 @@ async def _resolve(address: Address, report: Report) -> None:
     report(Finding(Level.GOOD, "name", f"{address.host} is {', '.join(found)}"))
 
 
-async def _timing(link: Link, report: Report) -> None:
+async def _timing(address: Address, link: Link, report: Report) -> None:
     loop = asyncio.get_running_loop()
     times, began = [], loop.time()
     for _ in range(PROBES):
@@ -108,7 +109,8 @@ async def _timing(link: Link, report: Report) -> None:
         report(Finding(Level.GOOD, "round trip", found))
     else:
         hertz = f"{1 / POLL_INTERVAL_S:.0f} Hz"
-        advice = f"Too slow for {hertz} at times: use a wired network, or a larger poll_interval."
+        what = "see what is said about adapter and line" if address.kind == "rtu" else "use a wired network"
+        advice = f"Too slow for {hertz} at times: {what}, or pass a larger poll_interval."
         if p99 > RESPONSE_TIMEOUT_S / 2:
             advice = f"Pass response_timeout={long_enough(p99):g}; a write, and a stop, take as long."
         report(Finding(Level.DOUBT, "round trip", found, advice))
