@@ -115,6 +115,8 @@ class Connection:
         """The exchange in flight."""
         self._failure: RobotiqConnectionError | None = None
         """An error of the link between two exchanges; the next exchange raises it."""
+        self._end: RobotiqConnectionError | None = None
+        """Why the last connection has ended for all of its users, if it has."""
         self._is_hushing = False
         """Whether arriving bytes are dropped as the rest of a damaged reply."""
         self._is_disturbed = False
@@ -164,7 +166,7 @@ class Connection:
         self._loop = loop = asyncio.get_running_loop()
         self.clock = clock_of(loop)
         self._watchdog = Watchdog(loop, lambda: self._is_waiting, self._on_timeout)
-        self._failure, self._is_disturbed = None, False
+        self._failure, self._end, self._is_disturbed = None, None, False
         self.echo.is_on = None if self._is_rtu else False
         try:
             with anyio.fail_after(seconds):
@@ -249,7 +251,8 @@ class Connection:
             self._drop(user, failure)
             raise plain(failure)
         if user not in self._users:
-            raise ConnectionLostError(f"not connected to {self._address}")
+            reason = f"not connected to {self._address}" if self._end is None else self._end.message
+            raise ConnectionLostError(reason)
 
     async def exchange(
         self, user: object, exchange: Exchange[T], seconds: float, by: float, bears: Bears = bears_nothing
@@ -326,6 +329,7 @@ class Connection:
 
     def _drop(self, user: object, error: RobotiqConnectionError) -> None:
         if isinstance(error, ConnectionLostError):
+            self._end = error
             self._disconnect()
         else:
             self._abandon(user)

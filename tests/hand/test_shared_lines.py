@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
@@ -144,7 +145,10 @@ async def test_the_one_that_stays_keeps_the_line_and_the_last_one_closes_it(bus:
         await alone.move(10)
 
 
-async def test_an_end_of_the_connection_is_the_end_for_both(bus: Bus) -> None:
+async def test_an_end_of_the_connection_is_the_end_for_both(
+    bus: Bus, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.WARNING, logger="robotiq_async")
     async with bus.hand(LEFT) as left, bus.hand(RIGHT) as right:
         bus.pull()
         for hand in (left, right):
@@ -155,6 +159,8 @@ async def test_an_end_of_the_connection_is_the_end_for_both(bus: Bus) -> None:
             await hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
             assert hand.statistics.reconnects == 1
         await asyncio.gather(left.move(100), right.move(100))
+    reasons = {message.partition("link lost: ")[2] for message in caplog.messages} - {""}
+    assert len(reasons) == 1, "both say what has happened"
 
 
 async def test_a_cancelled_start_leaves_the_other_alone(bus: Bus) -> None:
