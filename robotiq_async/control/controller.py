@@ -126,16 +126,15 @@ class Controller:
         return move.default_timeout(self.status, speeds, self._closing_time)
 
     def abandon(self, move: Move, *, unseen: bool = False) -> None:
-        """The caller has given up on a move: hold those of its axes that still move.
+        """The caller of a move has left: if it has given up, hold those of its axes that still move.
 
-        ``unseen`` if the call was cancelled: then the caller does not learn that the link went down, either.
+        ``unseen`` if it was cancelled: then it does not see, either, that the move has failed already.
         """
-        if self._requests.moves.remove(move):
-            self._requests.hold(move.axes, "a move took over and was given up")
-        elif unseen and move.was_lost:
-            self._requests.pending.merge_hold(move.axes)
-            if self._evidence.condition is not None:  # the link is back
-                self._requests.pending.hold_only(self._ledger.ours)
+        is_live = self._requests.moves.remove(move)
+        if is_live or unseen:
+            self._requests.hold(move.left, "a move took over and was given up")
+        if unseen and not is_live and self._evidence.condition is not None:
+            self._requests.pending.hold_only(self._ledger.ours)
 
     def hold(self, axes: Finger, waiter: Waiter[None]) -> None:
         """Hold those axes that move, whichever client moves them. In a procedure there is nothing to do.
@@ -457,6 +456,7 @@ class Controller:
         self._requests.moves.fail(
             MoveSupersededError("another client commands the gripper"),
             lambda move: move.entry is not None and not move.is_under(status, ledger.limited),
+            left=Finger.ALL,
         )
 
     def _finish(self, status: RobotiqStatus, *, has_written: bool) -> None:

@@ -9,7 +9,7 @@ from typing import Final
 
 from ..runtime.log import Log, log
 from ..values.enums import NO_AXES, Finger, ObjectStatus
-from ..values.errors import ConnectionLostError, RobotiqError
+from ..values.errors import RobotiqError
 from ..values.move_result import MoveResult
 from ..values.status import RobotiqStatus
 from .entry import Entry
@@ -32,8 +32,8 @@ class Move:
     def __init__(self, position: int, axes: Finger, now: float, waiter: Waiter[MoveResult]) -> None:
         self.position = position
         self.axes = axes
-        self.was_lost = False
-        """Whether the link went down during it."""
+        self.left = axes
+        """Those of its axes that may still follow it, although it may have failed."""
         self.entry: Entry | None = None
         """Its write; None before that."""
         self._started = now
@@ -78,13 +78,14 @@ class Move:
         return self.axes in resting and not status.moving & self.axes and self.is_under(status, limited)
 
     def end(self, status: RobotiqStatus) -> MoveResult:
-        result = self._result(status)
+        result, self.left = self._result(status), NO_AXES
         if not self._waiter.done():
             self._waiter.set_result(result)
         return result
 
-    def fail(self, error: RobotiqError) -> None:
-        self.was_lost = isinstance(error, ConnectionLostError)
+    def fail(self, error: RobotiqError, left: Finger = NO_AXES) -> None:
+        """It has failed; only its axes in ``left`` still follow it. The first error counts."""
+        self.left &= left
         fail([self._waiter], error)
 
     def _result(self, status: RobotiqStatus) -> MoveResult:
@@ -101,26 +102,32 @@ class Move:
 
 
 class LiveMoves:
-    """The moves that have not ended. Each leaves once: when it arrives or fails, or its caller gives up."""
+    """The moves that have not ended. Each leaves once: when it arrives or fails, or its caller gives up.
+
+    A caller that gives up in the moment in which its move fails does not see the error, and counts on its
+    axes to be held. So a failed move with axes that still follow it is kept until its caller has left.
+    """
 
     def __init__(self, log: Log = log) -> None:
         self._moves: list[Move] = []
+        self._failed: list[Move] = []
         self._log = log
         self._has_warned = False
 
     def __bool__(self) -> bool:
-        return bool(self._moves)
+        return bool(self._moves or self._failed)
 
     def add(self, move: Move) -> None:
         """Add a move that goes out with the next write."""
         self._moves.append(move)
 
     def remove(self, move: Move) -> bool:
-        """Remove a move whose caller has given up; return whether it had not ended."""
-        if move not in self._moves:
-            return False
-        self._moves.remove(move)
-        return True
+        """Remove a move whose caller has left; return whether it had not ended."""
+        is_live = move in self._moves
+        for moves in (self._moves, self._failed):
+            if move in moves:
+                moves.remove(move)
+        return is_live
 
     def written(self, entry: Entry) -> None:
         """The moves added since the last write go out with this one."""
@@ -170,9 +177,20 @@ class LiveMoves:
                 result.positions[axis],
             )
 
-    def fail(self, error: RobotiqError, which: Callable[[Move], bool] = lambda _: True) -> None:
-        """Fail the moves for which ``which`` is true."""
-        failing = [move for move in self._moves if which(move)]
-        self._moves = [move for move in self._moves if move not in failing]
-        for move in failing:
-            move.fail(error)
+    def take_over(self, axes: Finger, error: RobotiqError) -> None:
+        """Fail the moves of these axes, which something else has taken over. Their other axes go on."""
+        self.fail(error, lambda move: bool(move.axes & axes), left=~axes)
+
+    def fail(
+        self,
+        error: RobotiqError,
+        which: Callable[[Move], bool] = lambda _: True,
+        *,
+        left: Finger = NO_AXES,
+    ) -> None:
+        """Fail the moves for which ``which`` is true. Only axes in ``left`` still follow a failed move."""
+        failed = [*self._failed, *(move for move in self._moves if which(move))]
+        self._moves = [move for move in self._moves if move not in failed]
+        for move in failed:
+            move.fail(error, left)
+        self._failed = [move for move in failed if move.left]

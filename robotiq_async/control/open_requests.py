@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from ..runtime.log import Log, log
-from ..values.enums import Finger
-from ..values.errors import MoveSupersededError, RobotiqError
+from ..values.enums import NO_AXES, Finger
+from ..values.errors import ConnectionLostError, MoveSupersededError, RobotiqError
 from .entry import Entry
 from .motion import LiveMoves
 from .pending import Command, Pending
@@ -38,7 +38,7 @@ class OpenRequests:
     def command(self, command: Command, waiter: Waiter[None] | None = None) -> None:
         """Ask something of axes. A position supersedes the moves of these axes."""
         if command.position is not None and self.moves:  # few loops at 200 Hz have a move to end
-            self._end_moves(command.axes, MoveSupersededError(f"another command moves {command.axes}"))
+            self.moves.take_over(command.axes, MoveSupersededError(f"another command moves {command.axes}"))
         self.pending.merge(command, waiter)
 
     def hold(self, axes: Finger, why: str, waiter: Waiter[None] | None = None) -> None:
@@ -48,11 +48,8 @@ class OpenRequests:
 
     def supersede(self, axes: Finger, error: MoveSupersededError) -> None:
         """Fail what moves these axes, and is not sent."""
-        self._end_moves(axes, error)
+        self.moves.take_over(axes, error)
         self.pending.drop_positions(axes, error)
-
-    def _end_moves(self, axes: Finger, error: MoveSupersededError) -> None:
-        self.moves.fail(error, lambda move: bool(move.axes & axes))
 
     # -- what becomes of it ----------------------------------------------------------------------------
 
@@ -80,7 +77,7 @@ class OpenRequests:
         self.pending.drop_changes(error)
         fail((waiter for _, waiter in self._sent.asking), error)
         self._sent.asking.clear()
-        self.moves.fail(error)
+        self.moves.fail(error, left=Finger.ALL if isinstance(error, ConnectionLostError) else NO_AXES)
 
     def fail(self, error: RobotiqError) -> None:
         """Fail everything asked so far. A write may be on the line all the same."""

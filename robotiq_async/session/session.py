@@ -238,17 +238,16 @@ class Session:
         However the block is left, a move that has not ended is given up, and its axes that move are held.
         """
         ended: asyncio.Future[MoveResult] = self.waiter()
-        move, is_cancelled = Move(position, axes, now(), ended), False
-        usual = self.ask(self.controller.move, move, speed, force)
+        move, is_seen = Move(position, axes, now(), ended), True
         try:
-            yield ended, usual
+            yield ended, self.ask(self.controller.move, move, speed, force)
         except asyncio.CancelledError:
-            is_cancelled = True
+            is_seen = False
             if ended.done() and not ended.cancelled():
                 ended.exception()  # retrieved: asyncio would log it as never looked at
             raise
-        finally:
-            self.ask(self.controller.abandon, move, unseen=is_cancelled)
+        finally:  # a limit of time cancels the wait as well
+            self.ask(self.controller.abandon, move, unseen=not is_seen or ended.cancelled())
 
     async def reach(
         self,

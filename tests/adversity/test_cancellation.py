@@ -15,6 +15,7 @@ from robotiq_async import (
     ConnectionLostError,
     Fault,
     Finger,
+    MoveTimeoutError,
     NotStartedError,
     RobotiqConnectionError,
     RobotiqHand,
@@ -26,7 +27,7 @@ from robotiq_async.simulator import Trouble
 from tests.adversity.world import World, started, world
 from tests.virtual import inside, run
 
-A, B = Finger.A, Finger.B
+A, B, C = Finger.A, Finger.B, Finger.C
 TARGET = 120
 SPEEDUP = 40.0
 """Slow enough for a move to take a dozen polls, fast enough to walk through all of them."""
@@ -240,6 +241,51 @@ async def check_nothing_is_left(world: World) -> None:
     # Wherever it was stopped: somewhere else.
     await hand.move(60 if world.gripper.position(B) > 100 else 180, B, speed=255)
     assert {axis for axis, travel in world.travels().items() if travel != before[axis]} == {B}
+
+
+# -- when another call takes over one of its axes at that moment ---------------------------------------------
+
+
+@inside(started)
+@pytest.mark.parametrize("is_sent", [False, True])
+@pytest.mark.parametrize("way", ["cancelled first", "taken over first", "one axis after the other", "held"])
+async def test_a_cancelled_move_whose_axis_is_taken_over_does_not_go_on_with_the_others(
+    here: World, way: str, is_sent: bool
+) -> None:
+    """Its caller saw the cancellation and no MoveSupersededError, and counted on A to be held."""
+    hand = here.hand
+    moving = asyncio.create_task(hand.move(255, A | B | C, speed=0))
+    await (here.until_moving() if is_sent else asyncio.sleep(0))
+    if way == "cancelled first":
+        moving.cancel()
+    holding = asyncio.create_task(hand.hold(C)) if way == "held" else None
+    if holding is None:
+        hand.command(C, position=40)
+    else:
+        await asyncio.sleep(0)
+    if way == "one axis after the other":
+        hand.command(B, position=40)
+    moving.cancel()
+    await asyncio.wait({moving} if holding is None else {moving, holding})
+    assert moving.cancelled()
+    await rest(here)
+    assert here.gripper.position(A) < 50, "it went on, or even began"
+    assert abs(here.gripper.position(C) - 40) <= 2 or way == "held"
+    assert abs(here.gripper.position(B) - 40) <= 2 or way != "one axis after the other"
+
+
+@inside(started)
+async def test_a_move_that_times_out_as_its_axis_is_taken_over_does_not_go_on_with_the_others(
+    here: World,
+) -> None:
+    moving = asyncio.create_task(here.hand.move(255, A | B, speed=0, timeout=1.0))
+    await asyncio.sleep(0)
+    here.loop.call_later(1.0, lambda: here.hand.command(B, position=40))
+    with pytest.raises(MoveTimeoutError):
+        await moving
+    await rest(here)
+    assert here.gripper.position(A) < 200
+    assert abs(here.gripper.position(B) - 40) <= 2
 
 
 # -- when the link fails at that moment ---------------------------------------------------------------------

@@ -13,7 +13,7 @@ from robotiq_async.control.ledger import Ledger
 from robotiq_async.control.motion import LiveMoves, Move
 from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.enums import Finger, ObjectStatus
-from robotiq_async.values.errors import ConnectionLostError, MoveSupersededError, RobotiqError
+from robotiq_async.values.errors import MoveSupersededError
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.move_result import MoveResult
 from robotiq_async.values.status import RobotiqStatus
@@ -86,12 +86,13 @@ def test_a_move_that_ended_well_does_not_fail_afterwards() -> None:
     assert outcome.result.status == status_of(0xF9, 0xFF)
 
 
-@pytest.mark.parametrize("error", [MoveSupersededError("no"), ConnectionLostError("yes")])
-def test_a_move_knows_whether_the_link_went_down_under_it(error: RobotiqError) -> None:
-    each, _ = move()
-    assert not each.was_lost
-    each.fail(error)
-    assert each.was_lost == (str(error) == "yes")
+def test_a_move_knows_which_of_its_axes_may_still_follow_it() -> None:
+    (each, _), (ended, _) = move(), move()
+    assert each.left == each.axes
+    each.fail(MoveSupersededError("A"), ~A)
+    assert each.left == each.axes & ~A
+    ended.end(status_of(0xF9, 0xFF))
+    assert not ended.left
 
 
 # -- the result --------------------------------------------------------------------------------------------

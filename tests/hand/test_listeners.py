@@ -194,6 +194,24 @@ def test_a_listener_that_ends_the_program_at_every_item_leaves_the_fingers_stopp
     assert not gripper.is_moving
 
 
+async def test_a_move_whose_request_ends_the_program_in_a_listener_does_not_begin(
+    hand: RobotiqHand, gripper: SimulatedGripper
+) -> None:
+    """It was written although its call had raised."""
+
+    def end(item: object) -> None:
+        if isinstance(item, Transition) and item.target is State.RUNNING_CC:
+            raise SystemExit
+
+    hand.add_listener(end)
+    writes = len(gripper.writes)
+    with pytest.raises(SystemExit):
+        await hand.move(255, A)
+    for _ in range(5):
+        await anext(hand.statuses())
+    assert len(gripper.writes) == writes
+
+
 async def coroutine(item: object) -> None:
     raise AssertionError("it would never be awaited")
 
