@@ -296,11 +296,9 @@ class Controller:
         return self._stop is not None or self._procedure is not None or not self._requests.pending.is_empty
 
     @property
-    def has_undelivered_stop(self) -> bool:
-        """Whether a halt, a hold or a reset waits for its acknowledgement."""
-        stop = self._stop
-        waits = stop is not None and (not stop.is_delivered or stop.is_early)
-        return waits or self._requests.has_undelivered_hold
+    def has_open_stop(self) -> bool:
+        """Whether a halt or a reset is not over, or a hold waits for its acknowledgement."""
+        return self._stop is not None or self._requests.has_undelivered_hold
 
     def _view(self) -> State:
         """The state: that of the stop or procedure that runs; if none does, what the gripper shows."""

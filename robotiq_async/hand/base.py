@@ -120,8 +120,8 @@ class Hand(Kind):
         It ends within 2 s, even on a dead link and when cancelled: the cancellation is raised once
         the hand has stopped. A link that is down is tried once more. Of several calls at a time the strongest
         counts, whichever comes first: without ``keep_grip``, then with it, then ``halt=False``. A call
-        stronger than those before it has 2 s of its own. A halt or a hold that was not delivered turns
-        ``halt=False`` into a stop with ``keep_grip``.
+        stronger than those before it has 2 s of its own. A halt or a reset that does not show yet, or a hold
+        that was not delivered, turns ``halt=False`` into a stop with ``keep_grip``.
 
         With ``keep_grip`` axes that move are held where they are, and rGTO stays set, so that a grip stays
         while nothing is connected. This needs every axis seen at rest. In any doubt rGTO is cleared after

@@ -130,8 +130,8 @@ class Poller:
         """
         level = StopLevel.of(halt=halt, keep_grip=keep_grip)
         if not self._stopping:
-            # A hold or a halt that was not delivered is dropped with the rest: this stop must replace it.
-            self._level = max(level, StopLevel.KEEP) if self._controller.has_undelivered_stop else level
+            # A halt, a reset or a hold that is not over is dropped with the rest: this stop must replace it.
+            self._level = max(level, StopLevel.KEEP) if self._controller.has_open_stop else level
             self._end_by = self._loop.time() + STOP_S
             if self._polling is not None:
                 self._polling.deadline = self._loop.time() + IN_FLIGHT_S

@@ -203,12 +203,12 @@ def test_a_lost_hold_is_dropped_when_the_gripper_comes_back_reset(scan: Scan) ->
     scan.run(0.5)
     scan.controller.abandon(move)
     scan.controller.lost(None)
-    assert scan.controller.has_undelivered_stop
+    assert scan.controller.has_open_stop
     scan.gripper.write(0, [0x0000])
     scan.now += 0.5
     scan.controller.see(scan.status())
     assert scan.state is State.RESET
-    assert not scan.controller.has_undelivered_stop
+    assert not scan.controller.has_open_stop
 
 
 def test_a_hold_is_dropped_when_another_client_commands_after_the_link_loss(scan: Scan) -> None:

@@ -27,7 +27,7 @@ def answers(hand: Controller, now: float) -> list[object]:
         hand.is_moving,
         hand.is_undecided,
         hand.has_request,
-        hand.has_undelivered_stop,
+        hand.has_open_stop,
         hand.is_busy,
         hand.due(now),
     ]

@@ -302,6 +302,37 @@ async def test_a_halt_or_a_hold_that_was_not_delivered_is_not_lost_with_a_gentle
     assert not gripper.is_moving
 
 
+class Forgetful(Wire):
+    """Acknowledges what it forgets."""
+
+    forgets = False
+
+    def take(self, registers: Registers) -> None:
+        if not self.forgets:
+            super().take(registers)
+
+
+@pytest.mark.parametrize("ask", ["halt", "reset"])
+async def test_a_stop_that_does_not_show_yet_is_not_lost_with_a_gentle_stop(ask: str) -> None:
+    """Acknowledged it was, and forgotten: the fingers moved on after halt() and stop()."""
+    wire = Forgetful()
+    await activate_beforehand(wire.gripper)
+    hand = RobotiqHand(wire)
+    await hand.start()
+    await hand.set_speed(0)
+    await hand.set_position(255)
+    await until(lambda: wire.gripper.position(A) > 20)
+    wire.forgets, written = True, len(wire.written)
+    asking = asyncio.create_task(getattr(hand, ask)())
+    await until(lambda: len(wire.written) > written)
+    await anext(hand.statuses())  # it was acknowledged
+    wire.forgets = False
+    await hand.stop(halt=False)
+    await asyncio.wait({asking})
+    assert isinstance(asking.exception(), NotStartedError)
+    assert not wire.gripper.is_moving
+
+
 async def test_a_gentle_stop_during_a_start_stays_gentle(
     server: SimulatorServer, gripper: SimulatedGripper
 ) -> None:

@@ -104,7 +104,7 @@ def test_an_unsent_request_never_begins(hand: RobotiqHand, wire: Wire, interrupt
         interrupt()
         session = hand._inner._session
         assert session is not None
-        until(lambda: is_caught.is_set() or session.controller.has_undelivered_stop)
+        until(lambda: is_caught.is_set() or session.controller.has_open_stop)
         wire.is_slow = False
 
     before = wire.targets()
