@@ -13,7 +13,7 @@
 # axis that is not addressed keeps its request. It leaves through one gate (gate.py): only the procedure that
 # was asked for raises rACT or rATR, whatever an image carries along from another client or an older one. One
 # race is left: if another client resets the gripper while a status is a device cycle old, an image with rACT
-# activates it [follows]. A stop takes that back; after a command or a hold the activation runs to its end.
+# activates it [follows]. That activation is taken back once it moves an axis, and by a stop at once.
 #
 # One write. A change is merged with others until the next cycle, then taken out and sent once, because it
 # may move an axis. Its acknowledgement answers its callers. It acts within a device cycle; a status shows it;

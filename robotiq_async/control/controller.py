@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
-from ..values.enums import NO_AXES, Finger, Severity, State, StopLevel, Trigger
+from ..values.enums import NO_AXES, Finger, State, StopLevel, Trigger
 from ..values.errors import (
     ConnectionLostError,
     GripperFaultError,
@@ -26,14 +26,14 @@ from ..values.model import THREE_FINGER, Model
 from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .entry import Entry
-from .evidence import FOLLOWS, Evidence, classify
+from .evidence import FOLLOWS, Evidence, classify, is_activating
 from .gate import gate
 from .ledger import NEVER, Ledger
 from .limits import Limits
 from .motion import Move
 from .open_requests import OpenRequests
 from .pending import Command, Pending, merged
-from .procedures import Procedure
+from .procedures import Begun, Procedure
 from .state_machine import RUNNING, StateMachine
 from .stops import Keeping, Stop
 from .waiters import Waiter, fail
@@ -102,8 +102,8 @@ class Controller:
         self._requests: Final = OpenRequests(machine.log)
         self._stop: Stop | None = None
         self._procedure: Procedure | None = None
-        # The write that raised rACT, until what it began has ended: stopping the hand takes it back.
-        self._activation: Entry | None = None
+        # What a write of ours has begun, or may have: stopping the hand takes it back.
+        self._activation: Begun | None = None
         # Why a hand that is being stopped must not leave rGTO set.
         self._why_no_grip = ""
         self._written_at = self._warned = NEVER  # when the last image was given to be written, and a warning
@@ -149,7 +149,7 @@ class Controller:
             waiter.set_result(None)
 
     def halt(self, waiter: Waiter[None]) -> None:
-        """Clear rGTO, unless no axis can move. In a procedure it is a reset.
+        """Clear rGTO, unless no axis can move. It ends no procedure: :meth:`reset` does.
 
         Raises:
             RobotiqError: the hand cannot halt now.
@@ -157,8 +157,6 @@ class Controller:
         if not self.machine.ask(Trigger.ASK_HALT, self.status):
             waiter.set_result(None)
             return
-        if self.is_busy or self._evidence.condition is Trigger.SEEN_BUSY:
-            self._begin_reset(Trigger.ASK_HALT, MoveSupersededError("a halt took over"))
         self._requests.supersede(Finger.ALL, MoveSupersededError("a halt stopped the fingers"))
         if self._stop is None or self._stop.is_delivered:  # a new halt is sent again
             self._stop = Stop(StopLevel.HALT, self._stop)
@@ -335,13 +333,16 @@ class Controller:
         ledger.update(status, asked)
         condition = self._evidence.update(status, asked)
         # This runs at every poll, so it works out only what is waited for.
-        if self._activation is not None:
-            self._note_end_of_activation(self._activation, status)
+        if self._activation is not None and self._activation.is_over(ledger, status):
+            self._activation = None
         if stop is not None:
             self._advance_stop(stop, status)
             if stop.level is not StopLevel.HALT:
                 return  # what shows during a stop is its business, and so is what shows in a procedure
         if condition is None or self.is_busy:
+            return
+        if self._activation is not None and self._activation.is_stray(status):
+            self._take_back("the gripper was reset as it was commanded: its activation is taken back")
             return
         is_news = condition is not before or ledger.match is None
         if is_news and not self._note_news(before, condition, status):
@@ -361,6 +362,8 @@ class Controller:
             self._begin(Trigger.ACTIVATES)
             return False
         if condition is not before:
+            if self._activation is None and is_activating(status) and self._ledger.may_activate(status):
+                self._activation = Begun(self._ledger.last, status)
             self._follow_change(before, condition, status)
         elif condition in FOLLOWS:
             self._adopt_other_client(status)
@@ -371,9 +374,7 @@ class Controller:
     def _advance_stop(self, stop: Stop, status: RobotiqStatus) -> None:
         stop.fail_overdue(self._ledger, status, self.machine.log)
         if stop.has_activated(self._ledger, status):
-            error = NotActivatedError("the gripper was reset as it was stopped: its activation is taken back")
-            self.machine.log.warning("%s", error)
-            self._begin_reset(Trigger.ASK_RESET, error)
+            self._take_back("the gripper was reset as it was stopped: its activation is taken back")
         elif isinstance(stop, Keeping):
             self._advance_keeping(stop)
         elif stop.is_reached(self._ledger, status):
@@ -398,11 +399,11 @@ class Controller:
             self._stop = None
             self.machine.log.info("stopped with rGTO set; in contact: %s", status.contacts or "nothing")
 
-    def _note_end_of_activation(self, activation: Entry, status: RobotiqStatus) -> None:
-        # What shows may be from before it.
-        is_over = classify(status) in (Trigger.SEEN_READY, Trigger.SEEN_RESET)
-        if (is_over or status.fault.severity is Severity.MAJOR) and self._ledger.acts(activation):
-            self._activation = None
+    def _take_back(self, why: str) -> None:
+        """End an activation that nobody has asked for."""
+        error = NotActivatedError(why)
+        self.machine.log.warning("%s", error)
+        self._begin_reset(Trigger.ASK_RESET, error)
 
     def _follow_change(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
         """The condition is another than before: what ends with that, whose image acts, what is held."""
@@ -540,7 +541,7 @@ class Controller:
         entry = self._send(image, Pending(), status, now, of=procedure)
         procedure.written(entry)
         if not procedure.releases:
-            self._activation = entry
+            self._activation = Begun(entry)
         return entry.image
 
     def _next_changes(self, status: RobotiqStatus, now: float) -> Request | None:

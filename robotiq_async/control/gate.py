@@ -26,8 +26,8 @@ def gate(
         releases: whether it begins an automatic release that was asked for.
     """
     # The status may be a device cycle old. If another client resets the gripper within it, rACT passes and
-    # activates [follows]. A stop takes that back (has_activated in stops.py); nothing takes it back after a
-    # command or a hold.
+    # activates [follows]. That is taken back: after a stop has_activated() in stops.py finds it, after a
+    # command or a hold Begun in procedures.py.
     return replace(
         image,
         activate=image.activate and (activates or status.activation_echo),

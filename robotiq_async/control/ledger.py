@@ -149,6 +149,11 @@ class Ledger:
             if each.number < entry.number
         )
 
+    def may_activate(self, status: RobotiqStatus) -> bool:
+        """Whether a write of ours with rACT begins to act only in a status, or a short time before it."""
+        recent = (each for each in self._entries if self.now.time - each.time < WINDOW_S)
+        return any(each.is_ours and each.image.activate and each.echo == status.echo for each in recent)
+
     @property
     def may_set_go(self) -> bool:
         """Whether an image that does not show yet sets rGTO."""

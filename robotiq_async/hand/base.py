@@ -44,8 +44,10 @@ class Hand(Kind):
     * ``speed``: 0 (the slowest) .. 255; None leaves the speed of these axes. In its place ``mm_per_s``,
       millimetres of opening a second.
     * ``force``: 0 (the least, not none) .. 255, not linear; None leaves the force of these axes. In its place
-      ``label_n``, newtons of a label: no measured force.
-    * ``timeout``: seconds above 0; None for twice the expected time plus 2 s.
+      ``label_n``, newtons of a label: no measured force. A speed and a force stay with the axes, also those
+      of a call that was cancelled or superseded: give them where they matter.
+    * ``timeout``: seconds above 0; None for twice the expected time plus 2 s, by the speeds at the call. A
+      move that is slowed down afterwards needs one of its own.
 
     Other amounts become the closest count by :attr:`units` (see there how far to trust them), and are
     refused outside their range. One amount is given once: counts and millimetres together are a TypeError.

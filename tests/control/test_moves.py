@@ -5,7 +5,9 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import Finger, MoveSupersededError, ObjectStatus, State
-from tests.control.scan import POLL_S, Scan, started
+from robotiq_async.control.motion import Move
+from robotiq_async.values.calibration.scales import closing_time
+from tests.control.scan import POLL_S, Outcome, Scan, started
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 
@@ -191,3 +193,32 @@ def test_a_pending_position_is_superseded_by_a_move_that_is_then_cancelled(scan:
     assert scan.positions()[A] < 10
     scan.until(lambda: not scan.controller.is_moving)
     assert abs(scan.positions()[B] - 70) <= 2
+
+
+@pytest.mark.parametrize("is_sent", [False, True])
+@pytest.mark.parametrize("end", ["abandoned", "halted", "superseded"])
+def test_the_speed_and_force_of_a_move_stay_however_it_ends(scan: Scan, end: str, is_sent: bool) -> None:
+    """As if it had been written: its caller cannot know which side of the write the end has met."""
+    move, _ = scan.move(255, A, speed=7, force=200)
+    scan.run(0.1 if is_sent else 0)
+    if end == "abandoned":
+        scan.controller.abandon(move)
+    elif end == "halted":
+        scan.halt()
+    scan.command(A, position=30)
+    scan.run(0.2)
+    scan.until(lambda: not scan.controller.is_moving)
+    (axis, *_) = scan.last_image.axes
+    assert (axis.position, axis.speed, axis.force) == (30, 7, 200)
+
+
+@pytest.mark.parametrize("slower", [False, True])
+def test_the_default_timeout_knows_the_speeds_at_the_call(scan: Scan, slower: bool) -> None:
+    """Of this call, of one before it in the same cycle, and none that comes later."""
+    fast, slow = (closing_time(speed) for speed in (255, 0))
+    scan.command(A, speed=255)
+    if slower:
+        scan.command(A, speed=0)
+    limit = scan.controller.move(Move(255, A, scan.now, Outcome()), None, None)
+    scan.command(A, speed=0)
+    assert limit == pytest.approx(2 * (slow if slower else fast) + 2, rel=0.15)

@@ -1,0 +1,150 @@
+"""Another client resets the gripper as the hand writes: the activation that follows is taken back.
+
+The image of any command has rACT set. If the reset acts just before it, rACT rises, and all fingers go to
+their stops beside the person who has just reset them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import Awaitable, Callable
+
+import pytest
+
+from robotiq_async import Finger, NotActivatedError, RobotiqError, RobotiqHand, State
+from tests.fake_transport import Wire
+from tests.grippers import activate_beforehand
+from tests.virtual import until
+
+pytestmark = pytest.mark.virtual_time
+
+A, B = Finger.A, Finger.B
+AXES = (A, B, Finger.C, Finger.SCISSOR)
+FASTEST = 112
+"""Counts a second of an activation."""
+
+
+async def at_every_status(hand: RobotiqHand) -> None:
+    """A control loop."""
+    position = 100
+    async for _ in hand.statuses():
+        position = 300 - position
+        hand.command(A, position=position)
+
+
+async def cancelled(hand: RobotiqHand) -> None:
+    moving = asyncio.create_task(hand.move(255, A, speed=0))
+    await asyncio.sleep(0.3)
+    moving.cancel()
+    await asyncio.wait({moving})
+
+
+CALLS: dict[str, Callable[[RobotiqHand], Awaitable[object]]] = {
+    "a control loop": at_every_status,
+    "set_position": lambda hand: hand.set_position(40, A),
+    "hold": lambda hand: hand.hold(A),
+    "move": lambda hand: hand.move(40, A),
+    "a cancelled move": cancelled,
+}
+
+
+async def active(device_cycle: float = 0.005) -> tuple[Wire, RobotiqHand]:
+    """A gripper whose finger A moves, and a hand."""
+    wire = Wire(device_cycle=device_cycle)
+    await activate_beforehand(wire.gripper)
+    hand = RobotiqHand(wire)
+    await hand.start()
+    await hand.set_speed(0)
+    await hand.set_position(255, A)
+    await until(lambda: wire.gripper.position(A) > 20)
+    return wire, hand
+
+
+def travels(wire: Wire) -> list[float]:
+    return [wire.gripper.travel(axis) for axis in AXES]
+
+
+async def crossed(wire: Wire, hand: RobotiqHand, call: str, offset: float) -> asyncio.Task[object]:
+    """Another client resets the gripper at a moment of a poll, and the call comes at once."""
+    calling = asyncio.ensure_future(CALLS[call](hand)) if call.startswith("a ") else None
+    await asyncio.sleep(0.297)
+    await anext(hand.statuses())
+    await asyncio.sleep(offset)
+    wire.gripper.write(0, [0])
+    return asyncio.ensure_future(CALLS[call](hand)) if calling is None else calling
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.001, 0.002, 0.004])
+@pytest.mark.parametrize("device_cycle", [0.005, 0.2])
+@pytest.mark.parametrize("call", CALLS)
+async def test_the_gripper_stays_reset(call: str, device_cycle: float, offset: float) -> None:
+    wire, hand = await active(device_cycle)
+    calling = await crossed(wire, hand, call, offset)
+    before = travels(wire)
+    await asyncio.sleep(2)
+    assert hand.state is State.RESET
+    assert not wire.gripper.request_registers[0] & 0x0100
+    # Ten counts prove that it moves; a device cycle each for that and for the reset, and some polls.
+    most = 10 + FASTEST * (2 * device_cycle + 0.06)
+    assert max(now - then for now, then in zip(travels(wire), before, strict=True)) < most
+    error = (await asyncio.gather(calling, return_exceptions=True))[0]
+    assert error is None or isinstance(error, NotActivatedError)
+    with pytest.raises(NotActivatedError):
+        hand.command(A, position=0)
+    await hand.stop()
+
+
+@pytest.mark.parametrize("pause", [0.0, 0.005, 0.02, 0.3])
+@pytest.mark.parametrize("device_cycle", [0.005, 0.2])
+async def test_a_stop_meanwhile_leaves_nothing_moving(device_cycle: float, pause: float) -> None:
+    """Clearing rGTO ends no activation: the fingers went to their stops after the hand had ended."""
+    wire, hand = await active(device_cycle)
+    calling = await crossed(wire, hand, "set_position", 0.002)
+    await asyncio.sleep(pause)
+    await hand.stop()
+    before = travels(wire)
+    await asyncio.sleep(20)
+    assert travels(wire) == before
+    await asyncio.gather(calling, return_exceptions=True)
+
+
+async def test_it_is_logged_and_can_be_activated_again(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.WARNING, logger="robotiq_async")
+    wire, hand = await active()
+    calling = await crossed(wire, hand, "set_position", 0.002)
+    await calling
+    await asyncio.sleep(1)
+    assert hand.state is State.RESET
+    assert "the gripper was reset as it was commanded" in caplog.text
+    await hand.recover()
+    await hand.move(40, A)
+    await hand.stop()
+
+
+@pytest.mark.parametrize("pause", [0.01, 0.05, 0.3])
+async def test_a_client_that_resets_and_activates_it_is_left_alone(pause: float) -> None:
+    wire, hand = await active()
+    await hand.set_position(100, A)
+    await asyncio.sleep(0.1)
+    wire.gripper.write(0, [0x0000])
+    await asyncio.sleep(pause)
+    wire.gripper.write(0, [0x0100])
+    await asyncio.sleep(6)
+    assert hand.state is State.RUNNING_IDLE
+    await hand.stop()
+
+
+async def test_an_emergency_stop_beside_a_control_loop_resets_nothing() -> None:
+    """A reset would drop the part, and the gripper shows what it shows while it activates."""
+    wire, hand = await active()
+    looping = asyncio.create_task(at_every_status(hand))
+    await asyncio.sleep(0.3)
+    wire.gripper.emergency_stop()
+    await asyncio.sleep(2)
+    assert hand.state is State.WF_ACTIVATION
+    assert all(image.activate for image in wire.written)
+    with contextlib.suppress(RobotiqError):
+        await looping
+    await hand.stop()
