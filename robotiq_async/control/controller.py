@@ -102,8 +102,7 @@ class Controller:
         self._requests: Final = OpenRequests(machine.log)
         self._stop: Stop | None = None
         self._procedure: Procedure | None = None
-        # What a write of ours has begun, or may have: stopping the hand takes it back.
-        self._activation: Begun | None = None
+        self._activation: Begun | None = None  # stopping the hand takes it back
         # Why a hand that is being stopped must not leave rGTO set.
         self._why_no_grip = ""
         self._written_at = self._warned = NEVER  # when the last image was given to be written, and a warning
@@ -341,7 +340,7 @@ class Controller:
                 return  # what shows during a stop is its business, and so is what shows in a procedure
         if condition is None or self.is_busy:
             return
-        if self._activation is not None and self._activation.is_stray(status):
+        if condition is Trigger.SEEN_BUSY and self._has_stray_activation(status):
             self._take_back("the gripper was reset as it was commanded: its activation is taken back")
             return
         is_news = condition is not before or ledger.match is None
@@ -362,8 +361,6 @@ class Controller:
             self._begin(Trigger.ACTIVATES)
             return False
         if condition is not before:
-            if self._activation is None and is_activating(status) and self._ledger.may_activate(status):
-                self._activation = Begun(self._ledger.last, status)
             self._follow_change(before, condition, status)
         elif condition in FOLLOWS:
             self._adopt_other_client(status)
@@ -399,11 +396,15 @@ class Controller:
             self._stop = None
             self.machine.log.info("stopped with rGTO set; in contact: %s", status.contacts or "nothing")
 
+    def _has_stray_activation(self, status: RobotiqStatus) -> bool:
+        if self._activation is None and is_activating(status) and self._ledger.may_activate(status):
+            self._activation = Begun(self._ledger.last, status)
+        return self._activation is not None and self._activation.is_stray(status)
+
     def _take_back(self, why: str) -> None:
         """End an activation that nobody has asked for."""
-        error = NotActivatedError(why)
-        self.machine.log.warning("%s", error)
-        self._begin_reset(Trigger.ASK_RESET, error)
+        self.machine.log.warning("%s", why)
+        self._begin_reset(Trigger.ASK_RESET, NotActivatedError(why))
 
     def _follow_change(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
         """The condition is another than before: what ends with that, whose image acts, what is held."""

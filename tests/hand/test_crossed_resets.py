@@ -9,11 +9,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+from collections import deque
 from collections.abc import Awaitable, Callable
 
 import pytest
 
 from robotiq_async import Finger, NotActivatedError, RobotiqError, RobotiqHand, State
+from robotiq_async.values.registers import Registers
 from tests.fake_transport import Wire
 from tests.grippers import activate_beforehand
 from tests.virtual import until
@@ -50,9 +52,8 @@ CALLS: dict[str, Callable[[RobotiqHand], Awaitable[object]]] = {
 }
 
 
-async def active(device_cycle: float = 0.005) -> tuple[Wire, RobotiqHand]:
+async def active(wire: Wire) -> tuple[Wire, RobotiqHand]:
     """A gripper whose finger A moves, and a hand."""
-    wire = Wire(device_cycle=device_cycle)
     await activate_beforehand(wire.gripper)
     hand = RobotiqHand(wire)
     await hand.start()
@@ -80,7 +81,7 @@ async def crossed(wire: Wire, hand: RobotiqHand, call: str, offset: float) -> as
 @pytest.mark.parametrize("device_cycle", [0.005, 0.2])
 @pytest.mark.parametrize("call", CALLS)
 async def test_the_gripper_stays_reset(call: str, device_cycle: float, offset: float) -> None:
-    wire, hand = await active(device_cycle)
+    wire, hand = await active(Wire(device_cycle=device_cycle))
     calling = await crossed(wire, hand, call, offset)
     before = travels(wire)
     await asyncio.sleep(2)
@@ -96,11 +97,37 @@ async def test_the_gripper_stays_reset(call: str, device_cycle: float, offset: f
     await hand.stop()
 
 
+class Trailing(Wire):
+    """gIMC trails the echo by some reads."""
+
+    def __init__(self, reads: int) -> None:
+        super().__init__()
+        self._before: deque[int] = deque(maxlen=reads + 1)
+
+    def shown(self) -> Registers:
+        first, *others = super().shown()
+        self._before.append(first & 0x3000)
+        return (first & ~0x3000 | self._before[0], *others)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.001, 0.002, 0.004])
+@pytest.mark.parametrize("reads", [1, 3])
+async def test_it_is_noticed_although_the_reset_shows_late(reads: int, offset: float) -> None:
+    """While gIMC was still 3, gACT was 0 and 1 again: one condition, and no news."""
+    wire, hand = await active(Trailing(reads))
+    calling = await crossed(wire, hand, "a control loop", offset)
+    await asyncio.sleep(2)
+    assert hand.state is State.RESET
+    assert not wire.gripper.is_moving
+    await asyncio.gather(calling, return_exceptions=True)
+    await hand.stop()
+
+
 @pytest.mark.parametrize("pause", [0.0, 0.005, 0.02, 0.3])
 @pytest.mark.parametrize("device_cycle", [0.005, 0.2])
 async def test_a_stop_meanwhile_leaves_nothing_moving(device_cycle: float, pause: float) -> None:
     """Clearing rGTO ends no activation: the fingers went to their stops after the hand had ended."""
-    wire, hand = await active(device_cycle)
+    wire, hand = await active(Wire(device_cycle=device_cycle))
     calling = await crossed(wire, hand, "set_position", 0.002)
     await asyncio.sleep(pause)
     await hand.stop()
@@ -112,7 +139,7 @@ async def test_a_stop_meanwhile_leaves_nothing_moving(device_cycle: float, pause
 
 async def test_it_is_logged_and_can_be_activated_again(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.WARNING, logger="robotiq_async")
-    wire, hand = await active()
+    wire, hand = await active(Wire())
     calling = await crossed(wire, hand, "set_position", 0.002)
     await calling
     await asyncio.sleep(1)
@@ -125,7 +152,7 @@ async def test_it_is_logged_and_can_be_activated_again(caplog: pytest.LogCapture
 
 @pytest.mark.parametrize("pause", [0.01, 0.05, 0.3])
 async def test_a_client_that_resets_and_activates_it_is_left_alone(pause: float) -> None:
-    wire, hand = await active()
+    wire, hand = await active(Wire())
     await hand.set_position(100, A)
     await asyncio.sleep(0.1)
     wire.gripper.write(0, [0x0000])
@@ -138,7 +165,7 @@ async def test_a_client_that_resets_and_activates_it_is_left_alone(pause: float)
 
 async def test_an_emergency_stop_beside_a_control_loop_resets_nothing() -> None:
     """A reset would drop the part, and the gripper shows what it shows while it activates."""
-    wire, hand = await active()
+    wire, hand = await active(Wire())
     looping = asyncio.create_task(at_every_status(hand))
     await asyncio.sleep(0.3)
     wire.gripper.emergency_stop()
