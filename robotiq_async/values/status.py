@@ -43,7 +43,8 @@ class RobotiqStatus:
 
     Attributes:
         registers: the eight registers as they came.
-        timestamp: monotonic seconds at which the reply arrived.
+        timestamp: monotonic seconds at which the reply was taken in. The gripper gave it at most one exchange
+            earlier. If something held up the event loop in that time, it was waiting, and is older by that.
         sequence: counts every poll of a hand, from 0.
         model: of the gripper.
         stroke: openings by position; by default the model's.
