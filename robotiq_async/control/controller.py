@@ -357,15 +357,15 @@ class Controller:
         """Take in a new condition, or an image that no entry explains; return whether it is to be shown."""
         if self.machine.state in _OFF:
             return False
-        if before is None and condition is Trigger.SEEN_RESET and self.activates:
-            self._begin(Trigger.ACTIVATES)
-            return False
         if condition is not before:
             self._follow_change(before, condition, status)
         elif condition in FOLLOWS:
             self._adopt_other_client(status)
         if self._ledger.match is None and condition not in FOLLOWS:
             self._ledger.adopt(status)  # after a reset or a power cycle no image from before acts [follows]
+        if before is None and condition is Trigger.SEEN_RESET and self.activates:
+            self._begin(Trigger.ACTIVATES)
+            return False
         return True
 
     def _advance_stop(self, stop: Stop, status: RobotiqStatus) -> None:

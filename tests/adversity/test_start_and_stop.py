@@ -32,6 +32,26 @@ async def test_a_start_that_was_cancelled_does_not_disturb_the_next(
     await here.nothing_moves_for(6)
 
 
+@inside(world, poll_interval=0.005)
+@pytest.mark.parametrize("device_cycle", [0.005, 0.05, 0.2])
+@pytest.mark.parametrize("after", [0.04, 0.06, 0.1])
+async def test_a_cancelled_start_at_a_gripper_that_a_program_has_reset_leaves_nothing_moving(
+    here: World, device_cycle: float, after: float
+) -> None:
+    """It showed the image of that reset, which was taken for the one that takes the activation back."""
+    await here.activate_beforehand()
+    await here.hand.start()
+    await here.hand.move(100)
+    await here.hand.reset()
+    await here.hand.stop()
+    await asyncio.sleep(1)
+    here.gripper.device_cycle = device_cycle * here.gripper.speedup
+    with pytest.raises(TimeoutError):
+        async with asyncio.timeout(after):
+            await here.hand.start()
+    await here.nothing_moves_for(6)
+
+
 @inside(world)
 @pytest.mark.parametrize("device_cycle", [0.01, 0.1])
 async def test_an_activation_that_was_cancelled_and_reset_can_be_asked_for_again(
