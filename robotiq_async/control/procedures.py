@@ -76,12 +76,8 @@ class Begun:
 
     def is_over(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether a status shows its end. What shows may be from before it."""
-        if classify(status) in (Trigger.SEEN_READY, Trigger.SEEN_RESET) or (
-            status.fault.severity is Severity.MAJOR
-        ):
-            return ledger.acts(self._entry)
-        is_late = self._first is not None and status.timestamp - self._first.timestamp > WINDOW_S
-        return is_late and not self.is_stray(status)
+        has_ended = classify(status) in (Trigger.SEEN_READY, Trigger.SEEN_RESET)
+        return (has_ended or status.fault.severity is Severity.MAJOR) and ledger.acts(self._entry)
 
     def is_stray(self, status: RobotiqStatus) -> bool:
         """Whether nobody has asked for it, and it moves an axis."""

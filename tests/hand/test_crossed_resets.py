@@ -137,6 +137,22 @@ async def test_a_stop_meanwhile_leaves_nothing_moving(device_cycle: float, pause
     await asyncio.gather(calling, return_exceptions=True)
 
 
+@pytest.mark.parametrize("stop", [False, True])
+async def test_closed_fingers_do_not_open(stop: bool) -> None:
+    """An activation closes them first: they did not move for two seconds."""
+    wire, hand = await active(Wire())
+    await hand.close(speed=255)
+    calling = await crossed(wire, hand, "set_position", 0.002)
+    await asyncio.sleep(1)
+    if stop:
+        await hand.stop()
+    await asyncio.sleep(6)
+    assert wire.gripper.position(B) > 200
+    assert not wire.gripper.is_moving
+    await asyncio.gather(calling, return_exceptions=True)
+    await hand.stop()
+
+
 async def test_it_is_logged_and_can_be_activated_again(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.WARNING, logger="robotiq_async")
     wire, hand = await active(Wire())
