@@ -219,7 +219,9 @@ class RobotiqHand(Hand):
             await session.ended()  # stop() was called, and with its own arguments
             raise
         except BaseException:
-            await self.stop(halt=session.counters.has_begun_to_write)  # else another client moves the fingers
+            if not session.is_over:  # if it is, a listener may have started the next one
+                halt = session.counters.has_begun_to_write  # else another client moves the fingers
+                await session.stop(halt=halt, keep_grip=self._keep_grip)
             raise
 
     async def _stop(self, halt: bool, keep_grip: bool) -> None:

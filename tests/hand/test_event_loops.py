@@ -13,10 +13,11 @@ from typing import Any
 
 import pytest
 
-from robotiq_async import Finger, NotStartedError, RobotiqHand, State
+from robotiq_async import ConnectFailedError, Finger, NotStartedError, RobotiqHand, State, Transition
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.calls import COMMANDS, called
 from tests.patience import patience
+from tests.virtual import run
 
 ROOT = Path(__file__).parents[2]
 
@@ -73,6 +74,29 @@ def test_a_loop_whose_timer_handles_cannot_tell_their_time_runs_a_hand() -> None
 
     with asyncio.Runner(loop_factory=_ForeignLoop) as runner:
         runner.run(program())
+
+
+@pytest.mark.skipif(sys.version_info < (3, 12), reason="has no eager tasks")
+def test_a_start_that_failed_does_not_stop_the_next_one_of_a_listener() -> None:
+    """An eager task starts in the listener itself, before the failed call goes on."""
+
+    async def program() -> None:
+        loop = asyncio.get_running_loop()
+        loop.set_task_factory(getattr(asyncio, "eager_task_factory"))  # noqa: B009  # mypy checks for 3.11
+        hand, again = RobotiqHand("tcp://127.0.0.1:1"), list[asyncio.Task[None]]()
+
+        def start_again(item: object) -> None:
+            if isinstance(item, Transition) and item.target is State.SHUTDOWN and not again:
+                again.append(loop.create_task(hand.start(wait=1.0)))
+
+        hand.add_listener(start_again)
+        began = loop.time()
+        for starting in (hand.start(), None):
+            with pytest.raises(ConnectFailedError):
+                await (starting or again[0])
+        assert loop.time() - began > 0.9
+
+    run(program)
 
 
 async def test_the_advice_works(hand: RobotiqHand, gripper: SimulatedGripper) -> None:
