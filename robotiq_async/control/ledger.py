@@ -413,7 +413,7 @@ class Ledger:
             echo [manual 2014, p. 50], so an image with rATR counts as not shown by a gripper that follows
             requests.
         """
-        image, time = self.base, self.now.time
+        image, time = self.base, self._entries[-1].time
         self._adoption = None
         number = self._entries[-1].number + 1
         self.shown = self.match = Entry(number, image, image, status.echo, True, time, time, LONG_AGO)
