@@ -29,7 +29,6 @@ from .entry import Entry
 from .evidence import FOLLOWS, Evidence, classify, is_activating
 from .gate import gate
 from .ledger import NEVER, Ledger
-from .limits import Limits
 from .motion import Move
 from .open_requests import OpenRequests
 from .pending import Command, Pending, merged
@@ -95,7 +94,7 @@ class Controller:
         self.status: RobotiqStatus | None = None
         self.activates = False
         self.foreign_commands = 0
-        self._ledger: Final = Ledger(speed, force, model, Limits(machine.log))
+        self._ledger: Final = Ledger(speed, force, model, machine.log)
         self._closing_time: Final = closing_time
         self._spacing: Final = write_spacing
         self._evidence: Final = Evidence(machine.log)
@@ -349,7 +348,7 @@ class Controller:
         if condition is Trigger.SEEN_READY:
             ledger.update_rest(status)
             if self._requests.moves:
-                self._requests.moves.end_arrived(status, ledger.acts, ledger.resting, ledger.limited)
+                self._requests.moves.end_arrived(status, ledger.acts, ledger.resting, ledger.limits.limited)
         if condition is not before:
             self._update_state(condition)
 
@@ -450,12 +449,12 @@ class Controller:
         if status.timestamp - self._warned >= WARNING_S:
             self._warned = status.timestamp
             self.machine.log.warning("another client commands the gripper: %r", status)
-        ledger.note_other_client()
+        ledger.limits.note_other_client(ledger.now.time)
         ledger.adopt(status)
         self._requests.pending.hold_only(ledger.ours)
         self._requests.moves.fail(
             MoveSupersededError("another client commands the gripper"),
-            lambda move: move.entry is not None and not move.is_under(status, ledger.limited),
+            lambda move: move.entry is not None and not move.is_under(status, ledger.limits.limited),
             left=Finger.ALL,
         )
 

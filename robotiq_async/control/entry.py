@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..values.enums import NO_AXES, Finger
 from ..values.registers import Echo
 from ..values.request import Request
-from ..values.status import RobotiqStatus
 from .rest import Asked, Moment
 
 
@@ -69,45 +68,3 @@ class Entry:
         """The request that it replaces: unknown before another client's, if rGTO was clear."""
         known = self.before if self.before.go or self.is_ours else self.image
         return Asked(known.position(axis) if known.go else None)
-
-
-class NoLimits:
-    """A gripper that echoes each request as it was written. The base of software limits (see limits.py).
-
-    Attributes:
-        limited: the limit that the gripper shows in place of the last request, by axis.
-    """
-
-    def __init__(self) -> None:
-        self.limited: dict[Finger, int] = {}
-
-    @property
-    def has_alias(self) -> bool:
-        """Whether an entry that has not shown may show as another echo than its own."""
-        return False
-
-    def written(self, entry: Entry, moved: Finger) -> None:
-        """An entry is about to be sent, with new positions for some axes."""
-
-    def shows(self, entry: Entry, echo: Echo, *, is_new: bool, now: float) -> bool:  # noqa: ARG002
-        """Whether an echo that is not that of the entry shows it all the same."""
-        return False
-
-    def explains(
-        self,
-        shown: Entry,  # noqa: ARG002
-        waiting: Sequence[Entry],  # noqa: ARG002
-        status: RobotiqStatus,  # noqa: ARG002
-        now: float,  # noqa: ARG002
-    ) -> bool:
-        """Whether a status that shows no entry may show one of those that wait."""
-        return False
-
-    def settle(self, entry: Entry, last: Entry, echo: Echo) -> None:
-        """An entry shows for the first time; ``last`` is the newest one."""
-
-    def rests(self, axis: Finger, status: RobotiqStatus) -> None:
-        """An axis has come to rest."""
-
-    def note_other_client(self, now: float) -> None:
-        """Another client was seen."""

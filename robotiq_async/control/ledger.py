@@ -22,17 +22,19 @@ No I/O and no clock: time is that of the newest status.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import chain
 from typing import Final
 
+from ..runtime.log import Log, log
 from ..values.enums import NO_AXES, Finger, ObjectStatus
 from ..values.model import THREE_FINGER, Model
 from ..values.registers import Echo
 from ..values.request import AxisRequest, Request
 from ..values.status import RobotiqStatus
 from .adoption import Adoption
-from .entry import Entry, NoLimits
+from .entry import Entry
+from .limits import Limits
 from .rest import LONG_AGO, Asked, Grips, Moment, Rest, may_move, rest_of
 
 WINDOW_S: Final = 0.5
@@ -51,7 +53,7 @@ class Ledger:
         speed: what every axis gets until set otherwise, 0..255.
         force: what every axis gets until set otherwise, 0..255.
         model: of the gripper.
-        limits: software limits that a gripper may echo in place of requests.
+        log: gets its software limits.
 
     Attributes:
         shown: the newest entry that has shown.
@@ -61,11 +63,10 @@ class Ledger:
         ours: the axes that may move because of us: we gave them their position.
         unrested: the axes that are not known to have come to rest under their last request.
         grips: the contacts when rGTO was last set.
+        limits: the software limits that the gripper shows.
     """
 
-    def __init__(
-        self, speed: int, force: int, model: Model = THREE_FINGER, limits: NoLimits | None = None
-    ) -> None:
+    def __init__(self, speed: int, force: int, model: Model = THREE_FINGER, log: Log = log) -> None:
         first = Request(axes=(AxisRequest(0, speed, force),) * len(model.axes), model=model)
         self.shown = Entry(0, first, first, first.echo, False, NEVER, NEVER, LONG_AGO)
         self.match: Entry | None = None
@@ -73,8 +74,8 @@ class Ledger:
         self.ours = NO_AXES
         self.unrested = NO_AXES
         self.grips: Final = Grips()
+        self.limits: Final = Limits(log)
         self._model: Final = model
-        self._limits: Final = NoLimits() if limits is None else limits
         # Those that a status may show.
         self._entries = deque([self.shown])
         # Those before them. No status shows them, but a late gDT may be from their time.
@@ -122,11 +123,6 @@ class Ledger:
     def resting(self) -> Finger:
         """The axes that are known to rest under their last request, and those that the model lacks."""
         return Finger.ALL & ~self.unrested
-
-    @property
-    def limited(self) -> Mapping[Finger, int]:
-        """The limit that the gripper shows in place of the last request, by axis."""
-        return self._limits.limited
 
     def acts(self, entry: Entry | None = None) -> bool:
         """Whether the image of an entry, or of a later one, acts by now; None for the last one.
@@ -204,7 +200,7 @@ class Ledger:
         before = self.base
         self._freeze(before)
         entry = Entry(self._entries[-1].number + 1, image, before, image.echo, is_ours=True, sent=now)
-        self._limits.written(entry, moved)
+        self.limits.written(entry, moved)
         self.grips.forget(moved)  # a new position may let go
         self._note_asked(entry)
         self.ours |= moved
@@ -266,7 +262,7 @@ class Ledger:
 
     def _shows_still(self, shown: Entry) -> bool:
         """Whether an echo of the entry shown before is its own, although others wait."""
-        return shown.number >= self._entries[0].number and not self._limits.has_alias
+        return shown.number >= self._entries[0].number and not self.limits.has_alias
 
     def _raise_floor(self) -> None:
         """Take the entries that were replaced longer than WINDOW_S ago out of those that a status may show.
@@ -299,26 +295,31 @@ class Ledger:
 
     def _find(self, status: RobotiqStatus) -> Entry | None:
         """The entry that a status shows, perhaps with software limits in place of its requests."""
-        found = self._entry_of(status)
-        if found is None and self._is_limit(self._waiting(), status):
-            # Even so it may have to wait: while the echo has not changed, the write may not act yet.
-            found = self._entry_of(status)
-        return found
+        found = self._entry_of(status.echo)
+        # A write in doubt may not have arrived: then another client explains the echo better.
+        if found is not None or self._has_doubtful:
+            return found
+        if not self.limits.explains(self.shown, self._waiting(), status, self.now.time):
+            return None
+        # Even so it may have to wait: while the echo has not changed, the write may not act yet.
+        return self._entry_of(status.echo)
 
-    def _entry_of(self, status: RobotiqStatus) -> Entry | None:
-        """Of the entries that fit the echo the first after the one shown before."""
+    def _entry_of(self, echo: Echo) -> Entry | None:
+        """Of the entries that fit an echo the first after the one shown before."""
         # A control loop leaves a hundred entries in the window. Those that wait are few, and looked at first.
-        newer = next((each for each in self._waiting() if self._fits(each, status.echo)), None)
-        if newer is not None:
-            self._show(newer, status.echo)
-            return newer
-        return next((each for each in self._entries if self._fits(each, status.echo)), None)
+        for each in self._waiting():
+            if each.echo == echo or self._shows_limit(each, echo):
+                self._show(each, echo)
+                return each
+        return next((each for each in self._entries if each.echo == echo), None)
 
-    def _fits(self, entry: Entry, echo: Echo) -> bool:
-        """Whether an echo shows an entry, or the software limits in place of its requests."""
-        if entry.echo == echo or not self._limits.has_alias:
-            return entry.echo == echo
-        return self._limits.shows(entry, echo, is_new=self.shown.echo != echo, now=self.now.time)
+    def _shows_limit(self, entry: Entry, echo: Echo) -> bool:
+        # If the gripper showed the same echo before, the write may not act yet: then wait for SILENT_S.
+        if self.shown.echo == echo and (
+            entry.acknowledged is None or self.now.time - entry.acknowledged < SILENT_S
+        ):
+            return False
+        return self.limits.shows(entry, echo)
 
     def _waiting(self) -> list[Entry]:
         """The entries after the one that shows, the oldest first."""
@@ -334,7 +335,7 @@ class Ledger:
         if entry.is_doubtful:
             self._revive(entry)
         self.shown = entry
-        self._limits.settle(entry, self._entries[-1], echo)
+        self.limits.settle(entry, self._entries[-1], echo)
 
     def _revive(self, entry: Entry) -> None:
         """An entry in doubt acts after all, and so will those that were acknowledged after it.
@@ -367,11 +368,6 @@ class Ledger:
         )
         self._has_doubtful = any(each.is_doubtful for each in self._entries)
 
-    def _is_limit(self, waiting: list[Entry], status: RobotiqStatus) -> bool:
-        # A write in doubt may not have arrived: then another client explains the echo better.
-        is_known = not any(each.is_doubtful for each in waiting)
-        return is_known and self._limits.explains(self.shown, waiting, status, self.now.time)
-
     def adopt(self, status: RobotiqStatus, *, is_found: bool = False) -> None:
         """Add an entry for the image that a status shows, as no other explains it; the next is made from it.
 
@@ -400,10 +396,6 @@ class Ledger:
         self._has_doubtful = bool(waiting)
         self.grips.forget()
         self._forget_past()
-
-    def note_other_client(self) -> None:
-        """Another client was seen."""
-        self._limits.note_other_client(self.now.time)
 
     def restart(self, status: RobotiqStatus) -> bool:
         """A procedure has ended: the gripper has its last image, and no other write is on its way.
@@ -459,7 +451,7 @@ class Ledger:
             rest = rest_of(self._asked(axis), self._model, what, position)
             if rest is not Rest.UNKNOWN and axis & self.unrested:
                 self.unrested &= ~axis
-                self._limits.rests(axis, status)
+                self.limits.note_rest(axis, status)
             if rest is Rest.PROVEN:
                 self._unproven &= ~axis
 

@@ -16,6 +16,7 @@ position at which the axis came to rest, and not with MoveSupersededError.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -25,8 +26,7 @@ from ..values.model import TOLERANCE
 from ..values.registers import Echo
 from ..values.request import Request
 from ..values.status import RobotiqStatus
-from .entry import Entry, NoLimits
-from .ledger import NEVER, SILENT_S
+from .entry import Entry
 
 ALONE_S: Final = 10.0
 """If another client was seen within this time, it explains the echo better than a limit."""
@@ -36,41 +36,45 @@ FIRST_POSITION: Final = 2
 """Index of the first position in an echo."""
 
 
-class Limits(NoLimits):
-    """The limits that have been echoed in place of requests."""
+class Limits:
+    """The limits that have been echoed in place of requests.
+
+    Attributes:
+        limited: the limit that the gripper shows in place of the last request, by axis.
+    """
 
     def __init__(self, log: Log = log) -> None:
-        super().__init__()
-        self._log = log
+        self.limited: dict[Finger, int] = {}
+        self._log: Final = log
         # The limit by axis and whether it limits closing.
         self._known: dict[tuple[Finger, bool], int] = {}
         self._proven: set[tuple[Finger, bool]] = set()
         # The echo of an entry under the known limits, until it shows.
         self._aliases: dict[Entry, Echo] = {}
-        self._others_at = NEVER
+        self._others_at = -math.inf
 
     # -- what the ledger asks --------------------------------------------------------------------------
 
     @property
     def has_alias(self) -> bool:
+        """Whether an entry that has not shown may show as another echo than its own."""
         return bool(self._aliases)
 
     def written(self, entry: Entry, moved: Finger) -> None:
+        """An entry is about to be sent, with new positions for some axes."""
         if self.limited:
             self.limited = {axis: at for axis, at in self.limited.items() if axis not in moved}
         self._note_alias(entry)
 
-    def shows(self, entry: Entry, echo: Echo, *, is_new: bool, now: float) -> bool:
-        # If the gripper showed the same echo before, the write may not act yet: then wait for SILENT_S.
-        if self._aliases.get(entry) != echo:
-            return False
-        return is_new or (entry.acknowledged is not None and now - entry.acknowledged >= SILENT_S)
+    def shows(self, entry: Entry, echo: Echo) -> bool:
+        """Whether an echo shows an entry with limits in place of its requests."""
+        return self._aliases.get(entry) == echo
 
     def explains(self, shown: Entry, waiting: Sequence[Entry], status: RobotiqStatus, now: float) -> bool:
-        if now - self._others_at <= ALONE_S:
-            return False
+        """Whether limits explain a status that shows no entry; they are known from then on."""
         # Any of those that wait may be the one: a slow gripper skips images [follows].
-        if not any(self.learn(shown.image, each.image, status) for each in waiting):
+        is_alone = now - self._others_at > ALONE_S
+        if not is_alone or not any(self.learn(shown.image, each.image, status) for each in waiting):
             return False
         for each in waiting:
             self._note_alias(each)
@@ -78,23 +82,29 @@ class Limits(NoLimits):
 
     def settle(self, entry: Entry, last: Entry, echo: Echo) -> None:
         """If an entry shows as limits in place of requests, make it an entry of these limits."""
-        if echo == entry.echo:
-            self.forget(entry.image)
-        else:
-            # Later entries with the same request would echo the limit as well; the last is the base.
-            for axis, limit in self.apply(entry.image).items():
-                if last.image.position(axis) == entry.image.position(axis):
-                    self.limited[axis] = limit
-                    if last is not entry:
-                        last.limit({axis: limit})
-            entry.limit(self.apply(entry.image), echo)
+        limits = self.apply(entry.image)
         self._aliases = {each: alias for each, alias in self._aliases.items() if each.number > entry.number}
+        if echo == entry.echo:  # it is refuted by an image that shows as it was written
+            self._known = {key: limit for key, limit in self._known.items() if key[0] not in limits}
+            return
+        # Later entries with the same request would echo the limit as well; the last is the base.
+        for axis, limit in limits.items():
+            if last.image.position(axis) == entry.image.position(axis):
+                self.limited[axis] = limit
+                if last is not entry:
+                    last.limit({axis: limit})
+        entry.limit(limits, echo)
 
-    def rests(self, axis: Finger, status: RobotiqStatus) -> None:
-        if axis in self.limited and status.finger_status(axis) is ObjectStatus.AT_POSITION:
-            limit = self.prove(axis, status.position(axis))
-            if limit is not None:
+    def note_rest(self, axis: Finger, status: RobotiqStatus) -> None:
+        """An axis has come to rest: at its limit it proves that."""
+        if axis not in self.limited or status.finger_status(axis) is not ObjectStatus.AT_POSITION:
+            return
+        for key, limit in self._known.items():
+            is_news = key[0] is axis and key not in self._proven
+            if is_news and abs(limit - status.position(axis)) <= TOLERANCE:
+                self._proven.add(key)
                 self._log.info("the gripper replaces requests of %s by its limit %d", axis, limit)
+                return
 
     def note_other_client(self, now: float) -> None:
         """Drop the limits that no axis has proven: they may be the other client's requests."""
@@ -119,10 +129,7 @@ class Limits(NoLimits):
     def learn(self, before: Request, image: Request, status: RobotiqStatus) -> bool:
         """Learn the differences between a write and a status as limits; return whether they can be limits.
 
-        Args:
-            before: the image in force before the write.
-            image: the image written.
-            status: the first status that shows neither.
+        ``before`` is the image in force before the write; the status is the first that shows neither.
         """
         echo = status.echo
         if echo[:FIRST_POSITION] != image.echo[:FIRST_POSITION] or not image.go:
@@ -138,19 +145,6 @@ class Limits(NoLimits):
         self._known |= found
         self._proven -= set(found)
         return bool(found)
-
-    def prove(self, axis: Finger, position: int) -> int | None:
-        """The limit that an axis newly proves by coming to rest there, if any."""
-        for key, limit in self._known.items():
-            if key[0] is axis and key not in self._proven and abs(limit - position) <= TOLERANCE:
-                self._proven.add(key)
-                return limit
-        return None
-
-    def forget(self, image: Request) -> None:
-        """Drop the limits that a status refutes by showing an image as it was written."""
-        beyond = self.apply(image)
-        self._known = {key: limit for key, limit in self._known.items() if key[0] not in beyond}
 
 
 def _may_be_limit(axis: Finger, request: int, shown: int, status: RobotiqStatus) -> bool:

@@ -7,6 +7,7 @@ import logging
 import pytest
 
 from robotiq_async import ConnectionLostError, Finger, MoveSupersededError, ObjectStatus, State
+from robotiq_async.control.entry import Entry
 from robotiq_async.control.limits import ALONE_S, Limits
 from robotiq_async.simulator import Habits
 from robotiq_async.values.model import THREE_FINGER
@@ -269,18 +270,27 @@ def test_a_halt_and_a_reset_by_others_are_no_limits(byte_0: int) -> None:
     assert not Limits().learn(BEFORE, image, status)
 
 
-def test_unproven_limits_are_dropped_when_another_client_is_seen() -> None:
+def shown(limits: Limits, image: Request) -> None:
+    """The gripper echoes an image as it was written."""
+    entry = Entry(1, image, BEFORE, image.echo, is_ours=True, sent=0.0)
+    limits.settle(entry, entry, image.echo)
+
+
+def test_unproven_limits_are_dropped_when_another_client_is_seen(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO)
     limits, image = Limits(), BEFORE.with_positions({S: 255})
     status = status_of(0x39, 0xFF, echo=(0, 0, 0, 220), position=130)
     assert limits.learn(BEFORE, image, status)
     limits.note_other_client(0.0)
     assert not limits.apply(image)
     assert limits.learn(BEFORE, image, status)
-    assert limits.prove(S, 219) == 220
-    assert limits.prove(S, 219) is None, "no news"
+    limits.limited[S] = 220
+    for _ in range(2):
+        limits.note_rest(S, status_of(0x39, 0xFF, echo=(0, 0, 0, 220), position=219))
+    assert caplog.text.count("its limit 220") == 1, "no news"
     limits.note_other_client(0.0)
     assert limits.apply(image) == {S: 220}
-    limits.forget(image)
+    shown(limits, image)
     assert not limits.apply(image)
 
 
@@ -288,9 +298,9 @@ def test_unproven_limits_are_dropped_when_another_client_is_seen() -> None:
 def test_a_request_at_a_limit_does_not_refute_it_and_one_beyond_does(asked: int, limit: int) -> None:
     limits, beyond, at = Limits(), BEFORE.with_positions({S: asked}), BEFORE.with_positions({S: limit})
     assert limits.learn(BEFORE, beyond, status_of(0x39, 0xFF, echo=(0, 0, 0, limit), position=130))
-    limits.forget(at)
+    shown(limits, at)
     assert limits.apply(beyond) == {S: limit}
-    limits.forget(beyond)
+    shown(limits, beyond)
     assert not limits.apply(beyond)
 
 
