@@ -35,7 +35,7 @@ from .pending import Command, Pending, merged
 from .procedures import Begun, Procedure
 from .state_machine import RUNNING, StateMachine
 from .stops import Keeping, Stop
-from .waiters import Waiter, fail
+from .waiters import Waiter, fail, resolve
 
 WARNING_S: Final = 1.0
 """Seconds between two warnings about another client."""
@@ -348,7 +348,7 @@ class Controller:
         if condition is Trigger.SEEN_READY:
             ledger.update_rest(status)
             if self._requests.moves:
-                self._requests.moves.end_arrived(status, ledger.acts, ledger.resting, ledger.limits.limited)
+                self._requests.moves.end_arrived(status, ledger)
         if condition is not before:
             self._update_state(condition)
 
@@ -564,7 +564,7 @@ class Controller:
         if not pending.has_changes and gate(image, status) == base:
             # No axis moves. If an earlier write does not act yet, one may begin to: ask again then.
             if ledger.acts():
-                self._requests.nothing_to_send()
+                resolve(self._requests.taken().waiters)
                 self._update_state(Trigger.DELIVERED)
             return None
         return self._send(image, self._requests.taken(), status, now).image

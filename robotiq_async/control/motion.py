@@ -13,6 +13,7 @@ from ..values.errors import RobotiqError
 from ..values.move_result import MoveResult
 from ..values.status import RobotiqStatus
 from .entry import Entry
+from .ledger import Ledger
 from .waiters import Waiter, fail
 
 MARGIN_S: Final = 2.0
@@ -135,28 +136,15 @@ class LiveMoves:
             if move.entry is None:
                 move.written(entry)
 
-    def end_arrived(
-        self,
-        status: RobotiqStatus,
-        acts: Callable[[Entry], bool],
-        resting: Finger,
-        limited: Mapping[Finger, int],
-    ) -> None:
-        """End the moves that a status shows to have arrived.
-
-        Args:
-            status: the newest one.
-            acts: whether a write acts.
-            resting: the axes that are known to rest under their last request.
-            limited: the limit that the gripper shows in place of the request, by axis.
-        """
+    def end_arrived(self, status: RobotiqStatus, ledger: Ledger) -> None:
+        """End the moves that a status shows to have arrived."""
         for move in self._moves[:]:
             if move.entry is None:
                 continue
             move.note_currents(status)
-            if acts(move.entry) and move.has_arrived(status, resting, limited):
+            if ledger.acts(move.entry) and move.has_arrived(status, ledger.resting, ledger.limits.limited):
                 self._moves.remove(move)
-                self._warn_of_unreached(move, move.end(status), limited)
+                self._warn_of_unreached(move, move.end(status), ledger.limits.limited)
 
     def _warn_of_unreached(self, move: Move, result: MoveResult, limited: Mapping[Finger, int]) -> None:
         """Warn once if a gripper shows "at position" and stands far from where it was asked to go.

@@ -68,10 +68,6 @@ class OpenRequests:
         sent, self._sent = self._sent, Pending()
         resolve(sent.waiters)
 
-    def nothing_to_send(self) -> None:
-        """Everything pending is in force already."""
-        resolve(self.taken().waiters)
-
     def fail_motions(self, error: RobotiqError) -> None:
         """Fail everything that would move an axis, sent or not; holds that callers have named remain."""
         self.pending.drop_changes(error)

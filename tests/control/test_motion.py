@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.control.entry import Entry
 from robotiq_async.control.ledger import Ledger
 from robotiq_async.control.motion import LiveMoves, Move
 from robotiq_async.values.calibration.scales import closing_time
@@ -192,13 +191,10 @@ def test_any_move_may_take_at_least_the_margin_and_at_most_the_slowest_full_stro
 
 # -- the moves that run ------------------------------------------------------------------------------------
 
-ENTRY = Ledger(128, 64).last
+LEDGER = Ledger(128, 64)
+ENTRY = LEDGER.last
 ARRIVED = status_of(0xF9, 0xFF, echo=255, current=7)
 MOVING = status_of(0x39, 0x00, echo=255, current=9)
-
-
-def acts(_: Entry) -> bool:
-    return True
 
 
 def live(*each: Move) -> LiveMoves:
@@ -212,10 +208,10 @@ def test_a_move_that_was_not_written_yet_does_not_end() -> None:
     """The axes may rest where a move before this one has brought them."""
     each, outcome = move()
     moves = live(each)
-    moves.end_arrived(ARRIVED, acts, Finger.ALL, {})
+    moves.end_arrived(ARRIVED, LEDGER)
     assert not outcome.answers
     moves.written(ENTRY)
-    moves.end_arrived(ARRIVED, acts, Finger.ALL, {})
+    moves.end_arrived(ARRIVED, LEDGER)
     assert outcome.result.positions == {A: 0, B: 0, C: 0}
     assert not moves
 
@@ -223,20 +219,22 @@ def test_a_move_that_was_not_written_yet_does_not_end() -> None:
 def test_a_move_whose_write_does_not_act_yet_does_not_end() -> None:
     each, outcome = move()
     moves = live(each)
-    moves.written(ENTRY)
-    moves.end_arrived(ARRIVED, lambda entry: entry is not ENTRY, Finger.ALL, {})
+    ledger = Ledger(128, 64)
+    moves.written(ledger.write(ledger.base, A, 1.0))
+    moves.end_arrived(ARRIVED, ledger)
     assert not outcome.answers
-    moves.end_arrived(ARRIVED, lambda entry: entry is ENTRY, Finger.ALL, {})
+    ledger.acknowledge(1.0)
+    moves.end_arrived(ARRIVED, ledger)
     assert outcome.is_answered
 
 
 def test_a_move_takes_in_currents_from_its_write_on() -> None:
     each, outcome = move()
     moves = live(each)
-    moves.end_arrived(status_of(0x39, 0x00, echo=255, current=99), acts, Finger.ALL, {})
+    moves.end_arrived(status_of(0x39, 0x00, echo=255, current=99), LEDGER)
     moves.written(ENTRY)
-    moves.end_arrived(MOVING, acts, Finger.ALL, {})
-    moves.end_arrived(ARRIVED, acts, Finger.ALL, {})
+    moves.end_arrived(MOVING, LEDGER)
+    moves.end_arrived(ARRIVED, LEDGER)
     assert set(outcome.result.peak_current_ma.values()) == {90}
 
 
@@ -253,7 +251,7 @@ def test_every_move_that_has_arrived_ends_and_the_others_go_on() -> None:
     (first, one), (second, other), (third, goes_on) = move(axes=A), move(axes=B), move(100, C)
     moves = live(first, second, third)
     moves.written(ENTRY)
-    moves.end_arrived(ARRIVED, acts, Finger.ALL, {})
+    moves.end_arrived(ARRIVED, LEDGER)
     assert one.is_answered
     assert other.is_answered
     assert not goes_on.answers
@@ -296,7 +294,7 @@ def test_a_move_has_left_when_its_outcome_is_handed_over(how: str) -> None:
     moves = live(each)
     moves.written(ENTRY)
     if how == "end":
-        moves.end_arrived(ARRIVED, acts, Finger.ALL, {})
+        moves.end_arrived(ARRIVED, LEDGER)
     else:
         moves.fail(MoveSupersededError("now"))
     assert was_under_way == [False]
