@@ -26,22 +26,19 @@ class Adoption:
     """Follows an adopted gripper until the hand writes its own first image.
 
     Args:
-        first: the first status after the adoption.
-        now: when it was asked for; None for the time of the reply.
+        first: the first status after the adoption, asked for at ``now``.
         since: when the time begins that a moving axis has to show its direction, and a late object status to
-            come; None for the same time.
+            come.
     """
 
-    def __init__(self, first: RobotiqStatus, now: Moment | None = None, since: Moment | None = None) -> None:
-        self._first = first
-        self._latest = first
-        self._now = Moment(first.timestamp, 0) if now is None else now
-        self.since = self._now if since is None else since
+    def __init__(self, first: RobotiqStatus, now: Moment, since: Moment) -> None:
+        self.since: Final = since
+        self._first: Final = first
+        self._latest, self._now = first, now
 
-    def update(self, status: RobotiqStatus, now: Moment | None = None) -> None:
+    def update(self, status: RobotiqStatus, now: Moment) -> None:
         """Take in the next status, and when it was asked for."""
-        self._latest = status
-        self._now = Moment(status.timestamp, self._now.reads + 1) if now is None else now
+        self._latest, self._now = status, now
 
     @property
     def is_certain(self) -> bool:

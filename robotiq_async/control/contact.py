@@ -9,14 +9,9 @@ from ..values.status import RobotiqStatus
 
 
 def agrees(model: Model, request: int, what: ObjectStatus, position: int, direction: int) -> bool:
-    """Whether what an axis shows can result from this request.
+    """Whether what an axis shows at a position can result from a request; positions are in counts.
 
-    Args:
-        model: of the gripper.
-        request: position request in counts.
-        what: the object status of the axis.
-        position: where it is, in counts.
-        direction: above 0 closing, below 0 opening, 0 unknown; used only while it moves.
+    ``direction`` is above 0 closing, below 0 opening, 0 unknown; it is used only while the axis moves.
     """
     # gDT says that an axis has stopped before its request, and in which direction it was going [manual 2014,
     # p. 51; 2018, p. 39]. One at its request may be off by the model's tolerance [manual: up to 2 counts].
@@ -35,12 +30,7 @@ def drifts(axis: Finger, base: Request, status: RobotiqStatus, may_move: Finger 
 
     An axis in contact keeps its request, and with it its grip; so does one at rest where it was asked to be.
     An axis may still show what the request before this one made it do: then the two disagree.
-
-    Args:
-        axis: the axis.
-        base: the image that acts, or is about to.
-        status: the newest status.
-        may_move: the axes that show rest, and may move because of an earlier request.
+    ``may_move`` has the axes that show rest, and may move because of an earlier request.
     """
     if not base.go:
         return False  # rGTO = 0 stops every axis [manual 2014, p. 50]

@@ -107,9 +107,10 @@ class Controller:
         self._written_at = self._warned = NEVER  # when the last image was given to be written, and a warning
 
     # -- what is asked ---------------------------------------------------------------------------------
+    # Each call raises the error by which the state machine refuses it. A refusal changes nothing.
 
     def command(self, command: Command, waiter: Waiter[None] | None = None) -> None:
-        """Add a command to the next write; raises RobotiqError if the hand takes none now."""
+        """Add a command to the next write."""
         self.machine.ask(Trigger.ASK_COMMAND, self.status)
         self._requests.command(command, waiter)
         self._update_state(Trigger.ASK_COMMAND)
@@ -135,11 +136,7 @@ class Controller:
             self._requests.pending.hold_only(self._ledger.ours)
 
     def hold(self, axes: Finger, waiter: Waiter[None]) -> None:
-        """Hold those axes that move, whichever client moves them. In a procedure there is nothing to do.
-
-        Raises:
-            RobotiqError: the gripper cannot be reached.
-        """
+        """Hold those axes that move, whichever client moves them. In a procedure there is nothing to do."""
         if self.machine.ask(Trigger.ASK_HOLD, self.status):
             self._requests.hold(axes, "a hold took over", waiter)
             self._update_state(Trigger.ASK_HOLD)
@@ -147,11 +144,7 @@ class Controller:
             waiter.set_result(None)
 
     def halt(self, waiter: Waiter[None]) -> None:
-        """Clear rGTO, unless no axis can move. It ends no procedure: :meth:`reset` does.
-
-        Raises:
-            RobotiqError: the hand cannot halt now.
-        """
+        """Clear rGTO, unless no axis can move. It ends no procedure: :meth:`reset` does."""
         if not self.machine.ask(Trigger.ASK_HALT, self.status):
             waiter.set_result(None)
             return
@@ -162,32 +155,17 @@ class Controller:
         self._update_state(Trigger.ASK_HALT)
 
     def activate(self) -> None:
-        """Begin an activation, unless the gripper is active or activating.
-
-        Raises:
-            RobotiqError: not possible now: a fault, a reset or a release; the link is down.
-        """
+        """Begin an activation, unless the gripper is active or activating."""
         if self.machine.ask(Trigger.ASK_ACTIVATE, self.status):
             self._begin(Trigger.ASK_ACTIVATE)
 
     def reset(self, trigger: Trigger = Trigger.ASK_RESET) -> None:
-        """Begin a reset, unless one is about to be sent.
-
-        Args:
-            trigger: ASK_HALT for a halt that ends a procedure.
-
-        Raises:
-            RobotiqError: not possible now.
-        """
+        """Begin a reset, unless one is about to be sent; ``trigger`` is ASK_HALT if a halt asks for it."""
         if self.machine.ask(trigger, self.status):
             self._begin_reset(trigger, MoveSupersededError(f"a {trigger.value.removesuffix('()')} took over"))
 
     def release(self) -> None:
-        """Begin an automatic release.
-
-        Raises:
-            RobotiqError: not in FAULT; or the gripper is reset: raising rACT would activate it.
-        """
+        """Begin an automatic release. Of a gripper that is reset it would raise rACT and activate it."""
         if self.machine.state is State.FAULT and self.status is not None and not self.status.activation_echo:
             raise NotActivatedError("the gripper is reset: there is nothing to release")
         self.machine.ask(Trigger.ASK_RELEASE, self.status)
@@ -266,7 +244,7 @@ class Controller:
     @property
     def passing_faults(self) -> int:
         """The number of times that 0x09 has passed."""
-        return self._evidence.passed
+        return self._evidence.passing.passed
 
     @property
     def is_moving(self) -> bool:
@@ -523,7 +501,7 @@ class Controller:
         has_written = procedure.entry is not None
         if procedure.entry is not None and not self._ledger.acts(procedure.entry):
             return None
-        if not has_written and not procedure.releases and self._evidence.may_pass:
+        if not has_written and not procedure.releases and self._evidence.passing.may_pass:
             return None  # if the fault lasts, no activation is begun
         try:
             image = procedure.steps.send(status)
@@ -548,7 +526,7 @@ class Controller:
         ledger, pending = self._ledger, self._requests.pending
         if self._evidence.condition not in FOLLOWS or not ledger.is_certain:
             return None
-        if self._evidence.may_pass and pending.has_changes:
+        if self._evidence.passing.may_pass and pending.has_changes:
             return None  # if the fault lasts, no motion is sent at all
         base = ledger.base
         # After a halt a motion waits until the halt acts: only then is it known where the fingers stopped.

@@ -69,28 +69,19 @@ class Evidence:
     Attributes:
         status: that status; None before the first.
         condition: what it shows; None while the link is down.
+        passing: 0x09, as far as it was seen.
     """
 
     def __init__(self, log: Log) -> None:
         self.status: RobotiqStatus | None = None
         self.condition: Trigger | None = None
+        self.passing: Final = PassingFault()
         self._log: Final = log
-        self._passing: Final = PassingFault()
-
-    @property
-    def passed(self) -> int:
-        """The number of times that 0x09 has passed."""
-        return self._passing.passed
-
-    @property
-    def may_pass(self) -> bool:
-        """Whether 0x09 shows, and the next reads decide whether it counts."""
-        return self._passing.is_open
 
     @property
     def is_undecided(self) -> bool:
         """Whether the first status on a new link shows 0x09, perhaps because of the silence before it."""
-        return self._passing.is_open and self.condition is None
+        return self.passing.may_pass and self.condition is None
 
     def update(self, status: RobotiqStatus, asked: float) -> Trigger | None:
         """Take in a status that was asked for at ``asked``.
@@ -99,8 +90,10 @@ class Evidence:
             Its condition, which counts from now on; None while the first one on a new link is undecided.
         """
         condition = classify(status)
-        if self._passing.is_counting or condition is Trigger.SEEN_FAULT:
-            status = self._without_passing(status, asked)
+        if self.passing.is_counting or condition is Trigger.SEEN_FAULT:
+            judged = self._without_passing(status, asked)
+            # In a fault 0x09 is no news, and counts at once: hiding it would show the fault as cleared.
+            status = status if self.condition is Trigger.SEEN_FAULT else judged
             condition = classify(status)
         self.status = status
         if self.condition is None and self.is_undecided:
@@ -109,15 +102,14 @@ class Evidence:
         return condition
 
     def _without_passing(self, status: RobotiqStatus, asked: float) -> RobotiqStatus:
-        passing, passed = self._passing, self._passing.passed
-        judged = passing.filtered(status, asked)
-        if passing.passed > passed == 0:
+        before = self.passing.passed
+        judged = self.passing.filtered(status, asked)
+        if self.passing.passed > before == 0:
             self._log.info(
                 "the gripper showed fault 0x09 for a moment, as some do after a second without a poll: "
                 "ignored, and from here on only counted"
             )
-        # In a fault 0x09 is no news, and counts at once: hiding it would show the fault as cleared.
-        return status if self.condition is Trigger.SEEN_FAULT else judged
+        return judged
 
     def lost(self) -> None:
         """The link is down: the next condition is the first."""
@@ -148,8 +140,8 @@ class PassingFault:
         return bool(self._since_silence) and not _lasts(self._since_silence)
 
     @property
-    def is_open(self) -> bool:
-        """Whether the next reads decide. Never on a link so slow that each read ends a silence."""
+    def may_pass(self) -> bool:
+        """Whether the next reads decide about it. Never on a link so slow that each read ends a silence."""
         return bool(self._row) and not _lasts(self._row)
 
     def filtered(self, status: RobotiqStatus, asked: float) -> RobotiqStatus:

@@ -17,14 +17,7 @@ from ..values.status import RobotiqStatus
 def gate(
     image: Request, status: RobotiqStatus, *, activates: bool = False, releases: bool = False
 ) -> Request:
-    """The image as it may be written.
-
-    Args:
-        image: to be written.
-        status: the newest one.
-        activates: whether it begins an activation that was asked for.
-        releases: whether it begins an automatic release that was asked for.
-    """
+    """The image as it may be written: ``activates`` or ``releases`` if it begins what was asked for."""
     # The status may be a device cycle old. If another client resets the gripper within it, rACT passes and
     # activates [follows]. That is taken back: after a stop has_activated() in stops.py finds it, after a
     # command or a hold Begun in procedures.py.

@@ -136,12 +136,8 @@ def merged(
 ) -> Request:
     """Merge pending changes into ``base``. Axes that they do not address keep their requests.
 
-    Args:
-        base: the image in force.
-        pending: what callers ask for.
-        status: the newest status.
-        gripping: the axes that were in contact when rGTO was last set.
-        may_move: the axes that show rest and may move all the same.
+    ``gripping`` has the axes that were in contact when rGTO was last set, ``may_move`` those that show rest
+    and may move all the same.
     """
     if pending.positions and not base.go:
         # rGTO starts every axis [manual 2012, 4.6]: ask each for where it is. An axis that gripped keeps its

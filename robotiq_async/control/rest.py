@@ -74,13 +74,9 @@ class Rest(Enum):
 
 
 def rest_of(asked: Iterator[Asked], model: Model, what: ObjectStatus, position: int) -> Rest:
-    """Whether an axis rests under the last of its requests.
+    """Whether an axis rests under the last of its requests. Its position is never late.
 
-    Args:
-        asked: the requests that the status may show, the newest first.
-        model: of the gripper.
-        what: the object status of the axis.
-        position: where it is, in counts. It is never late.
+    ``asked`` has the requests that the status may show, the newest first.
     """
     # Only the newest requests are looked at where they decide: this runs at every poll of a motion, and a
     # control loop leaves fifty requests in the lag.

@@ -31,11 +31,6 @@ def fail(waiters: Iterable[Waiter[Any]], error: RobotiqError) -> None:
     """Give each caller an error of its own: a raised error collects the traceback of its caller."""
     for waiter in waiters:
         if not waiter.done():
-            waiter.set_exception(copy_of(error))
-
-
-def copy_of(error: RobotiqError) -> RobotiqError:
-    """Copy an error with its cause, which ``copy`` leaves out."""
-    copied = copy.copy(error)
-    copied.__cause__ = error.__cause__
-    return copied
+            copied = copy.copy(error)
+            copied.__cause__ = error.__cause__  # which copy leaves out
+            waiter.set_exception(copied)

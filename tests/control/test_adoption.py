@@ -32,11 +32,23 @@ def gripper(
     return status_of(byte_0, byte_1, echo=echo, position=position, at=at)
 
 
+class Seen(Adoption):
+    """Each status was asked for when it came."""
+
+    def __init__(self, first: RobotiqStatus) -> None:
+        self.reads, now = 0, Moment(first.timestamp, 0)
+        super().__init__(first, now, now)
+
+    def see(self, status: RobotiqStatus) -> None:
+        self.reads += 1
+        self.update(status, Moment(status.timestamp, self.reads))
+
+
 def adopted(*statuses: RobotiqStatus) -> Request:
     """The request that follows from statuses, the first one first."""
-    adoption = Adoption(statuses[0])
+    adoption = Seen(statuses[0])
     for status in statuses[1:]:
-        adoption.update(status)
+        adoption.see(status)
     return adoption.request(SETTINGS)
 
 
@@ -109,23 +121,19 @@ def test_a_halted_gripper_has_its_own_positions_as_requests(what: ObjectStatus) 
 
 
 def test_nothing_is_certain_before_every_moving_axis_has_shown_its_direction() -> None:
-    adoption = Adoption(gripper(MOVING, MOVING, THERE, THERE, position=(100, 100, 6, 6)))
+    adoption = Seen(gripper(MOVING, MOVING, THERE, THERE, position=(100, 100, 6, 6)))
     assert not adoption.is_certain
-    adoption.update(gripper(MOVING, MOVING, THERE, THERE, position=(101, 100, 6, 6), at=0.01))
+    adoption.see(gripper(MOVING, MOVING, THERE, THERE, position=(101, 100, 6, 6), at=0.01))
     assert not adoption.is_certain
-    adoption.update(gripper(MOVING, MOVING, THERE, THERE, position=(101, 99, 6, 6), at=0.02))
+    adoption.see(gripper(MOVING, MOVING, THERE, THERE, position=(101, 99, 6, 6), at=0.02))
     assert adoption.is_certain
 
 
 def test_an_axis_that_stays_where_it_is_is_not_waited_for_any_longer_than_a_count_takes() -> None:
-    adoption = Adoption(gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.0))
-    adoption.update(
-        gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.0 + DIRECTION_WAIT_S / 2)
-    )
+    adoption = Seen(gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.0))
+    adoption.see(gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.0 + DIRECTION_WAIT_S / 2))
     assert not adoption.is_certain
-    adoption.update(
-        gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.001 + DIRECTION_WAIT_S)
-    )
+    adoption.see(gripper(MOVING, THERE, THERE, THERE, position=(100, 0, 0, 0), at=5.001 + DIRECTION_WAIT_S))
     assert adoption.is_certain
 
 
@@ -138,7 +146,7 @@ def test_a_slow_axis_has_the_time_to_show_its_direction() -> None:
 @pytest.mark.parametrize(("what", "echo"), [(OPENING, 0), (CLOSING, 255), (THERE, 100)])
 def test_a_gripper_at_rest_is_certain_at_once(byte_0: int, what: ObjectStatus, echo: int) -> None:
     at_rest = gripper(what, what, what, what, byte_0=byte_0, echo=(echo,) * 4, position=(100,) * 4)
-    assert Adoption(at_rest).is_certain
+    assert Seen(at_rest).is_certain
 
 
 @pytest.mark.parametrize(("what", "echo"), [(OPENING, 255), (CLOSING, 0), (THERE, 255)])
@@ -147,9 +155,9 @@ def test_an_axis_at_rest_that_contradicts_its_echo_may_show_what_was_before_it(
 ) -> None:
     """Another client may have opened the hand just before we came: our first write must not close it."""
     shown = gripper(THERE, what, THERE, THERE, echo=(100, echo, 100, 100), position=(100,) * 4)
-    adoption = Adoption(shown)
+    adoption = Seen(shown)
     assert not adoption.is_certain
-    adoption.update(gripper(THERE, MOVING, THERE, THERE, echo=(100, echo, 100, 100), position=(100,) * 4))
+    adoption.see(gripper(THERE, MOVING, THERE, THERE, echo=(100, echo, 100, 100), position=(100,) * 4))
     assert not adoption.is_certain, "its direction is not known yet"
     for reads in range(1, LAG_READS):
         adoption.update(shown, Moment(LAG_S, reads))
@@ -159,7 +167,7 @@ def test_an_axis_at_rest_that_contradicts_its_echo_may_show_what_was_before_it(
 
 
 def test_a_gripper_with_rgto_clear_is_certain_at_once() -> None:
-    assert Adoption(status_of(0x31, 0x00)).is_certain
+    assert Seen(status_of(0x31, 0x00)).is_certain
 
 
 # -- the rest of the image ---------------------------------------------------------------------------------

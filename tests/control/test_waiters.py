@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from robotiq_async.control.waiters import copy_of, fail, resolve
+from robotiq_async.control.waiters import fail, resolve
 from robotiq_async.values.enums import Fault
 from robotiq_async.values.errors import ConnectionLostError, GripperFaultError, RobotiqError
 from tests.control.scan import Outcome
@@ -56,7 +56,9 @@ async def test_a_future_is_a_waiter() -> None:
 def test_a_copy_of_an_error_says_what_the_error_says(cause: OSError | None) -> None:
     error: RobotiqError = GripperFaultError(Fault.SCISSOR_BLOCKED)
     error.__cause__ = cause
-    copy = copy_of(error)
+    caller = Outcome()
+    fail([caller], error)
+    copy = caller.error
     assert isinstance(copy, GripperFaultError)
     assert copy is not error
     assert (str(copy), copy.fault, copy.__cause__) == (str(error), Fault.SCISSOR_BLOCKED, cause)
