@@ -22,8 +22,10 @@ No I/O and no clock: time is that of the newest status.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import reduce
 from itertools import chain
+from operator import or_
 from typing import Final
 
 from ..runtime.log import Log, log
@@ -209,13 +211,10 @@ class Ledger:
 
     def _note_asked(self, entry: Entry) -> None:
         image, before = entry.image, entry.before
-        for axis, old, new in zip(image.model.axes, before.axes, image.axes, strict=True):
-            # More force lets an axis in contact try again [conceivable]; one that moves keeps moving.
-            pressed = new.force > old.force
-            is_new = image.go is not before.go or new.position != old.position
-            if is_new or (pressed and not axis & self.unrested):
-                entry.asks |= axis
-                entry.again |= axis if pressed or (image.go and not before.go) else NO_AXES
+        # More force lets an axis in contact try again [conceivable]; one that moves keeps moving.
+        pressed = _axes(before, image, lambda old, new: new.force > old.force)
+        entry.asks = _changed(before, image) | (pressed & ~self.unrested)
+        entry.again = entry.asks & (Finger.ALL if image.go and not before.go else pressed)
         # With rGTO clear gDT has no meaning, so no axis was proven to rest under what was asked before.
         if before.go:
             entry.rested = entry.asks & ~self._unproven
@@ -351,12 +350,10 @@ class Ledger:
                 each.is_doubtful, each.before = False, before
                 if each.acknowledged is None:  # its echo is its acknowledgement: it is not in flight any more
                     each.acknowledged = self.now.time
-                each.asks = each.again = NO_AXES
                 self._unproven |= _changed(before, each.image)
                 self._note_asked(each)
                 self.ours |= each.asks
                 before = each.image
-        self._has_doubtful = any(each.is_doubtful for each in self._entries)
 
     def _forget_doubtful(self) -> None:
         """Forget the writes in doubt that did not show in time, but not before this status was compared."""
@@ -383,11 +380,7 @@ class Ledger:
         other = Entry(self._entries[-1].number + 1, image, before, status.echo, False, time, time, self.now)
         other.asks = _changed(before, image)
         self._unproven |= other.asks
-        for axis, old in before.by_axis:
-            if old.position != image.position(axis):
-                self.ours &= ~axis
-        if is_found:
-            self.ours = NO_AXES
+        self.ours = NO_AXES if is_found else self.ours & ~_moved(before, image)
         waiting = self._waiting()
         self._past.extend(each for each in self._entries if each.number <= self.shown.number)
         self._entries, self.shown, self.match = deque([other, *waiting]), other, other
@@ -466,8 +459,14 @@ class Ledger:
 
 def _changed(before: Request, image: Request) -> Finger:
     """The axes whose request is another: all if rGTO is."""
-    changed = NO_AXES
-    for axis, old in before.by_axis:
-        if image.go is not before.go or old.position != image.position(axis):
-            changed |= axis
-    return changed
+    return _moved(before, image) if image.go is before.go else image.model.all_axes
+
+
+def _moved(before: Request, image: Request) -> Finger:
+    return _axes(before, image, lambda old, new: new.position != old.position)
+
+
+def _axes(before: Request, image: Request, which: Callable[[AxisRequest, AxisRequest], bool]) -> Finger:
+    """The axes for whose requests, the old one and the new one, ``which`` is true."""
+    pairs = zip(before.by_axis, image.axes, strict=True)
+    return reduce(or_, (axis for (axis, old), new in pairs if which(old, new)), NO_AXES)
