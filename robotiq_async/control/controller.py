@@ -35,7 +35,7 @@ from .pending import Command, Pending, merged
 from .procedures import Begun, Procedure
 from .state_machine import RUNNING, StateMachine
 from .stops import Keeping, Stop
-from .waiters import Waiter, fail, resolve
+from .waiters import Waiter, resolve
 
 WARNING_S: Final = 1.0
 """Seconds between two warnings about another client."""
@@ -151,7 +151,7 @@ class Controller:
         self._requests.supersede(Finger.ALL, MoveSupersededError("a halt stopped the fingers"))
         if self._stop is None or self._stop.is_delivered:  # a new halt is sent again
             self._stop = Stop(StopLevel.HALT, self._stop)
-        self._stop.waiters.append(waiter)
+        self._stop.add(waiter)
         self._update_state(Trigger.ASK_HALT)
 
     def activate(self) -> None:
@@ -188,7 +188,7 @@ class Controller:
         if self.machine.ask(Trigger.ASK_STOP):
             self.machine.show(State.DO_SHUTDOWN, Trigger.ASK_STOP)
         self._fail_all(NotStartedError("the hand was stopped"))
-        self._procedure, self._stop = None, None
+        self._procedure = None
 
     def stopped(self) -> None:
         """The shutdown has ended or has run out of time."""
@@ -234,10 +234,9 @@ class Controller:
     def _fail_all(self, error: RobotiqError) -> None:
         """Fail everything asked so far, halts too. A write may be on the line all the same."""
         self._requests.fail(error)
-        stop = self._stop
-        if stop is not None:
-            fail(stop.callers, error)
-            self._stop = None if stop.level is StopLevel.HALT else stop
+        if self._stop is not None:
+            self._stop.fail(error)
+            self._stop = None
 
     # -- what is known ---------------------------------------------------------------------------------
 
@@ -569,7 +568,7 @@ class Controller:
         error = ConnectionLostError(f"the link went down before this was done: {why}")
         error.__cause__ = why
         if self._stop is not None:
-            fail(self._stop.callers, error)
+            self._stop.fail(error)
         self._requests.lost(error)
         self._procedure, self._stop = None, None
         self._evidence.lost()

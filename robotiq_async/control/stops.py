@@ -26,7 +26,7 @@ from typing import Final
 
 from ..runtime.log import Log
 from ..values.enums import Fault, Finger, StopLevel, Trigger
-from ..values.errors import StateTimeoutError
+from ..values.errors import RobotiqError, StateTimeoutError
 from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .entry import Entry
@@ -50,17 +50,17 @@ class Stop:
 
     Attributes:
         level: its level. A new level is a new stop.
-        waiters: the callers of halt(); beside them are those of the halts that it replaces.
+        callers: of halt(), each with the stop that was begun for it: this one, or one that it has replaced.
+        entries: its writes.
         is_early: whether its last write came within write_spacing of another: the gripper may have forgotten
             it, and it is due again.
     """
 
     def __init__(self, level: StopLevel, before: Stop | None = None) -> None:
         self.level: Final = level
-        self.waiters: Final[list[Waiter[None]]] = []
-        self._older: Final = [] if before is None else before.asked_since()
         self.is_early = False
-        self._entries: Final[list[Entry]] = []
+        self.callers: Final[list[tuple[Waiter[None], Stop]]] = [*before.callers] if before else []
+        self.entries: Final[list[Entry]] = []
         self._times = 0
         # Whether the gripper was active before it: an activation that runs already is not ours to take back.
         self._was_active = False
@@ -68,16 +68,16 @@ class Stop:
     @property
     def entry(self) -> Entry | None:
         """Its last write; None before that."""
-        return self._entries[-1] if self._entries else None
+        return self.entries[-1] if self.entries else None
 
     @property
     def is_delivered(self) -> bool:
         """Whether a write of it was acknowledged: it is sent again only after that."""
-        return bool(self._entries) and self._entries[0].acknowledged is not None
+        return bool(self.entries) and self.entries[0].acknowledged is not None
 
     def written(self, entry: Entry, status: RobotiqStatus, *, is_early: bool) -> None:
         """A write of it is about to be sent, made from this status."""
-        self._entries.append(entry)
+        self.entries.append(entry)
         self.is_early = is_early
         self._times += not is_early
         self._was_active = status.activation_echo and status.is_activated
@@ -117,6 +117,8 @@ class Stop:
                 is_due = status.activation_echo
             case StopLevel.HALT:
                 is_due = status.go_echo and self._times < MOST_HALTS
+            case StopLevel.KEEP:  # what moves is held once
+                is_due = False
             case _:  # while another client resets the gripper it comes to rest, and rACT might cross that
                 is_due = not entry.image.activate or status.activation_echo
         return entry.image if is_due else None
@@ -139,31 +141,30 @@ class Stop:
         # about to change.
         return is_reset or status.echo == entry.echo
 
-    def asked_since(self) -> list[tuple[Waiter[None], float]]:
-        """The callers of halt(), each with the time at which a halt was first acknowledged for it."""
-        first = self._entries[0].acknowledged if self._entries else None
-        return [*self._older, *((waiter, math.inf if first is None else first) for waiter in self.waiters)]
+    def add(self, caller: Waiter[None]) -> None:
+        """Add a caller of halt()."""
+        self.callers.append((caller, self))
+
+    def fail(self, error: RobotiqError) -> None:
+        """Fail the callers that have no answer yet."""
+        fail((caller for caller, _ in self.callers), error)
 
     def fail_overdue(self, ledger: Ledger, status: RobotiqStatus, log: Log) -> None:
         """Fail callers whose halt does not show, however often it has been replaced since."""
         since = ledger.now.time - MOST_HALTS * WINDOW_S
-        overdue = [waiter for waiter, first in self._older if first <= since]
+        older = [(caller, stop) for caller, stop in self.callers if stop is not self and not caller.done()]
+        overdue = [caller for caller, stop in older if stop.entries[0].time <= since]
         if overdue and status.go_echo:
-            self._older[:] = [each for each in self._older if each[0] not in overdue]
-            self._fail(overdue, log)
+            self._give_up(overdue, log)
 
     def answer(self, status: RobotiqStatus, log: Log) -> None:
-        """Answer the callers of halt(): it is reached, or was sent as often as it may be."""
+        """Answer the callers: it is reached, or was sent as often as it may be."""
+        callers = [caller for caller, _ in self.callers]
         if self.level is StopLevel.HALT and status.go_echo:
-            self._fail(self.callers, log)
-        resolve(self.callers)
+            self._give_up(callers, log)
+        resolve(callers)
 
-    @property
-    def callers(self) -> list[Waiter[None]]:
-        """The callers of halt() that have no answer yet."""
-        return [*self.waiters, *(waiter for waiter, _ in self._older)]
-
-    def _fail(self, callers: list[Waiter[None]], log: Log) -> None:
+    def _give_up(self, callers: list[Waiter[None]], log: Log) -> None:
         error = StateTimeoutError(
             f"the gripper does not show that it has stopped after {MOST_HALTS} halts: the fingers may "
             "still move (another client commands it, or it forgets writes)"
@@ -192,12 +193,9 @@ class Keeping(Stop):
     first, once, as after a cancelled move. In any doubt rGTO is cleared. docs/decisions/keeping-a-grip.md has
     the reasons.
 
-    Args:
-        status: the newest one.
-        why_no_grip: why rGTO must be cleared whatever the statuses show; empty for no reason.
-
     Attributes:
-        why_no_grip: why rGTO must be cleared, as far as the statuses so far show; empty for no reason.
+        why_no_grip: why rGTO must be cleared, from the beginning or as a status has shown since; empty for no
+            reason.
     """
 
     def __init__(self, status: RobotiqStatus, why_no_grip: str) -> None:
@@ -225,9 +223,6 @@ class Keeping(Stop):
 
     def is_reached(self, ledger: Ledger, status: RobotiqStatus) -> bool:  # noqa: ARG002
         return ledger.now.time - self._since >= REST_S
-
-    def again(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:  # noqa: ARG002
-        return None  # what moves is held once
 
     def image(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
         """The image that holds every axis that moves or is about to; None if no axis does."""
