@@ -177,8 +177,8 @@ class Controller:
         self._requests.fail_motions(error)
         self._update_state(Trigger.DELIVERED)
 
-    def stop(self) -> None:
-        """Begin to stop the hand: refuse new requests, and fail those that are not sent."""
+    def refuse_requests(self) -> None:
+        """The hand is to stop: refuse requests from here on, and fail those that are not sent."""
         state, stop = self.machine.state, self._stop
         halts = stop is not None and stop.level is StopLevel.HALT and stop.entry is None
         was_elsewhere = "" if state in RUNNING else f"the hand was in {state.name}"
@@ -190,8 +190,8 @@ class Controller:
         self._fail_all(NotStartedError("the hand was stopped"))
         self._procedure = None
 
-    def stopped(self) -> None:
-        """The shutdown has ended or has run out of time."""
+    def close(self) -> None:
+        """The hand has stopped, or the time for that is over."""
         self._stop = None
         if self.machine.ask(Trigger.STOPPED):
             self.machine.show(State.SHUTDOWN, Trigger.STOPPED)
@@ -202,7 +202,7 @@ class Controller:
         if isinstance(self._stop, Keeping):
             self._stop = Stop(StopLevel.SHUTDOWN)
 
-    def shut_down(self, level: StopLevel = StopLevel.SHUTDOWN) -> None:
+    def stop_fingers(self, level: StopLevel = StopLevel.SHUTDOWN) -> None:
         """Begin to stop the fingers, if any may move, by KEEP or SHUTDOWN.
 
         An activation that this hand began is taken back with rACT = 0: clearing rGTO would not stop it.

@@ -153,7 +153,7 @@ class Poller:
         take a request and begin a motion.
         """
         self._stopping = True
-        self._controller.stop()
+        self._controller.refuse_requests()
         self._channels.publish_changes()
 
     def hurry(self) -> None:
@@ -486,7 +486,7 @@ class Poller:
             # with rACT would activate it.
             await self._transport.open()
             await self._poll_once()
-        self._controller.shut_down(self._level)
+        self._controller.stop_fingers(self._level)
         while True:
             await self._cycle()
             if not self._controller.is_busy:

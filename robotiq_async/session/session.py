@@ -137,8 +137,8 @@ class Session:
         self._poller.abandon()
         self._waiters = StateWaiters()
         self._channels.end()
-        self.controller.stop()
-        self.controller.stopped()
+        self.controller.refuse_requests()
+        self.controller.close()
         self._channels.publish_changes()
 
     def _claim(self) -> None:
@@ -166,7 +166,7 @@ class Session:
         if self.is_over:
             return
         self._release()  # before SHUTDOWN is published: a reader of it may start a hand
-        self.controller.stopped()
+        self.controller.close()
         self._channels.publish_changes()
         failure: Callable[[], RobotiqError] | None = None
         if bug is not None:

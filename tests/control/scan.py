@@ -232,8 +232,8 @@ class Scan:
         self.until(lambda: outcome.is_answered)
 
     def stop(self, *, keep_grip: bool = False) -> None:
-        self.controller.stop()
-        self.controller.shut_down(StopLevel.KEEP if keep_grip else StopLevel.SHUTDOWN)
+        self.controller.refuse_requests()
+        self.controller.stop_fingers(StopLevel.KEEP if keep_grip else StopLevel.SHUTDOWN)
         self.until(lambda: not self.controller.is_busy, 1.0)
 
     # -- what has happened -----------------------------------------------------------------------------

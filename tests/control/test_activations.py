@@ -77,9 +77,9 @@ def test_a_stop_after_a_lost_link_writes_what_the_gripper_has() -> None:
     scan.run(0.1)
     scan.controller.lost(None)
     scan.now += 1
-    scan.controller.stop()
+    scan.controller.refuse_requests()
     scan.controller.see(scan.status())
-    scan.controller.shut_down()
+    scan.controller.stop_fingers()
     scan.step()
     assert [request.position for request in scan.last_image.axes[:3]] == [200, 200, 200]
 

@@ -52,8 +52,10 @@ CALLS: dict[str, Callable[[Controller, int], object]] = {
     "reset": lambda hand, _: hand.reset(),
     "release": lambda hand, _: hand.release(),
     "lost": lambda hand, _: hand.lost(None),
-    "stop": lambda hand, _: hand.stop(),
-    "shut down": lambda hand, value: hand.shut_down(StopLevel.KEEP if value > 127 else StopLevel.SHUTDOWN),
+    "refuse requests": lambda hand, _: hand.refuse_requests(),
+    "stop fingers": lambda hand, value: hand.stop_fingers(
+        StopLevel.KEEP if value > 127 else StopLevel.SHUTDOWN
+    ),
 }
 words = st.integers(0, 0xFFFF)
 # Mostly of a gripper that is active, reset, in a fault or activating: random words seldom are.

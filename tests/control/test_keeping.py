@@ -220,12 +220,12 @@ def test_on_any_doubt_rgto_is_cleared_and_a_word_says_why(
 
 def test_a_link_that_goes_down_meanwhile_is_a_doubt() -> None:
     scan = holding()
-    scan.controller.stop()
-    scan.controller.shut_down(StopLevel.KEEP)
+    scan.controller.refuse_requests()
+    scan.controller.stop_fingers(StopLevel.KEEP)
     scan.step()
     scan.controller.lost(None)
     scan.controller.see(scan.status())
-    scan.controller.shut_down(StopLevel.KEEP)
+    scan.controller.stop_fingers(StopLevel.KEEP)
     scan.until(lambda: not scan.controller.is_busy, 1.0)
     assert not scan.gripper.grips
     assert not scan.last_image.go
@@ -234,8 +234,8 @@ def test_a_link_that_goes_down_meanwhile_is_a_doubt() -> None:
 def test_replies_that_were_looked_at_late_tell_of_no_rest(caplog: pytest.LogCaptureFixture) -> None:
     """The loop was held up: they are as old as their requests."""
     scan = holding()
-    scan.controller.stop()
-    scan.controller.shut_down(StopLevel.KEEP)
+    scan.controller.refuse_requests()
+    scan.controller.stop_fingers(StopLevel.KEEP)
     images = []
     for late in (0.0, 0.3, 0.3, 0.6):
         status = scan.status()
@@ -263,8 +263,8 @@ def test_a_hold_that_activates_a_gripper_reset_by_another_client_is_taken_back()
     scan = started()
     scan.move(255, speed=0)
     scan.run(0.5)
-    scan.controller.stop()
-    scan.controller.shut_down(StopLevel.KEEP)
+    scan.controller.refuse_requests()
+    scan.controller.stop_fingers(StopLevel.KEEP)
     scan.gripper.write(0, [0x0000])
     scan.now += 0.006
     scan.hurry()

@@ -34,9 +34,9 @@ def test_the_shutdown_never_activates_a_gripper_that_was_power_cycled_unnoticed(
     scan.step(answer=False)
     scan.gripper.power_cycle()
     scan.now += 0.01
-    scan.controller.stop()
+    scan.controller.refuse_requests()
     scan.controller.status = scan.status()
-    scan.controller.shut_down()
+    scan.controller.stop_fingers()
     assert scan.controller.is_busy, "the write that was not acknowledged may still act"
     scan.run(0.5)
     assert not scan.gripper.is_moving
@@ -149,9 +149,9 @@ def test_the_shutdown_leaves_what_another_client_has_just_asked(scan: Scan) -> N
 
 
 def test_a_shutdown_without_an_answer_ends_in_time(scan: Scan) -> None:
-    scan.controller.stop()
-    scan.controller.shut_down()
-    scan.controller.stopped()
+    scan.controller.refuse_requests()
+    scan.controller.stop_fingers()
+    scan.controller.close()
     assert scan.state is State.SHUTDOWN
     assert not scan.controller.is_busy
     with pytest.raises(NotStartedError):
