@@ -287,7 +287,7 @@ class Controller:
         if self._evidence.condition is not Trigger.SEEN_READY:
             return _STATES[self._evidence.condition]
         halts = stop is not None and not stop.is_delivered
-        return State.RUNNING_CC if halts or self._requests.is_asked else State.RUNNING_IDLE
+        return State.RUNNING_CC if halts or self._requests.has_caller else State.RUNNING_IDLE
 
     def _update_state(self, trigger: Trigger) -> None:
         state = self._view()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ..values.enums import NO_AXES, Finger
 from ..values.registers import Echo
 from ..values.request import Request
-from .rest import Asked, Moment
+from .rest import Moment, Target
 
 
 @dataclass(slots=True, eq=False)
@@ -24,9 +24,9 @@ class Entry:
         sent: when, in monotonic seconds; of a write that was lost with the link, the latest time at which it
             may have arrived.
         acknowledged: when; None before that.
-        shown: the first status that showed that it acts, as far as that was needed.
+        acts_since: the first status that showed that it acts, as far as that was needed.
         is_doubtful: whether it may or may not act.
-        asks: the axes whose request it changes.
+        changes: the axes whose request it changes.
         again: those of them that it lets try again: it sets rGTO or raises the force.
         rested: those of them that were proven to rest before it.
         started: those of these that have shown motion since, so that no status from before can follow.
@@ -39,9 +39,9 @@ class Entry:
     is_ours: bool
     sent: float
     acknowledged: float | None = None
-    shown: Moment | None = None
+    acts_since: Moment | None = None
     is_doubtful: bool = False
-    asks: Finger = NO_AXES
+    changes: Finger = NO_AXES
     again: Finger = NO_AXES
     rested: Finger = NO_AXES
     started: Finger = NO_AXES
@@ -60,11 +60,11 @@ class Entry:
     def is_in_flight(self) -> bool:
         return self.acknowledged is None and not self.is_doubtful
 
-    def asked(self, axis: Finger, shown: Moment | None) -> Asked:
+    def target(self, axis: Finger, since: Moment | None) -> Target:
         position = self.image.position(axis) if self.image.go else None
-        return Asked(position, bool(self.again & axis), shown)
+        return Target(position, bool(self.again & axis), since)
 
-    def asked_before(self, axis: Finger) -> Asked:
+    def target_before(self, axis: Finger) -> Target:
         """The request that it replaces: unknown before another client's, if rGTO was clear."""
         known = self.before if self.before.go or self.is_ours else self.image
-        return Asked(known.position(axis) if known.go else None)
+        return Target(known.position(axis) if known.go else None)

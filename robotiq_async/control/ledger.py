@@ -37,7 +37,7 @@ from ..values.status import RobotiqStatus
 from .adoption import Adoption
 from .entry import Entry
 from .limits import Limits
-from .rest import LONG_AGO, Asked, Grips, Moment, Rest, may_move, rest_of
+from .rest import LONG_AGO, Grips, Moment, Rest, Target, may_move, rest_of
 
 WINDOW_S: Final = 0.5
 """Time after its acknowledgement in which a write shows, if it acts: the slowest device cycle considered is
@@ -172,28 +172,28 @@ class Ledger:
         moving = NO_AXES
         for axis in self._model.axes if self._unproven else ():
             what, position = status.finger_status(axis), status.position(axis)
-            if may_move(self._asked(axis), self._model, what, position):
+            if may_move(self._targets(axis), self._model, what, position):
                 moving |= axis
         return moving
 
-    def _asked(self, axis: Finger) -> Iterator[Asked]:
+    def _targets(self, axis: Finger) -> Iterator[Target]:
         """The requests that an axis may show, the newest first."""
-        shown: Moment | None = None
+        since: Moment | None = None
         oldest: Entry | None = None
         for each in chain(reversed(self._entries), reversed(self._past)):
             if each.is_doubtful:
                 continue
-            shown = each.shown or shown  # an entry acts when it or a later one does
-            if not each.asks & axis:
+            since = each.acts_since or since  # an entry acts when it or a later one does
+            if not each.changes & axis:
                 continue
             oldest = each
-            yield each.asked(axis, shown)
-            if each.started & axis or (shown is not None and shown.is_lag_over(self.now)):
+            yield each.target(axis, since)
+            if each.started & axis or (since is not None and since.is_lag_over(self.now)):
                 return
             if each.rested & axis:
                 break
         if oldest is not None:
-            yield oldest.asked_before(axis)
+            yield oldest.target_before(axis)
 
     # -- what is written -------------------------------------------------------------------------------
 
@@ -204,24 +204,24 @@ class Ledger:
         entry = Entry(self._entries[-1].number + 1, image, before, image.echo, is_ours=True, sent=now)
         self.limits.written(entry, moved)
         self.grips.forget(moved)  # a new position may let go
-        self._note_asked(entry)
+        self._note_changes(entry)
         self.ours |= moved
         self._entries.append(entry)
         return entry
 
-    def _note_asked(self, entry: Entry) -> None:
+    def _note_changes(self, entry: Entry) -> None:
         image, before = entry.image, entry.before
         # More force lets an axis in contact try again [conceivable]; one that moves keeps moving.
         pressed = _axes(before, image, lambda old, new: new.force > old.force)
-        entry.asks = _changed(before, image) | (pressed & ~self.unrested)
-        entry.again = entry.asks & (Finger.ALL if image.go and not before.go else pressed)
+        entry.changes = _changed(before, image) | (pressed & ~self.unrested)
+        entry.again = entry.changes & (Finger.ALL if image.go and not before.go else pressed)
         # With rGTO clear gDT has no meaning, so no axis was proven to rest under what was asked before.
         if before.go:
-            entry.rested = entry.asks & ~self._unproven
+            entry.rested = entry.changes & ~self._unproven
             self._may_start |= entry.rested
-        self._unproven |= entry.asks
+        self._unproven |= entry.changes
         if image.go:
-            self.unrested |= entry.asks
+            self.unrested |= entry.changes
 
     def acknowledge(self, now: float) -> None:
         """The last image was acknowledged."""
@@ -288,7 +288,7 @@ class Ledger:
             past.clear()
         while past:
             following = past[1] if len(past) > 1 else self._entries[0]
-            if following.shown is None or not following.shown.is_lag_over(self.now):
+            if following.acts_since is None or not following.acts_since.is_lag_over(self.now):
                 return
             past.popleft()
 
@@ -351,8 +351,8 @@ class Ledger:
                 if each.acknowledged is None:  # its echo is its acknowledgement: it is not in flight any more
                     each.acknowledged = self.now.time
                 self._unproven |= _changed(before, each.image)
-                self._note_asked(each)
-                self.ours |= each.asks
+                self._note_changes(each)
+                self.ours |= each.changes
                 before = each.image
 
     def _forget_doubtful(self) -> None:
@@ -378,8 +378,8 @@ class Ledger:
         self._adoption = Adoption(status, self.now, since)
         image, time = self._adoption.request(before.axes), self.now.time
         other = Entry(self._entries[-1].number + 1, image, before, status.echo, False, time, time, self.now)
-        other.asks = _changed(before, image)
-        self._unproven |= other.asks
+        other.changes = _changed(before, image)
+        self._unproven |= other.changes
         self.ours = NO_AXES if is_found else self.ours & ~_moved(before, image)
         waiting = self._waiting()
         self._past.extend(each for each in self._entries if each.number <= self.shown.number)
@@ -413,7 +413,7 @@ class Ledger:
     def update_rest(self, status: RobotiqStatus) -> None:
         """Find out which axes have come to rest. Not in a fault: it keeps axes from starting."""
         if self._unproven:  # usually none is
-            self._note_shown()
+            self._note_acting()
             if status.go_echo:  # gDT has no meaning without rGTO [manual]
                 self._find_rest(status)
         if status.go_echo and (self.grips or status.contacts):
@@ -422,15 +422,15 @@ class Ledger:
                 contacts &= ~self.may_move(status)
             self.grips.remember(status, contacts)
 
-    def _note_shown(self) -> None:
+    def _note_acting(self) -> None:
         """Note since when the newest entries act."""
         for each in chain(reversed(self._entries), reversed(self._past)):
-            if each.shown is not None:
+            if each.acts_since is not None:
                 return
             if not each.is_doubtful and self.acts(each):
                 # If the echo does not show when it began to act, the time for that and the lag end together.
                 never_showed = each.number > self.shown.number and self.now.time - each.time >= WINDOW_S
-                each.shown = LONG_AGO if never_showed else self.now
+                each.acts_since = LONG_AGO if never_showed else self.now
 
     def _find_rest(self, status: RobotiqStatus) -> None:
         for axis in self._model.axes:
@@ -441,7 +441,7 @@ class Ledger:
                 if axis & self._may_start:
                     self._note_start(axis)
                 continue
-            rest = rest_of(self._asked(axis), self._model, what, position)
+            rest = rest_of(self._targets(axis), self._model, what, position)
             if rest is not Rest.UNKNOWN and axis & self.unrested:
                 self.unrested &= ~axis
                 self.limits.note_rest(axis, status)

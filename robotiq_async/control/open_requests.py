@@ -27,9 +27,9 @@ class OpenRequests:
         self._sent = Pending()  # the write in flight
 
     @property
-    def is_asked(self) -> bool:
+    def has_caller(self) -> bool:
         """Whether a caller waits for an acknowledgement, or for a write."""
-        return self.pending.is_asked or self._sent.is_asked
+        return self.pending.has_caller or self._sent.has_caller
 
     @property
     def has_undelivered_hold(self) -> bool:
@@ -71,16 +71,16 @@ class OpenRequests:
     def fail_motions(self, error: RobotiqError) -> None:
         """Fail everything that would move an axis, sent or not; holds that callers have named remain."""
         self.pending.drop_changes(error)
-        fail((waiter for _, waiter in self._sent.asking), error)
-        self._sent.asking.clear()
+        fail((waiter for _, waiter in self._sent.callers), error)
+        self._sent.callers.clear()
         self.moves.fail(error, left=Finger.ALL if isinstance(error, ConnectionLostError) else NO_AXES)
 
     def fail(self, error: RobotiqError) -> None:
         """Fail everything asked so far. A write may be on the line all the same."""
         self.fail_motions(error)
         self.pending.drop(error)
-        fail((waiter for _, waiter in self._sent.holding), error)
-        self._sent.holding.clear()
+        fail((waiter for _, waiter in self._sent.holders), error)
+        self._sent.holders.clear()
 
     def lost(self, error: RobotiqError) -> None:
         """The link is down: fail everything. Holds stop motion: their axes remain, for when it is back."""

@@ -39,16 +39,16 @@ class Pending:
         forces: new force by axis.
         hold: axes to hold if they move. A position of the same axis goes before it, but does not end it: if
             the link goes down before the write, the hold remains and the position does not.
-        asking: callers that wait for the acknowledgement, each with the axes that it moves.
-        holding: callers of hold(), with their axes. These are held whichever client moves them.
+        callers: those of commands, which wait for the acknowledgement, each with the axes that it moves.
+        holders: those of hold(), with their axes. These are held whichever client moves them.
     """
 
     positions: dict[Finger, int] = field(default_factory=dict)
     speeds: dict[Finger, int] = field(default_factory=dict)
     forces: dict[Finger, int] = field(default_factory=dict)
     hold: Finger = NO_AXES
-    asking: list[tuple[Finger, Waiter[None]]] = field(default_factory=list)
-    holding: list[tuple[Finger, Waiter[None]]] = field(default_factory=list)
+    callers: list[tuple[Finger, Waiter[None]]] = field(default_factory=list)
+    holders: list[tuple[Finger, Waiter[None]]] = field(default_factory=list)
 
     @property
     def is_empty(self) -> bool:
@@ -61,9 +61,9 @@ class Pending:
         return bool(self.positions or self.speeds or self.forces)
 
     @property
-    def is_asked(self) -> bool:
+    def has_caller(self) -> bool:
         """Whether there is more than holds of our own making, for which no caller waits."""
-        return self.has_changes or bool(self.holding)
+        return self.has_changes or bool(self.holders)
 
     @property
     def moved(self) -> Finger:
@@ -71,13 +71,13 @@ class Pending:
         return reduce(or_, self.positions, NO_AXES)
 
     @property
-    def asked_to_hold(self) -> Finger:
+    def named_to_hold(self) -> Finger:
         """The axes named by callers of hold()."""
-        return reduce(or_, (axes for axes, _ in self.holding), NO_AXES)
+        return reduce(or_, (axes for axes, _ in self.holders), NO_AXES)
 
     @property
     def waiters(self) -> list[Waiter[None]]:
-        return [waiter for _, waiter in (*self.asking, *self.holding)]
+        return [waiter for _, waiter in (*self.callers, *self.holders)]
 
     def merge(self, new: Command, waiter: Waiter[None] | None = None) -> None:
         # The last value wins, per axis and field; an axis keeps what a command does not name.
@@ -86,43 +86,43 @@ class Pending:
             if value is not None:
                 changes.update(dict.fromkeys(new.axes, value))
         if waiter is not None:
-            self.asking.append((NO_AXES if new.position is None else new.axes, waiter))
+            self.callers.append((NO_AXES if new.position is None else new.axes, waiter))
 
     def merge_hold(self, axes: Finger, waiter: Waiter[None] | None = None) -> None:
         self.hold |= axes
         if waiter is not None:
-            self.holding.append((axes, waiter))
+            self.holders.append((axes, waiter))
 
     def hold_only(self, axes: Finger) -> None:
         """Hold none but these axes, and those that callers of hold() have named."""
-        self.hold &= axes | self.asked_to_hold
+        self.hold &= axes | self.named_to_hold
 
     def drop_positions(self, axes: Finger, superseded: RobotiqError) -> None:
         """Drop the positions of some axes. Their callers get the error ``superseded``."""
         for axis in axes:
             self.positions.pop(axis, None)
-        fail((waiter for mask, waiter in self.asking if mask & axes), superseded)
-        self.asking = [each for each in self.asking if not each[0] & axes]
+        fail((waiter for mask, waiter in self.callers if mask & axes), superseded)
+        self.callers = [each for each in self.callers if not each[0] & axes]
 
     def drop_changes(self, error: RobotiqError) -> None:
         """Drop everything that may move an axis, and holds of our own making."""
-        fail((waiter for _, waiter in self.asking), error)
-        for each in (self.positions, self.speeds, self.forces, self.asking):
+        fail((waiter for _, waiter in self.callers), error)
+        for each in (self.positions, self.speeds, self.forces, self.callers):
             each.clear()
         self.hold_only(NO_AXES)
 
     def drop(self, error: RobotiqError) -> None:
         """Drop everything."""
         self.drop_changes(error)
-        fail((waiter for _, waiter in self.holding), error)
+        fail((waiter for _, waiter in self.holders), error)
         self.hold = NO_AXES
-        self.holding.clear()
+        self.holders.clear()
 
     def take_holds(self) -> Pending:
         """Take the holds alone: a halt covers them, and goes before the rest."""
-        taken = Pending(hold=self.hold, holding=[*self.holding])
+        taken = Pending(hold=self.hold, holders=[*self.holders])
         self.hold = NO_AXES
-        self.holding.clear()
+        self.holders.clear()
         return taken
 
 

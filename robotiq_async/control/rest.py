@@ -45,18 +45,18 @@ class Moment(NamedTuple):
 LONG_AGO: Final = Moment(-math.inf, -LAG_READS)
 
 
-class Asked(NamedTuple):
+class Target(NamedTuple):
     """One request of an axis.
 
     Attributes:
         position: in counts; None while rGTO is clear, where gDT has no meaning [manual 2014, p. 51].
         again: whether it makes an axis in contact try again: it sets rGTO or raises the force.
-        shown: the first status that showed that it acts; None before that.
+        since: the first status that showed that it acts; None before that.
     """
 
     position: int | None
     again: bool = False
-    shown: Moment | None = LONG_AGO
+    since: Moment | None = LONG_AGO
 
     def fits(self, model: Model, what: ObjectStatus, position: int) -> bool:
         """Whether an axis can rest like this under it."""
@@ -73,35 +73,35 @@ class Rest(Enum):
     PROVEN = "what it shows is from after its last request, so that no older status can follow"
 
 
-def rest_of(asked: Iterator[Asked], model: Model, what: ObjectStatus, position: int) -> Rest:
+def rest_of(targets: Iterator[Target], model: Model, what: ObjectStatus, position: int) -> Rest:
     """Whether an axis rests under the last of its requests. Its position is never late.
 
-    ``asked`` has the requests that the status may show, the newest first.
+    ``targets`` has the requests that the status may show, the newest first.
     """
     # Only the newest requests are looked at where they decide: this runs at every poll of a motion, and a
     # control loop leaves fifty requests in the lag.
-    last = next(asked, None)
-    if what is ObjectStatus.IN_MOTION or (last is not None and last.shown is None):
+    last = next(targets, None)
+    if what is ObjectStatus.IN_MOTION or (last is not None and last.since is None):
         return Rest.UNKNOWN
-    before = next(asked, None)
+    before = next(targets, None)
     if last is None or before is None:
         # gDT results from the only request that is left, even if it contradicts it: the axis may be at a
         # software limit, or blocked.
         return Rest.PROVEN
     if what is ObjectStatus.AT_POSITION:  # within its tolerance, whatever the age of gDT
         return Rest.KNOWN if last.fits(model, what, position) else Rest.UNKNOWN
-    is_true = _is_true_since((last, before, *asked), model, what, position, unless_again=True)
+    is_true = _is_true_since((last, before, *targets), model, what, position, unless_again=True)
     return Rest.PROVEN if is_true else Rest.UNKNOWN
 
 
-def may_move(asked: Iterable[Asked], model: Model, what: ObjectStatus, position: int) -> bool:
+def may_move(targets: Iterable[Target], model: Model, what: ObjectStatus, position: int) -> bool:
     """Whether an axis may move, or be about to, although it shows rest.
 
     A contact is doubted only if a request within the lag contradicts it: a needless doubt would cost the
     grip. An axis close to the request before the last may have some counts to go [conceivable].
-    ``asked`` as above.
+    ``targets`` as above.
     """
-    last, *before = [*asked] or [Asked(None)]
+    last, *before = [*targets] or [Target(None)]
     if not before or what is ObjectStatus.IN_MOTION:
         return False
     if what is ObjectStatus.AT_POSITION:
@@ -113,14 +113,14 @@ def may_move(asked: Iterable[Asked], model: Model, what: ObjectStatus, position:
 
 
 def _is_true_since(
-    asked: tuple[Asked, ...], model: Model, what: ObjectStatus, position: int, *, unless_again: bool
+    targets: tuple[Target, ...], model: Model, what: ObjectStatus, position: int, *, unless_again: bool
 ) -> bool:
     """Whether this fits the last request, and every request since the first that it fits.
 
     It was true under that one. If no later request contradicts it, it is still true.
     """
     fits = False
-    for each in reversed(asked):
+    for each in reversed(targets):
         was_fitting, fits = fits, each.fits(model, what, position)
         if was_fitting and ((unless_again and each.again) or not fits):
             return False

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from robotiq_async import Finger, MoveResult, MoveSupersededError, ObjectStatus
-from robotiq_async.control.rest import LAG_READS, LAG_S, LONG_AGO, Asked, Moment, Rest, may_move, rest_of
+from robotiq_async.control.rest import LAG_READS, LAG_S, LONG_AGO, Moment, Rest, Target, may_move, rest_of
 from robotiq_async.values.enums import NO_AXES
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
 from tests.control.other_client import image
@@ -419,12 +419,12 @@ NOW = Moment(10.0, 1000)
 OLD = Moment(NOW.time - LAG_S, NOW.reads - LAG_READS)
 
 
-def rest(what: ObjectStatus, position: int, *asked: Asked) -> Rest:
+def rest(what: ObjectStatus, position: int, *asked: Target) -> Rest:
     """The known rest of an axis with these requests, the oldest first."""
     return rest_of(reversed(asked), THREE_FINGER, what, position)
 
 
-def doubted(what: ObjectStatus, position: int, *asked: Asked) -> bool:
+def doubted(what: ObjectStatus, position: int, *asked: Target) -> bool:
     return may_move(reversed(asked), THREE_FINGER, what, position)
 
 
@@ -432,17 +432,17 @@ def test_a_status_is_trusted_unless_an_earlier_request_explains_it() -> None:
     assert rest(THERE, 100) is Rest.PROVEN
     assert rest(MOVING, 100) is Rest.UNKNOWN
     assert not doubted(CLOSING, 100)
-    assert rest(CLOSING, 9, Asked(0), Asked(255)) is Rest.PROVEN, "it fits the new request alone"
-    assert rest(CLOSING, 9, Asked(255), Asked(0)) is Rest.UNKNOWN
-    asked = Asked(255), Asked(0), Asked(255)
+    assert rest(CLOSING, 9, Target(0), Target(255)) is Rest.PROVEN, "it fits the new request alone"
+    assert rest(CLOSING, 9, Target(255), Target(0)) is Rest.UNKNOWN
+    asked = Target(255), Target(0), Target(255)
     assert rest(CLOSING, 150, *asked) is Rest.UNKNOWN, "it fitted before, and was contradicted since"
     assert doubted(CLOSING, 150, *asked)
 
 
 def test_an_axis_that_is_where_it_was_asked_to_be_rests_and_an_older_status_may_follow() -> None:
-    assert rest(THERE, 101, Asked(0), Asked(100)) is Rest.KNOWN
-    assert rest(THERE, 101, Asked(100)) is Rest.PROVEN
-    assert rest(THERE, 110, Asked(0), Asked(100)) is Rest.UNKNOWN
+    assert rest(THERE, 101, Target(0), Target(100)) is Rest.KNOWN
+    assert rest(THERE, 101, Target(100)) is Rest.PROVEN
+    assert rest(THERE, 110, Target(0), Target(100)) is Rest.UNKNOWN
 
 
 @pytest.mark.parametrize(("seconds", "reads"), [(0.001, 0), (0.0, 1)])
@@ -453,12 +453,12 @@ def test_the_lag_takes_both_time_and_reads(seconds: float, reads: int) -> None:
 
 
 def test_nothing_is_known_under_what_does_not_act() -> None:
-    assert rest(THERE, 100, Asked(101), Asked(100, shown=None)) is Rest.UNKNOWN
+    assert rest(THERE, 100, Target(101), Target(100, since=None)) is Rest.UNKNOWN
 
 
 def asked_of(scan: Scan, axis: Finger) -> int:
     """The number of requests of an axis that a status may be from."""
-    return len([*scan.controller._ledger._asked(axis)])
+    return len([*scan.controller._ledger._targets(axis)])
 
 
 @LAGS
@@ -486,11 +486,11 @@ def test_a_status_after_a_motion_is_not_from_before_it() -> None:
 
 @pytest.mark.parametrize(("position", "doubtful"), [(100, True), (102, True), (103, False), (105, False)])
 def test_an_axis_between_two_requests_may_have_some_counts_to_go(position: int, doubtful: bool) -> None:
-    assert doubted(THERE, position, Asked(100), Asked(104)) is doubtful
+    assert doubted(THERE, position, Target(100), Target(104)) is doubtful
 
 
 def test_a_contact_that_is_tried_again_is_known_when_the_lag_is_over() -> None:
-    asked = Asked(255), Asked(255, again=True)
+    asked = Target(255), Target(255, again=True)
     assert rest(CLOSING, 150, *asked) is Rest.UNKNOWN
     assert not doubted(CLOSING, 150, *asked), "for a hold it is a grip"
     assert rest(CLOSING, 150, *asked[1:]) is Rest.PROVEN

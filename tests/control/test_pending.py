@@ -150,9 +150,9 @@ def test_a_position_goes_before_a_hold_whose_caller_still_waits() -> None:
 def test_a_hold_that_nobody_asked_for_is_no_request() -> None:
     pending = Pending()
     pending.merge_hold(A)
-    assert not pending.is_asked
+    assert not pending.has_caller
     pending.merge_hold(B, Outcome())
-    assert pending.is_asked
+    assert pending.has_caller
     pending.hold_only(C)
     assert pending.hold == B, "another client moves A now; B was named by a caller"
 
