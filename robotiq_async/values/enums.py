@@ -300,7 +300,8 @@ class Trigger(Enum):
     """An event that can change the state of a hand.
 
     ``ASK_`` marks a call of the user, ``SEEN_`` a condition found in a status; the others concern the link
-    and the delivery of a request.
+    and the delivery of a request. DELIVERED comes, too, if there is nothing left to deliver: what was asked
+    was dropped, or is in force already.
     """
 
     __hash__ = object.__hash__  # see State
