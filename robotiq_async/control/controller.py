@@ -196,9 +196,8 @@ class Controller:
         if self.machine.ask(Trigger.STOPPED):
             self.machine.show(State.SHUTDOWN, Trigger.STOPPED)
 
-    def keep_no_grip(self, why: str) -> None:
+    def keep_no_grip(self) -> None:
         """Make the stop that has begun clear rGTO after all."""
-        self._why_no_grip = why
         if isinstance(self._stop, Keeping):
             self._stop = Stop(StopLevel.SHUTDOWN)
 

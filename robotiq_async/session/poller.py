@@ -141,7 +141,7 @@ class Poller:
             self._level = level
             self._end_by = self._loop.time() + STOP_S
             if level is StopLevel.SHUTDOWN:
-                self._controller.keep_no_grip("a stop() without keep_grip came meanwhile")
+                self._controller.keep_no_grip()
         elif level < self._level:
             self._log.warning(self._level.prevails)
         self._opener.end()
