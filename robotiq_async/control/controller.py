@@ -358,8 +358,7 @@ class Controller:
     def _advance_keeping(self, keeping: Keeping) -> None:
         ledger, status = self._ledger, self._evidence.status
         assert status is not None
-        if classify(status) in FOLLOWS:
-            ledger.update_rest(status)
+        ledger.update_rest(status)
         keeping.judge(ledger, status)
         if keeping.why_no_grip:
             self._stop = stop = Stop(StopLevel.SHUTDOWN)
@@ -410,8 +409,6 @@ class Controller:
     def _resume_or_adopt(self, condition: Trigger, status: RobotiqStatus) -> None:
         """The link is back: continue from our image if the gripper shows one, or adopt it."""
         ledger, pending = self._ledger, self._requests.pending
-        if condition not in FOLLOWS:
-            return
         if ledger.match is None or not ledger.match.is_ours:
             ledger.adopt(status, is_found=True)
         if condition is Trigger.SEEN_FAULT and status.activation_echo:
