@@ -22,10 +22,8 @@ No I/O and no clock: time is that of the newest status.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
-from functools import reduce
+from collections.abc import Iterator
 from itertools import chain
-from operator import or_
 from typing import Final
 
 from ..runtime.log import Log, log
@@ -211,10 +209,11 @@ class Ledger:
 
     def _note_changes(self, entry: Entry) -> None:
         image, before = entry.image, entry.before
-        # More force lets an axis in contact try again [conceivable]; one that moves keeps moving.
-        pressed = _axes(before, image, lambda old, new: new.force > old.force)
-        entry.changes = _changed(before, image) | (pressed & ~self.unrested)
-        entry.again = entry.changes & (Finger.ALL if image.go and not before.go else pressed)
+        moved, pressed = _compared(before, image)
+        entry.changes = moved if image.go is before.go else image.model.all_axes
+        if pressed:  # more force lets an axis in contact try again [conceivable]; one that moves keeps moving
+            entry.changes |= pressed & ~self.unrested
+        entry.again = entry.changes & pressed if before.go or not image.go else entry.changes
         # With rGTO clear gDT has no meaning, so no axis was proven to rest under what was asked before.
         if before.go:
             entry.rested = entry.changes & ~self._unproven
@@ -380,7 +379,7 @@ class Ledger:
         other = Entry(self._entries[-1].number + 1, image, before, status.echo, False, time, time, self.now)
         other.changes = _changed(before, image)
         self._unproven |= other.changes
-        self.ours = NO_AXES if is_found else self.ours & ~_moved(before, image)
+        self.ours = NO_AXES if is_found else self.ours & ~_compared(before, image)[0]
         waiting = self._waiting()
         self._past.extend(each for each in self._entries if each.number <= self.shown.number)
         self._entries, self.shown, self.match = deque([other, *waiting]), other, other
@@ -459,14 +458,15 @@ class Ledger:
 
 def _changed(before: Request, image: Request) -> Finger:
     """The axes whose request is another: all if rGTO is."""
-    return _moved(before, image) if image.go is before.go else image.model.all_axes
+    return _compared(before, image)[0] if image.go is before.go else image.model.all_axes
 
 
-def _moved(before: Request, image: Request) -> Finger:
-    return _axes(before, image, lambda old, new: new.position != old.position)
-
-
-def _axes(before: Request, image: Request, which: Callable[[AxisRequest, AxisRequest], bool]) -> Finger:
-    """The axes for whose requests, the old one and the new one, ``which`` is true."""
-    pairs = zip(before.by_axis, image.axes, strict=True)
-    return reduce(or_, (axis for (axis, old), new in pairs if which(old, new)), NO_AXES)
+def _compared(before: Request, image: Request) -> tuple[Finger, Finger]:
+    """The axes whose position request is another, and those that are to press harder."""
+    moved = pressed = NO_AXES
+    for (axis, old), new in zip(before.by_axis, image.axes, strict=True):
+        if new.position != old.position:
+            moved |= axis
+        if new.force > old.force:
+            pressed |= axis
+    return moved, pressed
