@@ -27,8 +27,13 @@ from typing import Final
 from .checks import check_byte, check_number, repr_of
 
 WIDEST_MM: Final = 1000.0  # widest opening that a point may have
+LEAST_FALL_MM: Final = 0.02
+"""The least that a measured opening falls in a count. Nominal ones fall by 0.2 and more, whatever the
+fingertips: less is a slip of the calliper or of the pen. And a position could not be found again by its
+opening, which is kept to 0.01 mm."""
 
-Points = tuple[tuple[int, float], ...]
+Point = tuple[int, float]
+Points = tuple[Point, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +117,9 @@ class Stroke:
             TypeError: not a number.
             ValueError: outside the openings of this gripper, 0 (closed) .. ``mm`` (open) unless measured.
         """
-        wanted = check_number("mm", mm, self.closed_mm, self.mm, "millimetres")
+        # An opening that was read is accepted, too: it is rounded, perhaps to beyond the measured end.
+        least, most = min(self.closed_mm, self.openings[-1]), max(self.mm, self.openings[0])
+        wanted = check_number("mm", mm, least, most, "millimetres")
         # Openings fall from the open reading to the closed one.
         low, high = self.open_reading, self.closed_reading
         after = bisect_left(self.openings, -wanted, low, high, key=operator.neg)
@@ -160,7 +167,8 @@ def check_points(name: str, given: object) -> Points:
 
     Raises:
         TypeError: not a sequence of pairs of an int and a number.
-        ValueError: fewer than two, a position outside 0..255, an opening outside 0..1000 mm, or not in order.
+        ValueError: fewer than two, a position outside 0..255, an opening outside 0..1000 mm, not in order, or
+            an opening that falls by less than 0.02 mm a count.
     """
     form = f"{name} must be two or more points (position in counts, opening in mm)"
     if not isinstance(given, Iterable) or isinstance(given, str | bytes):
@@ -175,10 +183,18 @@ def check_points(name: str, given: object) -> Points:
         )
         for position, mm in pairs
     )
-    for (before, wider), (after, narrower) in pairwise(points):
-        if not (before < after and wider > narrower):
-            raise ValueError(
-                f"{name}: positions must rise and openings fall, "
-                f"got {wider:g} mm at {before} and then {narrower:g} mm at {after}"
-            )
+    for before, after in pairwise(points):
+        if why := why_not_after(before, after):
+            raise ValueError(f"{name}: {why}")
     return points
+
+
+def why_not_after(before: Point, after: Point) -> str:
+    """The reason why a measured point cannot follow another; empty if it can."""
+    (position, wider), (further, narrower) = before, after
+    got = f"got {wider:g} mm at {position} and then {narrower:g} mm at {further}"
+    if not (position < further and wider > narrower):
+        return f"positions must rise and openings fall, {got}"
+    if wider - narrower < LEAST_FALL_MM * (further - position):
+        return f"an opening must fall by {LEAST_FALL_MM:g} mm a count or more, {got}"
+    return ""

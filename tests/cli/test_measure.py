@@ -125,7 +125,8 @@ async def test_stroke_asks_for_figures_that_fall_until_the_fingertips_meet(
         outcome = await shell.finish(process)
     outcome.assert_succeeded()
     assert outcome.out.count("Millimetres with at most two decimals, such as 42.5, please.") == 1
-    assert outcome.out.count("Less than the 101.25 mm before, please") == 1
+    again = "positions must rise and openings fall, got 101.25 mm at "
+    assert outcome.out.count(again) == 1
     assert "The fingertips met at" in outcome.out
     points = read_stroke(file)
     assert [mm for _, mm in points] == [101.25, 52, 0]

@@ -79,7 +79,7 @@ def test_the_thesis_tables_are_there() -> None:
         (f"{HEADER}\n0,1,600001\n", ", line 2: run_2_ms must be an integer in 0..600000, got '600001'"),
         (f"{HEADER}\n256,1,2\n", ", line 2: speed_value must be an integer in 0..255, got '256'"),
         (f"{HEADER}\n0,1,2\n\n0,3,4\n", ", line 4: speed_value 0 appears twice"),
-        (f'{HEADER}\n0,"1,2\n', ": cannot be read"),
+        (f'{HEADER}\n0,"1,2\n', ", line 2: unexpected end of data"),
     ],
 )
 def test_a_bad_table_is_refused_with_file_line_and_reason(file: Path, text: str, words: str) -> None:
@@ -91,7 +91,7 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
         read_table(tmp_path / "nowhere.csv", SPEED)
     with pytest.raises(TableError, match="cannot be read: Is a directory"):
         read_table(tmp_path, SPEED)
-    with pytest.raises(TableError, match="cannot be read: a line has more than 10000 characters"):
+    with pytest.raises(TableError, match="/dev/zero, line 1: it has more than 10000 characters"):
         read_table("/dev/zero", SPEED)
     (tmp_path / "latin").write_bytes(b"speed_value,run_1_ms\n0,\xff\n")
     with pytest.raises(TableError, match="cannot be read"):

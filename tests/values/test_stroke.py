@@ -31,7 +31,7 @@ from robotiq_async.values.calibration import SpeedCalibration
 from robotiq_async.values.calibration.csv_tables import TableError, read_stroke, write_stroke
 from robotiq_async.values.model import MODELS
 from robotiq_async.values.status import Part
-from robotiq_async.values.stroke import Stroke, check_points
+from robotiq_async.values.stroke import LEAST_FALL_MM, Stroke, check_points
 
 COUNTS = st.integers(0, 255)
 models = pytest.mark.parametrize("model", MODELS.values(), ids=lambda model: model.name)
@@ -141,6 +141,33 @@ def test_more_points_are_met_exactly() -> None:
     assert stroke.position_of(1.5) == 226
 
 
+@st.composite
+def tables(draw: st.DrawFn) -> tuple[tuple[int, float], ...]:
+    """Any points that are a stroke: 2..256 positions, each with an opening below that of the one before."""
+    closed, *others = sorted(draw(st.sets(COUNTS, min_size=2)), reverse=True)
+    points = [(closed, draw(st.floats(0, 10)))]
+    for position in others:
+        further, mm = points[-1]
+        points.append((position, mm + (further - position) * draw(st.floats(1.0001 * LEAST_FALL_MM, 3.8))))
+    return tuple(reversed(points))
+
+
+@given(st.sampled_from([*MODELS.values()]), tables(), st.floats(0, 1))
+def test_any_measured_table_goes_both_ways(
+    model: Model, table: tuple[tuple[int, float], ...], share: float
+) -> None:
+    """Counts come back as themselves, and millimetres within half a count."""
+    stroke = model.stroke.measured(check_points("stroke", table))
+    low, high = stroke.open_reading, stroke.closed_reading
+    for each in range(low, high + 1):
+        assert stroke.position_of(stroke.opening_mm(each)) == each
+    mm = stroke.closed_mm + share * (stroke.mm - stroke.closed_mm)
+    found = stroke.position_of(mm)
+    wider, narrower = stroke.openings[max(found - 1, low)], stroke.openings[min(found + 1, high)]
+    half = 0.005  # to which openings are rounded
+    assert (stroke.openings[found] + narrower) / 2 - half <= mm <= (stroke.openings[found] + wider) / 2 + half
+
+
 REFUSED: list[tuple[object, type[Exception], str]] = [
     (
         "left.csv",
@@ -154,6 +181,21 @@ REFUSED: list[tuple[object, type[Exception], str]] = [
     ([(3, 85), (256, 0)], ValueError, "a position of stroke must be in 0..255, got 256"),
     ([(3, 85), (2.5, 0)], TypeError, "a position of stroke must be an int in 0..255, got 2.5"),
     ([(3, 1001), (9, 0)], ValueError, "an opening of stroke must be millimetres in 0.0..1000.0, got 1001"),
+    (
+        [(3, 85), (9, float("nan"))],
+        ValueError,
+        "an opening of stroke must be millimetres in 0.0..1000.0, got nan",
+    ),
+    (
+        [(3, 85), (9, float("inf"))],
+        ValueError,
+        "an opening of stroke must be millimetres in 0.0..1000.0, got inf",
+    ),
+    (
+        [(3, 85), (203, 81.001)],
+        ValueError,
+        "stroke: an opening must fall by 0.02 mm a count or more, got 85 mm at 3 and then 81.001 mm at 203",
+    ),
     (
         [(3, 85), (100, 85.0)],
         ValueError,
@@ -194,11 +236,49 @@ def test_a_file_is_read_as_it_was_written(tmp_path: Path) -> None:
     [
         ("", "expected the columns position_counts,opening_mm, got none"),
         ("position,mm\n3,85\n", ", line 1: expected the columns position_counts,opening_mm, got position,mm"),
-        ("position_counts,opening_mm\n3,85\n", "stroke must be two or more points"),
-        ("position_counts,opening_mm\n3,-1\n", ", line 2: expected counts and millimetres, got '3,-1'"),
-        ("position_counts,opening_mm\n3,85,1\n", ", line 2: expected counts and millimetres, got '3,85,1'"),
+        ("position_counts,opening_mm\n", "left.csv: two or more points are needed, got 0"),
+        ("position_counts,opening_mm\n3,85\n", "left.csv: two or more points are needed, got 1"),
+        (
+            "position_counts,opening_mm\n3,-1\n",
+            ", line 2: expected counts and millimetres, such as 113,46.2, got '3,-1'",
+        ),
+        (
+            "position_counts,opening_mm\n3,85,1\n",
+            ", line 2: expected counts and millimetres, such as 113,46.2, got '3,85,1'",
+        ),
         ("position_counts,opening_mm\n300,85\n", ", line 2: position_counts must be an integer in 0..255"),
-        ("position_counts,opening_mm\n3,85\n9,85\n", "left.csv: positions must rise and openings fall"),
+        (
+            "position_counts,opening_mm\n3,85\n9,85\n",
+            ", line 3: positions must rise and openings fall, got 85 mm at 3 and then 85 mm at 9",
+        ),
+        (
+            "position_counts,opening_mm\n\n3,85\n\n228,1\n99,60\n",
+            ", line 6: positions must rise and openings fall, got 1 mm at 228 and then 60 mm at 99",
+        ),
+        ("position_counts,opening_mm\n3,85\n3,85\n", ", line 3: positions must rise and openings fall"),
+        (
+            "position_counts,opening_mm\n3,85\n128,84.5\n228,0\n",
+            ", line 3: an opening must fall by 0.02 mm a count or more, got 85 mm at 3 and then 84.5 mm at",
+        ),
+        (
+            "position_counts,opening_mm\n3,nan\n",
+            ", line 2: expected counts and millimetres, such as 113,46.2,",
+        ),
+        ("position_counts,opening_mm\n3,1e2\n", ", line 2: expected counts and millimetres"),
+        (
+            "position_counts,opening_mm\n-3,85\n",
+            ", line 2: position_counts must be an integer in 0..255, got '-3'",
+        ),
+        (
+            "position_counts;opening_mm\n3;85,2\n",
+            ", line 1: expected the columns position_counts,opening_mm, got",
+        ),
+        ('position_counts,opening_mm\n3,"85\n', ", line 2: unexpected end of data"),
+        (
+            '{"stroke": [[3, 85.0], [228, 0.0]]}',
+            ", line 1: expected the columns position_counts,opening_mm, got",
+        ),
+        (f"position_counts,opening_mm\n3,{'8' * 10_001}\n", ", line 2: it has more than 10000 characters"),
         ("position_counts,opening_mm,model\n3,85,2f85\n9,5\n", ", line 3: expected 3 columns, got 2"),
         ("position_counts,opening_mm,model\n3,85,2f\n", ", line 2: model must be one of 3f, 2f85"),
         (

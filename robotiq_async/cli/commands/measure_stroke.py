@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter
 
 from ...link.address import is_remote
+from ...values.stroke import why_not_after
 from ..addresses import gripper_words, is_simulated, named_model
 from ..arguments import Address, Flag, Yes
 from ..consent import consent
@@ -19,7 +20,7 @@ from .measure_force import prompt
 
 if TYPE_CHECKING:
     from ...hand import Hand
-    from ...values.stroke import Points
+    from ...values.stroke import Point, Points
 
 WARNING: Final = """the jaw MOVES to {count} positions, from open to closed, at its least force, and waits at
 each for the figure of a calliper. Nothing but the calliper may be between the fingertips; take it out before
@@ -27,6 +28,8 @@ you answer. If the gripper is not active yet the jaw opens and closes first, and
 QUESTION: Final = "At {position} counts: what does the calliper show between the fingertips, in mm?"
 MET: Final = """The fingertips met at {position} counts: that is the closed end. If they met something else,
 press Ctrl-C, take it out and begin again."""
+OPEN_IS_ZERO: Final = "an open jaw cannot have an opening of 0 mm"
+TOUCH: Final = "The fingertips touch at {position} counts: that is the closed end."
 FORM: Final = r"[0-9]{1,3}(?:\.[0-9]{1,2})?"
 
 Calliper = Callable[[int], Awaitable[float]]  # takes the position, in counts
@@ -95,7 +98,7 @@ async def measured(hand: Hand, count: int, calliper: Calliper) -> Points:
     """
     if len(hand.model.axes) > 1:
         raise CommandError("a width is measured between the fingertips of a jaw; this is a 3-Finger")
-    points: list[tuple[int, float]] = []
+    points: list[Point] = []
     for number in range(count):
         result = await hand.move(round(255 * number / (count - 1)), force=0)
         (position,) = result.positions.values()
@@ -106,18 +109,22 @@ async def measured(hand: Hand, count: int, calliper: Calliper) -> Points:
             print(MET.format(position=position), flush=True)
         if points and position <= points[-1][0]:
             raise CommandError(f"the jaw did not move on from {position} counts: ask for fewer --points")
-        points.append((position, await _falling(calliper, position, points)))
-        if has_met:
+        points.append(await _point_after(points, calliper, position))
+        is_closed = points[-1][1] == 0
+        if is_closed and not has_met:
+            print(TOUCH.format(position=position), flush=True)
+        if has_met or is_closed:
             break
     return tuple(points)
 
 
-async def _falling(calliper: Calliper, position: int, before: Points | list[tuple[int, float]]) -> float:
+async def _point_after(points: Sequence[Point], calliper: Calliper, position: int) -> Point:
     while True:
         mm = await calliper(position)
-        if not before or mm < before[-1][1]:
-            return mm
-        print(f"Less than the {before[-1][1]:g} mm before, please: the jaw has closed further.", flush=True)
+        why = why_not_after(points[-1], (position, mm)) if points else OPEN_IS_ZERO * (mm == 0)
+        if not why:
+            return position, mm
+        print(f"{why}. Please measure again.", flush=True)
 
 
 def _calliper(address: str, hand: Hand) -> Calliper:

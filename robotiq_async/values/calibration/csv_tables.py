@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Final, TextIO
 
 from ..model import Model, model_of
-from ..stroke import Points, check_points
+from ..stroke import Point, Points, why_not_after
 
 Table = dict[int, tuple[int, ...]]  # for each value, its runs
 Row = tuple[int, list[str]]  # line number and cells
@@ -91,7 +91,7 @@ def read_measured(path: Path | str, layout: Layout) -> tuple[Table, Model | None
             expected = layout.header(max(1, columns - 1))
             if cells != expected:
                 wanted, there = ",".join(expected), ",".join(cells)
-                raise TableError(path, line, f"expected the columns {wanted}, got {there}")
+                raise TableError(path, line, f"expected the columns {wanted}, got {there:.100}")
             continue
         if len(cells) != columns:
             raise TableError(path, line, f"expected {columns} columns, got {len(cells)}")
@@ -136,18 +136,21 @@ def read_stroke(path: Path | str, model: Model | None = None) -> Points:
     rows = iter(found)
     line, header = next(rows, (None, []))
     if header != STROKE:
-        raise TableError(
-            path, line, f"expected the columns {','.join(STROKE)}, got {','.join(header) or 'none'}"
-        )
-    points: list[tuple[int, float]] = []
+        there = ",".join(header) or "none"
+        raise TableError(path, line, f"expected the columns {','.join(STROKE)}, got {there:.100}")
+    points: list[Point] = []
     for line, cells in rows:
-        if len(cells) != 2 or not re.fullmatch(r"[0-9]{1,4}(\.[0-9]{1,6})?", cells[1]):
-            raise TableError(path, line, f"expected counts and millimetres, got {','.join(cells)!r:.100}")
-        points.append((integer(path, line, STROKE[0], cells[0], 255), float(cells[1])))
-    try:
-        return check_points("stroke", points)
-    except ValueError as error:
-        raise TableError(path, None, str(error).removeprefix("stroke: ")) from error
+        if len(cells) != 2 or not re.fullmatch(r"[0-9]{1,3}(\.[0-9]{1,6})?", cells[1]):
+            raise TableError(
+                path, line, f"expected counts and millimetres, such as 113,46.2, got {','.join(cells)!r:.100}"
+            )
+        point = (integer(path, line, STROKE[0], cells[0], 255), float(cells[1]))
+        if points and (why := why_not_after(points[-1], point)):
+            raise TableError(path, line, why)
+        points.append(point)
+    if len(points) < 2:
+        raise TableError(path, None, f"two or more points are needed, got {len(points)}")
+    return tuple(points)
 
 
 def write_stroke(path: Path | str, points: Points, model: Model | None = None) -> None:
@@ -202,19 +205,29 @@ def read_rows(path: Path | str) -> list[Row]:
     Raises:
         TableError: the file cannot be read.
     """
+    rows: list[Row] = []
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
-            lines = csv.reader(_lines(file), strict=True)
-            return [(lines.line_num, [cell.strip() for cell in cells]) for cells in lines if cells]
-    except (OSError, ValueError, csv.Error) as error:
-        why = error.strerror if isinstance(error, OSError) else str(error)
-        raise TableError(path, None, f"cannot be read: {why}") from error
+            lines = csv.reader(_lines(path, file), strict=True)
+            try:
+                rows += ((lines.line_num, [cell.strip() for cell in cells]) for cells in lines if cells)
+            except csv.Error as error:
+                raise TableError(path, lines.line_num, str(error)) from error
+    except TableError:
+        raise
+    except OSError as error:
+        raise TableError(path, None, f"cannot be read: {error.strerror}") from error
+    except ValueError as error:  # not UTF-8, or a path with a null character
+        raise TableError(path, None, f"cannot be read: {error}") from error
+    return rows
 
 
-def _lines(file: TextIO) -> Iterator[str]:
+def _lines(path: Path | str, file: TextIO) -> Iterator[str]:
+    number = 0
     while line := file.readline(LONGEST + 1):
+        number += 1
         if len(line) > LONGEST:
-            raise ValueError(f"a line has more than {LONGEST} characters")
+            raise TableError(path, number, f"it has more than {LONGEST} characters")
         yield line
 
 
