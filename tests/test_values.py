@@ -306,6 +306,7 @@ def test_values_of_one_axis_are_listed_below_its_name() -> None:
     assert result().as_dict()["A"] == {
         "outcome": "CONTACT_CLOSING",
         "position": 150,
+        "opening_mm": result().opening_mm(A),
         "reached": False,
         "peak_current_ma": 310,
     }

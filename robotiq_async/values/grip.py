@@ -8,7 +8,7 @@ from enum import Enum
 from typing import Any
 
 from .checks import check_int
-from .enums import Finger, ObjectStatus, names_of
+from .enums import JAW, Finger, ObjectStatus, names_of
 from .move_result import MoveResult
 from .status import RobotiqStatus
 
@@ -50,7 +50,8 @@ class GraspResult:
 
         In millimetres: nominal, unless the hand has measured points.
         """
-        return self.move.opening_mm if self.is_held else None
+        is_jaw = len(self.status.model.axes) == 1
+        return self.move.opening_mm(JAW) if self.is_held and is_jaw else None
 
     @property
     def positions(self) -> Mapping[Finger, int]:

@@ -41,15 +41,15 @@ class MoveResult:
         for name in ("outcomes", "positions", "peak_current_ma"):
             object.__setattr__(self, name, FrozenMapping(getattr(self, name)))
 
-    @property
-    def opening_mm(self) -> float | None:
-        """The final opening of a jaw, in millimetres: nominal, unless the hand has measured points.
+    def opening_mm(self, finger: Finger | int) -> float:
+        """The opening at a finger when the move ended, in millimetres; as ``status.opening_mm(finger)``.
 
-        None for a 3-Finger: ``result.status.opening_mm(finger)`` has that of each finger.
+        Of a jaw it is the width between its fingertips: ``result.opening_mm(JAW)``.
+
+        Raises:
+            TypeError, ValueError: as :meth:`RobotiqStatus.opening_mm`.
         """
-        if len(self.status.model.axes) > 1:
-            return None
-        return self.status.stroke.opening_mm(self.positions[JAW])
+        return self.status.opening_mm(finger)
 
     @property
     def object_detected(self) -> bool:
@@ -59,18 +59,18 @@ class MoveResult:
     def as_dict(self) -> dict[str, Any]:
         """The result in types that JSON and pandas accept; enumerations and masks as in a status.
 
-        The key of each axis holds its ``outcome``, ``position``, ``reached`` and ``peak_current_ma``. What is
-        None is left out: openings, and the current where the link does not carry it.
+        The key of each axis holds its ``outcome``, ``position``, of a finger ``opening_mm``, ``reached`` and
+        ``peak_current_ma``, which is left out where the link does not carry it.
         """
         return {
             "duration": self.duration,
-            **({} if self.opening_mm is None else {"opening_mm": self.opening_mm}),
             "object_detected": self.object_detected,
             "contacts": names_of(self.contacts),
             **{
                 str(axis.name): {
                     "outcome": self.outcomes[axis].name,
                     "position": self.positions[axis],
+                    **({} if axis is Finger.SCISSOR else {"opening_mm": self.opening_mm(axis)}),
                     "reached": axis in self.reached,
                     **({} if (peak := self.peak_current_ma[axis]) is None else {"peak_current_ma": peak}),
                 }
@@ -84,5 +84,5 @@ class MoveResult:
             f"{axis}={self.positions.get(axis)} {how.name}{milliampere(self.peak_current_ma.get(axis))}"
             for axis, how in self.outcomes.items()
         )
-        opening = "" if self.opening_mm is None else f", {self.opening_mm:.1f} mm open"
+        opening = f", {self.opening_mm(JAW):.1f} mm open" if len(self.status.model.axes) == 1 else ""
         return f"<MoveResult {axes} in {self.duration:.3f} s{opening}>"

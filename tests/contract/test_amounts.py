@@ -28,9 +28,10 @@ async def test_a_move_in_millimetres(here: Bench, hand: Hand) -> None:
         hand.units.force(label_n=100),
     )
     assert result.reached == JAW
-    assert result.opening_mm == pytest.approx(40, abs=1)
-    assert hand.status.opening_mm(JAW) == result.opening_mm
-    assert result.as_dict()["opening_mm"] == result.opening_mm
+    assert result.opening_mm(JAW) == pytest.approx(40, abs=1)
+    assert hand.status.opening_mm(JAW) == result.opening_mm(JAW)
+    assert result.as_dict()["A"]["opening_mm"] == result.opening_mm(JAW)
+    assert f"{result.opening_mm(JAW):.1f} mm open" in repr(result)
 
 
 @jaw
@@ -81,7 +82,7 @@ async def test_what_is_not_held_has_no_width(here: Bench, hand: Hand) -> None:
     assert not grasp
     assert grasp.width_mm is None
     assert "width_mm" not in grasp.as_dict()
-    assert grasp.move.opening_mm == pytest.approx(0, abs=1)
+    assert grasp.move.opening_mm(JAW) == pytest.approx(0, abs=1)
 
 
 @three
@@ -90,11 +91,14 @@ async def test_fingers_of_a_3_finger_have_openings_and_no_width(here: Bench, han
     here.gripper.place_object(Finger.ABC, position=150)
     grasp = await hand.grasp()
     assert grasp
-    assert (grasp.width_mm, grasp.move.opening_mm) == (None, None)
+    assert grasp.width_mm is None
     assert hand.part == Part(Finger.ABC, None)
     result = await hand.move(mm=100, fingers=Finger.A)
     assert set(result.outcomes) == {Finger.A}
-    assert hand.status.opening_mm(Finger.A) == pytest.approx(100, abs=2)
+    assert result.opening_mm(Finger.A) == hand.status.opening_mm(Finger.A) == pytest.approx(100, abs=2)
+    assert "mm open" not in repr(result), "there is no single width"
+    with pytest.raises(ValueError, match="the scissor has no opening"):
+        result.opening_mm(Finger.SCISSOR)
 
 
 Refusal = tuple[Callable[[Any], Any], type[Exception], str]

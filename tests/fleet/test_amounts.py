@@ -31,7 +31,7 @@ async def test_the_points_of_the_agents_hand_are_those_of_the_client() -> None:
         assert here.gripper.writes[-1].registers[1] & 0xFF == hand.units.position(mm=40)
         for status in (hand.status, result.status, await anext(hand.statuses())):
             assert status.opening_mm(JAW) == here.local.status.opening_mm(JAW)
-        assert result.opening_mm == pytest.approx(40, abs=1)
+        assert result.opening_mm(JAW) == pytest.approx(40, abs=1)
         with pytest.raises(ValueError, match=r"mm must be millimetres in 2\.0\.\.100\.0, got 1"):
             await hand.move(mm=1)
 

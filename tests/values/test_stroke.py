@@ -396,7 +396,7 @@ async def test_a_move_to_a_measured_end_has_reached_it(caplog: pytest.LogCapture
         assert hand.status.stroke == hand.units.stroke
         result = await hand.close()
         assert result.reached == JAW
-        assert result.opening_mm == pytest.approx(2, abs=1.5)
+        assert result.opening_mm(JAW) == pytest.approx(2, abs=1.5)
     assert "at position" not in caplog.text
 
 
