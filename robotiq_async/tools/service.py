@@ -34,7 +34,7 @@ from ..hand import Hand
 from ..runtime.clock import now
 from ..runtime.log import log
 from ..runtime.signals import ending_signals
-from ..values.enums import Fault, Finger, State
+from ..values.enums import Fault, Finger, State, names_of
 from ..values.errors import NotStartedError
 from ..values.status import RobotiqStatus
 
@@ -70,16 +70,18 @@ class Health:
         return not self.problem
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, for JSON."""
+        """Plain values, for JSON; enumerations and masks as in a status."""
         return {
             "name": self.name,
-            "ready": self.is_ready,
+            "is_ready": self.is_ready,
             "problem": self.problem,
             "state": self.state.name,
             "status_age": self.status_age,
-            "fault": int(self.fault),
-            "fault_description": self.fault.description,
-            "holds": str(self.holds),
+            "fault": self.fault.name,
+            "fault_code": int(self.fault),
+            "severity": self.fault.severity.name,
+            "description": self.fault.description,
+            "holds": names_of(self.holds),
         }
 
 

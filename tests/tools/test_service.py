@@ -175,13 +175,15 @@ async def test_health_in_every_condition(server: SimulatorServer) -> None:
         hand = RobotiqHand(server.address, name="left")
         assert health(hand).as_dict() == {
             "name": "left",
-            "ready": False,
+            "is_ready": False,
             "problem": "no status has been read yet",
             "state": "DISCONNECTED",
             "status_age": None,
-            "fault": 0,
-            "fault_description": Fault.NONE.description,
-            "holds": str(Finger(0)),
+            "fault": "NONE",
+            "fault_code": 0,
+            "severity": "NONE",
+            "description": Fault.NONE.description,
+            "holds": [],
         }
         await hand.start()
         found = health(hand)
@@ -191,6 +193,7 @@ async def test_health_in_every_condition(server: SimulatorServer) -> None:
         server.gripper.place_object(Finger.ABC, 120)
         await hand.grasp()
         assert health(hand).holds == Finger.ABC
+        assert health(hand).as_dict()["holds"] == ["A", "B", "C"], "as in the JSON of a status"
         async with server.fault_injector.making(Trouble("fault", 14)):
             await hand.wait_for_state(State.FAULT, timeout=1)
             assert health(hand).problem.startswith("fault 0x0E: ")
