@@ -36,29 +36,39 @@ def _integer(name: str, low: int, high: int) -> Callable[[object, Sequence[Token
     return convert
 
 
-class Amount(NamedTuple):
-    """A position, a speed or a force as it was typed: an argument of a hand, and its value."""
+UNITS: Final = {"": "counts", "mm": "mm", "mm/s": "mm_per_s", "N": "label_n"}
+"""The units of amounts on the command line, and the arguments of a hand, and of ``values.amounts``, that they
+are. A new one is a row here, and is named where it may be typed: :data:`Position` and below."""
 
-    argument: str
+
+class Amount(NamedTuple):
+    """A position, a speed or a force as it was typed."""
+
     value: float
+    unit: str
 
     def __str__(self) -> str:
         """The amount as text for a person."""
-        return f"{self.value:g} mm" if self.argument == "mm" else f"{self.value:g}"
+        return f"{self.value:g} {self.unit}".rstrip()
+
+    @property
+    def argument(self) -> dict[str, Any]:
+        """The amount as an argument of ``values.amounts``."""
+        return {UNITS[self.unit]: self.value}
 
 
-def _amount(name: str, counts: str, unit: str, argument: str, metavar: str | None = None) -> Parameter:
+def _amount(name: str, unit: str, metavar: str | None = None) -> Parameter:
     """A parameter of counts, or of a number with its unit; the hand knows the range of that."""
     integer = _integer(name, 0, 255)
 
     def convert(kind: object, tokens: Sequence[Token]) -> Amount:
         found = re.fullmatch(rf"([0-9]{{1,6}}(?:\.[0-9]{{1,6}})?) ?{re.escape(unit)}", tokens[0].value)
         if found:
-            return Amount(argument, float(found[1]))
+            return Amount(float(found[1]), unit)
         try:
-            return Amount(counts, integer(kind, tokens))
+            return Amount(integer(kind, tokens), "")
         except UsageError as error:
-            raise UsageError(f"{error}; or give it in {unit}, as in 40{unit}") from None
+            raise UsageError(f"{error}; or give it in {unit}, as in 40.5{unit}") from None
 
     return Parameter(converter=convert, n_tokens=1, accepts_keys=False, metavar=metavar)
 
@@ -79,9 +89,9 @@ Flag = Annotated[bool, Parameter(negative=(), show_default=False)]
 """Off unless given. There is no --no- form, and the help shows no default."""
 Yes = Annotated[Flag, Parameter(name=("--yes", "-y"))]
 Host = Annotated[str, Parameter(metavar="HOST")]
-Position = Annotated[Amount, _amount("POSITION", "position", "mm", "mm")]
-Speed = Annotated[Amount | None, _amount("the value", "speed", "mm/s", "mm_per_s", metavar="0..255|MM/S")]
-Force = Annotated[Amount | None, _amount("the value", "force", "N", "label_n", metavar="0..255|N")]
+Position = Annotated[Amount, _amount("POSITION", "mm")]
+Speed = Annotated[Amount | None, _amount("the value", "mm/s", metavar="0..255|MM/S")]
+Force = Annotated[Amount | None, _amount("the value", "N", metavar="0..255|N")]
 Byte = Annotated[int, Parameter(converter=_integer("the value", 0, 255), metavar="0..255")]
 Port = Annotated[int, Parameter(converter=_integer("the port", 0, 65535), metavar="0..65535")]
 Unit = Annotated[int, Parameter(converter=_integer("the unit id", 0, 255), metavar="0..255")]

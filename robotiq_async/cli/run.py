@@ -23,12 +23,12 @@ from ..runtime.signals import ending_signals
 from ..session.options import LATE_POLLS
 from ..values.errors import RobotiqError
 from .app import build
+from .arguments import UNITS
 from .commands.ports import with_ports
 from .failures import CommandError, UsageError
 from .output.messages import forget, forwarded_warnings, tell
 
 SUCCESS, FAILURE, WRONG_USAGE, SIGNALLED = 0, 1, 2, 128
-UNITS = ("mm", "mm/s", "N")
 INSIST_S = 10.0
 """Seconds after the first signal in which a further Ctrl-C is ignored. A stop takes 2 s at most, a report of
 verify a few more."""
@@ -97,10 +97,14 @@ def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | No
 
 
 def _check_units(arguments: Sequence[str]) -> None:
-    """Refuse ``40 mm``: the unit would be taken for the address."""
+    """Refuse ``40 mm``: the unit would be taken for the address. And ``-1mm``, which looks like an option."""
+    units = [unit for unit in UNITS if unit]
     for number, unit in pairwise(arguments):
-        if unit in UNITS and re.fullmatch(r"[0-9.,]+", number):
+        if unit in units and re.fullmatch(r"[+-]?[0-9.,]+", number):
             raise UsageError(f"a number and its unit are one word: {number}{unit}")
+    below = re.compile(rf"-[0-9.,]+ ?({'|'.join(map(re.escape, units))})")
+    for amount in filter(below.fullmatch, arguments):
+        raise UsageError(f"an amount must be 0 or more, got {amount!r}")
 
 
 class _Signals:

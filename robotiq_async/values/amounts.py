@@ -15,9 +15,9 @@ from .enums import Finger
 def position_of(
     units: Units,
     axes: Finger,
-    counts: int | None,
-    mm: float | None,
-    open_fraction: float | None,
+    counts: int | None = None,
+    mm: float | None = None,
+    open_fraction: float | None = None,
     name: str = "position",
 ) -> int | None:
     """A position in counts; None if none is given. ``name`` is that of the argument in counts.
@@ -38,7 +38,9 @@ def position_of(
     return units.position(mm=mm)
 
 
-def speed_of(units: Units, counts: int | None, mm_per_s: float | None, name: str = "speed") -> int | None:
+def speed_of(
+    units: Units, counts: int | None = None, mm_per_s: float | None = None, name: str = "speed"
+) -> int | None:
     """A speed in counts, as :func:`position_of`."""
     if mm_per_s is None:
         return check_optional_byte(name, counts)
@@ -46,7 +48,9 @@ def speed_of(units: Units, counts: int | None, mm_per_s: float | None, name: str
     return units.speed(mm_per_s=mm_per_s)
 
 
-def force_of(units: Units, counts: int | None, label_n: float | None, name: str = "force") -> int | None:
+def force_of(
+    units: Units, counts: int | None = None, label_n: float | None = None, name: str = "force"
+) -> int | None:
     """A force in counts, as :func:`position_of`."""
     if label_n is None:
         return check_optional_byte(name, counts)

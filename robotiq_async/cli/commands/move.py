@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Coroutine
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
+from ...link.address import is_remote
 from ...tools.wording import axis_name
 from ...values.amounts import force_of, position_of, speed_of
 from ...values.calibration import Units
 from ...values.checks import check_timeout
 from ...values.enums import Finger
-from ..addresses import gripper_words, named_model
+from ..addresses import gripper_words, is_simulated
 from ..arguments import USUAL, Address, Amount, Fingers, Flag, Force, Link, Position, Speed, Yes
 from ..consent import consent
 from ..failures import usage
@@ -70,22 +71,28 @@ def move(
     """
     with usage():
         check_timeout("timeout", timeout)
-        model = named_model(address)
-        axes = axis_name(model.mask(fingers), model)
-    # Asked here and not in the coroutine: a question would block the event loop.
-    consent(address, WARNING.format(fingers=axes, position=position), yes=yes)
+    if not is_simulated(address):
+        from ..connect import make_hand
+
+        hand = make_hand(address, link)  # only to check: wrong usage is told before the question
+        with usage():
+            axes = hand.model.mask(fingers)
+            if not is_remote(address):  # there the agent knows the gripper
+                counts_of(hand.units, axes, position, speed, force)
+        # Asked here and not in the coroutine: a question would block the event loop.
+        consent(address, WARNING.format(fingers=axis_name(axes, hand.model), position=position), yes=yes)
     return _move(position, address, fingers, speed, force, timeout, keep, link)
 
 
-def counts_of(units: Units, axes: Finger, *amounts: Amount | None) -> dict[str, int]:
+def counts_of(
+    units: Units, axes: Finger, position: Amount, speed: Amount | None, force: Amount | None
+) -> dict[str, int | None]:
     """Position, speed and force in counts, by the names that a move has for them."""
-    given: dict[str, Any] = {each.argument: each.value for each in amounts if each is not None}
-    counts = {
-        "position": position_of(units, axes, given.get("position"), given.get("mm"), None),
-        "speed": speed_of(units, given.get("speed"), given.get("mm_per_s")),
-        "force": force_of(units, given.get("force"), given.get("label_n")),
+    return {
+        "position": position_of(units, axes, **position.argument),
+        "speed": speed_of(units, **(speed.argument if speed else {})),
+        "force": force_of(units, **(force.argument if force else {})),
     }
-    return {name: value for name, value in counts.items() if value is not None}
 
 
 async def _move(
