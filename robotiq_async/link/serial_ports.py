@@ -24,6 +24,9 @@ _WHY: Final = {
     **dict.fromkeys((errno.EBUSY, errno.EAGAIN), TAKEN),
     **dict.fromkeys((errno.ENOTTY, errno.EINVAL, errno.EISDIR), NO_PORT),
 }
+_ON_WINDOWS: Final = {"FileNotFoundError(": MISSING, "PermissionError(": TAKEN}
+"""There pyserial writes the system's error into its message, and gives no number. A port is opened for one
+program alone, and access is denied to the next."""
 
 
 def why_no_port(error: OSError | None, folder: Path = BY_ID) -> str:
@@ -32,10 +35,10 @@ def why_no_port(error: OSError | None, folder: Path = BY_ID) -> str:
         return "cannot open the serial port"
     # For a port that it cannot configure, pyserial gives no number; its context, the error of termios, does.
     numbers = (error.errno, *getattr(error.__context__, "args", ()))
-    why = next(
-        (_WHY[each] for each in numbers if isinstance(each, int) and each in _WHY),
-        f"cannot open the serial port: {error}",
-    )
+    known = [_WHY[each] for each in numbers if isinstance(each, int) and each in _WHY]
+    if error.errno is None:
+        known += [why for name, why in _ON_WINDOWS.items() if name in str(error)]
+    why = known[0] if known else f"cannot open the serial port: {error}"
     adapters = names_of_adapters(folder) if why is MISSING else {}
     return f"{why} These are: {', '.join(sorted(adapters))}" if adapters else why
 

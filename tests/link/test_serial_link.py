@@ -229,6 +229,24 @@ def test_a_port_that_is_missing_is_told_with_those_that_are_there(tmp_path: Path
     assert names_of_adapters(folder)[f"{tmp_path}/ttyUSB1"] == str(folder / "usb-FTDI_FT232R-if00")
 
 
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ("FileNotFoundError(2, 'The system cannot find the file specified.', None, 2)", MISSING),
+        ("PermissionError(13, 'Access is denied.', None, 5)", TAKEN),
+        (
+            "OSError(22, 'The parameter is incorrect.', None, 87)",
+            "cannot open the serial port: could not open",
+        ),
+    ],
+)
+def test_the_reasons_of_windows_are_understood(words: str, why: str, tmp_path: Path) -> None:
+    """Pyserial gives no number there: it writes the error of the system into its message."""
+    error = serial.SerialException(f"could not open port 'COM9': {words}")
+    assert error.errno is None
+    assert why_no_port(error, tmp_path).startswith(why)
+
+
 async def test_a_port_of_another_program_is_reported(tmp_path: Path) -> None:
     with (
         SerialLine(tmp_path) as line,

@@ -211,7 +211,10 @@ def _advice_for_opening(address: Address, why: str) -> str:
     if "pip install" in why:
         return "Install it, and run doctor again."
     if address.kind == "rtu":
-        return "ls -l /dev/ttyUSB* /dev/ttyACM* shows the ports and their owners, dmesg what was plugged in."
+        return (
+            "robotiq-async ports lists the ports of this computer; what was plugged in is in dmesg (Linux), "
+            "the System Report (macOS) or the Device Manager (Windows)."
+        )
     return f"It accepted a connection before and refuses one now. {ALONE}: stop the other."
 
 
