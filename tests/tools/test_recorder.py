@@ -146,6 +146,11 @@ async def test_marks_are_events_and_label_what_comes_after_them(hand: RobotiqHan
         assert [label for label, _ in groupby(labels)][-3:] == ["grasp 1", "grasp 2", ""]
         at = [int(row["A.position"]) for row in rows if row["label"] == "grasp 1"]
         assert (at[0], at[-1]) == (6, position)
+        assert {row["label"]: row["values"] and json.loads(row["values"]) for row in rows} == {
+            "grasp 1": {"object": "cup", "weight": 0.25, "wet": False},
+            "grasp 2": "",
+            "": "",
+        }, "a table has nowhere else for them"
     assert export(read_recording(mcap), "event", exported)
     row = next(each for each in table(exported) if each["label"] == "grasp 1")
     assert json.loads(row["values"]) == {"object": "cup", "weight": 0.25, "wet": False}

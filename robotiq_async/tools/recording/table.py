@@ -36,6 +36,8 @@ STATE: Final = "state"
 """The column with the state of the hand as of the last event; the JSON of a status does not have it."""
 LABEL: Final = "label"
 """The column with the label of the last mark."""
+VALUES: Final = "values"
+"""The column with the values of the last mark, as JSON; empty if it has none."""
 
 NEARBY: Final = 100  # entries in the window for sorting
 PREFIX: Final = "/gripper/"
@@ -50,7 +52,7 @@ def _names(schema: Mapping[str, Any], prefix: str = "") -> list[str]:
 
 
 COLUMNS: Final = {
-    "status": ["time", STATE, LABEL, *_names(SCHEMAS["status"])],
+    "status": ["time", STATE, LABEL, VALUES, *_names(SCHEMAS["status"])],
     "command": ["time", *_names(SCHEMAS["command"])],
     "event": ["time", *_names(SCHEMAS["event"])],
 }
@@ -65,6 +67,7 @@ class Table:
         self._names = COLUMNS[kind]
         self._state = ""
         self._label = ""
+        self._values = ""
 
     def row(self, kind: str, nanoseconds: int, fields: Fields) -> list[object] | None:
         """The row of a message of this kind, with its time since 1970; None if it has none."""
@@ -72,11 +75,12 @@ class Table:
             self._state = fields["target"]
         if kind == "event" and fields.get("kind") == "mark":
             self._label = str(fields["label"])
+            self._values = json.dumps(fields["values"]) if fields["values"] else ""
         if kind != self._kind:
             return None
         given = {"time": wall_clock(nanoseconds)}
         if kind == "status":
-            given |= {STATE: self._state, LABEL: self._label}
+            given |= {STATE: self._state, LABEL: self._label, VALUES: self._values}
         return [_cell(given[name] if name in given else _value(fields, name, kind)) for name in self._names]
 
 
