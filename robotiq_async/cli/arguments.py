@@ -96,6 +96,9 @@ Byte = Annotated[int, Parameter(converter=_integer("the value", 0, 255), metavar
 Port = Annotated[int, Parameter(converter=_integer("the port", 0, 65535), metavar="0..65535")]
 Unit = Annotated[int, Parameter(converter=_integer("the unit id", 0, 255), metavar="0..255")]
 Stage = Annotated[int, Parameter(converter=_integer("the stage", 0, 9), metavar="0..9")]
+Runs = Annotated[int, Parameter(converter=_integer("the runs", 1, 100), metavar="N")]
+Step = Annotated[int, Parameter(converter=_integer("the step", 1, 255), metavar="N")]
+PointCount = Annotated[int, Parameter(converter=_integer("the points", 2, 50), metavar="N")]
 Fingers = Annotated[
     Finger,
     Parameter(

@@ -112,7 +112,12 @@ def _problem(state: State, age: float | None, status: RobotiqStatus | None) -> s
         return f"the link is down: no status for {age:.1f} s"
     if status.fault.is_serious:
         return f"fault 0x{int(status.fault):02X}: {status.fault.description}"
-    return "" if state in RUNNING else f"the hand is in {state.name}"
+    if state in RUNNING:
+        return ""
+    # In an emergency stop a gripper waits for its activation, and shows why as a fault that ends nothing.
+    fault = status.fault
+    why = "" if fault is Fault.NONE else f", fault 0x{int(fault):02X}: {fault.description}"
+    return f"the hand is in {state.name}{why}"
 
 
 class Signals:

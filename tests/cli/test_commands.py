@@ -73,6 +73,16 @@ def test_status_of_a_gripper_at_rest_and_in_words(call: Call, there: SimulatorSe
     assert "SCISSOR" in outcome.out
 
 
+def test_no_number_is_cut_in_a_narrow_window(
+    call: Call, there: SimulatorServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "30")
+    outcome = call("status", there.address)
+    outcome.assert_succeeded()
+    assert "…" not in outcome.out
+    assert re.search(r"SCISSOR +137 ", outcome.out)
+
+
 def test_status_shows_a_fault(call: Call, there: SimulatorServer) -> None:
     there.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
     outcome = call("status", there.address)

@@ -210,6 +210,10 @@ async def test_health_in_every_condition(server: SimulatorServer) -> None:
         await hand.wait_for_state(State.RUNNING_IDLE, timeout=10)
         await hand.reset()
         assert health(hand).problem == "the hand is in RESET"
+        await hand.activate()
+        server.gripper.emergency_stop(2)
+        await hand.wait_for_state(State.WF_ACTIVATION, timeout=5)
+        assert health(hand).problem.startswith("the hand is in WF_ACTIVATION, fault 0x05: ")
         await hand.stop()
     assert health(hand).problem == "the hand is not started"
 

@@ -14,7 +14,7 @@ from ...link.address import Simulation, parse_address
 from ...values.enums import Finger
 from ...values.errors import MeasuringError
 from ..addresses import full_address, gripper_words, is_simulated, named_model
-from ..arguments import Address, Fingers, Flag, Yes, need
+from ..arguments import Address, Fingers, Flag, Runs, Step, Yes, need
 from ..consent import consent
 from ..failures import CommandError, UsageError
 
@@ -28,20 +28,15 @@ SPEEDUP = 15.0
 POLL_S = 0.001
 """Poll interval with a simulated gripper that is faster than real time: to keep the resolution."""
 
-Runs = Annotated[int, Parameter(metavar="N")]
 Speedup = Annotated[float | None, Parameter(metavar="FACTOR")]
 NoPlot = Annotated[Flag, Parameter(name="--no-plot")]
 
 
-def check(address: str, output: Path, speedup: float | None, runs: int, step: int, plot: bool) -> float:
+def check(address: str, output: Path, speedup: float | None, *, plot: bool) -> float:
     """Check the arguments before anything moves; returns the speedup of the gripper's time."""
     simulated = is_simulated(address)
     if output.suffix != ".csv":
         raise UsageError(f"--output must be a file named .csv, got {str(output)!r}")
-    if not 1 <= runs <= 100:
-        raise UsageError(f"--runs must be an integer in 1..100, got {runs}")
-    if not 1 <= step <= 255:
-        raise UsageError(f"--step must be an integer in 1..255, got {step}")
     if speedup is not None and not simulated:
         raise UsageError("--speedup is for sim:// only: the time of a real gripper cannot be changed")
     if simulated and parse_address(address).simulation != Simulation():
@@ -183,7 +178,7 @@ def speed(
     /,
     *,
     output: Annotated[Path, Parameter(metavar="FILE.csv")] = Path("closing_time_ms.csv"),
-    step: Annotated[int, Parameter(metavar="N")] = 4,
+    step: Step = 4,
     runs: Runs = 3,
     fingers: Fingers = Finger.ABC,
     speedup: Speedup = None,
@@ -214,7 +209,7 @@ def speed(
     """
     if Finger.SCISSOR in fingers:
         raise UsageError("--fingers takes A, B and C only: the scissor has a different stroke")
-    factor = check(address, output, speedup, runs, step, not no_plot)
+    factor = check(address, output, speedup, plot=not no_plot)
     from ...tools.measure.campaigns import speed_campaign
 
     with table_errors():

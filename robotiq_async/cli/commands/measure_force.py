@@ -14,10 +14,10 @@ from ...runtime.concurrency import in_a_thread
 from ...values.enums import DEFAULT_SPEED, Finger
 from ...values.model import THREE_FINGER
 from ..addresses import full_address, is_simulated, named_model
-from ..arguments import Address, Byte, Yes
+from ..arguments import Address, Byte, Runs, Step, Yes
 from ..consent import consent, read_line
 from ..failures import CommandError, UsageError
-from .measure import NoPlot, Runs, Speedup, check, measure_left, print_files, table_errors
+from .measure import NoPlot, Speedup, check, measure_left, print_files, table_errors
 
 if TYPE_CHECKING:
     from ...hand import Hand
@@ -37,7 +37,7 @@ def force(
     surface: Literal["foam", "rigid"] = "foam",
     output: Annotated[Path | None, Parameter(metavar="FILE.csv")] = None,
     scale: Annotated[Path | None, Parameter(metavar="FILE.csv")] = None,
-    step: Annotated[int, Parameter(metavar="N")] = 25,
+    step: Step = 25,
     runs: Runs = 3,
     speed: Byte = DEFAULT_SPEED,
     speedup: Speedup = None,
@@ -74,7 +74,7 @@ def force(
         raise UsageError("--scale must be another file than --output")
     if (model := named_model(address)) is not THREE_FINGER:
         raise UsageError(f"forces are measured with three fingers; {address} names a {model}")
-    factor = check(address, path, speedup, runs, step, not no_plot)
+    factor = check(address, path, speedup, plot=not no_plot)
     from ...tools.measure.campaigns import force_campaign
     from ...values.calibration.csv_tables import FORCE, read_table
 

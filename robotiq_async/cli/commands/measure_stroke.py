@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from ...link.address import is_remote
 from ...values.stroke import why_not_after
 from ..addresses import gripper_words, is_simulated, named_model
-from ..arguments import Address, Flag, Yes
+from ..arguments import Address, Flag, PointCount, Yes
 from ..consent import consent
 from ..failures import CommandError, UsageError
 from .measure import check, gripper_to_measure, table_errors
@@ -40,7 +40,7 @@ def stroke(
     /,
     *,
     output: Annotated[Path, Parameter(metavar="FILE.csv")] = Path("stroke.csv"),
-    points: Annotated[int, Parameter(metavar="N")] = 5,
+    points: PointCount = 5,
     overwrite: Annotated[Flag, Parameter(help="Replace an existing file.")] = False,
     yes: Yes = False,
 ) -> Coroutine[None, None, None]:
@@ -65,9 +65,7 @@ def stroke(
         points: Number of positions, 2..50.
         yes: Do not ask.
     """
-    if not 2 <= points <= 50:
-        raise UsageError(f"--points must be an integer in 2..50, got {points}")
-    check(address, output, None, runs=1, step=1, plot=False)
+    check(address, output, None, plot=False)
     if output.exists() and not overwrite:
         raise UsageError(f"{output} exists: choose another --output, or pass --overwrite")
     if len(named_model(address).axes) > 1 and not is_remote(address):

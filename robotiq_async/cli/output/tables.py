@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from rich import box
 from rich.console import Console
@@ -16,6 +16,9 @@ from .lines import axis_words
 if TYPE_CHECKING:
     from ... import MoveResult, RobotiqStatus
     from ...hand import Hand
+
+WIDTH: Final = 80
+"""Columns that a table may have in any window, as in a pipe."""
 
 
 def print_status(hand: Hand) -> None:
@@ -82,4 +85,7 @@ def _print_table(
         table.add_column(head, justify="left" if head in ("state", "outcome") else "right")
     for axis, row in zip(axes, rows, strict=True):
         table.add_row(axis_name(axis, status.model), *map(str, row))
-    Console().print(table)
+    console = Console()
+    # In a narrow window the terminal breaks the lines: an elided number would look like another one.
+    console.width = max(console.width, WIDTH)
+    console.print(table)

@@ -11,7 +11,7 @@ from operator import or_
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from robotiq_async.values import registers as reg
-from robotiq_async.values.checks import check_int, check_seconds
+from robotiq_async.values.checks import check_int, check_number, check_seconds
 from robotiq_async.values.enums import NO_AXES, Fault, Finger
 from robotiq_async.values.model import Model, model_of
 from robotiq_async.values.request import Request
@@ -97,7 +97,7 @@ class SimulatedGripper(Surroundings):
         self._cycle = check_seconds("device_cycle", device_cycle, 0, _LONGEST)
         number = check_int("seed", seed, 0, sys.maxsize)
         limit, seed_or_none = check_scissor_limit(scissor_limit), number if spread else None
-        self._speedup = check_seconds("speedup", speedup, 0, _LONGEST)
+        self._speedup = check_number("speedup", speedup, 0, _LONGEST)
         if self._speedup == 0:
             raise ValueError(f"speedup must be above 0, got {speedup!r}")
         kind = model_of(model)
