@@ -134,6 +134,30 @@ async def test_stroke_asks_for_figures_that_fall_until_the_fingertips_meet(
     assert gripper.writes[-1].registers[0] & 0x0800 == 0, "the jaw is stopped at the end"
 
 
+def test_stroke_does_not_measure_what_it_cannot_write(call: Call, tmp_path: Path) -> None:
+    outcome = call("measure", "stroke", "sim://?model=2f85", "--output", str(tmp_path / "none" / "s.csv"))
+    outcome.assert_failed(1, f"{tmp_path}/none/s.csv: its folder does not exist, or cannot be written to")
+    assert "calliper" not in outcome.out
+
+
+async def test_stroke_ends_where_the_fingertips_touch(shell: Shell, tmp_path: Path) -> None:
+    """Soft ones touch before the gripper's end, and no calliper shows less than 0."""
+    async with SimulatorServer(SimulatedGripper(speedup=20, model="2f85")) as server:
+        file = tmp_path / "s.csv"
+        process = await shell.start(
+            *("measure", "stroke", "--yes", server.address, "--output", str(file), "--points", "4"),
+            stdin=PIPE,
+        )
+        assert process.stdin is not None
+        process.stdin.write(b"0\n85\n84.9\n40\n0\n")
+        outcome = await shell.finish(process)
+    outcome.assert_succeeded()
+    assert outcome.out.count("an open jaw cannot have an opening of 0 mm. Please measure again.") == 1
+    assert outcome.out.count("an opening must fall by 0.02 mm a count or more, got 85 mm at ") == 1
+    assert "The fingertips touch at " in outcome.out
+    assert [mm for _, mm in read_stroke(file)] == [85, 40, 0]
+
+
 def test_stroke_needs_a_yes_without_a_terminal(call: Call, tmp_path: Path) -> None:
     address = "tcp://127.0.0.1:1?model=2f85"
     outcome = call("measure", "stroke", address, "--output", str(tmp_path / "s.csv"), stdin=b"y\n")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from pathlib import Path
@@ -14,8 +15,8 @@ from ...values.stroke import why_not_after
 from ..addresses import gripper_words, is_simulated, named_model
 from ..arguments import Address, Flag, PointCount, Yes
 from ..consent import consent
-from ..failures import CommandError, UsageError
-from .measure import check, gripper_to_measure, table_errors
+from ..failures import CommandError, UsageError, file_errors
+from .measure import check, gripper_to_measure
 from .measure_force import prompt
 
 if TYPE_CHECKING:
@@ -70,6 +71,8 @@ def stroke(
         raise UsageError(f"{output} exists: choose another --output, or pass --overwrite")
     if len(named_model(address).axes) > 1 and not is_remote(address):
         raise UsageError(f"a width is measured between the fingertips of a jaw; {address} names a 3-Finger")
+    if not os.access(output.parent, os.W_OK):  # before somebody has measured for nothing
+        raise CommandError(f"{output}: its folder does not exist, or cannot be written to")
     consent(address, WARNING.format(count=points), yes=yes)
     return _measure(address, output, points)
 
@@ -80,7 +83,7 @@ async def _measure(address: str, output: Path, count: int) -> None:
     print(gripper_words(address), flush=True)
     async with gripper_to_measure(address, 1.0) as hand:
         points = await measured(hand, count, _calliper(address, hand))
-    with table_errors():
+    with file_errors(output):
         write_stroke(output, points, hand.model)
     print(output)
 
