@@ -47,7 +47,10 @@ def run(arguments: Sequence[str]) -> int:
     with forwarded_warnings(keep), _Signals() as signals:
         code, problem = _outcome(arguments, signals)
     # A failure is always one line, for logs and scripts.
-    lines = warnings if problem is None else ["; ".join((problem, *warnings))]
+    if problem is not None:
+        lines = ["; ".join((problem, *(each for each in warnings if problem not in each)))]
+    else:
+        lines = warnings
     try:
         for line in lines:
             tell(" ".join(line.split()))

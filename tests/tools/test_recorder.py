@@ -326,7 +326,7 @@ class FullDisk(Recorder):
 
 
 async def test_a_full_disk_ends_the_recording_and_nothing_else(
-    hand: RobotiqHand, gripper: SimulatedGripper, file: Path
+    hand: RobotiqHand, gripper: SimulatedGripper, file: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     recorder = FullDisk(hand, file)
     with pytest.raises(RecordingError, match=r"it\.mcap: No space left on device"):  # noqa: PT012
@@ -337,6 +337,7 @@ async def test_a_full_disk_ends_the_recording_and_nothing_else(
             async with asyncio.timeout(20):
                 failure = await recorder.failure()
             assert "No space left" in str(failure)
+            assert "the recording has ended, the hand runs on: " in caplog.text, "at once, and not in an hour"
             assert hand.state is State.RUNNING_IDLE
             assert len(gripper.writes) == writes
             await hand.move(50)

@@ -27,6 +27,7 @@ from typing import Final, Protocol, Self
 
 from ...hand import Hand
 from ...runtime.concurrency import in_a_thread, wait_shielded, write_all
+from ...runtime.log import Log
 from ...sync.robotiq_hand import RobotiqHand as BlockingHand
 from ...sync.robotiq_hand import caller_of
 from ...values.errors import RecordingError
@@ -137,7 +138,7 @@ class Recorder:
 
     @property
     def has_failed(self) -> bool:
-        """Whether a write has failed; the recording ends then."""
+        """Whether a write has failed; the recording ends then, and the log has an error."""
         return self._failed.done()
 
     async def __aenter__(self) -> Self:
@@ -296,8 +297,12 @@ class Recorder:
             self._fail(error.strerror)
 
     def _fail(self, why: str | None) -> None:
-        if not self._failed.done():
-            self._failed.set_result(RecordingError(f"{self.path}: {why}"))
+        if self._failed.done():
+            return
+        error = RecordingError(f"{self.path}: {why}")
+        self._failed.set_result(error)
+        if self._is_open:  # the block goes on, perhaps for hours; at its end the error is raised
+            Log(self._hand.name).error("the recording has ended, the hand runs on: %s", error)
 
     def _write(self, data: bytes) -> None:
         write_all(self._file.fileno(), data)
