@@ -34,6 +34,7 @@ from ..hand import Hand
 from ..runtime.clock import now
 from ..runtime.log import log
 from ..runtime.signals import ending_signals
+from ..sync.robotiq_hand import RobotiqHand as BlockingHand
 from ..values.enums import Fault, Finger, State, names_of
 from ..values.errors import NotStartedError
 from ..values.status import RobotiqStatus
@@ -85,13 +86,13 @@ class Health:
         }
 
 
-def health(hand: Hand) -> Health:
-    """The health of a hand, at once and whatever its state: nothing is sent to the gripper."""
+def health(hand: Hand | BlockingHand) -> Health:
+    """The health of a hand, at once, in any state and any thread: nothing is sent to the gripper."""
     try:
         status = hand.status
     except NotStartedError:
         status = None
-    age = None if status is None else max(0.0, now() - status.timestamp)
+    age = None if status is None else max(0.0, _now() - status.timestamp)
     part = None if status is None else status.part
     return Health(
         hand.name or hand.address,
@@ -101,6 +102,13 @@ def health(hand: Hand) -> Health:
         Finger(0) if part is None else part.holds,
         _problem(hand.state, age, status),
     )
+
+
+def _now() -> float:
+    try:
+        return now()
+    except RuntimeError:  # a thread without an event loop: of a web server, or beside a blocking hand
+        return time.monotonic()
 
 
 def _problem(state: State, age: float | None, status: RobotiqStatus | None) -> str:

@@ -13,6 +13,8 @@ import pytest
 
 from robotiq_async import Fault, Finger, RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
+from robotiq_async.sync import RobotiqHand as BlockingHand
+from robotiq_async.sync.robotiq_hand import caller_of
 from robotiq_async.tools.service import INSIST_S, health, stops_on_signals, watched_by_systemd
 from tests.grippers import activate_beforehand
 from tests.virtual import until
@@ -227,6 +229,20 @@ async def test_a_contact_that_is_left_over_is_no_grip(server: SimulatorServer) -
         await hand.halt()
         assert hand.status.contacts == Finger.ABC
         assert (health(hand).holds, hand.part) == (Finger(0), None)
+
+
+def test_health_is_told_in_any_thread() -> None:
+    """A blocking hand runs in another one, and a web framework calls plain functions in its own."""
+    hand = BlockingHand("sim://?model=2f85&speedup=20&object=150", name="left")
+    assert health(hand).problem == "no status has been read yet"
+    with hand:
+        for each in (hand, caller_of(hand).hand):
+            found = health(each)
+            assert found.is_ready
+            assert found.status_age is not None
+        hand.grasp()
+        assert health(hand).as_dict()["holds"] == ["A"]
+    assert health(hand).problem == "the hand is not started"
 
 
 # -- systemd -----------------------------------------------------------------------------------------------
