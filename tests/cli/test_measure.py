@@ -104,6 +104,8 @@ def test_stroke_writes_the_points_of_a_jaw(call: Call, tmp_path: Path) -> None:
     assert len(read_stroke(file)) == 5
     call("status", "sim://?model=2f85", "--stroke", str(file)).assert_succeeded()
     call("status", f"sim://?model=2f85&stroke={file}").assert_succeeded()
+    call(*arguments, "--overwrite", "--points", "50").assert_succeeded()
+    assert 40 <= len(read_stroke(file)) < 50, "at its ends a jaw stays where it is"
     refused = call("status", f"sim://?model=2f140&stroke={file}")
     refused.assert_failed(2, f"stroke: {file}: it was measured on a 2F-85, and the gripper is a 2F-140")
 

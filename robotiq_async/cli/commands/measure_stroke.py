@@ -108,14 +108,16 @@ async def measured(hand: Hand, count: int, calliper: Calliper) -> Points:
             raise CommandError(f"something blocks the opening at {position} counts")
         if has_met:
             print(MET.format(position=position), flush=True)
-        if points and position <= points[-1][0]:
-            raise CommandError(f"the jaw did not move on from {position} counts: ask for fewer --points")
-        points.append(await _point_after(points, calliper, position))
+        # At its ends, and after a small step, the jaw is where it was.
+        if not points or position > points[-1][0]:
+            points.append(await _point_after(points, calliper, position))
         is_closed = points[-1][1] == 0
         if is_closed and not has_met:
             print(TOUCH.format(position=position), flush=True)
         if has_met or is_closed:
             break
+    if len(points) < 2:
+        raise CommandError(f"the jaw did not move on from {points[0][0]} counts")
     return tuple(points)
 
 
