@@ -72,7 +72,8 @@ def names_in(path: Path) -> Iterator[str]:
 
 def test_tools_do_not_know_which_kind_of_hand_they_use() -> None:
     """Except for the one function that makes a hand from an address. The blocking hand has one kind."""
-    blocking = [*(ROOT / "tools" / "lerobot").iterdir(), ROOT / "tools" / "recording" / "recorder.py"]
+    tools = ROOT / "tools"
+    blocking = [*(tools / "lerobot").iterdir(), tools / "recording" / "recorder.py", tools / "service.py"]
     knowing = [path for path in AROUND if "RobotiqHand" in names_in(path) and path not in blocking]
     assert knowing == [ROOT / "cli" / "connect.py"]
 
