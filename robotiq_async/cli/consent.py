@@ -6,14 +6,20 @@ command and harmless. Any other address may be a real gripper, also the address 
 
 from __future__ import annotations
 
+import os
 import select
 import sys
 from contextlib import suppress
-from typing import TextIO
+from typing import Final, TextIO
+from weakref import WeakKeyDictionary
 
 from .addresses import full_address, is_simulated
 from .failures import CommandError, UsageError
 
+LONGEST: Final = 1000
+"""Bytes of a line at most."""
+_typed: Final[WeakKeyDictionary[TextIO, bytearray]] = WeakKeyDictionary()
+"""What came from a stream after the last line that was read."""
 NOTE = "Nothing here has run on real hardware yet: keep a hand on the emergency stop."
 
 
@@ -32,13 +38,13 @@ def consent(address: str, what: str, *, yes: bool) -> None:
         raise UsageError(f"this moves the gripper at {gripper}; without a terminal to ask at it needs --yes")
     forget_keys()
     print(f"{gripper}: {what}\n{NOTE}\nContinue? [y/N] ", end="", file=screen, flush=True)
-    _wait_for_key()
     if read_line().strip().lower() not in ("y", "yes"):
         raise CommandError(f"nothing was sent to the gripper at {gripper}: the answer was not yes")
 
 
 def forget_keys() -> None:
     """Discard keys from before the question or the screen was there: they are no answers or commands."""
+    _typed.clear()
     with suppress(ImportError, OSError):  # Windows, or no terminal
         import termios
 
@@ -46,16 +52,30 @@ def forget_keys() -> None:
 
 
 def read_line() -> str:
-    """The next line of standard input, at most 1000 bytes; empty at its end."""
-    return "" if sys.stdin is None else sys.stdin.buffer.readline(1000).decode(errors="replace")
+    """The next line of standard input, at most 1000 bytes; empty at its end. In any thread."""
+    if sys.stdin is None:
+        return ""
+    try:
+        line = _next_line(sys.stdin.fileno(), _typed.setdefault(sys.stdin, bytearray()))
+    except (OSError, ValueError):  # Windows waits for sockets only
+        line = sys.stdin.buffer.readline(LONGEST)
+    return line.decode(errors="replace")
 
 
-def _wait_for_key() -> None:
-    # A signal that comes just before a read blocks, or that the system hands to another thread, does not
-    # interrupt the read: Ctrl-C would be lost. Between two waits its handler runs.
-    with suppress(OSError, ValueError):  # Windows waits for sockets only
-        while not select.select([sys.stdin], [], [], 0.1)[0]:
+def _next_line(stream: int, typed: bytearray) -> bytes:
+    # Not by the stream itself. A signal that comes just before its read blocks, or that the system hands to
+    # another thread, does not interrupt it: Ctrl-C would be lost. And a thread that waits in it holds its
+    # lock, without which the interpreter cannot end: it aborts.
+    while b"\n" not in typed and len(typed) < LONGEST:
+        while not select.select([stream], [], [], 0.1)[0]:
             pass
+        if not (data := os.read(stream, LONGEST)):
+            break
+        typed.extend(data)
+    end = (typed.find(b"\n") + 1) or len(typed)
+    line = bytes(typed[: min(end, LONGEST)])
+    del typed[: len(line)]
+    return line
 
 
 def _screen() -> TextIO | None:

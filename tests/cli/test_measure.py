@@ -180,6 +180,25 @@ async def test_stroke_without_an_answer_writes_nothing(shell: Shell, tmp_path: P
     assert not file.exists()
 
 
+async def test_ctrl_c_instead_of_an_answer(shell: Shell, tmp_path: Path) -> None:
+    """The thread that waits for the answer waits on, and must not hold what the interpreter needs to end."""
+    gripper = SimulatedGripper(speedup=20, model="2f85")
+    async with SimulatorServer(gripper) as server:
+        process = await shell.start(
+            *("measure", "stroke", "--yes", server.address, "--output", str(tmp_path / "s.csv")), stdin=PIPE
+        )
+        assert process.stdin is not None
+        assert process.stdout is not None
+        process.stdin.write(b"85\nwide\n")  # of two lines at once the second is no less an answer
+        await process.stdout.readuntil(b"such as 42.5, please.\n")
+        await process.stdout.readuntil(b"in mm?")
+        process.send_signal(signal.SIGINT)
+        outcome = await shell.finish(process)
+        assert (outcome.code, outcome.err) == (130, "robotiq-async: interrupted\n")
+        assert not gripper.is_moving
+    assert files_in(tmp_path) == []
+
+
 async def test_ctrl_c_keeps_the_rows_and_stops_the_fingers(shell: Shell, tmp_path: Path) -> None:
     gripper = SimulatedGripper(speedup=30)
     async with SimulatorServer(gripper) as server:
