@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Final
 from weakref import WeakValueDictionary
 
 from ..values.enums import Finger
-from ..values.errors import ConnectFailedError
+from ..values.errors import ConnectFailedError, ConnectionLostError, RobotiqConnectionError
 from ..values.model import THREE_FINGER, Model
 from ..values.registers import RegisterMap, Registers
 from .address import Address, Simulation, parse_address
@@ -33,6 +34,8 @@ def new_gripper(simulation: Simulation, model: Model = THREE_FINGER) -> Simulate
     # A thread of its own steps it: the loop must not wait.
     physics = None if scene is None else Physics(scene, threaded=True)
     gripper = SimulatedGripper(speedup=simulation.speedup, model=model, physics=physics)
+    if physics is not None:
+        physics.stop()  # a server starts it: a hand that is never opened has no thread
     if simulation.object is not None:
         gripper.place_object(Finger.ABC, simulation.object)
     return gripper
@@ -81,6 +84,8 @@ class SimulatedTransport:
 
     async def open(self) -> None:
         """Start the simulator if it does not run, and connect to it."""
+        if self._server.failure is not None:
+            raise ConnectFailedError("sim://", str(self._server.failure)) from self._server.failure
         if self._inner is None:
             try:
                 await self._server.start()
@@ -88,13 +93,16 @@ class SimulatedTransport:
                 why = f"the simulated gripper cannot listen: {error.strerror or error}"
                 raise ConnectFailedError("sim://", why) from error
             self._inner = self._make(parse_address(self._server.address))
-        await self._inner.open()
+        with self._explained():
+            await self._inner.open()
 
     async def read(self) -> Registers:
-        return await self._connected().read()
+        with self._explained():
+            return await self._connected().read()
 
     async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
-        return await self._connected().send(decide)
+        with self._explained():
+            return await self._connected().send(decide)
 
     async def close(self) -> None:
         """Disconnect and stop the simulator's server; does nothing when closed."""
@@ -102,6 +110,17 @@ class SimulatedTransport:
         if inner is not None:
             await inner.close()
         await self._server.stop()
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        """Raise the error in the bodies of the gripper in place of that of the connection, which it ended."""
+        try:
+            yield
+        except RobotiqConnectionError as error:
+            failure = self._server.failure
+            if failure is None:
+                raise
+            raise ConnectionLostError(f"the simulated gripper: {failure}") from error
 
     def _connected(self) -> ModbusTransport:
         assert self._inner is not None, "opened before it is used"

@@ -20,6 +20,7 @@ The physics imports neither pymodbus nor asyncio.
 
 from .mechanics.physics import Physics
 from .physics.bodies import Bodies, Body
+from .physics.driven_axis import PhysicsError
 from .physics.gripper import SimulatedGripper
 from .physics.habits import Habits
 from .physics.scale import SimulatedScale
@@ -37,6 +38,7 @@ __all__ = [
     "FaultInjector",
     "Habits",
     "Physics",
+    "PhysicsError",
     "RtuOverTcpSimulatorServer",
     "SerialSimulatorServer",
     "SimulatedGripper",

@@ -20,8 +20,8 @@ pytest.importorskip("mujoco", reason="needs the extra physics")
 
 from robotiq_async import Finger, ObjectStatus, RobotiqHand, RobotiqStatus
 from robotiq_async.simulator import Habits, Physics, SimulatedGripper
-from robotiq_async.simulator.mechanics.physics import OrderedDrive
 from robotiq_async.simulator.mechanics.scene import Part, Scene, parse_scene
+from robotiq_async.simulator.mechanics.stepper import OrderedDrive
 from robotiq_async.values.enums import JAW
 from robotiq_async.values.model import HAND_E, MODELS, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
 from tests.patience import patience
@@ -30,6 +30,8 @@ JAWS = pytest.mark.parametrize("model", [TWO_FINGER_85, TWO_FINGER_140, HAND_E],
 ROOT = Path(__file__).parents[2]
 POLL_S = 0.005
 BOX = "box:30x40x60,0.3"
+FINGERS = ("finger_middle_link_0", "finger_2_link_0", "finger_1_link_0")
+"""Links on which A, B and C hang (docs/decisions/finger-names.md)."""
 
 
 class Bench:
@@ -265,6 +267,39 @@ def test_a_finger_that_is_stopped_early_bends_earlier_than_a_free_one() -> None:
     )
     assert middle > 0.3, "the middle phalanx goes on"
     assert base < 1.15, "although the base has not reached its stop"
+
+
+@pytest.mark.parametrize("speed", [0, 255])
+@pytest.mark.parametrize("force", [0, 128, 255])
+def test_each_finger_presses_with_the_force_of_the_table_on_what_does_not_give_way(
+    force: int, speed: int
+) -> None:
+    """By the manual the register of a finger sets the force of this finger. A block of 90 kg stays."""
+    bench = active("box:60x80x90,90", THREE_FINGER)
+    bench.move(255, force=force, speed=speed)
+    bench.run(1)
+    low, high = THREE_FINGER.forces_n
+    forces = bench.physics.forces
+    assert forces.keys() == {*FINGERS}, "the palm touches nothing"
+    assert list(forces.values()) == pytest.approx([low + (high - low) * force / 255] * 3, rel=0.1, abs=1)
+
+
+def test_what_b_and_c_press_a_holds() -> None:
+    """The box can move: each of two fingers presses with its force, and the third has gears that lock."""
+    bench = active("box:60x80x60,0.3", THREE_FINGER)
+    bench.move(255, force=255, speed=0)
+    bench.run(1)
+    forces = bench.physics.forces
+    pressed = [forces[finger] for finger in FINGERS]
+    assert pressed == pytest.approx([120, 60, 60], rel=0.1)
+    assert bench.physics.grip_force == max(pressed)
+
+
+def test_the_opening_of_a_3_finger_is_that_between_a_and_the_others() -> None:
+    bench = active("box:60x80x60,0.3", THREE_FINGER)
+    assert bench.physics.opening_mm == pytest.approx(155, abs=4), "155 by its manual"
+    bench.move(255, force=0)
+    assert bench.physics.opening_mm == pytest.approx(60, abs=2)
 
 
 def test_a_3_finger_keeps_its_contact_when_the_part_is_gone() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import errno
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from cyclopts import Parameter
@@ -20,7 +20,8 @@ from ..failures import normal_end, usage
 from ..output.messages import tell
 
 if TYPE_CHECKING:
-    from ...simulator import Physics, SimulatedGripper
+    from ...simulator import Physics, SimulatedGripper, Trouble
+    from ...simulator.server.endpoint import SimulatorEndpoint
 
 
 _EXHAUSTED: Final = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
@@ -98,6 +99,7 @@ async def simulate(
         troubles: List the kinds of trouble, and end.
     """
     from ...simulator import (
+        PhysicsError,
         RtuOverTcpSimulatorServer,
         SerialSimulatorServer,
         SimulatedGripper,
@@ -146,9 +148,9 @@ async def simulate(
                 for habit in habits_like_hardware(kind) if like_hardware and not urcap else ():
                     await server.fault_injector.begin(habit)
                 print(server.address, flush=True)
-                await server.fault_injector.run(plan, lambda trouble: tell(f"trouble: {trouble}"))
-                await asyncio.Event().wait()
-    except ImportError as error:
+                await _play(server, plan)
+        raise RobotiqError(str(server.failure))
+    except (ImportError, PhysicsError) as error:
         raise RobotiqError(str(error)) from error
     except BrokenPipeError:
         raise  # the reader of the address has gone
@@ -156,6 +158,23 @@ async def simulate(
         if serial is not None:
             raise RobotiqError(f"cannot listen on {serial}: {why_no_port(error)}") from error
         raise RobotiqError(f"cannot listen on {host}:{port}: {error.strerror or error}") from error
+
+
+async def _play(server: SimulatorEndpoint, plan: Sequence[Trouble]) -> None:
+    """Carry out a plan, and go on until the physics of the gripper fails."""
+    playing = asyncio.ensure_future(
+        server.fault_injector.run(plan, lambda trouble: tell(f"trouble: {trouble}"))
+    )
+    failing = asyncio.ensure_future(server.failed.wait())
+    try:
+        await asyncio.wait({playing, failing}, return_when=asyncio.FIRST_COMPLETED)
+        if playing.done():
+            await playing
+            await failing
+    finally:
+        playing.cancel()
+        failing.cancel()
+        await asyncio.gather(playing, failing, return_exceptions=True)
 
 
 def _check_wire(model: Model, *, serial: bool, rtu_over_tcp: bool, urcap: bool, unpaced: bool) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 if TYPE_CHECKING:
     from robotiq_async.values.model import Model
 
-    from .scene import Part
+    from .scene import Part, Scene
 
 OURS: Final = "gripper/"
 """Before the names of all that belongs to the gripper."""
@@ -54,7 +54,6 @@ def above_table(text: str, reach: float, part: Part | None) -> Any:
     mount.mass, mount.inertia, mount.explicitinertial = 1.0, [0.001] * 3, True
     frame = mount.add_frame(quat=[0, 1, 0, 0])
     spec.attach(mujoco.MjSpec.from_string(text), frame=frame, prefix=OURS)
-    _rename_actuators(spec)
     drive = spec.add_actuator(name="mount", target="mount", trntype=mujoco.mjtTrn.mjTRN_JOINT)
     drive.set_to_position(kp=_MOUNT[0], kv=_MOUNT[1])
     return spec
@@ -78,14 +77,20 @@ def in_own_world(text: str, file: str) -> Any:
     for option in ("timestep", "integrator", "cone", "impratio"):  # those of the file, without a complaint
         setattr(gripper.option, option, getattr(spec.option, option))
     spec.attach(gripper, site="gripper", prefix=OURS)
-    _rename_actuators(spec)
     return spec
 
 
-def _rename_actuators(spec: Any) -> None:
-    # The axes are found by their names; a user's own actuators keep theirs.
-    for actuator in spec.actuators:
-        actuator.name = actuator.name.removeprefix(OURS)
+def compiled(spec: Any, scene: Scene) -> Any:
+    """The model of a world.
+
+    Raises:
+        ValueError: MuJoCo refuses it: a size that is not above 0, a moving body without a mass, a name twice.
+    """
+    try:
+        return spec.compile()
+    except ValueError as error:
+        what = scene.part if scene.file is None else repr(scene.file)
+        raise ValueError(f"physics: MuJoCo cannot make {what}: {error}") from error
 
 
 def _add_part(spec: Any, part: Part, height: float) -> None:

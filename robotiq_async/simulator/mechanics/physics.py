@@ -1,23 +1,17 @@
-"""Physics: bodies and contacts behind a simulated gripper, stepped by its user or in a thread of its own.
-
-A gripper with a thread stands in an event loop, which waits for nothing here. It reads single numbers that
-the thread leaves behind, and gives orders that the thread takes up before its next step. MuJoCo lets go of
-Python's lock in a step; what the thread does in Python takes some ten microseconds of each.
-"""
+"""Physics: bodies and contacts behind a simulated gripper, stepped by its user or in a thread of its own."""
 
 from __future__ import annotations
 
 import threading
-import time
 import weakref
-from collections import deque
 from collections.abc import Callable
-from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Self
 
-from robotiq_async.values.enums import ObjectStatus
+from robotiq_async.values.checks import check_number
 
+from ..physics.driven_axis import PhysicsError
 from .scene import parse_scene
+from .stepper import OrderedDrive, Stepper
 
 if TYPE_CHECKING:
     from robotiq_async.values.enums import Finger
@@ -27,10 +21,8 @@ if TYPE_CHECKING:
     from ..physics.driven_axis import Drive
     from .world import World
 
-_WAKES_S: Final = 0.004
-_LATE_S: Final = 0.1
-"""Behind the clock by so much, it lets simulated time go rather than hurry after it."""
 _SLACK: Final = 1e-9
+_HIGHEST_MM: Final = 1000.0
 
 
 class Physics:
@@ -40,6 +32,12 @@ class Physics:
     motions and contacts come from bodies. Without ``threaded`` every read of the gripper makes the steps that
     are due: the same clock gives the same result to the last bit. With it a thread steps in real time, and a
     read only takes the present state: for servers, as their event loop must not wait.
+
+    The thread begins with the first read or write of the gripper, or with :meth:`start`, and ends with
+    :meth:`stop` or a ``with`` block of the physics. A server starts it and stops it with itself, and so does
+    a hand with a ``sim://`` address. While there is none, bodies stand still.
+
+    After an error in the bodies every call raises :class:`PhysicsError`, reads of the gripper too.
 
     Nothing of the bodies was measured on a gripper: ``tools/description`` has the source of each dimension.
     """
@@ -64,14 +62,17 @@ class Physics:
         """
         self._scene = parse_scene(scene)
         self._threaded = threaded
-        self._run: _Run | None = None
+        self._stepper: Stepper | None = None
+        self._users = 0
+        """How many have started the thread and not stopped it."""
+        self._was_stopped = False
         self._lock = threading.Lock()
         self._world: World | None = None
         self._seen = 0
         self._until = 0.0
 
     def attach(self, model: Model, clock: Callable[[], float], speedup: float) -> None:
-        """Make the world, for a gripper of this model, and let it run by its clock.
+        """Make the world, for a gripper of this model, which moves by its clock.
 
         Raises:
             ImportError: MuJoCo is not installed.
@@ -84,44 +85,89 @@ class Physics:
             raise RuntimeError("physics has a gripper already: make one for each")
         self._world = World(model, self._scene)
         if self._threaded:
-            self._run = _Run(self._world, self._lock, clock, speedup)
-            threading.Thread(
-                target=self._run.while_wanted,
-                args=(weakref.ref(self),),
-                name="robotiq_async physics",
-                daemon=True,
-            ).start()
+            self._stepper = Stepper(self._world, self._lock, clock, speedup)
+            weakref.finalize(self, self._stepper.end).atexit = False
+
+    # -- the thread --------------------------------------------------------------------------------------
+
+    @property
+    def threaded(self) -> bool:
+        """Whether a thread steps it."""
+        return self._threaded
+
+    def start(self) -> None:
+        """Let the thread step the bodies; without ``threaded`` they move when the gripper is read.
+
+        It has its gripper by then. Each start needs its :meth:`stop`.
+        """
+        if self._stepper is not None:
+            self._users += 1
+            self._stepper.start()
+
+    def stop(self) -> None:
+        """End the thread with the last of those who started it, and wait for it: for one step at most."""
+        self._users = max(self._users - 1, 0)
+        if self._stepper is not None and not self._users:
+            self._was_stopped = True
+            self._stepper.stop()
+
+    def __enter__(self) -> Self:
+        """Let it have its thread during a block, which ends it."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._users = 0
+        self.stop()
+
+    # -- for the gripper that it moves -------------------------------------------------------------------
 
     @property
     def time(self) -> float:
         """The time it has reached, in simulated seconds."""
-        return self._made.time if self._run is None else self._until
+        return self._made.time if self._stepper is None else self._until
 
     def drive(self, axis: Finger) -> Drive:
         """The motor of an axis, for the gripper that it moves."""
         drive = self._made.drives[axis]
-        return drive if self._run is None else OrderedDrive(drive, self._run.orders)
+        return drive if self._stepper is None else OrderedDrive(drive, self._stepper.orders)
 
     def step(self, until: float) -> bool:
         """Make one step, or see whether the thread has; for the gripper that it moves."""
-        if self._run is not None:
-            self._until, before, self._seen = until, self._seen, self._run.steps
+        world = self._made
+        if self._stepper is not None:
+            if not self._was_stopped:
+                self._stepper.start()
+            self._until, before, self._seen = until, self._seen, self._stepper.steps
             return self._seen != before
-        if self._made.time + self._made.step_s > until + _SLACK:
+        if world.time + world.step_s > until + _SLACK:
             return False
-        self._made.step()
+        try:
+            world.step()
+        except Exception as error:
+            world.failure = error
+            raise _standing_still(error) from error
         return True
 
     def bodies(self) -> Bodies:
         """Places of joints and parts; with a thread, after its last steps: it does not wait for the next."""
-        return self._made.told(self._made.look() if self._run is None else self._run.seen)
+        return self._made.told(self._made.look() if self._stepper is None else self._stepper.seen)
 
     # -- changes to the scene ----------------------------------------------------------------------------
 
     def lift(self, millimetres: float) -> None:
-        """Raise the gripper to a height above its first place, at 100 mm/s; not in a scene of your own."""
+        """Raise the gripper to a height above its first place, at 100 mm/s.
+
+        Args:
+            millimetres: 0..1000.
+
+        Raises:
+            TypeError: not a number.
+            ValueError: outside 0..1000.
+            RuntimeError: the scene is a file: the gripper is mounted where its site is.
+        """
+        height = check_number("millimetres", millimetres, 0, _HIGHEST_MM)
         with self._lock:
-            self._made.lift(millimetres)
+            self._made.lift(height)
 
     def take_away(self) -> None:
         """Take the parts away, out of the fingers too."""
@@ -141,109 +187,41 @@ class Physics:
 
     @property
     def grip_force(self) -> float:
-        """The largest force of a pad on its contacts, in newtons."""
+        """The force of the finger that presses most, in newtons: see :attr:`forces`. 0 without a contact."""
         with self._lock:
-            return self._made.grip_force()
+            forces, palm = self._made.forces(), self._made.root
+        return max((force for link, force in forces.items() if link != palm), default=0.0)
+
+    @property
+    def forces(self) -> dict[str, float]:
+        """The force of each finger on what it touches, in newtons, and that of the palm.
+
+        Each is the sum of the normal forces at all contacts: of pads, phalanges and cranks. The names are
+        those of the links that hang on the root link, and of the root link for the palm. What touches nothing
+        is left out.
+        """
+        with self._lock:
+            return self._made.forces()
 
     @property
     def opening_mm(self) -> float:
-        """Distance between the faces of the first two pads, in millimetres."""
+        """Distance between the faces of the pads in millimetres.
+
+        Of a 3-Finger, from that of A to the middle between those of B and C. Between tips that are not at one
+        height it is too large.
+        """
         with self._lock:
             return self._made.opening_mm()
 
     @property
     def _made(self) -> World:
-        if self._world is None:
+        world = self._world
+        if world is None:
             raise RuntimeError("physics has no gripper yet")
-        return self._world
+        if world.failure is not None:
+            raise _standing_still(world.failure) from world.failure
+        return world
 
 
-class OrderedDrive:
-    """The motor of an axis, for a gripper in another thread than the world: neither waits for the other.
-
-    An order is taken up before the next step. Until then the motor counts as in motion, for what it tells is
-    about the goal before.
-
-    Attributes:
-        taken: how many orders the thread of the world has taken up.
-    """
-
-    def __init__(self, drive: Drive, orders: deque[Callable[[], None]]) -> None:
-        self.taken = 0
-        self._given = 0
-        self._drive = drive
-        self._orders = orders
-
-    @property
-    def position(self) -> float:
-        return self._drive.position
-
-    @property
-    def travel(self) -> float:
-        return self._drive.travel
-
-    @property
-    def outcome(self) -> ObjectStatus:
-        return self._drive.outcome if self.taken == self._given else ObjectStatus.IN_MOTION
-
-    @property
-    def is_pressing(self) -> bool:
-        return self.taken == self._given and self._drive.is_pressing
-
-    def go(self, target: float, rate: float, force: int, *, clears: bool) -> None:
-        self._order(partial(self._drive.go, target, rate, force, clears=clears))
-
-    def hold(self) -> None:
-        self._order(self._drive.hold)
-
-    def release(self) -> None:
-        self._order(self._drive.release)
-
-    def _order(self, what: Callable[[], None]) -> None:
-        self._given += 1
-        self._orders.append(partial(self._take_up, what))
-
-    def _take_up(self, what: Callable[[], None]) -> None:
-        what()
-        self.taken += 1
-
-
-class _Run:
-    """Steps a world in real time, in a thread.
-
-    Attributes:
-        steps: number of steps it has made.
-        seen: places of joints and parts after them.
-        orders: changes that are due before the next step.
-    """
-
-    def __init__(
-        self, world: World, lock: threading.Lock, clock: Callable[[], float], speedup: float
-    ) -> None:
-        self.steps = 0
-        self.seen = world.look()
-        self.orders: deque[Callable[[], None]] = deque()
-        self._world = world
-        self._lock = lock
-        self._clock = clock
-        self._speedup = speedup
-
-    def while_wanted(self, owner: weakref.ref[Physics]) -> None:
-        """Run until the physics has no owner any more."""
-        began, let_go = self._clock(), 0.0
-        while owner() is not None:
-            let_go += self._catch_up((self._clock() - began) * self._speedup - let_go)
-            self.seen = self._world.look()
-            time.sleep(_WAKES_S)
-
-    def _catch_up(self, due: float) -> float:
-        """Make the steps that are due; return the seconds that were let go."""
-        late = max(due - self._world.time - _LATE_S * self._speedup, 0.0)
-        due -= late
-        while self._world.time + self._world.step_s <= due:
-            while self.orders:
-                self.orders.popleft()()
-            with self._lock:
-                self._world.step()
-            self.steps += 1
-        return late
+def _standing_still(error: Exception) -> PhysicsError:
+    return PhysicsError(f"the bodies stand still: {error}")

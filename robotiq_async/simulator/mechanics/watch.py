@@ -69,6 +69,16 @@ def root_of(model: Any) -> int:
     return next(body for body in range(model.nbody) if model.body(body).name.startswith(OURS))
 
 
+def links_of(model: Any, root: int) -> dict[int, str]:
+    """The name of the root link, or of the link on it that a body hangs on, for each body of the gripper."""
+    links = {root: root}
+    for body in range(root + 1, model.nbody):
+        parent = int(model.body_parentid[body])
+        if parent in links:
+            links[body] = body if parent == root else links[parent]
+    return {body: model.body(link).name.removeprefix(OURS) for body, link in links.items()}
+
+
 def _shape(model: Any, geom: int) -> tuple[str, tuple[float, ...]]:
     kind, factors = _KINDS[int(model.geom_type[geom])]
     size = model.geom_size[geom][: len(factors)] * np.array(factors)

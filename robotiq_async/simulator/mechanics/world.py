@@ -20,9 +20,9 @@ import numpy as np
 from robotiq_async.values.enums import Finger
 
 from .alone import levers_of, pads, put_at, reach
-from .building import above_table, in_own_world, packaged
+from .building import OURS, above_table, compiled, in_own_world, packaged
 from .drive import MotorDrive
-from .watch import Look, Watch, root_of
+from .watch import Look, Watch, links_of, root_of
 
 if TYPE_CHECKING:
     from robotiq_async.values.model import Model
@@ -43,6 +43,8 @@ class World:
         drives: the motor of each axis.
         time: simulated seconds since it was made.
         step_s: seconds of a step.
+        root: the name of the gripper's root link.
+        failure: the error that has ended it, if one has.
     """
 
     def __init__(self, model: Model, scene: Scene) -> None:
@@ -51,7 +53,8 @@ class World:
             spec = above_table(text, reach(text), scene.part)
         else:
             spec = in_own_world(text, scene.file)
-        self._model: Any = spec.compile()
+        self._model: Any = compiled(spec, scene)
+        self.failure: Exception | None = None
         self._data: Any = mujoco.MjData(self._model)
         # Views of MuJoCo's own numbers: each look at an attribute makes one.
         self._controls, self._lengths = self._data.ctrl, self._data.actuator_length
@@ -69,7 +72,9 @@ class World:
         if scene.part is not None and self._touches_part():
             raise ValueError(f"physics: there is no room for a {scene.part} between the open fingers")
         self._start = self._data.qpos.copy()
-        base = self._model.body_rootid[root_of(self._model)]  # of a robot that drives about, perhaps
+        root = root_of(self._model)
+        self.root: str = self._model.body(root).name.removeprefix(OURS)
+        base = self._model.body_rootid[root]  # of a robot that drives about, perhaps
         self._parts = [
             joint
             for joint in range(self._model.njnt)
@@ -83,6 +88,7 @@ class World:
             if self._model.body_rootid[self._model.geom_bodyid[geom]] in bodies
         ]
         self._watch = Watch(self._model, self._part_geoms)
+        self._links = links_of(self._model, root)
         self._sleeps = is_ours and not self._parts
         """Whether nothing moves while the motors rest: no part, and not a user's world."""
         self._collides = self._model.geom_contype.copy(), self._model.geom_conaffinity.copy()
@@ -110,7 +116,13 @@ class World:
             way = self._height - self._lifted
             self._lifted += min(max(way, -_LIFTING * self.step_s), _LIFTING * self.step_s)
             self._controls[self._mount] = self._lifted
+        before = data.time
         mujoco.mj_step(self._model, data)
+        if not data.time > before:  # MuJoCo begins again with bodies that have become unstable
+            raise RuntimeError(
+                f"they became unstable after {before:.3f} s (timestep {self.step_s:g} s): smaller steps,"
+                " softer contacts or parts of a sensible size and mass help"
+            )
         for drive in drives:
             drive.see(float(self._lengths[drive.index]), self.step_s)
         fingers = [drive for axis, drive in self.drives.items() if axis is not Finger.SCISSOR]
@@ -119,6 +131,10 @@ class World:
 
     def lift(self, millimetres: float) -> None:
         """Begin to raise the gripper to so many millimetres above its first place."""
+        if self._mount is None:
+            raise RuntimeError(
+                "physics: a gripper in a scene of a file is not lifted: it is where the site is"
+            )
         self._height = millimetres / 1000
 
     def take_away(self) -> None:
@@ -146,24 +162,24 @@ class World:
         """Joints and parts as they were seen; for any thread."""
         return self._watch.told(look)
 
-    def grip_force(self) -> float:
-        """The force of the pads on their contacts, in newtons: of the pad with the largest."""
-        forces: dict[int, float] = {}
+    def forces(self) -> dict[str, float]:
+        """The sum of the normal forces at the contacts of each finger and of the palm, in newtons."""
+        forces: dict[str, float] = {}
         found = np.zeros(6)
         for number in range(self._data.ncon):
-            contact = self._data.contact[number]
             mujoco.mj_contactForce(self._model, self._data, number, found)
-            for geom in contact.geom:
-                if self._model.geom(int(geom)).name.endswith("_pad"):
-                    forces[int(geom)] = forces.get(int(geom), 0.0) + float(found[0])
-        return max(forces.values(), default=0.0)
+            for geom in self._data.contact[number].geom:
+                link = self._links.get(int(self._model.geom_bodyid[geom]))
+                if link is not None:
+                    forces[link] = forces.get(link, 0.0) + float(found[0])
+        return forces
 
     def opening_mm(self) -> float:
-        """Distance between the pads of a jaw, or the first two of a 3-Finger, in millimetres."""
-        one, other = pads(self._model)[:2]
-        apart = np.linalg.norm(self._data.geom_xpos[one] - self._data.geom_xpos[other])
-        thick = min(self._model.geom_size[one]) + min(self._model.geom_size[other])
-        return 1000 * float(apart - thick)
+        """Distance between the faces of the pads; of a 3-Finger from A to the middle of the others."""
+        *others, last = pads(self._model)
+        places, sizes = self._data.geom_xpos, self._model.geom_size
+        apart = np.linalg.norm(places[others].mean(axis=0) - places[last])
+        return 1000 * float(apart - min(sizes[others[0]]) - min(sizes[last]))
 
     def _touches_part(self) -> bool:
         names = ({self._model.geom(int(geom)).name for geom in each.geom} for each in self._data.contact)
@@ -195,7 +211,7 @@ class World:
         self._hands = []
 
     def _drive(self, model: Model, axis: Finger) -> MotorDrive:
-        index = self._model.actuator(str(axis.name)).id
+        index = self._model.actuator(f"{OURS}{axis.name}").id
         self._model.actuator_ctrllimited[index] = 0  # a motor presses its axis against a stop
         levers = levers_of(packaged(model), axis)
         gain, damping = self._model.actuator_gainprm[index][0], -self._model.actuator_biasprm[index][2]

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from .bodies import Bodies
 
 
+class PhysicsError(RuntimeError):
+    """The bodies of a simulated gripper cannot be moved any more; the error before is its cause."""
+
+
 class Drive(Protocol):
     """One motor of a mechanism, in counts.
 
@@ -76,10 +80,24 @@ class Mechanism(Protocol):
     def attach(self, model: Model, clock: Callable[[], float], speedup: float) -> None:
         """Become the mechanism of a gripper of this model, with this clock; once."""
 
+    @property
+    def threaded(self) -> bool:
+        """Whether a thread moves it in real time."""
+
+    def start(self) -> None:
+        """Let its thread move it."""
+
+    def stop(self) -> None:
+        """End its thread, and wait for that."""
+
     def drive(self, axis: Finger) -> Drive: ...
 
     def step(self, until: float) -> bool:
-        """Make one step if that does not lead beyond a time, in simulated seconds; return whether it did."""
+        """Make one step if that does not lead beyond a time, in simulated seconds; return whether it did.
+
+        Raises:
+            PhysicsError: it cannot move any more.
+        """
 
     def bodies(self) -> Bodies:
         """Places of joints and parts."""

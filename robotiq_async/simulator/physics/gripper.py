@@ -18,6 +18,7 @@ from robotiq_async.values.request import Request
 
 from .control_modes import SCISSOR_HIGH, SCISSOR_LOW, check_scissor_limit
 from .controller import ZEROS, Controller
+from .driven_axis import PhysicsError
 from .habits import Habits
 from .spread import SEED
 from .surroundings import Surroundings
@@ -181,6 +182,24 @@ class SimulatedGripper(Surroundings):
         self.power_off()
         self._off_until = self._time + seconds
 
+    # Bodies.
+
+    @property
+    def physics(self) -> Mechanism | None:
+        """What moves its axes; None for straight lines in time."""
+        return self._physics
+
+    @property
+    def bodies(self) -> Bodies | None:
+        """Places of joints and parts, for a drawing; None without physics, and after an error in it."""
+        if self._physics is None:
+            return None
+        try:
+            self._catch_up()
+            return self._physics.bodies()
+        except PhysicsError:
+            return None
+
     # Inspection.
 
     @property
@@ -278,14 +297,6 @@ class SimulatedGripper(Surroundings):
             ValueError: finger is not exactly one axis.
         """
         return self._axis(finger).travel(self._time)
-
-    @property
-    def bodies(self) -> Bodies | None:
-        """Places of joints and parts, for a drawing; None without physics."""
-        if self._physics is None:
-            return None
-        self._catch_up()
-        return self._physics.bodies()
 
     @property
     def writes(self) -> tuple[Write, ...]:

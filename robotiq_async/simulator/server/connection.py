@@ -8,6 +8,7 @@ import struct
 from collections import deque
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
+from ..physics.driven_axis import PhysicsError
 from .framing import BadFrameError, Frame
 
 if TYPE_CHECKING:
@@ -42,6 +43,9 @@ class Server(Protocol):
 
     def answer(self, frame: Frame) -> bytes:
         """Carry out a request; return the frame of the reply."""
+
+    def fail(self, error: PhysicsError) -> None:
+        """Drop all clients for good."""
 
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
         """The parts to send for a reply; None to hang up."""
@@ -157,7 +161,12 @@ class Connection(asyncio.Protocol):
                 if self._inbox:
                     self._goes_on = True
                     self._loop.call_soon(self._go_on)
-                self._send(self._server.answer(frame))
+                try:
+                    reply = self._server.answer(frame)
+                except PhysicsError as error:
+                    self._server.fail(error)
+                    return
+                self._send(reply)
                 break
         self._regulate()
 

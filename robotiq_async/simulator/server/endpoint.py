@@ -7,6 +7,8 @@ from abc import ABC, abstractmethod
 from collections import deque
 from typing import TYPE_CHECKING, ClassVar, Final, Self
 
+from robotiq_async.runtime.concurrency import in_a_thread, wait_shielded
+from robotiq_async.runtime.log import log
 from robotiq_async.values.model import THREE_FINGER
 
 from ..physics.gripper import SimulatedGripper
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
     from types import TracebackType
 
+    from ..physics.driven_axis import PhysicsError
     from ..troubles.trouble import Link
     from .framing import Frame
 
@@ -37,6 +40,8 @@ class SimulatorEndpoint(ABC):
         policy: changes, delays or drops each reply that no trouble concerns.
         fault_injector: makes troubles happen, and decides on requests and replies.
         connections: to the clients that are there, oldest first.
+        failure: the error that has ended the physics of the gripper, if one has; no client is answered then.
+        failed: set with it.
     """
 
     link: ClassVar[Link]
@@ -48,6 +53,8 @@ class SimulatorEndpoint(ABC):
         self.policy: ReplyPolicy = unchanged
         self.fault_injector = FaultInjector(self)
         self.connections: list[Connection] = []
+        self.failure: PhysicsError | None = None
+        self.failed = asyncio.Event()
         self._bank = RegisterBank(self.gripper, self.fault_injector)
         self._is_running = False
         self._left_over: deque[bytes] = deque(maxlen=_MOST_LEFT_OVER)
@@ -87,19 +94,28 @@ class SimulatorEndpoint(ABC):
         if self._is_running:
             raise RuntimeError(f"{type(self).__name__} is running already, at {self.address}")
         await self._open()
+        if self.gripper.physics is not None:
+            self.gripper.physics.start()
         self._is_running = True
 
     async def stop(self) -> None:
-        """Drop all connections and stop listening. Bounded in time; without effect when it is not running."""
+        """Drop all connections and stop listening. Bounded in time; without effect when it is not running.
+
+        The thread of the gripper's physics has ended then, unless another server has the gripper, too.
+        """
         if not self._is_running:
             return
         self._is_running = False
         self._close()
         self._hang_up()
         self._left_over.clear()
+        physics = self.gripper.physics
+        ending = in_a_thread(physics.stop) if physics is not None and physics.threaded else None
         # Two turns of the loop, in which transports close their files.
         await asyncio.sleep(0)
         await asyncio.sleep(0)
+        if ending is not None:
+            await wait_shielded(ending)
 
     def cut(self, *, reset: bool = False) -> None:  # noqa: ARG002
         """Drop all connections. On a serial line there are none."""
@@ -142,7 +158,7 @@ class SimulatorEndpoint(ABC):
     def lets_in(self, client: Connection) -> bool:
         """Take note of a client that has come; return whether it may stay."""
         self.connections.append(client)
-        return self.fault_injector.lets_in(len(self.connections) - 1)
+        return self.failure is None and self.fault_injector.lets_in(len(self.connections) - 1)
 
     def forget(self, client: Connection) -> None:
         """Take note that a client has gone."""
@@ -161,6 +177,14 @@ class SimulatorEndpoint(ABC):
         """Carry out a request; return the frame of the reply."""
         served = set(self.functions) - self.fault_injector.refused_functions
         return self._reply(frame, self._bank.answer(frame.pdu, served))
+
+    def fail(self, error: PhysicsError) -> None:
+        """Drop all clients for good: the gripper has no state any more that could be told."""
+        if self.failure is None:
+            self.failure = error
+            self.failed.set()
+            log.error("the simulated gripper answers no more: %s", error)
+        self._hang_up(reset=True)
 
     def as_reply(self, frame: bytes) -> Reply:
         """A reply in the form for troubles."""
