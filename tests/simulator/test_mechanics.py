@@ -20,7 +20,6 @@ pytest.importorskip("mujoco", reason="needs the extra physics")
 
 from robotiq_async import Finger, ObjectStatus, RobotiqHand, RobotiqStatus
 from robotiq_async.simulator import Habits, Physics, SimulatedGripper
-from robotiq_async.simulator.mechanics.scene import Part, Scene, parse_scene
 from robotiq_async.simulator.mechanics.stepper import OrderedDrive
 from robotiq_async.values.enums import JAW
 from robotiq_async.values.model import HAND_E, MODELS, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
@@ -269,19 +268,19 @@ def test_a_finger_that_is_stopped_early_bends_earlier_than_a_free_one() -> None:
     assert base < 1.15, "although the base has not reached its stop"
 
 
-@pytest.mark.parametrize("speed", [0, 255])
+@pytest.mark.parametrize(("speed", "within"), [(0, 0.03), (255, 0.2)])
 @pytest.mark.parametrize("force", [0, 128, 255])
 def test_each_finger_presses_with_the_force_of_the_table_on_what_does_not_give_way(
-    force: int, speed: int
+    force: int, speed: int, within: float
 ) -> None:
-    """By the manual the register of a finger sets the force of this finger. A block of 90 kg stays."""
+    """By the manual the register of a finger sets its force. A block of 90 kg stays; fast fingers hit it."""
     bench = active("box:60x80x90,90", THREE_FINGER)
     bench.move(255, force=force, speed=speed)
     bench.run(1)
     low, high = THREE_FINGER.forces_n
     forces = bench.physics.forces
     assert forces.keys() == {*FINGERS}, "the palm touches nothing"
-    assert list(forces.values()) == pytest.approx([low + (high - low) * force / 255] * 3, rel=0.1, abs=1)
+    assert list(forces.values()) == pytest.approx([low + (high - low) * force / 255] * 3, rel=within)
 
 
 def test_what_b_and_c_press_a_holds() -> None:
@@ -320,105 +319,6 @@ def test_a_stronger_pair_does_not_push_a_finger_open() -> None:
     bench.run(1)
     positions = [bench.status.position(finger) for finger in (Finger.A, Finger.B, Finger.C)]
     assert max(positions) - min(positions) < 30
-
-
-# -- scenes ----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("text", "scene"),
-    [
-        ("table", Scene()),
-        ("box:40x60x80,0.3", Scene(Part("box", (40, 60, 80), 0.3))),
-        ("rod:40x120,0.25@95", Scene(Part("rod", (40, 120), 0.25, 95))),
-        ("sphere:60,1", Scene(Part("sphere", (60,), 1))),
-        ("cell.xml", Scene(file="cell.xml")),
-    ],
-)
-def test_scenes_in_words(text: str, scene: Scene) -> None:
-    assert parse_scene(text) == scene
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("", "physics must be table"),
-        ("cone:40,1", "box, cylinder, rod, sphere"),
-        ("box:40x60,0.3", "a box has 3 lengths, got 40x60"),
-        ("box:40x60x0,0.3", "size must be a number above 0 and at most 1000, got '0'"),
-        ("sphere:60,0", "mass must be"),
-        ("sphere:60,1000", "mass must be"),
-    ],
-)
-def test_words_that_are_no_scene(text: str, words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        Physics(text)
-
-
-def test_a_part_without_room_between_the_fingers_is_refused() -> None:
-    with pytest.raises(ValueError, match="no room for a box of 90x40x60 mm"):
-        Bench("box:90x40x60,0.3")
-
-
-def test_physics_has_one_gripper() -> None:
-    bench = Bench("table")
-    with pytest.raises(RuntimeError, match="one for each"):
-        SimulatedGripper(physics=bench.physics)
-    with pytest.raises(RuntimeError, match="no gripper yet"):
-        Physics("table").lift(10)
-
-
-def test_obstacles_at_a_count_are_for_grippers_without_physics() -> None:
-    with pytest.raises(ValueError, match="not obstacles at a count"):
-        Bench("table").gripper.place_object(JAW, 100)
-
-
-OWN = """<mujoco><worldbody>
-  <geom type="plane" size="1 1 0.1"/>
-  <body name="arm" pos="0 0 0.17">
-    <joint name="elbow" type="hinge" axis="0 0 1" damping="1"/>
-    <geom type="box" size="0.02 0.02 0.02" pos="0 0 0.05" mass="1" contype="0" conaffinity="0"/>
-    <site name="gripper" quat="0 1 0 0"/>
-  </body>
-  <body name="can" pos="0 0 0.03"><freejoint/><geom type="cylinder" size="0.02 0.03" mass="0.1"/></body>
-</worldbody><actuator><position name="elbow" joint="elbow" kp="50"/></actuator></mujoco>"""
-
-
-def test_the_gripper_is_mounted_in_a_world_of_ones_own(tmp_path: Path) -> None:
-    file = tmp_path / "cell.xml"
-    file.write_text(OWN, encoding="utf-8")
-    bench = active(str(file))
-    bench.move(255)
-    assert bench.status.finger_status(JAW) is ObjectStatus.CONTACT_CLOSING
-    assert bench.physics.opening_mm == pytest.approx(40, abs=4)
-
-
-def test_a_part_of_several_bodies_is_out_of_the_way_as_a_whole(tmp_path: Path) -> None:
-    file = tmp_path / "cell.xml"
-    geom = '<geom type="cylinder" size="0.02 0.03" mass="0.1"/>'
-    dumbbell = f'<geom size="0.01" pos="0 0.1 0" mass="0.1"/><body>{geom}</body>'
-    file.write_text(OWN.replace(geom, dumbbell), encoding="utf-8")
-    bench, farthest = Bench(str(file)), 0
-    bench.ask(0, go=False)
-    while not bench.status.is_activated:
-        bench.run(POLL_S)
-        farthest = max(farthest, bench.status.position(JAW))
-        assert bench.now < 10, "it ends"
-    assert farthest == 228, "an activation closes the fingers on nothing"
-    bench.move(255)
-    assert bench.status.finger_status(JAW) is ObjectStatus.CONTACT_CLOSING
-
-
-def test_a_world_that_is_none_is_refused(tmp_path: Path) -> None:
-    file = tmp_path / "cell.xml"
-    with pytest.raises(ValueError, match="there is no file"):
-        Bench(str(file))
-    file.write_text("<mujoco>", encoding="utf-8")
-    with pytest.raises(ValueError, match="MuJoCo cannot read"):
-        Bench(str(file))
-    file.write_text("<mujoco/>", encoding="utf-8")
-    with pytest.raises(ValueError, match="no site named gripper"):
-        Bench(str(file))
 
 
 # -- behind the wire -------------------------------------------------------------------------------------

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 OURS: Final = "gripper/"
 """Before the names of all that belongs to the gripper."""
 _TIMESTEP: Final = 0.002
+_TIMESTEPS: Final = (0.0001, 0.004)
+"""Those of a user's own world: with 10 ms no motion of a gripper ends, and with 20 ms it flies apart."""
 _CLEARANCE: Final = 0.006
 """Distance in metres between the table and the lowest point that the fingertips reach."""
 _FRICTION: Final = (0.6, 0.005, 0.0001)
@@ -63,16 +65,23 @@ def in_own_world(text: str, file: str) -> Any:
     """The gripper at the site ``gripper`` of a file.
 
     Raises:
-        ValueError: there is no such file, MuJoCo cannot read it, or it has no such site.
+        ValueError: there is no such file, MuJoCo cannot read it, it has no such site, or its timestep is too
+            long or too short.
     """
     if not Path(file).is_file():
         raise ValueError(f"physics: there is no file {file!r:.100}")
     try:
         spec = mujoco.MjSpec.from_file(file)
     except ValueError as error:
-        raise ValueError(f"physics: MuJoCo cannot read {file!r:.100}: {error}") from error
+        raise ValueError(f"physics: MuJoCo cannot read {file!r:.100}: {_in_one_line(error)}") from error
     if not any(site.name == "gripper" for site in spec.sites):
         raise ValueError(f"physics: {file!r:.100} has no site named gripper, where the gripper is mounted")
+    shortest, longest = _TIMESTEPS
+    if not shortest <= spec.option.timestep <= longest:
+        raise ValueError(
+            f"physics: the timestep of {file!r:.100} must be in {shortest:g}..{longest:g} s, with which a"
+            f" gripper is stable, got {spec.option.timestep:g}"
+        )
     gripper = mujoco.MjSpec.from_string(text)
     for option in ("timestep", "integrator", "cone", "impratio"):  # those of the file, without a complaint
         setattr(gripper.option, option, getattr(spec.option, option))
@@ -90,12 +99,20 @@ def compiled(spec: Any, scene: Scene) -> Any:
         return spec.compile()
     except ValueError as error:
         what = scene.part if scene.file is None else repr(scene.file)
-        raise ValueError(f"physics: MuJoCo cannot make {what}: {error}") from error
+        raise ValueError(f"physics: MuJoCo cannot make {what}: {_in_one_line(error)}") from error
+
+
+def _in_one_line(error: ValueError) -> str:
+    return " ".join(str(error).split())
 
 
 def _add_part(spec: Any, part: Part, height: float) -> None:
     size = [each / 1000 for each in part.size]
     middle = part.height / 2000 if part.at is None else height - part.at / 1000
+    if middle <= 0:
+        raise ValueError(
+            f"physics: the table is {1000 * height:.0f} mm from the mounting face: no {part} at {part.at:g}"
+        )
     body = spec.worldbody.add_body(name="part", pos=[0, 0, middle])
     body.add_freejoint(name="part")
     kinds = mujoco.mjtGeom

@@ -6,6 +6,8 @@ One step is 2 ms, or that of the user's file. Nothing here knows a clock.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from math import isnan
 from typing import TYPE_CHECKING, Any, Final
 
 from robotiq_async.runtime.extras import install
@@ -32,6 +34,8 @@ if TYPE_CHECKING:
 
 _LIFTING: Final = 0.1
 """Speed of the mount, in m/s: slow for an arm."""
+_INSIDE: Final = 0.0005
+"""Depth in metres from which a part is in the gripper, and does not only touch it."""
 _FAR: Final = 100.0
 """Height in metres of a part that was taken away."""
 
@@ -69,8 +73,6 @@ class World:
         for drive in self.drives.values():
             put_at(self._model, self._data, [drive.index], drive.share)
         mujoco.mj_forward(self._model, self._data)
-        if scene.part is not None and self._touches_part():
-            raise ValueError(f"physics: there is no room for a {scene.part} between the open fingers")
         self._start = self._data.qpos.copy()
         root = root_of(self._model)
         self.root: str = self._model.body(root).name.removeprefix(OURS)
@@ -89,6 +91,9 @@ class World:
         ]
         self._watch = Watch(self._model, self._part_geoms)
         self._links = links_of(self._model, root)
+        for body in self._jammed():
+            what = f"a {scene.part}" if is_ours else f"the part {self._model.body(body).name!r}"
+            raise ValueError(f"physics: there is no room for {what} between the open fingers")
         self._sleeps = is_ours and not self._parts
         """Whether nothing moves while the motors rest: no part, and not a user's world."""
         self._collides = self._model.geom_contype.copy(), self._model.geom_conaffinity.copy()
@@ -118,13 +123,15 @@ class World:
             self._controls[self._mount] = self._lifted
         before = data.time
         mujoco.mj_step(self._model, data)
-        if not data.time > before:  # MuJoCo begins again with bodies that have become unstable
+        values = [float(self._lengths[drive.index]) for drive in drives]
+        # MuJoCo begins again at 0 with bodies that have become unstable, unless a file forbids it.
+        if not data.time > before or any(map(isnan, values)):
             raise RuntimeError(
                 f"they became unstable after {before:.3f} s (timestep {self.step_s:g} s): smaller steps,"
                 " softer contacts or parts of a sensible size and mass help"
             )
-        for drive in drives:
-            drive.see(float(self._lengths[drive.index]), self.step_s)
+        for drive, value in zip(drives, values, strict=True):
+            drive.see(value, self.step_s)
         fingers = [drive for axis, drive in self.drives.items() if axis is not Finger.SCISSOR]
         if self._hands and all(drive.outcome.is_contact for drive in fingers):
             self._let_go()
@@ -181,9 +188,14 @@ class World:
         apart = np.linalg.norm(places[others].mean(axis=0) - places[last])
         return 1000 * float(apart - min(sizes[others[0]]) - min(sizes[last]))
 
-    def _touches_part(self) -> bool:
-        names = ({self._model.geom(int(geom)).name for geom in each.geom} for each in self._data.contact)
-        return any("part" in pair and "table" not in pair for pair in names)
+    def _jammed(self) -> Iterator[int]:
+        """Bodies of parts that reach into the gripper."""
+        parts = set(self._part_geoms)
+        for contact in self._data.contact:
+            for geom, other in (contact.geom, contact.geom[::-1]):
+                is_inside = contact.dist < -_INSIDE and int(self._model.geom_bodyid[other]) in self._links
+                if is_inside and int(geom) in parts:
+                    yield int(self._model.geom_bodyid[geom])
 
     def _put(self, z: float = 0.0) -> None:
         for joint in self._parts:
