@@ -236,6 +236,56 @@ def test_a_halt_keeps_the_part_unless_the_gripper_has_that_habit() -> None:
         assert bench.physics.part[2] == pytest.approx(height, abs=5)
 
 
+@pytest.mark.parametrize("model", MODELS.values(), ids=str)
+def test_a_request_for_more_force_does_not_let_go_of_the_part_first(model: Model) -> None:
+    """The force began at nothing: a Hand-E dropped 5 kg, and finger A went back by 40 counts."""
+    bench = active("box:60x80x60,3" if model is THREE_FINGER else "box:30x40x60,5", model)
+    bench.move(255, force=240, speed=0)
+    bench.physics.lift(60)
+    bench.run(2)
+    held_at, part = bench.status.position(Finger.A), bench.physics.part
+    assert part is not None
+    for force in range(241, 246):
+        bench.ask(255, force=force, speed=0)
+        bench.run(1)
+        bench.ask(255, force=force, speed=0, go=False)
+        bench.run(0.1)
+    bench.move(255, force=255)
+    assert bench.physics.part == pytest.approx(part, abs=6)
+    assert bench.status.position(Finger.A) == pytest.approx(held_at, abs=3)
+
+
+def test_a_sheet_that_slips_out_of_closed_fingers_is_lost() -> None:
+    """They move on by one count, and had kept their contact."""
+    bench = active("box:2x40x90,0.02")
+    bench.move(255, force=0)
+    assert bench.status.finger_status(JAW) is ObjectStatus.CONTACT_CLOSING
+    bench.physics.take_away()
+    bench.run(1)
+    assert bench.status.finger_status(JAW) is ObjectStatus.AT_POSITION
+    assert bench.status.position(JAW) == 228
+
+
+def test_parts_stay_away_until_an_activation_that_began_half_closed_has_ended() -> None:
+    """Fingers close for half of its time, and wait when they began nearer: parts came back between them."""
+    bench = active(BOX)
+    bench.move(60)
+    bench.gripper.power_cycle(0.1)
+    bench.run(0.5)
+    bench.activate()
+    assert bench.physics.part == pytest.approx((0, 0, 30), abs=1)
+
+
+def test_a_part_that_is_put_back_between_closed_fingers_is_met() -> None:
+    bench = active(BOX)
+    bench.physics.take_away()
+    bench.move(255)
+    assert bench.status.finger_status(JAW) is ObjectStatus.AT_POSITION
+    bench.physics.put_back()
+    bench.run(1)
+    assert bench.status.finger_status(JAW) is ObjectStatus.CONTACT_CLOSING
+
+
 # -- the 3-Finger ----------------------------------------------------------------------------------------
 
 

@@ -50,7 +50,7 @@ class MotorDrive:
         position: of the axis.
         travel: the distance that it has travelled.
         outcome: of the last goal.
-        clears: parts are out of the way while it goes to its goal.
+        clears: parts are out of the way while it has this goal.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class MotorDrive:
         self._is_locked = True
         self._rested = 0.0
         self._rests_at = self._counted_at = self.position
-        self._met_at = 0.0
+        self._ended_at = 0.0
 
     @property
     def share(self) -> float:
@@ -101,6 +101,11 @@ class MotorDrive:
         return self._has_goal and self.outcome is ObjectStatus.IN_MOTION
 
     @property
+    def _presses(self) -> bool:
+        """Whether it keeps a grip: another request in its direction does not let go of the part first."""
+        return self._sign * (self._reference - self.position) > _NEAR
+
+    @property
     def _is_near(self) -> bool:
         return abs(self._target - self.position) <= _NEAR
 
@@ -110,9 +115,11 @@ class MotorDrive:
         self._aim = min(max(target, low - 1), high + 1)  # pressed against a stop, it reads the stop
         self._rate, self._force = rate, force
         before, self._sign = self._sign, 1.0 if self._target > self.position else -1.0
-        # A new request in the same direction does not restart the pressing: a loop of 50 Hz sends many.
-        if not self._is_going or before != self._sign:
+        turns = before != self._sign
+        if turns or not (self._is_going or self._presses):
             self._reference = self._farthest = self.position
+        # A new request in the same direction does not restart the pressing: a loop of 50 Hz sends many.
+        if turns or not self._is_going:
             self._rested = 0.0
         self.clears = clears
         self.outcome = ObjectStatus.IN_MOTION
@@ -187,8 +194,8 @@ class MotorDrive:
     def _lock(self, *, presses: bool) -> None:
         """Stay here, with the force of the request if it presses against something."""
         if not self._is_locked:
-            ahead = self._sign * self._limit() / self._stiffness if presses else 0.0
-            self._reference = self.position + ahead
+            ahead = self._limit() / self._stiffness + self._pushed_back() if presses else 0.0
+            self._reference = self.position + self._sign * ahead
         self._is_locked = True
 
     def see(self, value: float, step_s: float) -> None:
@@ -206,19 +213,23 @@ class MotorDrive:
             return
         if self.outcome is ObjectStatus.IN_MOTION:
             self._judge()
-        elif self.outcome.is_contact and not self._locks and abs(position - self._met_at) > _SLIPPED:
+        elif not self._locks and self._has_moved_on:
             self.outcome = ObjectStatus.IN_MOTION
             self._rested = 0.0
+
+    @property
+    def _has_moved_on(self) -> bool:
+        """Whether a jaw leaves its place: a part slips or has gone, or one was put back between its pads."""
+        return abs(self.position - self._ended_at) > _SLIPPED or (self.outcome.is_contact and self._is_near)
 
     def _judge(self) -> None:
         if self._is_near and self._reference == self._aim and self._rested >= _ARRIVED_S:
             self.outcome = ObjectStatus.AT_POSITION
-            self.clears = False
+            self._ended_at = self.position
         elif self._rested >= _CONTACT_S and not self._is_near and self._has_its_force:
             closing = self._target > self.position
             self.outcome = ObjectStatus.CONTACT_CLOSING if closing else ObjectStatus.CONTACT_OPENING
-            self._met_at = self.position
-            self.clears = False
+            self._ended_at = self.position
             if self._locks:
                 self._lock(presses=True)
 

@@ -57,7 +57,7 @@ class Drive(Protocol):
             target: the position.
             rate: the speed.
             force: of the register, 0..255.
-            clears: parts are out of the way until it arrives.
+            clears: parts are out of the way until the next order.
         """
 
     def hold(self) -> None:
