@@ -149,7 +149,8 @@ async def simulate(
                     await server.fault_injector.begin(habit)
                 print(server.address, flush=True)
                 await _play(server, plan)
-        raise RobotiqError(str(server.failure))
+        if server.failure is not None:
+            raise RobotiqError(str(server.failure))
     except (ImportError, PhysicsError) as error:
         raise RobotiqError(str(error)) from error
     except BrokenPipeError:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .world import World
 
 _WAKES_S: Final = 0.004
+_STEPS_AT_ONCE: Final = 50
 _LATE_S: Final = 0.1
 """Behind the clock by so much, it lets simulated time go rather than hurry after it."""
 
@@ -68,25 +69,28 @@ class Stepper:
         self._ends.set()
 
     def _work(self) -> None:
-        began, let_go = self._clock() - self._world.time / self._speedup, 0.0
+        world, let_go = self._world, 0.0
+        due, began = world.time, self._clock() - world.time / self._speedup
         try:
-            while not self._ends.wait(_WAKES_S):
-                let_go += self._catch_up((self._clock() - began) * self._speedup - let_go)
-                self.seen = self._world.look()
+            while not self._ends.wait(_WAKES_S if world.time + world.step_s > due else 0):
+                due = (self._clock() - began) * self._speedup - let_go
+                late = max(due - world.time - _LATE_S * self._speedup, 0.0)
+                let_go, due = let_go + late, due - late
+                self._catch_up(due)
+                self.seen = world.look()
         except Exception as error:  # noqa: BLE001  # raised by the next call
             self._world.failure = error
 
-    def _catch_up(self, due: float) -> float:
-        """Make the steps that are due; return the seconds that were let go."""
-        late = max(due - self._world.time - _LATE_S * self._speedup, 0.0)
-        due -= late
-        while self._world.time + self._world.step_s <= due and not self._ends.is_set():
+    def _catch_up(self, due: float) -> None:
+        """Make steps that are due, but not so many that nobody would see what happens between them."""
+        for _ in range(_STEPS_AT_ONCE):
+            if self._world.time + self._world.step_s > due or self._ends.is_set():
+                return
             while self.orders:
                 self.orders.popleft()()
             with self._lock:
                 self._world.step()
             self.steps += 1
-        return late
 
 
 class OrderedDrive:
