@@ -41,13 +41,15 @@ PARTS: Final = (
 )
 FORCE: Final = 128
 LIFT_MM: Final = 60.0
-HEIGHT_3F: Final = 155
+HEIGHT_3F: Final = 175
 THIN_MM: Final = 50
 SIZE: Final = 180
 BACKGROUND: Final = (226, 230, 236)
 AROUND: Final = {"3f": "rod:60x140,0.3@105"}
 """Parts for the grippers for which the can is not the one that is shown."""
 CAN: Final = "cylinder:45x60,0.2"
+BLOCK: Final = "box:60x80x90,90"
+"""One that a 3-Finger does not move: of a free one, A holds what B and C press."""
 POLL_S: Final = 0.005
 
 
@@ -69,30 +71,29 @@ def main() -> None:
     print("\n| | speed 0 | speed 255 | force 0 | force 128 | force 255 |")
     print(f"|{' -- |' * 6}")
     for model in MODELS.values():
-        if len(model.axes) == 1:
-            said = [*speeds(model), *forces(model)]
-            print(f"| {model.title} | {' | '.join(f'{found:.0f} ({table:.0f})' for found, table in said)} |")
+        said = [*speeds(model), *forces(model)]
+        print(f"| {model.title} | {' | '.join(f'{found:.0f} ({table:.0f})' for found, table in said)} |")
 
 
-def speeds(jaw: Model) -> list[tuple[float, float]]:
-    """Of the opening in mm/s, at the lowest and the highest speed, and what the manual has."""
-    found = []
-    for value, nominal in zip((0, 255), jaw.speeds_mm_s, strict=True):
-        stage, curve = Stage(jaw, "table"), []
+def speeds(model: Model) -> list[tuple[float, float]]:
+    """In mm/s, at the lowest and the highest speed, and what the manual has: of the opening; of one finger of three."""
+    found, fingers = [], 2 if model is THREE_FINGER else 1
+    for value, nominal in zip((0, 255), model.speeds_mm_s, strict=True):
+        stage, curve = Stage(model, "table"), []
         stage.ask(255, speed=value, force=255)
-        while stage.physics.opening_mm > 0.2 * jaw.stroke.mm:
+        while stage.physics.opening_mm > 0.2 * model.stroke.mm:
             stage.wait(POLL_S)
             curve.append(stage.physics.opening_mm)
-        middle = [each for each in curve if each < 0.8 * jaw.stroke.mm]
-        found.append(((middle[0] - middle[-1]) / (len(middle) - 1) / POLL_S, nominal))
+        middle = [each for each in curve if each < 0.8 * model.stroke.mm]
+        found.append(((middle[0] - middle[-1]) / (len(middle) - 1) / POLL_S / fingers, nominal))
     return found
 
 
-def forces(jaw: Model) -> list[tuple[float, float]]:
-    """Of a pad on a box in newtons, at three forces, and what lies evenly between those of the manual."""
-    found, (least, most) = [], jaw.forces_n
+def forces(model: Model) -> list[tuple[float, float]]:
+    """Of a finger on a box in newtons, at three forces, and what lies evenly between those of the manual."""
+    found, (least, most) = [], model.forces_n
     for value in (0, 128, 255):
-        stage = Stage(jaw, PARTS[0][0])
+        stage = Stage(model, BLOCK if model is THREE_FINGER else PARTS[0][0])
         stage.ask(255, speed=0, force=value)
         stage.wait(6)
         found.append((stage.physics.grip_force, least + (most - least) * value / 255))
