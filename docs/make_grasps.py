@@ -76,7 +76,7 @@ def main() -> None:
 
 
 def speeds(model: Model) -> list[tuple[float, float]]:
-    """In mm/s, at the lowest and the highest speed, and what the manual has: of the opening; of one finger of three."""
+    """Of the opening, or of one finger of three, in mm/s at both ends of the scale; and what the manual has."""
     found, fingers = [], 2 if model is THREE_FINGER else 1
     for value, nominal in zip((0, 255), model.speeds_mm_s, strict=True):
         stage, curve = Stage(model, "table"), []

@@ -113,8 +113,9 @@ def _geom(link: Link, shape: Shape) -> ET.Element:
         geom.set("friction", numbers(_PAD_FRICTION))
         geom.set("condim", "4")
         geom.set("priority", "1")
-        # A little soft, as rubber is: without it a part that is squeezed rattles.
-        geom.set("solref", "0.006 1")
+        # Hard: the softness of a contact grows as the mass of the part and the number of points shrink.
+        geom.set("solref", "0.004 1")
+        geom.set("solimp", "0.99 0.9999 0.0005")
     else:
         geom.set("friction", numbers(_BODY_FRICTION))
     return geom
