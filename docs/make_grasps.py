@@ -71,12 +71,12 @@ def main() -> None:
     print("\n| | speed 0 | speed 255 | force 0 | force 128 | force 255 |")
     print(f"|{' -- |' * 6}")
     for model in MODELS.values():
-        said = [*speeds(model), *forces(model)]
-        print(f"| {model.title} | {' | '.join(f'{found:.0f} ({table:.0f})' for found, table in said)} |")
+        both = [*speeds(model), *forces(model)]
+        print(f"| {model.title} | {' | '.join(f'{found:.0f} ({table:.0f})' for found, table in both)} |")
 
 
 def speeds(model: Model) -> list[tuple[float, float]]:
-    """Of the opening, or of one finger of three, in mm/s at both ends of the scale; and what the manual has."""
+    """Of the opening, or of one finger of three, in mm/s at both ends; and what the manual has."""
     found, fingers = [], 2 if model is THREE_FINGER else 1
     for value, nominal in zip((0, 255), model.speeds_mm_s, strict=True):
         stage, curve = Stage(model, "table"), []
