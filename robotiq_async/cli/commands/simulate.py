@@ -149,8 +149,6 @@ async def simulate(
                     await server.fault_injector.begin(habit)
                 print(server.address, flush=True)
                 await _play(server, plan)
-        if server.failure is not None:
-            raise RobotiqError(str(server.failure))
     except (ImportError, PhysicsError) as error:
         raise RobotiqError(str(error)) from error
     except BrokenPipeError:
@@ -172,6 +170,7 @@ async def _play(server: SimulatorEndpoint, plan: Sequence[Trouble]) -> None:
         if playing.done():
             await playing
             await failing
+        raise RobotiqError(str(server.failure))
     finally:
         playing.cancel()
         failing.cancel()

@@ -50,7 +50,7 @@ class MotorDrive:
         position: of the axis.
         travel: the distance that it has travelled.
         outcome: of the last goal.
-        clears: parts are out of the way while it has this goal.
+        clears: parts are out of the way until it has opened, or has another order.
     """
 
     def __init__(
@@ -213,6 +213,8 @@ class MotorDrive:
             return
         if self.outcome is ObjectStatus.IN_MOTION:
             self._judge()
+            # Parts come back to open fingers; between closed ones there is no room for them.
+            self.clears = self.clears and (self._is_going or self._sign > 0)
         elif not self._locks and self._has_moved_on:
             self.outcome = ObjectStatus.IN_MOTION
             self._rested = 0.0

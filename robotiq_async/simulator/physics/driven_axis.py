@@ -57,7 +57,7 @@ class Drive(Protocol):
             target: the position.
             rate: the speed.
             force: of the register, 0..255.
-            clears: parts are out of the way until the next order.
+            clears: parts are out of the way until it has opened, or has another order.
         """
 
     def hold(self) -> None:
