@@ -315,9 +315,6 @@ class Controller:
                 return  # what shows during a stop is its business, and so is what shows in a procedure
         if condition is None or self.is_busy:
             return
-        if condition is Trigger.SEEN_BUSY and self._has_stray_activation(status):
-            self._take_back("the gripper was reset as it was commanded: its activation is taken back")
-            return
         is_news = condition is not before or ledger.match is None
         if is_news and not self._note_news(before, condition, status):
             return
@@ -327,6 +324,8 @@ class Controller:
                 self._requests.moves.end_arrived(status, ledger)
         if condition is not before:
             self._update_state(condition)
+        if condition is Trigger.SEEN_BUSY and self._has_stray_activation(status):
+            self._take_back("the gripper was reset as it was commanded: its activation is taken back")
 
     def _note_news(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> bool:
         """Take in a new condition, or an image that no entry explains; return whether it is to be shown."""
