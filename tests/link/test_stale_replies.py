@@ -122,12 +122,11 @@ class SerialLiar(RtuLiar):
         self.hear(self._port.read(4096))
 
 
-class ServerLiar(RtuLiar, asyncio.Protocol):
-    """A serial server; it answers the connection that is there when the answer comes."""
+class BehindASocket(Liar, asyncio.Protocol):
+    """A liar that answers the connection that is there when the answer comes."""
 
-    def __init__(self, seed: int) -> None:
-        super().__init__(seed)
-        self._transport: Any = None
+    _inbox = b""
+    _transport: Any = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport, self._inbox = transport, b""
@@ -135,25 +134,17 @@ class ServerLiar(RtuLiar, asyncio.Protocol):
     def send(self, data: bytes) -> None:
         if self._transport is not None:
             self._transport.write(data)
+
+
+class ServerLiar(BehindASocket, RtuLiar):
+    """A serial server."""
 
     def data_received(self, data: bytes) -> None:
         self.hear(data)
 
 
-class TcpLiar(Liar, asyncio.Protocol):
-    """A gateway; it answers the connection that is there when the answer comes."""
-
-    def __init__(self, seed: int) -> None:
-        super().__init__(seed)
-        self._transport: Any = None
-        self._inbox = b""
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self._transport, self._inbox = transport, b""
-
-    def send(self, data: bytes) -> None:
-        if self._transport is not None:
-            self._transport.write(data)
+class TcpLiar(BehindASocket):
+    """A gateway."""
 
     def damage(self, reply: bytes) -> bytes:
         """TCP has no damaged bytes, but gateways that answer something else."""
@@ -229,7 +220,7 @@ async def test_a_serial_server(registers: RegisterMap) -> None:
     await behind_a_socket(ServerLiar(4), "rtu+tcp", registers)
 
 
-async def behind_a_socket(liar: TcpLiar | ServerLiar, scheme: str, registers: RegisterMap) -> None:
+async def behind_a_socket(liar: BehindASocket, scheme: str, registers: RegisterMap) -> None:
     server = await asyncio.get_running_loop().create_server(lambda: liar, "127.0.0.1", 0)
     address = parse_address(f"{scheme}://127.0.0.1:{server.sockets[0].getsockname()[1]}")
     transport = ModbusTransport(address, registers, connect_timeout=1.0, response_timeout=RESPONSE_S)
