@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import select
 import signal
 import sys
 import time
@@ -17,7 +18,7 @@ from robotiq_async.cli.output.lines import print_objects
 from robotiq_async.session.options import LATE_POLLS
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.terminal import ROOT
-from tests.grippers import shows
+from tests.grippers import shows, until
 from tests.patience import patience
 
 if TYPE_CHECKING:
@@ -143,9 +144,10 @@ async def test_a_signal_ends_it_although_its_output_is_not_read(
         process = await asyncio.create_subprocess_exec(
             sys.executable, *arguments, stdout=writing, env=environment
         )
+        await until(lambda: not select.select([], [writing], [], 0)[1], within=60)
         os.close(writing)
-        started = asyncio.get_running_loop().time()
-        await shows(hand, lambda status: status.timestamp > started + 3)  # three times what fills the pipe
+        full_at = hand.status.sequence
+        await shows(hand, lambda status: status.sequence > full_at + 200)
         process.send_signal(signal.SIGTERM)
         async with asyncio.timeout(patience(10)):
             assert await process.wait() == 0
