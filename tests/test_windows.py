@@ -14,7 +14,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.patience import patience
 
 ROOT = Path(__file__).parents[1]
-BEGIN = "import sys\nfrom tests.windows import Winmm, become\nbecome(coarse={})\n"
+BEGIN = "import sys\nfrom tests.windows import Winmm, become\nbecome(coarse={}, commands={})\n"
 ENVIRONMENT = {
     "PYTHONPATH": str(ROOT),
     # The one for Windows wants a console of it.
@@ -25,11 +25,11 @@ if sys.platform == "win32":
     pytest.skip("the core's own tests run there", allow_module_level=True)
 
 
-async def on_windows(program: str, *arguments: str, coarse: bool = False) -> str:
+async def on_windows(program: str, *arguments: str, coarse: bool = False, commands: bool = False) -> str:
     """The output of a program there; it must end well, and complain of nothing but late polls."""
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-X", "warn_default_encoding"),
-        *("-c", BEGIN.format(coarse) + program, *arguments),
+        *("-c", BEGIN.format(coarse, commands) + program, *arguments),
         cwd=ROOT,
         env=os.environ | ENVIRONMENT,
         stdin=asyncio.subprocess.DEVNULL,
@@ -75,7 +75,7 @@ fails(EncodingWarning, exec, "open('README.md')", {"__name__": "robotiq_async"})
 
 
 async def test_all_of_the_core_and_the_command_line_can_be_imported() -> None:
-    await on_windows("""
+    program = """
 import importlib, pkgutil, robotiq_async
 from robotiq_async.cli.tui.screen import DRIVER
 
@@ -88,7 +88,8 @@ for found in pkgutil.walk_packages(robotiq_async.__path__, "robotiq_async."):
         importlib.import_module(found.name)
         count += 1
 assert count > 140, count
-""")
+"""
+    await on_windows(program, commands=True)
 
 
 @pytest.mark.parametrize("coarse", [False, True], ids=["fine clock", "coarse clock"])
@@ -218,7 +219,7 @@ interrupted("record", f"{folder}/second.mcap", address)
 @pytest.mark.parametrize("what", RUNS)
 async def test_the_commands_run(what: str, tmp_path: Path) -> None:
     async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
-        await on_windows(COMMANDS + RUNS[what], server.address, str(tmp_path))
+        await on_windows(COMMANDS + RUNS[what], server.address, str(tmp_path), commands=True)
 
 
 async def test_the_monitor_is_driven_by_keys() -> None:
@@ -246,4 +247,4 @@ async def main(address):
 asyncio.run(main(sys.argv[1]))
 """
     async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
-        await on_windows(program, server.address)
+        await on_windows(program, server.address, commands=True)

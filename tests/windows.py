@@ -41,9 +41,12 @@ NAMES: dict[Any, str] = {
 }
 LOOP = "add_reader add_writer add_signal_handler remove_signal_handler"
 THEIRS = (
-    *("anyio._backends._asyncio", "cyclopts", "mcap.reader", "mcap.writer", "platform", "pymodbus.client"),
-    *("pymodbus.server", "rich.live", "serial.tools.list_ports", "shutil", "subprocess", "tempfile"),
-    *("textual.app", "textual.drivers.headless_driver", "textual.widgets", "webbrowser"),
+    *("anyio._backends._asyncio", "platform", "pymodbus.client", "pymodbus.server"),
+    *("serial.tools.list_ports", "shutil", "subprocess", "tempfile"),
+)
+OF_COMMANDS = (
+    *("cyclopts", "mcap.reader", "mcap.writer", "rich.live", "webbrowser"),
+    *("textual.app", "textual.drivers.headless_driver", "textual.widgets"),
 )
 
 
@@ -74,9 +77,14 @@ class Winmm:
         return 0
 
 
-def become(*, coarse: bool = False) -> None:
-    """Give up what Windows has not; ``coarse``: for the clock of Python before 3.13, too."""
-    for name in THEIRS:
+def become(*, coarse: bool = False, commands: bool = False) -> None:
+    """Give up what Windows has not.
+
+    Args:
+        coarse: have the clock of Python before 3.13, too.
+        commands: import what the command line imports, which takes a while.
+    """
+    for name in (*THEIRS, *(OF_COMMANDS if commands else ())):
         importlib.import_module(name)
     importlib.import_module("pymodbus.transport.serialtransport").SerialTransport.force_poll = True
     ctypes.WinDLL = Winmm  # type: ignore[attr-defined]

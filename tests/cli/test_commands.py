@@ -346,8 +346,8 @@ def test_a_machine_without_ports(call: Call, monkeypatch: pytest.MonkeyPatch) ->
 # -- doctor ------------------------------------------------------------------------------------------------
 
 
-async def test_doctor_finds_nothing_wrong_with_the_simulator(shell: Shell) -> None:
-    outcome = await shell.run("doctor", "sim://")
+def test_doctor_finds_nothing_wrong_with_the_simulator(call: Call) -> None:
+    outcome = call("doctor", "sim://")
     outcome.assert_succeeded()
     lines = outcome.out.splitlines()
     assert lines[1].split()[:2] == ["ok", "Modbus"]

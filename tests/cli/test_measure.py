@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
+import os
 import signal
 from asyncio.subprocess import PIPE
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,8 +16,8 @@ from robotiq_async import JAW, TWO_FINGER_85
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.measure.campaigns import read_currents
 from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, read_stroke, read_table, thesis_table
+from robotiq_async.values.request import Request
 from tests.cli.conftest import served
-from tests.grippers import until
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Call, Shell
@@ -68,21 +71,15 @@ def test_force_writes_readings_currents_and_pictures(call: Call, tmp_path: Path)
     assert "foam" in both
 
 
-async def test_the_scale_is_read_by_a_person(
-    shell: Shell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("PYTHONIOENCODING", "utf-8:strict")  # no language is to hide that a byte is none
+def test_the_scale_is_read_by_a_person(call: Call, tmp_path: Path) -> None:
     gripper = SimulatedGripper(speedup=30)
     gripper.place_object(7, 150)
-    async with SimulatorServer(gripper) as server:
-        process = await shell.start(
+    with served(gripper) as server:
+        outcome = call(
             *("measure", "force", "--yes", server.address, "--output", str(tmp_path / "f.csv")),
             *("--step", "250", "--runs", "1", "--speed", "255", "--no-plot"),
-            stdin=PIPE,
+            stdin=b"much\n-5\n\xff\n1500\n2500\n",
         )
-        assert process.stdin is not None
-        process.stdin.write(b"much\n-5\n\xff\n1500\n2500\n")
-        outcome = await shell.finish(process)
     outcome.assert_succeeded()
     assert outcome.out.count("An integer in 0..100000, please.") == 3
     assert "Force 250, run 1: what does the scale show, in grams?" in outcome.out
@@ -110,21 +107,16 @@ def test_stroke_writes_the_points_of_a_jaw(call: Call, tmp_path: Path) -> None:
     refused.assert_failed(2, f"stroke: {file}: it was measured on a 2F-85, and the gripper is a 2F-140")
 
 
-async def test_stroke_asks_for_figures_that_fall_until_the_fingertips_meet(
-    shell: Shell, tmp_path: Path
-) -> None:
+def test_stroke_asks_for_figures_that_fall_until_the_fingertips_meet(call: Call, tmp_path: Path) -> None:
     """Fingertips of one's own meet before the end of the gripper: the contact is the closed end."""
     gripper = SimulatedGripper(speedup=20, model="2f85")
     gripper.place_object(JAW, position=180)
-    async with SimulatorServer(gripper) as server:
+    with served(gripper) as server:
         file = tmp_path / "s.csv"
-        process = await shell.start(
+        outcome = call(
             *("measure", "stroke", "--yes", server.address, "--output", str(file), "--points", "3"),
-            stdin=PIPE,
+            stdin=b"wide\n101.25\n101.3\n52\n0\n",
         )
-        assert process.stdin is not None
-        process.stdin.write(b"wide\n101.25\n101.3\n52\n0\n")
-        outcome = await shell.finish(process)
     outcome.assert_succeeded()
     assert outcome.out.count("Millimetres with at most two decimals, such as 42.5, please.") == 1
     again = "positions must rise and openings fall, got 101.25 mm at "
@@ -166,17 +158,11 @@ def test_stroke_needs_a_yes_without_a_terminal(call: Call, tmp_path: Path) -> No
     outcome.assert_failed(2, "--yes", "127.0.0.1:1")
 
 
-async def test_stroke_without_an_answer_writes_nothing(shell: Shell, tmp_path: Path) -> None:
-    gripper = SimulatedGripper(speedup=20, model="2f85")
-    async with SimulatorServer(gripper) as server:
-        file = tmp_path / "s.csv"
-        process = await shell.start(
-            "measure", "stroke", "--yes", server.address, "--output", str(file), stdin=PIPE
-        )
-        assert process.stdin is not None
-        process.stdin.write(b"85\n")
-        process.stdin.close()
-        (await shell.finish(process)).assert_failed(1, "no answer: the input ended")
+def test_stroke_without_an_answer_writes_nothing(call: Call, tmp_path: Path) -> None:
+    file = tmp_path / "s.csv"
+    with served(SimulatedGripper(speedup=20, model="2f85")) as server:
+        outcome = call(*("measure", "stroke", "--yes", server.address, "--output", str(file)), stdin=b"85\n")
+    outcome.assert_failed(1, "no answer: the input ended")
     assert not file.exists()
 
 
@@ -199,19 +185,28 @@ async def test_ctrl_c_instead_of_an_answer(shell: Shell, tmp_path: Path) -> None
     assert files_in(tmp_path) == []
 
 
-async def test_ctrl_c_keeps_the_rows_and_stops_the_fingers(shell: Shell, tmp_path: Path) -> None:
-    gripper = SimulatedGripper(speedup=30)
-    async with SimulatorServer(gripper) as server:
-        table = tmp_path / "t.csv"
-        process = await shell.start(
-            *("measure", "speed", "--yes", server.address),
-            *("--output", str(table), "--runs", "1", "--no-plot"),
-        )
-        await until(lambda: table.exists() and gripper.is_moving)
-        process.send_signal(signal.SIGINT)
-        outcome = await shell.finish(process)
-        assert outcome.code == 130
-        assert not gripper.is_moving
+@pytest.mark.usefixtures("virtually")
+def test_ctrl_c_keeps_the_rows_and_stops_the_fingers(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In virtual time: on a busy machine a run is repeated, and in the end there is no row."""
+    table, write = tmp_path / "t.csv", SimulatedGripper.write
+    interrupted: list[SimulatedGripper] = []
+
+    def interrupt(gripper: SimulatedGripper) -> None:
+        assert gripper.is_moving
+        os.kill(os.getpid(), signal.SIGINT)
+
+    def interrupting(gripper: SimulatedGripper, offset: int, registers: Sequence[int]) -> None:
+        write(gripper, offset, registers)
+        if table.exists() and not interrupted:
+            interrupted.append(gripper)
+            asyncio.get_running_loop().call_later(0.03, interrupt, gripper)
+
+    monkeypatch.setattr(SimulatedGripper, "write", interrupting)
+    options = ("--output", str(table), "--runs", "1", "--no-plot", "--speedup", "30")
+    call("measure", "speed", "sim://", *options).assert_failed(130, "interrupted")
+    assert not Request.from_registers(interrupted[0].writes[-1].registers).go
     rows = read_table(table, SPEED)
     assert 0 in rows
     assert files_in(tmp_path) == ["t.csv", "t.csv.origin.csv"]

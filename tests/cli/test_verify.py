@@ -14,6 +14,7 @@ from robotiq_async.cli.keyboard import AGREE, PROMPT, wrapped
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.verify.stages import STAGES
 from robotiq_async.values.registers import rACT, rGTO
+from tests.cli.conftest import WITHOUT
 from tests.cli.terminal import Terminal
 from tests.grippers import until
 
@@ -99,8 +100,9 @@ async def asks(terminal: Terminal, words: bytes) -> None:
 
 
 def at_terminal(server: SimulatorServer, folder: Path, *arguments: str) -> Terminal:
-    where = ("--report", str(folder / "report"))
-    return Terminal("-m", "robotiq_async", "verify", server.address, *arguments, *where)
+    """Without matplotlib: its pictures, which tests/verify looks at, take longer than the run."""
+    command = ["verify", server.address, *arguments, "--report", str(folder / "report")]
+    return Terminal("-c", WITHOUT.format("matplotlib", command))
 
 
 async def moves(server: SimulatorServer, folder: Path) -> Terminal:
