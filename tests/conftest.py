@@ -11,11 +11,12 @@ import logging
 import os
 import signal
 from collections.abc import AsyncIterator, Callable, Generator, Iterator
+from typing import Any
 from zlib import crc32
 
 import pytest
 import pytest_asyncio
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from robotiq_async import RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
@@ -23,8 +24,9 @@ from tests.patience import patience
 from tests.virtual import VirtualLoop
 
 # The suite tries the same examples every time; HYPOTHESIS_PROFILE=explore tries new ones, and more.
-settings.register_profile("suite", derandomize=True, deadline=None)
-settings.register_profile("explore", max_examples=1000, deadline=None, print_blob=True)
+NO_QUICK_MACHINE: dict[str, Any] = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
+settings.register_profile("suite", derandomize=True, **NO_QUICK_MACHINE)
+settings.register_profile("explore", max_examples=1000, print_blob=True, **NO_QUICK_MACHINE)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
 
 MADE_ONCE = ("test_replay.py", "test_guard.py", "test_access.py", "test_roles.py", "test_examination.py")

@@ -13,6 +13,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from robotiq_async.tools.viewer import Viewer
+from tests.patience import patience
 
 MESSAGE_DATA = 1
 """The binary operation of the protocol foxglove.sdk.v1."""
@@ -32,7 +33,7 @@ class Client:
 
     async def read(self) -> None:
         """One frame."""
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(patience(20)):
             frame = await self.socket.recv()
         if isinstance(frame, str):
             said = json.loads(frame)

@@ -29,6 +29,7 @@ from robotiq_async.tools.recording.payloads import reading_fields
 from robotiq_async.tools.recording.recorder import Recorder
 from robotiq_async.tools.recording.recordings import read_recording
 from tests.fake_hand import FakeHand
+from tests.patience import patience
 
 ROOT = Path(robotiq_async.__file__).parent
 AROUND = [path for room in ("tools", "cli") for path in sorted((ROOT / room).rglob("*.py"))]
@@ -106,7 +107,7 @@ async def test_everything_around_a_hand(
         assert await grasp(hand, 64, 255, speedup=1000.0)
         await pilot.press("c")
         log = pilot.app.query_one("#log", RichLog)
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(patience(20)):
             while not any("close: A in contact at 150" in line.text for line in log.lines):
                 await pilot.pause(0.02)
     hand.fail(Fault.SCISSOR_BLOCKED)

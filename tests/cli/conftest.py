@@ -83,9 +83,9 @@ def _environs() -> dict[str, object]:
 
 
 def _end_threads(before: set[threading.Thread]) -> None:
-    """Fail when there are more threads than before, and do not end at once either."""
+    """Fail when there are more threads than before, and do not end soon either."""
     for thread in set(threading.enumerate()) - before:
-        thread.join(2)
+        thread.join(patience(2))
         assert not thread.is_alive(), f"left running: {thread}"
 
 

@@ -23,6 +23,7 @@ from robotiq_async.fleet.network.route import (
 from robotiq_async.fleet.wire.names import ROOT, GripperName, check_name
 from robotiq_async.link.address import is_remote
 from robotiq_async.runtime.extras import install
+from tests.patience import patience
 
 GOOD = st.from_regex(r"[A-Za-z0-9_.-]{1,64}", fullmatch=True)
 BAD = ["", "a" * 65, "*", "$*", "a/b", "é", "a\n"]
@@ -241,7 +242,9 @@ def test_an_endpoint_must_be_text() -> None:
 
 
 def test_the_names_are_there_without_zenoh_and_cryptography() -> None:
-    done = subprocess.run([sys.executable, "-c", WITHOUT], capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT], capture_output=True, text=True, timeout=patience(60)
+    )
     assert done.stdout == "Agent\n", done.stderr
 
 
@@ -255,6 +258,8 @@ from robotiq_async.fleet import Fleet, RemoteHand
 
 asyncio.run({use}.__aenter__())
 """
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=patience(60)
+    )
     last = done.stderr.splitlines()[-1]
     assert last == f"ImportError: hands on other hosts need zenoh: {install('fleet')}"

@@ -227,7 +227,7 @@ async def test_two_clients_share_one_gripper(server: SimulatorServer, client: Ra
 
 async def test_stop_is_idempotent_and_ends_connections(server: SimulatorServer, client: RawClient) -> None:
     await client.read_status()
-    async with asyncio.timeout(1):
+    async with asyncio.timeout(patience(1)):
         await server.stop()
         await server.stop()
     assert not server.is_running

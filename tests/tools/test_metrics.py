@@ -24,7 +24,7 @@ async def page(where: tuple[str, int]) -> str:
     """The page that Prometheus gets."""
 
     def get() -> str:
-        with urllib.request.urlopen(f"http://{where[0]}:{where[1]}/metrics", timeout=10) as answer:
+        with urllib.request.urlopen(f"http://{where[0]}:{where[1]}/metrics", timeout=patience(10)) as answer:
             text: str = answer.read().decode()
             return text
 

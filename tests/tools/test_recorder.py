@@ -31,6 +31,7 @@ from robotiq_async.tools.recording.table import export
 from robotiq_async.values.errors import RecordingError
 from tests.forks import in_the_child
 from tests.grippers import until
+from tests.patience import patience
 
 ROOT = Path(__file__).parents[2]
 
@@ -334,7 +335,7 @@ async def test_a_full_disk_ends_the_recording_and_nothing_else(
             writes = len(gripper.writes)
             with pytest.raises(TimeoutError):  # it continues when this waiting ends
                 await asyncio.wait_for(recorder.failure(), 0.01)
-            async with asyncio.timeout(20):
+            async with asyncio.timeout(patience(20)):
                 failure = await recorder.failure()
             assert "No space left" in str(failure)
             assert "the recording has ended, the hand runs on: " in caplog.text, "at once, and not in an hour"
@@ -353,7 +354,7 @@ async def test_a_file_that_is_deleted_meanwhile_is_a_failure(hand: RobotiqHand, 
     with pytest.raises(RecordingError, match="deleted"):  # noqa: PT012
         async with Recorder(hand, file) as recorder:
             await asyncio.to_thread(file.unlink)
-            async with asyncio.timeout(20):
+            async with asyncio.timeout(patience(20)):
                 await recorder.failure()
     assert recorder.saved == 0
 
@@ -433,7 +434,7 @@ asyncio.run(main())
     process = await asyncio.create_subprocess_exec(sys.executable, "-c", program, stdout=PIPE, cwd=ROOT)
     assert process.stdout is not None
     last = 0
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(patience(60)):
         while last < 600:
             last = int(await process.stdout.readline())
     process.send_signal(signal.SIGKILL)
