@@ -408,7 +408,7 @@ def test_a_hand_on_a_sibling_keeps_its_contract(
     """All scenes of the contract, but those that name an axis that the model lacks."""
     token, link, failed, tried = MODEL.set(model), SERVER.set(server), set(), set()
     try:
-        for name, scene in scenes(file):
+        for name, scene in dict(scenes(file)).items():
             tried.add(name)
             try:
                 scene()

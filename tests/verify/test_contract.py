@@ -1,4 +1,7 @@
-"""With the option that the report names, a hand keeps its contract on a gripper with the habit."""
+"""With the option that the report names, a hand keeps its contract on a gripper with the habit.
+
+A scene is tried in one of its forms: they differ in what the hand is asked, and not in the gripper's habit.
+"""
 
 from __future__ import annotations
 
@@ -83,7 +86,7 @@ def test_with_its_option_a_hand_keeps_its_contract(trouble: str, option: str, fi
     habit = HABIT.set((parse_troubles(trouble)[0], slowly | options(option)))
     failed, tried = set(), set()
     try:
-        for name, scene in scenes(file):
+        for name, scene in dict(scenes(file)).items():
             tried.add(name)
             try:
                 scene()
