@@ -140,7 +140,7 @@ def test_an_axis_that_the_fault_keeps_from_starting_is_held() -> None:
 @pytest.mark.parametrize("by", [-2, -1, 1, 2])
 def test_an_axis_that_the_fault_keeps_from_its_last_two_counts_is_held(device_cycle: float, by: int) -> None:
     """So close to its request an axis counts as there; one that had not begun yet moved afterwards."""
-    for steps in range(8):
+    for steps in range(by % 2, 8, 2):
         scan = started(device_cycle)
         scan.moved(112, A)
         scan.move(112 + by, A)

@@ -316,7 +316,7 @@ async def rest(world: World) -> float:
     """The time when the fingers last moved."""
     since = world.now()
     while True:
-        await asyncio.sleep(0.005)
+        await asyncio.sleep(0.02)  # a tenth of what is allowed beside the window
         if world.gripper.is_moving:
             since = world.now()
         elif world.now() - since > 1.0:

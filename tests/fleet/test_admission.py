@@ -163,7 +163,7 @@ class Model:
     holder: str | None = None
 
 
-@settings(max_examples=1500)
+@settings(max_examples=500)
 @given(st.lists(STEP, max_size=40))
 def test_never_two_holders_and_never_an_old_lease(steps: list[tuple[str, str, int, int, float]]) -> None:
     one, model, now, number = Admission(BASE, EPOCH, Lease(1.0)), Model(), NOW, 10

@@ -168,7 +168,7 @@ class ResetByAnother(Wire):
 
 
 @pytest.mark.parametrize("resets_after", [0.0, 0.001, 0.003])
-@pytest.mark.parametrize("later", [0.0, 0.002, 0.004, 0.006, 0.009, 0.05])
+@pytest.mark.parametrize("later", [0.0, 0.004, 0.009, 0.05])
 @pytest.mark.parametrize("spacing", [0.0, 0.01, 0.1])
 @pytest.mark.parametrize("call", ["halt", "stop"])
 async def test_a_stop_that_is_repeated_activates_nothing(
@@ -180,13 +180,13 @@ async def test_a_stop_that_is_repeated_activates_nothing(
     await wire.activate()
     hand = RobotiqHand(wire, write_spacing=spacing)
     await hand.start(activate=False)
-    await asyncio.sleep(1)
+    await asyncio.sleep(0.2)
     await hand.set_position(255, A)
     await asyncio.sleep(later)
     wire.resets_after = resets_after
     stopping = asyncio.create_task(getattr(hand, call)())
     await asyncio.wait({stopping}, timeout=2)
-    await asyncio.sleep(2)
+    await asyncio.sleep(0.5)
     assert not wire.gripper.status_registers()[0], "it was reset, and is so still"
     await asyncio.gather(stopping, return_exceptions=True)
     await hand.stop(halt=False)
