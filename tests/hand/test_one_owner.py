@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 
 import pytest
 
 from robotiq_async import ConnectFailedError, InvalidStateError, RobotiqHand, State
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
-from tests.serial_line import SerialLine
+from tests.virtual_line import VirtualLine
 
 
 @pytest.mark.parametrize(
@@ -46,18 +47,23 @@ async def test_two_grippers_behind_one_gateway_have_two_hands(server: SimulatorS
         assert four.state is State.RUNNING_IDLE
 
 
-async def test_a_serial_port_has_one_hand_unless_both_name_their_units(tmp_path: Path) -> None:
-    with SerialLine(tmp_path) as line:
-        async with (
-            SerialSimulatorServer(line.far, SimulatedGripper(speedup=20)),
-            RobotiqHand(f"rtu://{line.near}", device_id=9) as hand,
-        ):
-            for port in (line.near, line.near.resolve()):
-                for unit in (None, 9):
-                    other = RobotiqHand(f"rtu://{port}", device_id=unit)
-                    with pytest.raises(InvalidStateError, match="give each of the hands its device_id"):
-                        await other.start()
-            assert hand.statistics.reconnects == 0
+@pytest.mark.virtual_time
+async def test_a_serial_port_has_one_hand_unless_both_name_their_units(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    line, link = VirtualLine(monkeypatch), tmp_path / "tty"
+    link.symlink_to(line.NEAR)
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, speedup=20)
+    async with (
+        SerialSimulatorServer(line.FAR, gripper),
+        RobotiqHand(f"rtu://{line.NEAR}", device_id=9) as hand,
+    ):
+        for port in (line.NEAR, link):
+            for unit in (None, 9):
+                other = RobotiqHand(f"rtu://{port}", device_id=unit)
+                with pytest.raises(InvalidStateError, match="give each of the hands its device_id"):
+                    await other.start()
+        assert hand.statistics.reconnects == 0
 
 
 async def test_a_gripper_is_free_again_after_stop_and_after_a_failed_start(server: SimulatorServer) -> None:

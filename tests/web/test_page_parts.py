@@ -231,14 +231,13 @@ async def test_the_mirror_shows_what_the_hand_is(hand: RobotiqHand, gripper: Sim
 async def test_what_a_simulation_knows_reaches_the_page(query: str, parts: int | None) -> None:
     pytest.importorskip("mujoco", reason="needs the extra physics")
     mirror = Mirror(("here",), control=False, say=lambda _: None)
-    shown = mirror.hands[0]
+
+    def known() -> int | None:
+        mirrored(HandUpdates(jaw), mirror)
+        return None if mirror.hands[0].joints is None else len(mirror.hands[0].parts)
+
     async with RobotiqHand(f"sim://?model=2f85&speedup=10{query}") as jaw:
-        updates = HandUpdates(jaw)
-        mirrored(updates, mirror)
-        while parts and not shown.parts:  # the thread of the bodies gives the first look when it has one
-            await anext(aiter(jaw.statuses()))
-            mirrored(updates, mirror)
-    assert (None if shown.joints is None else len(shown.parts)) == parts
+        await until(lambda: known() == parts)  # bodies have a thread of their own
 
 
 async def test_a_gripper_elsewhere_tells_no_more_than_its_registers(hand: RobotiqHand) -> None:
