@@ -156,12 +156,14 @@ async def test_the_question_is_where_it_is_seen(server: SimulatorServer, file: P
     assert server.gripper.writes
 
 
-def test_nothing_is_asked_when_there_is_nothing_left_to_measure(
-    call: Call, there: SimulatorServer, file: Path
-) -> None:
-    options = ("--output", "t.csv", "--step", "255", "--runs", "1", "--no-plot", there.address)
-    call("measure", "speed", "--yes", *options).assert_succeeded()
-    outcome = call("measure", "speed", *options)
+@pytest.mark.usefixtures("virtually")
+def test_nothing_is_asked_when_there_is_nothing_left_to_measure(call: Call, file: Path) -> None:
+    """The table is of a simulated gripper, measured in virtual time, and says that it is of a real one."""
+    options = ("--output", "t.csv", "--step", "255", "--runs", "1", "--no-plot")
+    call("measure", "speed", "sim://", "--speedup", "30", *options).assert_succeeded()
+    origin = file.with_name("t.csv.origin.csv")
+    origin.write_text(written(origin).replace("sim://", NO_GRIPPER), encoding="utf-8")
+    outcome = call("measure", "speed", NO_GRIPPER, *options)
     outcome.assert_succeeded()
     assert "is complete: nothing is measured again" in outcome.out
 
