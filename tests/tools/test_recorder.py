@@ -213,7 +213,7 @@ async def of_ros(
 ) -> tuple[Path, Recorder]:
     """A recording for ROS 2, as it was made or as recover made it of what a kill left."""
     async with Recorder(hand, file, ros2=True) as recorder:
-        await hand.move(180)
+        await hand.move(180, speed=0)  # long enough for many polls, however late they are
     if request.param == "whole":
         return file, recorder
     file.write_bytes(file.read_bytes()[:-100])  # noqa: ASYNC240  # short
