@@ -217,3 +217,16 @@ def test_a_power_cycle_leaves_the_hand_in_reset_and_writes_nothing(scan: Scan) -
     assert isinstance(outcome.error, NotActivatedError)
     assert len(scan.written) == writes
     assert not scan.gripper.is_moving
+
+
+def test_an_activation_by_crossing_a_reset_is_taken_back_on_a_link_that_returns_in_it() -> None:
+    """The reset began before the status that brought the link back was shown. Random lives found it."""
+    scan = started(device_cycle=0.03)
+    scan.run(0.2)
+    scan.gripper.write(0, [0])
+    scan.command(Finger.A, 100)
+    scan.until(lambda: scan.state is State.WF_ACTIVATION)
+    scan.blink(away=0.4)
+    assert (State.DISCONNECTED, State.WF_ACTIVATION) in [each[:2] for each in scan.transitions]
+    scan.until(lambda: scan.state is State.RESET)
+    assert not scan.gripper.is_moving
