@@ -34,7 +34,7 @@ from ..hand import Hand
 from ..runtime.clock import now
 from ..runtime.log import log
 from ..runtime.signals import ending_signals
-from ..sync.robotiq_hand import RobotiqHand as BlockingHand
+from ..sync import RobotiqHand as BlockingHand
 from ..values.enums import Fault, Finger, State, names_of
 from ..values.errors import NotStartedError
 from ..values.status import RobotiqStatus
