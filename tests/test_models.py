@@ -43,7 +43,7 @@ from robotiq_async.values.checks import parse_fingers
 from robotiq_async.values.errors import MeasuringError, RobotiqStateError
 from robotiq_async.values.model import MODELS, model_of
 from robotiq_async.values.request import AxisRequest, Request
-from tests.contract.bench import MODEL, SERVER
+from tests.contract.bench import MODEL, OTHERWISE, SERVER
 from tests.fleet.lab import lab
 from tests.verify.test_contract import FILES, OF_OTHERS, scenes
 from tests.virtual import virtual
@@ -364,34 +364,6 @@ async def test_a_remote_hand_learns_the_model_from_its_agent() -> None:
 
 
 # -- the contract ------------------------------------------------------------------------------------------
-
-
-FINGERS = "it counts on three fingers"
-STROKE = "it counts on the time that a 3-Finger takes for a stroke"
-READING = "it has the reading of a closed 3-Finger"
-CODES = "its codes mean something else on a sibling"
-OTHERWISE = {
-    "test_more_contacts_than_axes": FINGERS,
-    "test_integers_of_numpy_are_integers": FINGERS,
-    "test_a_hold_leaves_a_grip_alone": FINGERS,
-    "test_a_part_that_every_finger_meets": FINGERS,
-    "test_a_part_that_is_pulled_out_is_noticed_when_the_fingers_try_again": FINGERS,
-    "test_opening_releases_the_part_and_a_reset_loses_it": FINGERS,
-    "test_the_link_is_lost_and_comes_back": FINGERS,
-    "test_there": FINGERS,
-    "test_against_something": FINGERS,
-    "test_against_something_on_the_way_open": FINGERS,
-    "test_requests": FINGERS,
-    "test_a_command_moves_from_the_moment_it_is_asked_for": STROKE,
-    "test_a_grasp_that_is_given_up_holds_what_moves_and_keeps_the_grip": STROKE,
-    "test_a_finger_that_presses_again_after_a_fault_has_kept_its_grip": STROKE,
-    "test_timestamps_are_of_this_process_and_only_rise": STROKE,
-    "test_nothing_there": READING,
-    "test_a_contact_while_opening_is_not_held": READING,
-    "test_a_major_fault": CODES,
-    "test_recover_waits_for_a_fault_that_no_manual_names_and_drops_no_part": CODES,
-}
-"""Scenes of the contract that are about the 3-Finger alone, and why; the tests above have their like."""
 
 
 LINKS = [(model, SimulatorServer) for model in SIBLINGS] + [(TWO_FINGER_85, UrcapSimulatorServer)]

@@ -17,8 +17,7 @@ import pytest
 pytest.importorskip("mujoco", reason="needs the extra physics")
 
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
-from tests.contract.bench import MODEL, PHYSICS
-from tests.test_models import OTHERWISE
+from tests.contract.bench import MODEL, OTHERWISE, PHYSICS
 from tests.verify.test_contract import ASKING, scenes
 
 OF_FINGERS = ("test_grasping", "test_moves")

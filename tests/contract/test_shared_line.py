@@ -20,11 +20,10 @@ from robotiq_async import RobotiqConnectionError, RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.simulator.troubles.fault_injector import FaultInjector
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
-from tests.contract.bench import HABIT, MODEL, SERVER
+from tests.contract.bench import HABIT, MODEL, OTHERWISE, SERVER
 from tests.fleet.lab import SPEEDUP
 from tests.grippers import activate_beforehand
 from tests.shared_line import Bus, Kind, serial_bus, socket_bus
-from tests.test_models import OTHERWISE
 from tests.verify.test_contract import ASKING, scenes
 
 OURS, ITS = 9, 12
