@@ -324,8 +324,8 @@ class Controller:
                 self._requests.moves.end_arrived(status, ledger)
         if condition is not before:
             self._update_state(condition)
-        if condition is Trigger.SEEN_BUSY and self._has_stray_activation(status):
-            self._take_back("the gripper was reset as it was commanded: its activation is taken back")
+        if condition is Trigger.SEEN_BUSY:
+            self._follow_activation(status)
 
     def _note_news(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> bool:
         """Take in a new condition, or an image that no entry explains; return whether it is to be shown."""
@@ -369,10 +369,11 @@ class Controller:
             self._stop = None
             self.machine.log.info("stopped with rGTO set; in contact: %s", status.contacts or "nothing")
 
-    def _has_stray_activation(self, status: RobotiqStatus) -> bool:
+    def _follow_activation(self, status: RobotiqStatus) -> None:
         if self._activation is None and is_activating(status) and self._ledger.may_activate(status):
             self._activation = Begun(self._ledger.last, status)
-        return self._activation is not None and self._activation.is_stray(status)
+        if self._activation is not None and self._activation.is_stray(status):
+            self._take_back("the gripper was reset as it was commanded: its activation is taken back")
 
     def _take_back(self, why: str) -> None:
         """End an activation that nobody has asked for."""

@@ -166,7 +166,7 @@ class LiveMoves:
             )
 
     def take_over(self, axes: Finger, error: RobotiqError) -> None:
-        """Fail the moves of these axes, which something else has taken over. Their other axes go on."""
+        """Fail the moves of these axes, which something else has taken over. Their other axes still move."""
         self.fail(error, lambda move: bool(move.axes & axes), left=~axes)
 
     def fail(

@@ -301,7 +301,7 @@ class Recorder:
             return
         error = RecordingError(f"{self.path}: {why}")
         self._failed.set_result(error)
-        if self._is_open:  # the block goes on, perhaps for hours; at its end the error is raised
+        if self._is_open:  # the block may last for hours; at its end the error is raised
             Log(self._hand.name).error("the recording has ended, the hand runs on: %s", error)
 
     def _write(self, data: bytes) -> None:
