@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 from ..runtime.log import Log
 from ..values.enums import Fault, Finger, StopLevel, Trigger
@@ -45,42 +45,54 @@ MOST_HALTS: Final = 2
 """The most times that a halt is sent. If rGTO still shows then, its callers get an error."""
 
 
+class Write(NamedTuple):
+    """One write of a stop.
+
+    Attributes:
+        entry: in the ledger.
+        is_early: whether it came within write_spacing of another: the gripper may have forgotten it, and it
+            is due again.
+        was_active: whether the gripper was active before it: an activation that runs already is not ours to
+            take back.
+    """
+
+    entry: Entry
+    is_early: bool
+    was_active: bool
+
+
 class Stop:
     """One stop, from its request until it is reached.
 
     Attributes:
         level: its level. A new level is a new stop.
         callers: of halt(), each with the stop that was begun for it: this one, or one that it has replaced.
-        entries: its writes.
-        is_early: whether its last write came within write_spacing of another: the gripper may have forgotten
-            it, and it is due again.
+        writes: those that it has made.
     """
 
     def __init__(self, level: StopLevel, before: Stop | None = None) -> None:
         self.level: Final = level
-        self.is_early = False
         self.callers: Final[list[tuple[Waiter[None], Stop]]] = [*before.callers] if before else []
-        self.entries: Final[list[Entry]] = []
-        self._times = 0
-        # Whether the gripper was active before it: an activation that runs already is not ours to take back.
-        self._was_active = False
+        self.writes: Final[list[Write]] = []
 
     @property
     def entry(self) -> Entry | None:
         """Its last write; None before that."""
-        return self.entries[-1] if self.entries else None
+        return self.writes[-1].entry if self.writes else None
 
     @property
     def is_delivered(self) -> bool:
         """Whether a write of it was acknowledged: it is sent again only after that."""
-        return bool(self.entries) and self.entries[0].acknowledged is not None
+        return bool(self.writes) and self.writes[0].entry.acknowledged is not None
+
+    @property
+    def _times(self) -> int:
+        """The number of its writes that the gripper cannot have forgotten."""
+        return sum(not each.is_early for each in self.writes)
 
     def written(self, entry: Entry, status: RobotiqStatus, *, is_early: bool) -> None:
         """A write of it is about to be sent, made from this status."""
-        self.entries.append(entry)
-        self.is_early = is_early
-        self._times += not is_early
-        self._was_active = status.activation_echo and status.is_activated
+        self.writes.append(Write(entry, is_early, status.activation_echo and status.is_activated))
 
     def is_urgent(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether it is to be written before the next read."""
@@ -105,10 +117,12 @@ class Stop:
 
     def again(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
         """The image to write once more, if it is due again."""
-        entry = self.entry
-        if entry is None or entry.acknowledged is None:
+        if not self.writes:
             return None
-        if self.is_early:
+        entry, is_early, _ = self.writes[-1]
+        if entry.acknowledged is None:
+            return None
+        if is_early:
             return entry.image  # whatever shows: the gripper may yet forget it [manual 2014, p. 75]
         if not ledger.acts(entry):
             return None
@@ -124,8 +138,10 @@ class Stop:
         return entry.image if is_due else None
 
     def is_reached(self, ledger: Ledger, status: RobotiqStatus) -> bool:
-        entry = self.entry
-        if entry is None or entry.acknowledged is None or self.is_early:
+        if not self.writes:
+            return False
+        entry, is_early, _ = self.writes[-1]
+        if entry.acknowledged is None or is_early:
             return False
         if self.level is StopLevel.HALT and not status.go_echo and not ledger.may_set_go:
             return True  # nothing that may act later sets rGTO, so it need not act
@@ -153,7 +169,7 @@ class Stop:
         """Fail callers whose halt does not show, however often it has been replaced since."""
         since = ledger.now.time - MOST_HALTS * WINDOW_S
         older = [(caller, stop) for caller, stop in self.callers if stop is not self and not caller.done()]
-        overdue = [caller for caller, stop in older if stop.entries[0].time <= since]
+        overdue = [caller for caller, stop in older if stop.writes[0].entry.time <= since]
         if overdue and status.go_echo:
             self._give_up(overdue, log)
 
@@ -177,12 +193,14 @@ class Stop:
 
         Two clients within one device cycle can do that [follows from Modbus].
         """
-        entry = self.entry
-        if entry is None or not self.is_delivered or not entry.image.activate:
+        if not self.is_delivered:
+            return False
+        entry, _, was_active = self.writes[-1]
+        if not entry.image.activate:
             return False
         if self.level is StopLevel.HALT:
             return classify(status) is Trigger.SEEN_RESET or is_activating(status)
-        return self._was_active and ledger.acts(entry) and is_activating(status)
+        return was_active and ledger.acts(entry) and is_activating(status)
 
 
 class Keeping(Stop):
