@@ -21,8 +21,8 @@ def gate(
     # The status may be a device cycle old. If another client resets the gripper within it, rACT passes and
     # activates [follows]. That is taken back: after a stop has_activated() in stops.py finds it, after a
     # command or a hold Begun in procedures.py.
-    return replace(
-        image,
-        activate=image.activate and (activates or status.activation_echo),
-        release=image.release and releases,
-    )
+    activate = image.activate and (activates or status.activation_echo)
+    release = image.release and releases
+    if activate is image.activate and release is image.release:
+        return image  # the usual case
+    return replace(image, activate=activate, release=release)
