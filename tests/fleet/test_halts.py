@@ -24,7 +24,7 @@ from tests.fleet.cell import ask, ending, move_slowly
 from tests.fleet.lab import LEFT, Garbling, Lab, Spoiling, lab
 from tests.fleet.world import World, motions, world
 from tests.grippers import Restless
-from tests.virtual import VirtualLoop, inside, virtual
+from tests.virtual import VirtualLoop, inside, until, virtual
 
 # -- halts -------------------------------------------------------------------------------------------------
 
@@ -232,6 +232,35 @@ async def test_a_cancelled_move_is_called_off_although_that_was_lost(here: Lab, 
         await asyncio.sleep(2.5)
         assert not here.gripper.is_moving
         assert here.gripper.position(Finger.A) < 220
+
+
+@inside(lab)
+@pytest.mark.parametrize(
+    "way", ["cancelled first", "taken over first", "held", "while the answer is on its way"]
+)
+async def test_a_cancelled_move_whose_axis_is_taken_over_does_not_go_on_with_the_others(
+    here: Lab, way: str
+) -> None:
+    """The agent had nothing left to cancel: its move had failed, and the client never saw that."""
+    here.network.delay("client", "agent", 0.05)
+    async with here.client() as hand:
+        moving = asyncio.create_task(hand.move(255, Finger.ABC, speed=0))
+        await until(lambda: here.gripper.is_moving)
+        if way == "cancelled first":
+            moving.cancel()
+        if way == "held":
+            taking = asyncio.create_task(hand.hold(Finger.C))
+        else:
+            taking = asyncio.create_task(hand.set_position(40, Finger.C))
+            hand.command(Finger.B, position=50)
+        await asyncio.sleep(0.075 if way == "while the answer is on its way" else 0)
+        moving.cancel()
+        await asyncio.wait({moving, taking})
+        assert moving.cancelled()
+        await asyncio.sleep(5)
+        assert here.gripper.position(Finger.A) < 50
+        assert way == "held" or abs(here.gripper.position(Finger.B) - 50) <= 2
+        assert way == "held" or abs(here.gripper.position(Finger.C) - 40) <= 2
 
 
 @inside(lab)

@@ -9,7 +9,7 @@ from typing import Any, Final, TypeVar
 
 from ...runtime.log import Log, printable
 from ...values.enums import NO_AXES, Finger
-from ...values.errors import AgentError, ControlLostError, RobotiqError
+from ...values.errors import AgentError, ControlLostError, MoveSupersededError, RobotiqError
 from ...values.move_result import MoveResult
 from ..network.bus import Query
 from ..wire.envelope import Answer, Call, failure
@@ -19,6 +19,8 @@ from .publisher import HandPublisher
 REMEMBERED: Final = 256  # requests whose answers are kept for repetitions
 END_S: Final = 0.5
 """Seconds for requests to end after the hand has been stopped, before they are cancelled."""
+MOTIONS: Final = ("move", "set_position", "command")
+"""Commands that may send axes to a position."""
 T = TypeVar("T")
 Work = Coroutine[Any, Any, MoveResult | None]
 LABEL_MAX: Final = 200  # characters of a label that are shown
@@ -39,6 +41,14 @@ class Request:
         self.task: asyncio.Task[MoveResult | None] | None = None
         self.reason = ""
 
+    @property
+    def was_superseded(self) -> bool:
+        """Whether it is a move that has failed because something else took over an axis."""
+        task = self.task if self.name == "move" else None
+        if task is None or not task.done() or task.cancelled():
+            return False
+        return isinstance(task.exception(), MoveSupersededError)
+
     def cancel(self, reason: str = "") -> None:
         if self.task is not None and not self.task.done():
             self.reason = reason
@@ -56,6 +66,7 @@ class Requests:
         self._log = log
         self._carried_out = carried_out
         self._known: dict[int, Request] = {}
+        self._followed: dict[Finger, Request] = {}  # by axis, the newest that sends it to a position
         self._tasks: set[asyncio.Task[Any]] = set()
 
     def find(self, number: object) -> Request | None:
@@ -65,6 +76,7 @@ class Requests:
     def begin(self, request: Request, work: Work) -> None:
         """Carry out a command, and keep it for repetitions."""
         self._known[request.call.number] = request
+        self._followed.update(dict.fromkeys(moved_by(request.name, request.call.arguments), request))
         if len(self._known) > REMEMBERED:
             self._forget()
         self.start(request, work)
@@ -86,10 +98,19 @@ class Requests:
         # The client leaves the fingers moving, so the end of its lease must not cancel the moves.
         self._known = {at: each for at, each in self._known.items() if each.name != "move"}
 
+    def left_of(self, number: object) -> Finger:
+        """The axes that still follow a move that has failed because something else took over another one."""
+        left = NO_AXES
+        for axis, request in self._followed.items():
+            if request.call.number == number and request.was_superseded:
+                left |= axis
+        return left
+
     def cancel_all(self, reason: str) -> None:
         for request in self._known.values():
             request.cancel(reason)
         self._known.clear()
+        self._followed.clear()
 
     def spawn(self, work: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
         task = asyncio.get_running_loop().create_task(work)
@@ -133,6 +154,17 @@ class Requests:
 def label_of(call: Call) -> str:
     """The label a client gives itself, made printable."""
     return printable(str(call.arguments.get("label", "unknown client"))[:LABEL_MAX])
+
+
+def moved_by(name: str, arguments: Fields) -> Finger:
+    """The axes that a command sends to a position."""
+    axes = arguments.get("axes")
+    if name == "command" and isinstance(axes, dict):
+        moved = (
+            mask for mask, changes in axes.items() if isinstance(changes, dict) and "position" in changes
+        )
+        arguments = {"axes": [*moved]}
+    return axes_of(name, arguments) if name in MOTIONS else NO_AXES
 
 
 def axes_of(name: str, arguments: Fields) -> Finger:

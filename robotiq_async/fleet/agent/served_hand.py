@@ -46,7 +46,7 @@ from ..wire.settings import Setting, read_settings, settings_of
 from ..wire.values import Fields, error_fields
 from .publisher import HandPublisher
 from .records import Records
-from .requests import Request, Requests, Work, axes_of, label_of
+from .requests import MOTIONS, Request, Requests, Work, axes_of, label_of
 
 RETRY_S: Final = 1.0  # seconds between two attempts to reach the gripper
 REST_S: Final = (
@@ -355,7 +355,7 @@ class ServedHand:
 
     def _carried_out(self, request: Request) -> None:
         # A new command replaces the hold that its axes still wait for.
-        if request.name in ("move", "set_position", "command"):
+        if request.name in MOTIONS:
             self._to_hold &= ~axes_of(request.name, request.call.arguments)
 
     def _work(self, name: str, arguments: Fields) -> Work:
@@ -387,8 +387,11 @@ class ServedHand:
 
     def _cancel(self, call: Call, query: Query) -> None:
         self._admission.renew(call, now())
-        request = self._requests.find(call.arguments.get("number", -1))
-        if request is not None:
+        number = call.arguments.get("number", -1)
+        request, left = self._requests.find(number), self._requests.left_of(number)
+        if left:  # the move has failed, and its client left before it could see that
+            self._requests.spawn(self._hold(left))
+        elif request is not None:
             request.cancel()
         else:
             # The cancellation may have overtaken the command: refuse it when it arrives.
