@@ -196,6 +196,23 @@ def test_a_fault_at_the_loss_of_the_activation_does_not_activate(scan: Scan) -> 
     assert len(scan.written) == written
 
 
+def test_nothing_is_written_to_a_gripper_whose_reset_by_another_client_shows_with_a_fault(scan: Scan) -> None:
+    """A hold would carry rACT = 0, and might end the activation that the other client begins next."""
+    scan.move(200, A)
+    scan.run(0.3)
+    written = len(scan.written)
+    first, *others = scan.gripper.request_registers
+    scan.gripper.write(0, (first & ~0x0100, *others))
+    scan.now += 0.01
+    assert not scan.status().activation_echo
+    scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    scan.run(0.5)
+    assert scan.latest.go_echo
+    assert not scan.latest.activation_echo
+    assert scan.state is State.FAULT
+    assert len(scan.written) == written
+
+
 def test_stops_pending_in_fault_are_not_written_once_the_activation_is_lost(scan: Scan) -> None:
     """A hold or a halt carries rACT = 1: written after a power cycle it would activate."""
     scan.move(255)

@@ -42,6 +42,16 @@ def test_a_command_after_a_halt_moves_only_its_own_axes(scan: Scan) -> None:
     assert scan.gripper.position(A) == pytest.approx(100, abs=2)
 
 
+def test_the_state_tells_of_a_command_that_waits_for_the_halt_before_it(scan: Scan) -> None:
+    halted, waiting = scan.halt(), scan.command(A, 100)
+    scan.step()
+    assert (halted.is_answered, waiting.is_answered) == (False, False)
+    assert scan.state is State.RUNNING_CC
+    scan.until(lambda: waiting.is_answered)
+    assert halted.is_answered
+    assert scan.state is State.RUNNING_IDLE
+
+
 def test_a_command_after_a_halt_waits_until_a_slow_gripper_has_stopped() -> None:
     scan = started(0.1)
     scan.move(255, speed=255)

@@ -218,6 +218,20 @@ def test_on_any_doubt_rgto_is_cleared_and_a_word_says_why(
     assert why in said
 
 
+def test_another_client_seen_between_the_call_and_the_stop_is_a_doubt(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """By the read that was on the line as the hand was stopped."""
+    scan = holding()
+    scan.controller.refuse_requests()
+    other_client(scan)
+    scan.controller.see(scan.status())
+    scan.controller.stop_fingers(StopLevel.KEEP)
+    scan.until(lambda: not scan.controller.is_busy, 1.0)
+    assert not scan.status().go_echo
+    assert "no grip is kept: another client" in caplog.text
+
+
 def test_a_link_that_goes_down_meanwhile_is_a_doubt() -> None:
     scan = holding()
     scan.controller.refuse_requests()

@@ -329,6 +329,16 @@ def test_a_long_life_does_not_make_the_history_remember_more() -> None:
     assert len(history._entries) + len(history._past) <= WINDOW_S * 10 + 2 + LAG_READS
 
 
+def test_settings_of_fingers_at_rest_are_not_remembered_for_ever() -> None:
+    """A control loop that sends speeds alone: no axis has an object status that could be late."""
+    history = History(100)
+    for n in range(2000):
+        history.deliver(image(100, speed=n % 256), n / 200)
+        history.look(shows(100, n / 200 + EPSILON))
+        history.update_rest(history.latest)
+    assert len(history._entries) + len(history._past) <= WINDOW_S * 200 + 2
+
+
 def test_an_adopted_image_may_differ_from_its_echo() -> None:
     """Simple control: B, C and the scissor echo 0 and have other requests."""
     ledger, status = Ledger(100, 50), status_of(0x39, 0xFF, echo=(80, 0, 0, 0), position=(80, 80, 80, 60))
