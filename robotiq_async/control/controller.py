@@ -221,7 +221,6 @@ class Controller:
         """Begin an activation or a release."""
         releases = trigger is Trigger.ASK_RELEASE
         self._procedure, self._stop = Procedure(self._ledger, releases=releases), None
-        self._requests.pending.hold_only(NO_AXES)
         self._update_state(trigger)
 
     def _begin_reset(self, trigger: Trigger, error: RobotiqError) -> None:
