@@ -182,7 +182,8 @@ class ModbusTransport:
 
         After a reply that is missing or damaged the write is in doubt, and the status is read on its own. A
         device that refuses the function, or does not answer the first of these, gets function 16 from then
-        on. The write is repeated with it only if it was refused, and so not carried out.
+        on. Only what was refused, and so not carried out, is written with it at once: what ``decide`` returns
+        then, for a stop may have come since.
 
         Raises:
             RobotiqConnectionError: no clean answer in time, and no status after it; the transport is closed.
@@ -203,6 +204,10 @@ class ModbusTransport:
                     self._log.warning("%s is written with function 16: %s", self._address, plain(error))
                 is_refused = isinstance(error, RefusedError) and error.is_unknown_function
                 if is_refused:
+                    await self._prepare_write()
+                    registers = decide()
+                    if registers is None:
+                        return None
                     await self._ask(write_request(self._map, registers))
             else:
                 self._has_23 = True

@@ -98,7 +98,9 @@ class CyclicLink(Link, Protocol):
         """Whether it has, once."""
 
     async def send_and_read(self, decide: Callable[[], Sequence[int] | None]) -> Answer | None:
-        """As :meth:`send`, and read the status in the same exchange; None if there was nothing to write.
+        """As :meth:`send`, and read the status in the same exchange; None if nothing was written.
+
+        ``decide`` is called again if the gripper refuses such an exchange, before another one is tried.
 
         Raises:
             RobotiqConnectionError: no clean answer in time, and no status after it; the transport is closed.

@@ -305,11 +305,16 @@ class Poller:
             return False
         self._decided, self._tick.late = None, 0.0
         try:
-            answer = await link.send_and_read(self._decide)
-            if answer is None or self._decided is None:
+            answer = await link.send_and_read(self._decide_or_repeat)
+            if self._decided is None:
                 return False
             answered = self._tick.time()
             request, decided = self._decided
+            if answer is None:
+                # Refused, and not repeated: what has been asked since replaces it, and is made from it.
+                self._controller.acknowledged(answered)
+                self._note_unacknowledged()
+                return True
             status = self._status(answer.registers, answered)
             if answer.doubt is not None and not self._shows(status, request):
                 await link.close()
@@ -360,6 +365,12 @@ class Poller:
         self._counters.has_begun_to_write = True
         self._decided = request, now
         return request.registers
+
+    def _decide_or_repeat(self) -> Registers | None:
+        """The same; after a refusal once more what was refused, unless something has been asked since."""
+        if self._decided is None:
+            return self._decide()
+        return None if self._stopping or self._controller.has_request else self._decided[0].registers
 
     async def _poll_once(self, *, is_first: bool = False) -> None:
         self._tick.late = 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import asynccontextmanager
 from dataclasses import replace
 from typing import Any
@@ -13,6 +13,7 @@ import pytest
 from robotiq_async import ConnectionLostError, Finger, RobotiqHand
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, parse_troubles
 from robotiq_async.values.model import model_of
+from robotiq_async.values.request import Request
 from tests.grippers import activate_beforehand
 from tests.virtual import VirtualLoop
 from tests.virtual_line import VirtualLine
@@ -54,10 +55,11 @@ async def at_a_line(
     *,
     poll_interval: float = 0.005,
     write_function: int | None = None,
+    device: type[SerialSimulatorServer] = SerialSimulatorServer,
 ) -> AsyncIterator[tuple[RobotiqHand, Replies]]:
     cable = VirtualLine(monkeypatch)
     gripper = SimulatedGripper(asyncio.get_running_loop().time, model=model_of(model))
-    async with SerialSimulatorServer(cable.FAR, gripper) as server:
+    async with device(cable.FAR, gripper) as server:
         await activate_beforehand(gripper)
         address = f"rtu://{cable.NEAR}?model={model}"
         async with RobotiqHand(address, poll_interval=poll_interval, write_function=write_function) as hand:
@@ -213,6 +215,67 @@ async def test_a_write_of_speed_alone_stays_in_doubt_after_a_damaged_reply(
         async with replies.server.fault_injector.making(replace(trouble, on="write")):
             with pytest.raises(ConnectionLostError):
                 await hand.set_speed(17)
+
+
+class Refusing(SerialSimulatorServer):
+    """Does not serve function 23, and says so."""
+
+    functions = SerialSimulatorServer.functions - {BOTH}
+
+    def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
+        return self.fault_injector.deliver(reply)
+
+
+REFUSAL = 0x80 | BOTH
+OVERTAKERS: dict[str, Callable[[RobotiqHand], Awaitable[Any]]] = {
+    "halt": lambda hand: hand.halt(),
+    "hold": lambda hand: hand.hold(),
+    "reset": lambda hand: hand.reset(),
+    "stop": lambda hand: hand.stop(),
+    "stop with a grip": lambda hand: hand.stop(halt=False),
+}
+
+
+@pytest.mark.parametrize("what", OVERTAKERS)
+async def test_a_motion_that_was_refused_is_not_written_after_what_ends_it(
+    monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    """It came while the refusal of function 23 was on its way, and function 16 moved the jaw all the same."""
+    async with at_a_line(monkeypatch, "2f85", device=Refusing) as (hand, replies):
+        gripper, calls = replies.server.gripper, []
+
+        def at_the_refusal(frame: bytes) -> Iterable[tuple[float, bytes]]:
+            if frame[1] == REFUSAL:
+                calls.append(asyncio.ensure_future(OVERTAKERS[what](hand)))
+            return [(0.0, frame)]
+
+        replies.server.policy = at_the_refusal
+        begins = gripper.position(A)
+        hand.command(A, position=200)
+        await asyncio.sleep(0.1)
+        (call,) = calls
+        await call
+        await asyncio.sleep(1.0)
+        images = [Request.from_registers(write.registers, gripper.model) for write in gripper.writes]
+        assert not [image for image in images if image.go and image.position(A) == 200]
+        assert gripper.position(A) == begins
+
+
+async def test_a_motion_that_was_refused_is_written_with_what_is_asked_meanwhile(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async with at_a_line(monkeypatch, "2f85", device=Refusing) as (hand, replies):
+
+        def at_the_refusal(frame: bytes) -> Iterable[tuple[float, bytes]]:
+            if frame[1] == REFUSAL:
+                hand.command(A, speed=17)
+            return [(0.0, frame)]
+
+        replies.server.policy = at_the_refusal
+        await hand.set_position(200)
+        await asyncio.sleep(3.0)
+        assert replies.server.gripper.position(A) == pytest.approx(200, abs=3)
+        assert hand.statistics.reconnects == 0
 
 
 async def test_function_16_can_be_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
