@@ -189,7 +189,7 @@ def parse_address(address: object) -> Address:
     if scheme in _SOCKETS:
         if "?" in rest:  # model and stroke have been taken out
             names = [option.partition("=")[0] for option in rest.partition("?")[2].split("&")]
-            what = f"no option {names[0]!r}; known are: {', '.join(GRIPPER_OPTIONS)}"
+            what = f"no option {_guess(names[0], GRIPPER_OPTIONS)}; known are: {', '.join(GRIPPER_OPTIONS)}"
             if not set(names).isdisjoint(LINE_OPTIONS):
                 what = "baud, parity and stopbits are options of a serial port; a serial server has its own"
             raise ValueError(f"malformed address {address!r}: {what}; accepted: {FORMS}")
@@ -283,9 +283,14 @@ def _meant_by_port(device: str) -> str:
 
 def _no_option_of_a_line(name: str) -> str:
     known = *GRIPPER_OPTIONS, *LINE_OPTIONS
+    guess = _guess(name, known, " of a serial port")
+    return f"no option {guess}; known are: {', '.join(known)} ({USUAL})"
+
+
+def _guess(name: str, known: Sequence[str], where: str = "") -> str:
+    """A name that is not known, and the known one that may be meant."""
     meant = next((each for each in known if _is_like(name, each)), "")
-    hint = f"; did you mean {meant}?" if meant else ""
-    return f"no option {name!r} of a serial port{hint}; known are: {', '.join(known)} ({USUAL})"
+    return f"{name!r}{where}" + (f"; did you mean {meant}?" if meant else "")
 
 
 def _is_like(name: str, known: str) -> bool:
@@ -316,7 +321,7 @@ def _host_and_port(text: str, usual: int | None) -> tuple[str, int | None]:
         if not bracket:
             return "", None
         number, percent, zone = host.partition("%")
-        host = number.lower() + percent + zone
+        host = number.lower() + percent + _zone(zone)
         separator, port = rest[:1], rest[1:]
         if rest and separator != ":":
             return "", None
@@ -332,6 +337,12 @@ def _host_and_port(text: str, usual: int | None) -> tuple[str, int | None]:
     if not (port.isascii() and port.isdigit() and len(port) <= 5 and 1 <= int(port) <= 65535):
         return host, None
     return host, int(port)
+
+
+def _zone(text: str) -> str:
+    """A zone as it is typed, or as in a URI, where %25 stands for the percent sign before it (RFC 6874)."""
+    name = text.removeprefix("25")
+    return text if not name or name.isdecimal() else name  # digits are the number of an interface
 
 
 _HOST_CHARACTERS: Final = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-_")
@@ -355,11 +366,11 @@ def _ends_in_a_number(host: str) -> bool:
 
 def parse_simulation(query: str) -> Simulation:
     """Parse the part after ``sim://``: nothing, or ``?OPTION=VALUE&...``."""
-    known = ", ".join(GRIPPER_OPTIONS + SIMULATION_OPTIONS)
+    known = GRIPPER_OPTIONS + SIMULATION_OPTIONS
     given = _options(
         query.removeprefix("?") if query else None,
         SIMULATION_OPTIONS,
-        lambda name: f"no option {name!r}; known are: {known}",
+        lambda name: f"no option {_guess(name, known)}; known are: {', '.join(known)}",
     )
     if "object" in given and "physics" in given:
         raise ValueError("object and physics cannot be combined: physics has its own part")

@@ -202,7 +202,9 @@ def test_a_character_has_ten_to_twelve_bits() -> None:
         ("rtu:///dev/ttyUSB0?baudrate=9600", "no option 'baudrate' of a serial port; did you mean baud?"),
         ("rtu://COM3?baudrate=9600&model=2f85", "did you mean baud?"),
         ("rtu:///dev/ttyUSB0?modle=2f85", "did you mean model?"),
-        ("tcp://host?modle=2f85", "no option 'modle'; known are: model, stroke"),
+        ("tcp://host?modle=2f85", "no option 'modle'; did you mean model?; known are: model, stroke"),
+        ("urcap://host?Model=2f85", "did you mean model?"),
+        ("tcp://host?x=1", "no option 'x'; known are: model, stroke"),
         (
             "rtu:///dev/ttyUSB0?x=1",
             "known are: model, stroke, baud, parity, stopbits",
@@ -269,7 +271,7 @@ def test_an_ipv4_address_is_four_numbers(host: str) -> None:
         ("object=1.5", "object must be an integer in 0..255, got '1.5'"),
         ("speedup", "speedup must be given once, as speedup=VALUE"),
         ("object=1&object=2", "object must be given once, as object=VALUE"),
-        ("speed=10", "no option 'speed'; known are: model, stroke, speedup, object, physics"),
+        ("speed=10", "no option 'speed'; did you mean speedup?; known are: model, stroke, speedup, object"),
         ("", "no option ''; known are: model, stroke, speedup, object, physics"),
         ("object=1&", "no option ''; known are: model, stroke, speedup, object, physics"),
     ],
@@ -319,6 +321,15 @@ def test_an_address_that_is_not_a_string_is_a_type_error(address: object) -> Non
 def test_a_link_local_address_names_its_interface_as_it_is_spelled(zone: str) -> None:
     """A gripper on a cable of its own may have nothing but a link-local address."""
     assert parse_address(f"tcp://[fe80::1%{zone}]:502") == Address("tcp", f"fe80::1%{zone}", 502)
+
+
+@pytest.mark.parametrize(
+    ("typed", "zone"),
+    [("25eth0", "eth0"), ("25Ethernet", "Ethernet"), ("252", "252"), ("25", "25"), ("2525gbe", "25gbe")],
+)
+def test_the_percent_sign_before_an_interface_may_be_that_of_a_uri(typed: str, zone: str) -> None:
+    """RFC 6874 writes it as %25. Digits are the number of an interface."""
+    assert parse_address(f"rtu+tcp://[fe80::1%{typed}]:4001") == Address("rtu+tcp", f"fe80::1%{zone}", 4001)
 
 
 # -- a serial line behind a socket -------------------------------------------------------------------------
