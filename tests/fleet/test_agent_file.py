@@ -109,6 +109,28 @@ def test_two_grippers_on_one_serial_line(tmp_path: Path) -> None:
         read(tmp_path, f"{site}{left}device_id = 9\n{right}")
 
 
+@pytest.mark.parametrize(
+    ("one", "other", "words"),
+    [
+        (
+            "rtu:///dev/ttyUSB0",
+            "rtu:///dev/ttyUSB0?baud=500000",
+            "rate of '.*USB0', as left's",
+        ),
+        ("rtu:///dev/ttyUSB0?parity=E", "rtu:///dev/ttyUSB0", "a port has only one"),
+        ("rtu+tcp://10.0.0.5:502", "tcp://10.0.0.5", "a socket has one protocol"),
+    ],
+)
+def test_two_grippers_at_one_place_have_one_way_to_it(
+    tmp_path: Path, one: str, other: str, words: str
+) -> None:
+    """The agent could not open the second one."""
+    text = f'site = "lab"\n[grippers.left]\naddress = "{one}"\ndevice_id = 9\n'
+    text += f'[grippers.right]\naddress = "{other}"\ndevice_id = 12\n'
+    with pytest.raises(AgentFileError, match=f"line 6.*right.*{words}"):
+        read(tmp_path, text)
+
+
 def test_the_opening_of_a_jaw_is_points_or_a_file_beside_it(tmp_path: Path) -> None:
     own = ((13, 100.0), (213, 2.0))
     write_stroke(tmp_path / "left.csv", own)

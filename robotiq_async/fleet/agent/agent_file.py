@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ...hand.robotiq_hand import RobotiqHand
-from ...link.address import is_remote
+from ...link.address import is_remote, parse_address
 from ...session.options import HandOptions, Place, offered
 from ...values.checks import check_seconds
 from ...values.model import model_of
@@ -131,12 +131,8 @@ class _Reader:
                 raise ValueError(f"a table for each gripper is needed: [grippers.left], got {tables!r}")
         grippers = {name: self._gripper(name, table) for name, table in tables.items()}
         for one, other in combinations(grippers, 2):
-            gripper = grippers[other].link.gripper()
-            if grippers[one].link.gripper().may_be(gripper):
-                address = f"{grippers[other].address!r}{gripper.hint.replace('hands', 'grippers')}"
-                raise self._error(
-                    (_GRIPPERS, other, "address"), f"address must be another than {one}'s, got {address}"
-                )
+            with self._blaming(_GRIPPERS, other, "address"):
+                _check_both(one, grippers[one], grippers[other])
         return grippers
 
     def _gripper(self, name: str, table: object) -> HandOptions:
@@ -202,6 +198,20 @@ class _Reader:
         if len(path) > 1:
             where += f", in [{path[0]}.{path[1]}]"
         return AgentFileError(f"{where}: {message}")
+
+
+def _check_both(name: str, one: HandOptions, other: HandOptions) -> None:
+    """Refuse two grippers that one agent cannot serve; ``name`` is the first one's."""
+    first, second = one.link.gripper(), other.link.gripper()
+    if first.may_be(second):
+        hint = second.hint.replace("hands", "grippers")
+        raise ValueError(f"address must be another than {name}'s, got {other.address!r}{hint}")
+    if first.place != second.place:
+        return
+    if first.is_on_line is not second.is_on_line:
+        raise ValueError(f"address must be {one.address!r}, as {name}'s: a socket has one protocol")
+    if parse_address(one.address).line != parse_address(other.address).line:
+        raise ValueError(f"address must have the rate of {one.address!r}, as {name}'s: a port has only one")
 
 
 def _check_bool(name: str, value: object) -> bool:
