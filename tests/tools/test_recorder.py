@@ -16,6 +16,7 @@ from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
@@ -26,7 +27,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.description.joint_states import SCHEMA_NAME, JointStateEncoder
 from robotiq_async.tools.description.kinematics import JOINTS, joint_angles
 from robotiq_async.tools.recording.recorder import Recorder
-from robotiq_async.tools.recording.recordings import read_recording, recover
+from robotiq_async.tools.recording.recordings import Entry, read_recording, recover
 from robotiq_async.tools.recording.table import export
 from robotiq_async.values.errors import RecordingError
 from tests.forks import in_the_child
@@ -170,11 +171,47 @@ async def test_a_mark_needs_a_recording_with_events_and_plain_values(
             recorder.mark("grasp", object=None)  # type: ignore[arg-type]
         with pytest.raises(ValueError, match="weight must be finite, got nan"):
             recorder.mark("grasp", weight=float("nan"))
+        with pytest.raises(ValueError, match="serial must have 64 bits or fewer, got "):
+            recorder.mark("grasp", serial=10**5000)
     with pytest.raises(RecordingError, match="async with"):
         recorder.mark("late")
     async with Recorder(hand, tmp_path / "it.mcap", ros2=True) as joints:
         with pytest.raises(RecordingError, match="joint states only"):
             joints.mark("grasp")
+
+
+@pytest.mark.parametrize("made", ["it.csv", "it.mcap"])
+async def test_a_name_that_is_not_utf_8_does_not_end_a_recording(
+    made: str, hand: RobotiqHand, tmp_path: Path
+) -> None:
+    """A table ended at the next row, and an export with a traceback."""
+    name = os.fsdecode(b"part \xff")
+    async with Recorder(hand, tmp_path / made) as recorder:
+        with pytest.raises(ValueError, match=r"label must be text without surrogates, got 'part \\udcff'"):
+            recorder.mark(name)
+        with pytest.raises(ValueError, match="file must be text without surrogates"):
+            recorder.mark("grasp", file=name)
+        recorder.mark("Tässä \N{WATCH}")
+        await hand.move(60)
+    assert recorder.saved == recorder.recorded > 0
+
+
+async def test_values_that_numpy_made_are_taken(hand: RobotiqHand, file: Path) -> None:
+    async with Recorder(hand, file) as recorder:
+        given = {"weight": np.float32(0.25), "count": np.int64(3), "wet": np.bool_(0), "part": np.str_("cup")}
+        recorder.mark("grasp", **given)  # type: ignore[arg-type]  # numpy's are no subclasses
+        with pytest.raises(TypeError, match="all must be a str, int, float or bool"):
+            recorder.mark("grasp", all=np.zeros(3))  # type: ignore[arg-type]
+    (mark,) = [each.fields for each in read_recording(file) if each.is_json and "values" in each.fields]
+    assert mark["values"] == {"weight": 0.25, "count": 3, "wet": False, "part": "cup"}
+
+
+def test_text_that_utf_8_does_not_have_is_exported_all_the_same(tmp_path: Path) -> None:
+    foreign = Entry(
+        "/gripper/event", 0, 1, b'{"kind": "mark", "label": "part \\udcff", "values": {}}', is_json=True
+    )
+    assert export([foreign], "event", tmp_path / "it.csv") == 1
+    assert table(tmp_path / "it.csv")[0]["label"] == "part \\udcff"
 
 
 async def test_it_tells_which_hand_it_is_of(file: Path) -> None:

@@ -160,7 +160,7 @@ class Feed:
 
         Raises:
             TypeError: a value is no text, number or truth value.
-            ValueError: a value is not finite.
+            ValueError: a value is not finite or too long, or text has surrogates.
         """
         fields = mark_fields(label, values, now())
         self._sources[0].drain()

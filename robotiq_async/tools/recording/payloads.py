@@ -20,6 +20,8 @@ from ...values.status import RobotiqStatus
 from ..description.kinematics import FINGER_NAMES
 
 Fields = dict[str, Any]
+LONGEST_BITS: Final = 64
+"""Of an int in a mark: others who read JSON keep no more, and Python writes no more than 4,300 digits."""
 
 INTEGER: Final = {"type": "integer"}
 NUMBER: Final = {"type": "number"}
@@ -135,16 +137,27 @@ def mark_fields(label: str, values: Mapping[str, object], timestamp: float) -> F
 
     Raises:
         TypeError: the label is no text, or a value no text, number or truth value.
-        ValueError: a value is infinite or not a number.
+        ValueError: a value is infinite, not a number or an int of more than 64 bits; or half a character.
     """
     if not isinstance(label, str):
         raise TypeError(f"label must be a str, got {repr_of(label)}")
-    for name, value in values.items():
-        if not isinstance(value, str | int | float):
-            raise TypeError(f"{name} must be a str, int, float or bool, got {repr_of(value)}")
-        if isinstance(value, float) and not math.isfinite(value):
-            raise ValueError(f"{name} must be finite, got {value}")
-    return {"kind": "mark", "timestamp": timestamp, "label": label, "values": dict(values)}
+    plain = {name: _plain(name, value) for name, value in values.items()}
+    return {"kind": "mark", "timestamp": timestamp, "label": _plain("label", label), "values": plain}
+
+
+def _plain(name: str, given: object) -> str | int | float | bool:
+    """A value of a mark. One that numpy has made becomes Python's."""
+    value = given.item() if hasattr(given, "item") and getattr(given, "ndim", None) == 0 else given
+    if not isinstance(value, str | int | float):
+        raise TypeError(f"{name} must be a str, int, float or bool, got {repr_of(given):.100}")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"{name} must be finite, got {value}")
+    if isinstance(value, int) and value.bit_length() > LONGEST_BITS:
+        raise ValueError(f"{name} must have {LONGEST_BITS} bits or fewer, got {value.bit_length()}")
+    # Python reads a file name that is not UTF-8 into such halves; no file of text could hold it.
+    if isinstance(value, str) and not value.isascii() and any("\ud800" <= each <= "\udfff" for each in value):
+        raise ValueError(f"{name} must be text without surrogates, got {value!a:.100}")
+    return value
 
 
 def is_command(event: Fields) -> bool:

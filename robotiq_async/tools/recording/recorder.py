@@ -223,11 +223,11 @@ class Recorder:
 
         Args:
             label: such as ``"grasp 7"``.
-            **values: such as ``object="cup"``; text, finite numbers and truth values.
+            **values: such as ``object="cup"``; text, finite numbers and truth values, also numpy's.
 
         Raises:
             TypeError: a label or a value of another type.
-            ValueError: an infinite value, or not a number.
+            ValueError: an infinite value, not a number, an int of more than 64 bits, or text with surrogates.
             RecordingError: the block is not entered or over, or the recording has joint states only.
         """
         if not self._is_open or self._joints_only:

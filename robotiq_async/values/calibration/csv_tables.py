@@ -250,7 +250,8 @@ def write_rows(path: Path | str, rows: Iterable[Sequence[object]]) -> None:
     # O_EXCL: in a folder that others can write to, a file of this name could be a link that they made.
     descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, NEW if mode is None else mode)
     try:
-        with open(descriptor, "w", encoding="utf-8", newline="") as file:
+        # A recording of others may hold half a character, which UTF-8 does not have.
+        with open(descriptor, "w", encoding="utf-8", errors="backslashreplace", newline="") as file:
             if mode is not None:
                 # The umask has removed bits from the mode given to os.open().
                 os.chmod(descriptor if os.chmod in os.supports_fd else beside, mode)
