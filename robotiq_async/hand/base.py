@@ -498,8 +498,8 @@ class Hand(Kind):
         ``missed`` counts the others. Opened before the start it waits for it. It ends after :meth:`stop`, and
         raises RobotiqConnectionError when the hand gives up on its link. While the link is down it waits; a
         control loop passes ``lost_after``, 0.01..3600 s: when no status has come for that time since the last
-        one, or since the opening, it raises ConnectionLostError, and may be read on. So it does if the event
-        loop was held up for that time.
+        one, or since the opening, it raises ConnectionLostError, also if the event loop was held up for that
+        time. It may be read on, unless the hand has given up: then it is in SHUTDOWN.
         """
         kept, limit = check_buffer(buffer), check_limit("lost_after", lost_after)
         return self._opened(self._channels.statuses, kept, limit)

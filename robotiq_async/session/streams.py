@@ -97,7 +97,11 @@ class Stream(Generic[T]):
             return self._items.popleft()
         failure = self._failure
         del self  # as above
-        raise StopAsyncIteration if failure is None else failure()
+        if failure is None:
+            raise StopAsyncIteration
+        # A loop that reads on after any error gets this one again at once, and must leave the others a turn.
+        await asyncio.sleep(0)
+        raise failure()
 
     def take_nowait(self) -> T | None:
         """The next item if there is one now, or None."""

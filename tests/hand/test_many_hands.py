@@ -10,7 +10,7 @@ from typing import Any
 import anyio
 import pytest
 
-from robotiq_async import ConnectionLostError, RobotiqError, RobotiqHand, State
+from robotiq_async import ConnectionLostError, RobotiqError, RobotiqHand, State, Stream
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
@@ -135,3 +135,22 @@ async def test_a_halt_of_all_reaches_those_that_can_be_reached(cell: Cell) -> No
         assert ended[0] is None
         assert isinstance(ended[1], ConnectionLostError)
         assert not cell.servers[0].gripper.is_moving
+
+
+async def all_of(stream: Stream[Any]) -> None:
+    async for _ in stream:
+        pass
+
+
+async def test_a_loop_that_reads_on_after_the_end_leaves_the_others_their_turns(cell: Cell) -> None:
+    """Without a turn between two errors, no other hand polled any more, and no stop was sent."""
+    async with cell.left, cell.right:
+        stream = cell.right.statuses(lost_after=0.2)
+        cell.servers[1].cut()
+        await cell.right.wait_for_state(State.SHUTDOWN)
+        turns: list[int] = []
+        for number in range(3):
+            asyncio.get_running_loop().call_soon(turns.append, number)
+            with pytest.raises(ConnectionLostError):
+                await all_of(stream)
+            assert turns == list(range(number + 1))
