@@ -33,7 +33,7 @@ def main(address: str) -> None:
         if found is None:
             print("nothing there")
         else:
-            print(f"held at {found} counts: about {hand.units.mm(found):.0f} mm by a straight line")
+            print(f"held at {found} counts: about {hand.units.mm(found):.0f} mm, {hand.units.stroke.source}")
         hand.open()
 
 
