@@ -145,8 +145,9 @@ async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator
 
     All stops begin at once, in the next turn of the event loop. When they have ended, the
     block is cancelled, and the program continues after it. The NotStartedError of a call that a stop has
-    ended does not leave the block. Further signals are ignored for 3 s; later ones act as before
-    the block. An ignored signal stays ignored. SIGKILL stops nothing.
+    ended does not leave the block, neither alone nor in the exception group of tasks. Further signals are
+    ignored for 3 s; later ones act as before the block. An ignored signal stays ignored. SIGKILL stops
+    nothing.
 
     Args:
         hands: to stop; one that does not run is left alone.
@@ -185,15 +186,22 @@ async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator
     try:
         with scope:
             yield signals
-    except NotStartedError:
+    except (NotStartedError, BaseExceptionGroup) as error:
         if not signals.received:
             raise
+        if (others := _without_stopped(error)) is not None:
+            raise others from None
     finally:
         if stopping:
             with anyio.CancelScope(shield=True):
                 await asyncio.wait(stopping)
         for number, handler in previous.items():
             signal.signal(number, handler)
+
+
+def _without_stopped(error: NotStartedError | BaseExceptionGroup[BaseException]) -> BaseException | None:
+    """What a stop does not explain; None if there is nothing. Each task of a group has an error of its own."""
+    return error.split(NotStartedError)[1] if isinstance(error, BaseExceptionGroup) else None
 
 
 def _pass_on(handler: object, number: int, frame: FrameType | None) -> None:

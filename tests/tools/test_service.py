@@ -78,6 +78,39 @@ async def test_all_hands_are_stopped_at_once(server: SimulatorServer) -> None:
         await server.fault_injector.end(dead)
 
 
+async def run_until_stopped(hand: RobotiqHand, error: Exception | None = None) -> None:
+    await hand.start()
+    try:
+        while True:
+            await hand.close(speed=0)
+            await hand.open(speed=0)
+    finally:
+        if error is not None:
+            raise error
+
+
+@pytest.mark.parametrize("error", [None, OSError("the camera is gone")])
+async def test_hands_in_a_group_of_tasks_end_as_quietly_as_one(
+    error: OSError | None, server: SimulatorServer
+) -> None:
+    """Their errors made the program fail, and systemd started it again: the fingers moved."""
+    other = SimulatorServer(SimulatedGripper(asyncio.get_running_loop().time))
+    await activate_beforehand(other.gripper)
+    async with server, other:
+        left, right = RobotiqHand(server.address), RobotiqHand(other.address)
+        caught: list[BaseException] = []
+        try:
+            async with stops_on_signals(left, right), asyncio.TaskGroup() as group:
+                group.create_task(run_until_stopped(left))
+                group.create_task(run_until_stopped(right, error))
+                await until(lambda: min(each.gripper.position(Finger.A) for each in (server, other)) > 20)
+                signal.raise_signal(signal.SIGTERM)
+        except* OSError as others:
+            caught += others.exceptions
+        assert caught == ([] if error is None else [error])
+        assert left.state is right.state is State.SHUTDOWN
+
+
 async def test_further_signals_disturb_nothing_until_someone_insists(server: SimulatorServer) -> None:
     seen = list[int]()
     before = signal.signal(signal.SIGTERM, lambda number, _: seen.append(number))
