@@ -125,6 +125,18 @@ def test_the_same_clock_gives_the_same_bits() -> None:
     assert runs[0] == runs[1]
 
 
+def test_a_rest_that_nobody_watches_is_no_other() -> None:
+    """While nothing moves, all steps that are due are made at once."""
+    watched, left = active("table"), active("table")
+    watched.run(30)
+    left.now = watched.now
+    for bench in (watched, left):
+        bench.move(100, speed=40)
+    assert left.now == watched.now
+    assert left.gripper.status_registers() == watched.gripper.status_registers()
+    assert left.physics.opening_mm == watched.physics.opening_mm
+
+
 # -- contact ---------------------------------------------------------------------------------------------
 
 

@@ -142,7 +142,7 @@ class Physics:
         if world.time + world.step_s > until + _SLACK:
             return False
         try:
-            world.step()
+            world.step(until)
         except Exception as error:
             world.failure = error
             raise _standing_still(error) from error

@@ -89,7 +89,7 @@ class Stepper:
             while self.orders:
                 self.orders.popleft()()
             with self._lock:
-                self._world.step()
+                self._world.step(due)
             self.steps += 1
 
 

@@ -36,6 +36,8 @@ _LIFTING: Final = 0.1
 """Speed of the mount, in m/s: slow for an arm."""
 _INSIDE: Final = 0.0005
 """Depth in metres from which a part is in the gripper, and does not only touch it."""
+_SLACK: Final = 1e-6
+"""Share of a step that rounding may take from a time."""
 _FAR: Final = 100.0
 """Height in metres of a part that was taken away."""
 
@@ -106,11 +108,11 @@ class World:
     def time(self) -> float:
         return float(self._data.time)
 
-    def step(self) -> None:
-        """Let one step pass."""
+    def step(self, until: float) -> None:
+        """Let one step pass, or all that are due until a time while nothing moves."""
         data, drives = self._data, self.drives.values()
         if self._sleeps and self._lifted == self._height and all(drive.is_still for drive in drives):
-            data.time += self.step_s
+            data.time += int((until - data.time) / self.step_s + _SLACK) * self.step_s
             return
         self._set_aside(self._is_taken or any(drive.clears for drive in drives))
         for drive in drives:
