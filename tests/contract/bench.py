@@ -30,8 +30,8 @@ MODEL: ContextVar[Model] = ContextVar("model", default=THREE_FINGER)
 """The model of the gripper."""
 SERVER: ContextVar[type[SimulatorServer]] = ContextVar("server", default=SimulatorServer)
 """Its server, and so the kind of link, for a hand of this process and for that of an agent."""
-PHYSICS: ContextVar[bool] = ContextVar("physics", default=False)
-"""Whether bodies move the axes of the gripper of a hand of this process."""
+PHYSICS: ContextVar[str | None] = ContextVar("physics", default=None)
+"""The scene of the bodies that move the axes of the gripper of a hand of this process; None for no bodies."""
 
 
 @dataclass
@@ -41,12 +41,14 @@ class Bench:
     Attributes:
         make: a hand that is not started; each call makes another one on the same gripper.
         lab: what stands behind a hand on another host; None for a hand of this process.
+        physics: the bodies that move the axes; None without.
     """
 
     gripper: SimulatedGripper
     server: SimulatorServer
     make: Callable[[], Hand]
     lab: Lab | None = None
+    physics: Physics | None = None
 
     @asynccontextmanager
     async def hand(self) -> AsyncIterator[Hand]:
@@ -100,14 +102,15 @@ async def bench(where: str, *, active: bool = True) -> AsyncIterator[Bench]:
             yield Bench(here.gripper, here.server, lambda: here.client(f"client {next(names)}"), here)
         return
     loop = asyncio.get_running_loop()
-    cycle, model = 0.005 * SPEEDUP, MODEL.get()
+    cycle, model, scene = 0.005 * SPEEDUP, MODEL.get(), PHYSICS.get()
+    physics = None if scene is None else Physics(scene)
     gripper = SimulatedGripper(
         loop.time,
         speedup=SPEEDUP,
         device_cycle=cycle,
         spread=False,
         model=model,
-        physics=Physics("table") if PHYSICS.get() else None,
+        physics=physics,
     )
     async with SERVER.get()(gripper) as server:
         if active:
@@ -115,7 +118,12 @@ async def bench(where: str, *, active: bool = True) -> AsyncIterator[Bench]:
         habit, options = HABIT.get()
         if habit is not None:
             await server.fault_injector.begin(habit)
-        yield Bench(gripper, server, lambda: RobotiqHand(server.address, model=gripper.model, **options))
+        yield Bench(
+            gripper,
+            server,
+            lambda: RobotiqHand(server.address, model=gripper.model, **options),
+            physics=physics,
+        )
 
 
 def contract(

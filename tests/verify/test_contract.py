@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -55,7 +55,7 @@ ASKING = [file for file in FILES if file not in ("test_arguments", *OF_OTHERS)]
 """All but what is refused before the gripper is asked anything."""
 
 
-def scenes(file: str) -> Iterator[tuple[str, Callable[[], None]]]:
+def scenes(file: str) -> Iterator[tuple[str, partial[None]]]:
     """Every test of a file of the contract on a hand of this process, but those that need a fixture."""
     for name, test in vars(importlib.import_module(f"tests.contract.{file}")).items():
         marks = [mark for mark in getattr(test, "pytestmark", []) if mark.name == "parametrize"]
