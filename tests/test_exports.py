@@ -13,6 +13,7 @@ from types import FunctionType
 import robotiq_async
 from robotiq_async import fleet, simulator, sync
 from robotiq_async.values import enums, model
+from robotiq_async.values.amounts import UNITS
 
 CONTRACT = {
     *("RobotiqHand", "RobotiqStatus", "MoveResult", "Transition", "Finger", "ObjectStatus", "Fault", "State"),
@@ -142,6 +143,10 @@ def test_the_parameters_of_the_calls_are_those_of_the_contract() -> None:
     motion = [(name, None, True) for name in ("speed", "mm_per_s", "force", "label_n", "timeout")]
     assert parameters("move") == [position, ("fingers", abc, False), *openings, *motion]
     assert parameters("open") == parameters("close") == [("fingers", abc, False), *motion]
+    calls = ("set_position", "set_speed", "set_force", "command", "move", "open", "close", "grasp")
+    given = {name for call in calls for name, _, _ in parameters(call)}
+    assert given - UNITS == {"fingers", "value", "position", "speed", "force", "timeout", "at_least"}
+    assert given >= UNITS
     assert parameters("statuses") == [("buffer", 1, False), ("lost_after", None, True)]
     assert parameters("transitions") == parameters("halt") == parameters("atr") == parameters("reset") == []
     assert parameters("wait_for_state")[-1] == ("timeout", None, True)

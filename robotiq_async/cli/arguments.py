@@ -38,7 +38,7 @@ def _integer(name: str, low: int, high: int) -> Callable[[object, Sequence[Token
 
 UNITS: Final = {"": "counts", "mm": "mm", "mm/s": "mm_per_s", "N": "label_n"}
 """The units of amounts on the command line, and the arguments of a hand, and of ``values.amounts``, that they
-are. A new one is a row here, and is named where it may be typed: :data:`Position` and below."""
+are. A new one is a row here, and one more unit where it may be typed: :data:`Position` and below."""
 
 
 class Amount(NamedTuple):
@@ -57,18 +57,18 @@ class Amount(NamedTuple):
         return {UNITS[self.unit]: self.value}
 
 
-def _amount(name: str, unit: str, metavar: str | None = None) -> Parameter:
-    """A parameter of counts, or of a number with its unit; the hand knows the range of that."""
+def _amount(name: str, *units: str, metavar: str | None = None) -> Parameter:
+    """A parameter of counts, or of a number with one of these units; the hand knows the range of that."""
     integer = _integer(name, 0, 255)
+    form = re.compile(rf"([0-9]{{1,6}}(?:\.[0-9]{{1,6}})?) ?({'|'.join(map(re.escape, units))})")
 
     def convert(kind: object, tokens: Sequence[Token]) -> Amount:
-        found = re.fullmatch(rf"([0-9]{{1,6}}(?:\.[0-9]{{1,6}})?) ?{re.escape(unit)}", tokens[0].value)
-        if found:
-            return Amount(float(found[1]), unit)
+        if found := form.fullmatch(tokens[0].value):
+            return Amount(float(found[1]), found[2])
         try:
             return Amount(integer(kind, tokens), "")
         except UsageError as error:
-            raise UsageError(f"{error}; or give it in {unit}, as in 40.5{unit}") from None
+            raise UsageError(f"{error}; or give it in {' or '.join(units)}, as in 40.5{units[0]}") from None
 
     return Parameter(converter=convert, n_tokens=1, accepts_keys=False, metavar=metavar)
 

@@ -10,7 +10,7 @@ from ..runtime.concurrency import running_loop
 from ..session.options import LONGEST_WAIT_S
 from ..session.streams import Stream, check_buffer, check_limit
 from ..session.waiting import check_states
-from ..values.amounts import force_of, needed, position_of, speed_of
+from ..values.amounts import LABELS, OPENINGS, RATES, force_of, needed, position_of, speed_of
 from ..values.calibration import Units
 from ..values.checks import check_flag, check_optional_byte, check_seconds, check_timeout
 from ..values.enums import CLOSED, OPEN, Finger, State
@@ -165,7 +165,7 @@ class Hand(Kind):
         axes = self.model.mask(fingers)
         target = position_of(self.units, axes, value, mm, open_fraction, "value")
         with self._naming:
-            await self._set("position", needed("set_position", target, "value", "mm", "open_fraction"), axes)
+            await self._set("position", needed("set_position", target, "value", *OPENINGS), axes)
 
     async def set_speed(
         self,
@@ -178,7 +178,7 @@ class Hand(Kind):
         axes = self.model.mask(fingers)
         speed = speed_of(self.units, value, mm_per_s, "value")
         with self._naming:
-            await self._set("speed", needed("set_speed", speed, "value", "mm_per_s"), axes)
+            await self._set("speed", needed("set_speed", speed, "value", *RATES), axes)
 
     async def set_force(
         self,
@@ -191,7 +191,7 @@ class Hand(Kind):
         axes = self.model.mask(fingers)
         force = force_of(self.units, value, label_n, "value")
         with self._naming:
-            await self._set("force", needed("set_force", force, "value", "label_n"), axes)
+            await self._set("force", needed("set_force", force, "value", *LABELS), axes)
 
     def command(
         self,
@@ -219,8 +219,8 @@ class Hand(Kind):
         if mm is open_fraction is mm_per_s is label_n is None:  # counts alone: loops call this in every cycle
             if position is None and speed is None and force is None:
                 raise ValueError(
-                    "command() needs at least one of position, speed and force in 0..255, or in mm, "
-                    "open_fraction, mm_per_s or label_n, got none"
+                    "command() needs at least one of position, speed and force in 0..255, or of "
+                    f"{', '.join((*OPENINGS, *RATES, *LABELS))}, got none"
                 )
             position = check_optional_byte("position", position)
             speed, force = check_optional_byte("speed", speed), check_optional_byte("force", force)
@@ -262,7 +262,7 @@ class Hand(Kind):
         axes = self.model.mask(fingers)
         units = self.units
         target = position_of(units, axes, position, mm, open_fraction)
-        target = needed("move", target, "position", "mm", "open_fraction")
+        target = needed("move", target, "position", *OPENINGS)
         speed, force = speed_of(units, speed, mm_per_s), force_of(units, force, label_n)
         limit = check_timeout("timeout", timeout)
         with self._naming:

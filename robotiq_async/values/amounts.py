@@ -7,9 +7,20 @@ in this process and to other hosts.
 
 from __future__ import annotations
 
+from typing import Final
+
 from .calibration import Units
 from .checks import check_optional_byte, repr_of
 from .enums import Finger
+
+OPENINGS: Final = ("mm", "open_fraction")
+"""The arguments of calls that stand in the place of a position."""
+RATES: Final = ("mm_per_s",)
+"""Those that stand in the place of a speed."""
+LABELS: Final = ("label_n",)
+"""Those that stand in the place of a force."""
+UNITS: Final = frozenset((*OPENINGS, *RATES, *LABELS))
+"""All arguments that are no counts: they become counts in this process, and an agent refuses them."""
 
 
 def position_of(

@@ -12,6 +12,7 @@ from robotiq_async.fleet.wire.values import reading
 from robotiq_async.runtime.clock import now
 from robotiq_async.runtime.log import log
 from robotiq_async.session.streams import Channels
+from robotiq_async.values.amounts import UNITS
 from robotiq_async.values.errors import ProtocolError
 from tests.fleet.lab import lab
 from tests.virtual import virtual
@@ -40,7 +41,7 @@ async def test_the_points_of_the_agents_hand_are_those_of_the_client() -> None:
 async def test_an_agent_takes_requests_in_counts_alone() -> None:
     """After a restart of the agent a client's speeds and forces are restored as it saw them."""
     requests: list[tuple[str, dict[str, Any]]] = [
-        ("move", {"mm": 40, "fingers": 1}),
+        *(("move", {name: 0, "fingers": 1}) for name in UNITS),
         ("move", {"position": 40, "fingers": 1, "mm_per_s": 40}),
         ("set_force", {"label_n": 40, "fingers": 1}),
         ("command", {"axes": {"1": {"open_fraction": 1}}}),

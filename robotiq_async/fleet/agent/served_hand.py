@@ -32,6 +32,7 @@ from ...hand.robotiq_hand import RobotiqHand
 from ...runtime.clock import now
 from ...runtime.log import Log
 from ...runtime.version import __version__
+from ...values.amounts import UNITS
 from ...values.checks import check_byte, check_mask
 from ...values.enums import Finger
 from ...values.errors import AgentError, ControlLostError, RobotiqConnectionError, RobotiqError
@@ -56,8 +57,6 @@ SEQUENCES: Final = frozenset({"activate", "reset", "atr", "recover"})
 """Commands with a speed and a force of their own."""
 COMMANDS: Final = frozenset({"set_position", "set_speed", "set_force", "move", "hold"}) | SEQUENCES
 """Commands of a holder: the methods of a hand by that name. In addition there are command and cancel."""
-UNITS: Final = frozenset({"mm", "open_fraction", "mm_per_s", "label_n"})
-"""Arguments of a hand that are no counts. Clients convert them: the agent restores the counts that it saw."""
 
 
 class ServedHand:
@@ -359,6 +358,7 @@ class ServedHand:
             self._to_hold &= ~axes_of(request.name, request.call.arguments)
 
     def _work(self, name: str, arguments: Fields) -> Work:
+        # Clients convert units: the agent restores the counts that it saw.
         if own := sorted(UNITS & arguments.keys()):
             raise TypeError(f"requests are in counts, got {', '.join(own)}")
         if name == "command":
