@@ -28,6 +28,7 @@ from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 from tests.simulator.conftest import simulator
+from tests.simulator.kinds import EXPECTED
 from tests.simulator.test_serial_frames import READ as READ_SERIAL
 from tests.simulator.test_serial_frames import RESET_READING, line
 from tests.simulator.test_server import RawClient, raw_client
@@ -37,23 +38,6 @@ pytestmark = pytest.mark.virtual_time
 READ = bytes.fromhex("04 0000 0001")
 AXES_ASKED = tuple(AxisRequest(10 * n, 100 + n, 200 + n) for n in range(1, 5))
 ACTIVE = Request(activate=True, axes=AXES_ASKED, individual_fingers=False, individual_scissor=False)
-MISFITS = {
-    "tcp": {
-        *("wrong-checksum", "byte-before", "byte-after", "seven-bits", "garbled", "echo", "strict-silence"),
-        "no-function-23",
-    },
-    "rtu": {
-        *("wrong-transaction", "wrong-protocol", "exception", "reset", "close", "accept-silence", "refuse"),
-        *("multiplexer", "wake-needed", "one-connection-only"),
-    },
-    "rtu+tcp": {"wrong-transaction", "wrong-protocol", "exception", "strict-silence"},
-    "urcap": {
-        *("wrong-function", "wrong-length", "wrong-count", "wrong-transaction", "wrong-unit"),
-        *("wrong-protocol", "wrong-echo", "wrong-checksum", "exception", "function-3-only", "registers"),
-        *("byte-before", "byte-after", "seven-bits", "garbled", "echo", "strict-silence", "no-function-23"),
-    },
-}
-"""Troubles that cannot happen on a kind of link."""
 
 
 @asynccontextmanager
@@ -501,7 +485,7 @@ def test_which_troubles_fit_which_link() -> None:
     for kind, server in itertools.product(KINDS, servers):
         if kind == "interference" and server.gripper.model is TWO_FINGER_85:
             continue  # of a scissor
-        if kind not in MISFITS[server.link]:
+        if server.link in EXPECTED[kind].links:
             server.fault_injector.check([Trouble(kind)])
         else:
             message = f"{kind} does not fit a simulator on {server.link}"

@@ -13,23 +13,17 @@ from hypothesis import strategies as st
 
 from robotiq_async.simulator import Trouble, parse_troubles
 from robotiq_async.simulator.troubles.trouble import KINDS
+from tests.simulator.kinds import (
+    CONDITIONS,
+    EITHER_WAY,
+    EVENT,
+    EXPECTED,
+    REPLIES,
+    REPLY,
+    WRITE_REPLY,
+)
 
 INF = math.inf
-CONDITIONS = [
-    *("accept-silence", "refuse", "multiplexer", "power-cut", "slow-device", "interference", "fault"),
-    *("idle-reset", "e-stop"),
-    *("status-lag", "silence-fault", "slow-activation", "echoed-limits", "write-spacing"),
-    *("wake-needed", "function-3-only", "one-connection-only", "echo", "strict-silence", "registers"),
-    "no-function-23",
-]
-"""Kinds that cannot be for a single reply or moment."""
-REPLIES = [
-    *("delay", "late", "drop", "half", "pieces", "twice", "exception"),
-    *("wrong-function", "wrong-length", "wrong-count", "wrong-transaction"),
-    *("wrong-unit", "wrong-protocol", "wrong-checksum"),
-    *("byte-before", "byte-after", "seven-bits", "garbled"),
-]
-"""Kinds that can be about replies to reads and to writes."""
 
 
 def seconds(low: int, high: int) -> st.SearchStrategy[float]:
@@ -55,7 +49,7 @@ def troubles(draw: st.DrawFn) -> Trouble:
     trouble = Trouble(
         name,
         value,
-        on=draw(st.sampled_from(["any", "read", "write"] if name in REPLIES else ["any"])),
+        on=draw(st.sampled_from(["any", "read", "write"] if name in EITHER_WAY else ["any"])),
         at=draw(st.just(0.0) | seconds(0, 86400)),
         lasts=draw(st.none() | lasts),
     )
@@ -63,16 +57,6 @@ def troubles(draw: st.DrawFn) -> Trouble:
         return trouble
     every = draw(seconds(int(trouble.duration) + 1, 86400))
     return Trouble(name, value, on=trouble.on, at=trouble.at, lasts=trouble.lasts, every=every)
-
-
-def test_the_kinds_that_are_about_replies() -> None:
-    """The lists above are all there are."""
-    corrupting = {name for name, kind in KINDS.items() if kind.corruption is not None}
-    assert corrupting == {*REPLIES, "wrong-echo"}
-    assert {name for name, kind in KINDS.items() if kind.lasts == INF} == {
-        *CONDITIONS,
-        *("delay", "pieces", "silence", "seven-bits", "garbled"),
-    }
 
 
 # Words.
@@ -154,7 +138,7 @@ def test_words_that_are_refused_say_why(words: str, message: str) -> None:
 
 
 def test_on_is_refused_for_troubles_that_are_no_replies() -> None:
-    for kind, direction in itertools.product(set(KINDS) - {*REPLIES, "wrong-echo"}, ["read", "write"]):
+    for kind, direction in itertools.product(set(KINDS) - {*EITHER_WAY, "wrong-echo"}, ["read", "write"]):
         with pytest.raises(ValueError, match=f"^'on {direction}' means nothing for {kind}$"):
             parse_troubles(f"{kind} on {direction}")
 
@@ -192,44 +176,17 @@ def test_a_direction_that_is_none_is_refused() -> None:
 # The defaults.
 
 
-VALUES = {
-    "delay": (0.05, 0, 10),
-    "late": (0.7, 0, 10),
-    "pieces": (0.002, 0, 1),
-    "multiplexer": (0.7, 0, 10),
-    "exception": (4, 1, 255),
-    "foreign": (128, 0, 255),
-    "fault": (9, 1, 15),
-    "e-stop": (1, 1, 9),
-    "idle-reset": (5, 0, 3600),
-    "slow-device": (0.2, 0, 10),
-    "status-lag": (0.05, 0, 1),
-    "silence-fault": (1, 0, 3600),
-    "slow-activation": (25, 0, 600),
-    "write-spacing": (0.01, 0, 1),
-    "byte-before": (0, 0, 255),
-    "byte-after": (0, 0, 255),
-    "strict-silence": (0.00175, 0, 1),
-    "registers": (3, 1, 8),
-}
-"""The usual value of each kind that has one, the least and the greatest."""
-WHOLE = {"exception", "foreign", "fault", "e-stop", "byte-before", "byte-after", "registers"}
-"""Kinds whose value is a whole number; others have seconds, or none."""
-
-
-def test_the_values() -> None:
+def test_every_kind_is_as_expected() -> None:
+    assert set(KINDS) == set(EXPECTED), "a row in tests/simulator/kinds.py"
     for name, kind in KINDS.items():
-        assert Trouble(name).amount == VALUES.get(name, (0, 0, 0))[0], name
-        assert (kind.low, kind.high) == VALUES.get(name, (0, 0, 0))[1:], name
-        assert isinstance(kind.value, int) == (name in WHOLE), name
-
-
-def test_conditions_last_until_ended_and_events_happen_once() -> None:
-    for_ever = dict.fromkeys([*CONDITIONS, "delay", "pieces", "silence"], INF)
-    events = ["late", "drop", "wrong-echo", "reset", "close", "foreign", "release"]
-    for kind, duration in (for_ever | dict.fromkeys(events, 0)).items():
-        assert Trouble(kind).duration == duration, kind
-        assert Trouble(kind, lasts=2).duration == 2, kind
+        form, links, value = EXPECTED[name]
+        assert kind.links == links, name
+        assert (kind.value, kind.low, kind.high) == (value or (None, 0, 0)), name
+        assert isinstance(kind.value, int) == EXPECTED[name].is_whole, name
+        assert (kind.corruption is not None) == (form in (REPLY, REPLIES, WRITE_REPLY)), name
+        assert Trouble(name).amount == (value or (0,))[0], name
+        assert Trouble(name).duration == (0 if form in (REPLY, WRITE_REPLY, EVENT) else INF), name
+        assert Trouble(name, lasts=2).duration == 2, name
 
 
 @pytest.mark.parametrize(

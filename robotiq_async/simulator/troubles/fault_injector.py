@@ -6,7 +6,8 @@
 # hit if it is for once. It acts in one of three ways:
 #
 #   on demand   the simulator calls hears(), lets_in(), deliver() and the properties; of several troubles
-#               about one request or reply the oldest decides
+#               about one request or reply the oldest decides. What needs no more than the reply is a function
+#               of corruption.py; what needs earlier ones keeps them here, in deliver()
 #   on state    _do() changes the gripper or the server, and _undo() restores it. Troubles of one kind overlap
 #               in any order, so those that last are applied again
 #   on habits   the gripper's own habits are kept from the first such trouble on, and restored at its end
