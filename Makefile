@@ -26,7 +26,7 @@ unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH PYTHONSTARTUP PIP_USER P
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo show smoke test-core test test-web test-ros2 test-lerobot test-urcap pages docs dist pythons canary soak habits fuzz explore bench lint check format constraints clean
+.PHONY: help demo show smoke test-core test test-web test-ros2 test-lerobot test-urcap test-urdf pages docs dist pythons canary soak habits fuzz explore bench lint check format constraints clean
 
 help:  ## Show this list; times are those of two idle cores, without setting up the environment (once, a minute)
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -44,7 +44,7 @@ smoke: $(STAMP)  ## Try a bit of everything; the first thing to run after a chan
 test-core: $(STAMP)  ## Run the tests of the core: values, control, link, session, hand, simulator, sync (1 minute)
 	@$(BIN)/python -m pytest -rs --numprocesses auto --dist worksteal @tests/core.txt
 
-test: $(STAMP)  ## Run the tests (5 minutes); those that need a browser, ROS or other environments are test-web, test-ros2, test-lerobot, test-urcap and pages
+test: $(STAMP)  ## Run the tests (5 minutes); those that need a browser, ROS or other environments are test-web, test-ros2, test-lerobot, test-urcap, test-urdf and pages
 	@$(BIN)/python -m pytest -rs --numprocesses auto --dist worksteal
 
 test-web: $(STAMP)  ## Test the page in a real browser (Debian: chromium, chromium-driver); skipped where there is none
@@ -58,6 +58,9 @@ test-lerobot:  ## Test the robot with the commands of LeRobot, in an environment
 
 test-urcap:  ## Drive the simulated URCap with clients of others, in an environment of its own (30 s, 0.4 GB)
 	@PYTHON="$(PYTHON)" tests/urcap/run.sh
+
+test-urdf:  ## Load URDF and SRDF with Pinocchio and Tesseract, in an environment of its own (10 s, 0.7 GB)
+	@PYTHON="$(PYTHON)" tests/urdf/run.sh
 
 pages: $(STAMP)  ## Run the code of every page in the environment that the page names (needs the package index)
 	@$(BIN)/python -m pytest --numprocesses auto tests/docs/environments.py
@@ -109,7 +112,7 @@ constraints: $(STAMP)  ## Take the newest versions of all dependencies into cons
 		docs/site/requirements.in --output-file docs/site/requirements.txt
 
 clean:  ## Remove what the other commands made
-	rm -rf $(VENV) $(SITE) $(RELEASE) .venv-ros2 .venv-lerobot .venv-lerobot-uv .venv-urcap build dist site .cache .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
+	rm -rf $(VENV) $(SITE) $(RELEASE) .venv-ros2 .venv-lerobot .venv-lerobot-uv .venv-urcap .venv-urdf build dist site .cache .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
 	find robotiq_async tests demo -type d -name __pycache__ -prune -exec rm -rf {} +
 
 # uv is several times quicker than pip, but nothing depends on it. When it fails, whatever the reason, pip does

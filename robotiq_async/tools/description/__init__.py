@@ -1,4 +1,4 @@
-"""The grippers in three dimensions: one description of each, and the URDF and MJCF written from it."""
+"""The grippers in three dimensions: one description of each, and the URDF, SRDF and MJCF written from it."""
 
 from __future__ import annotations
 
@@ -8,11 +8,25 @@ from importlib.resources import files
 from ...values.model import HAND_E, THREE_FINGER, Model, model_of
 from .geometry import Pose
 from .hand_e import hand_e
+from .kinematics import named_states
 from .model import HandModel, Joint, Link, Mimic, Shape, Tendon
+from .srdf_writer import write_srdf
 from .three_finger import three_finger
 from .two_finger import two_finger
 
-__all__ = ["HandModel", "Joint", "Link", "Mimic", "Pose", "Shape", "Tendon", "hand_model", "mjcf", "urdf"]
+__all__ = [
+    "HandModel",
+    "Joint",
+    "Link",
+    "Mimic",
+    "Pose",
+    "Shape",
+    "Tendon",
+    "hand_model",
+    "mjcf",
+    "srdf",
+    "urdf",
+]
 
 
 def hand_model(model: Model | str | None = None) -> HandModel:
@@ -36,6 +50,24 @@ def urdf(model: Model | str | None = None) -> str:
         ValueError: no model has this name.
     """
     return _packaged(model_of(model), "urdf")
+
+
+def srdf(model: Model | str | None = None, prefix: str = "") -> str:
+    """The SRDF of a model as text, which MoveIt wants beside the URDF; None for a 3-Finger.
+
+    The group ``gripper`` has the states ``open`` and ``closed``. Collisions between links of the gripper are
+    disabled. What follows a motor's first joint is passive.
+
+    Args:
+        model: or its name.
+        prefix: stands before the names of links, joints and the group, as ``joint_prefix`` of the ROS 2 node.
+
+    Raises:
+        TypeError: not a Model or a name.
+        ValueError: no model has this name.
+    """
+    kind = model_of(model)
+    return write_srdf(hand_model(kind), named_states(kind), prefix)
 
 
 def mjcf(model: Model | str | None = None) -> str:

@@ -111,6 +111,17 @@ def palm_angle(scissor: int) -> float:
     return radians(_between(scissor, PALM))
 
 
+def named_states(model: Model) -> dict[str, dict[str, float]]:
+    """The joints of an open and of a closed gripper, by name; B and C of a 3-Finger are parallel."""
+    if model is not THREE_FINGER:
+        jaw = JAW_JOINTS[model]
+        return {"open": {jaw.name: jaw.open}, "closed": {jaw.name: jaw.closed}}
+    return {
+        name: dict(zip(JOINTS, (0.0, *finger, 0.0, *finger, *finger), strict=True))
+        for name, finger in (("open", finger_angles(0)), ("closed", finger_angles(255)))
+    }
+
+
 def joint_angles(status: RobotiqStatus) -> tuple[float, ...]:
     """The joints in radians, or a Hand-E's in metres, in the order of :func:`joint_names`."""
     return _angles_at(status.model, status.position)
