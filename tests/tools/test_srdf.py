@@ -10,6 +10,8 @@ import pytest
 from robotiq_async.ros2.translation.description import robot_description
 from robotiq_async.ros2.translation.joints import targets
 from robotiq_async.tools.description import hand_model, srdf
+from robotiq_async.tools.description.kinematics import FINGER_NAMES
+from robotiq_async.values.enums import JAW, Finger
 from robotiq_async.values.model import MODELS, THREE_FINGER, TWO_FINGER_85
 
 ALL = pytest.mark.parametrize("name", MODELS)
@@ -62,14 +64,20 @@ def test_no_two_links_of_the_gripper_collide(name: str, prefix: str) -> None:
 
 @ALL
 @PREFIX
-def test_the_node_takes_goals_for_every_joint_that_is_not_passive(name: str, prefix: str) -> None:
-    """MoveIt has controllers for these alone."""
-    model, hand = MODELS[name], hand_model(name)
-    passive = names(ET.fromstring(srdf(name, prefix)).findall("passive_joint"))
-    active = [joint for joint in hand.moving if prefix + joint.name not in passive]
-    assert len(active) + len(passive) == len(hand.moving)
-    moved = [targets([prefix + joint.name], [joint.upper], prefix, model).axes for joint in active]
-    assert len(moved) == len({*moved}) == (4 if model is THREE_FINGER else 1), "one for each motor"
+def test_the_node_takes_the_joints_of_a_state_that_are_not_passive(name: str, prefix: str) -> None:
+    """MoveIt sends these to a controller, and no others."""
+    model, robot = MODELS[name], ET.fromstring(srdf(name, prefix))
+    passive = names(robot.findall("passive_joint"))
+    sent = []
+    for state in robot.findall("group_state"):
+        values = {each.attrib["name"]: float(each.attrib["value"]) for each in state}
+        active = [joint for joint in values if joint not in passive]
+        moved = targets(active, [values[joint] for joint in active], prefix, model)
+        sent.append({axis: position for position, axes in moved.counts for axis in axes})
+    if model is THREE_FINGER:
+        assert sent == [dict.fromkeys(FINGER_NAMES, at) | {Finger.SCISSOR: 128} for at in (0, 240)]
+    else:
+        assert sent == [{JAW: model.stroke.open_reading}, {JAW: model.stroke.closed_reading}]
 
 
 def test_a_note_says_what_is_missing_with_an_arm() -> None:

@@ -56,7 +56,7 @@ def srdf(model: Model | str | None = None, prefix: str = "") -> str:
     """The SRDF of a model as text, which MoveIt wants beside the URDF; None for a 3-Finger.
 
     The group ``gripper`` has the states ``open`` and ``closed``. Collisions between links of the gripper are
-    disabled. What follows a motor's first joint is passive.
+    disabled. Joints that no motor drives are passive.
 
     Args:
         model: or its name.

@@ -1,8 +1,8 @@
 """Writes what MoveIt wants beside a URDF: an SRDF, with a group, its states and the collisions to ignore.
 
-The group ``gripper`` is the whole gripper, for what is held touches all of it. Joints that follow the first
-one of their motor are passive: MoveIt then sends the others alone to a controller. Collisions of the gripper
-with itself are ignored, as in the MJCF: links overlap at their joints, pads meet, and no position does harm.
+The group ``gripper`` is the whole gripper, for what is held touches all of it. Joints that no motor drives
+are passive: MoveIt wants a controller for the others alone. The gripper's collisions with itself are ignored,
+as in the MJCF: links overlap at their joints, pads meet, and no position does harm.
 
 An end effector is not in it: it names the link of the arm, and that is in another URDF.
 """
@@ -52,7 +52,7 @@ def write_srdf(model: HandModel, states: Mapping[str, Mapping[str, float]], pref
 
 
 def passive(model: HandModel) -> list[str]:
-    """The joints that move and are not the first that a motor drives."""
-    tendons = {tendon.name: next(iter(tendon.joints)) for tendon in model.tendons}
-    driven = {tendons.get(drive, drive) for drive in model.drives.values()}
+    """The joints that move and that no motor drives."""
+    tendons = {tendon.name: tendon.joints for tendon in model.tendons}
+    driven = {joint for drive in model.drives.values() for joint in tendons.get(drive, (drive,))}
     return [joint.name for joint in model.moving if joint.name not in driven]
