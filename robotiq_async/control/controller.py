@@ -483,7 +483,7 @@ class Controller:
                 self._finish(status, has_written=False)
         if image is None:
             return None
-        is_early = now - self._written_at < self._spacing
+        is_early = now < self._written_at + self._spacing
         # A halt also stops the axes to be held, so the callers of hold() have their answer with it.
         covered = self._requests.pending.take_holds() if stop.level is StopLevel.HALT else Pending()
         entry = self._send(image, covered, status, now)

@@ -42,6 +42,21 @@ def test_a_command_after_a_halt_moves_only_its_own_axes(scan: Scan) -> None:
     assert scan.gripper.position(A) == pytest.approx(100, abs=2)
 
 
+@pytest.mark.parametrize("at", [100.0, 139.0])
+def test_a_halt_whose_repetition_leaves_just_after_the_spacing_is_over(at: float) -> None:
+    """By rounding it counted as early, each time, and was repeated until the polls left that grid."""
+    scan = Scan(spacing=0.01)
+    scan.now = at
+    scan.start()
+    scan.command(A, 255)
+    scan.step()
+    written, halted = len(scan.written), scan.halt()
+    scan.hurry()
+    scan.run(1.0)
+    assert halted.answers == [None]
+    assert len(scan.written) == written + 2
+
+
 def test_the_state_tells_of_a_command_that_waits_for_the_halt_before_it(scan: Scan) -> None:
     halted, waiting = scan.halt(), scan.command(A, 100)
     scan.step()
