@@ -129,11 +129,13 @@ class Controller:
 
         ``unseen`` if it was cancelled: then it does not see, either, that the move has failed already.
         """
-        is_live = self._requests.moves.remove(move)
+        is_live, pending = self._requests.moves.remove(move), self._requests.pending
         if is_live or unseen:
             self._requests.hold(move.left, "a move took over and was given up")
+            # Its other axes follow it until what has taken them over is written, and that may be lost.
+            pending.merge_hold(move.axes & pending.moved)
         if unseen and not is_live and self._evidence.condition is not None:
-            self._requests.pending.hold_only(self._ledger.ours)
+            pending.hold_only(self._ledger.ours)
 
     def hold(self, axes: Finger, waiter: Waiter[None]) -> None:
         """Hold those axes that move, whichever client moves them. In a procedure there is nothing to do."""

@@ -198,6 +198,25 @@ def test_a_hold_outlives_what_has_replaced_it_and_was_lost(scan: Scan, how: str)
     assert abs(scan.positions()[A] - at) <= 4
 
 
+@pytest.mark.parametrize("is_written", [False, True])
+def test_a_cancelled_move_is_held_although_what_took_over_its_axis_is_lost(
+    scan: Scan, is_written: bool
+) -> None:
+    move, _ = scan.move(200, A | B, speed=0)
+    scan.run(0.5)
+    scan.command(A, position=10)
+    scan.controller.abandon(move, unseen=True)
+    at = scan.positions()
+    if is_written:
+        scan.forgets = 1
+        scan.step(answer=False)
+        scan.come_back(0.05)
+    else:
+        scan.blink()
+    scan.run(10)
+    assert [abs(scan.positions()[axis] - at[axis]) <= 10 for axis in (A, B)] == [True, True]
+
+
 def test_a_lost_hold_is_dropped_when_the_gripper_comes_back_reset(scan: Scan) -> None:
     move, _ = scan.move(200, A, speed=0)
     scan.run(0.5)
