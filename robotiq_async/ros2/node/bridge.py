@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import concurrent.futures
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from typing import Any, Final, TypeVar
 
@@ -21,7 +21,7 @@ class ClosedError(Exception):
 
 
 class Bridge:
-    """Three ways to run work in the loop. None blocks the loop, and only :meth:`wait` blocks the executor.
+    """Four ways to run work in the loop. None blocks the loop, and only :meth:`wait` blocks the executor.
 
     Work begins in the order of the calls.
     """
@@ -64,6 +64,10 @@ class Bridge:
     def submit(self, work: Coroutine[Any, Any, object]) -> None:
         """Run work in the loop without waiting for it. It must not raise."""
         self._begin(work)
+
+    def tell(self, what: Callable[..., object], *arguments: object) -> None:
+        """Call a function in the loop, also after :meth:`close`. It must not raise."""
+        self._loop.call_soon_threadsafe(what, *arguments)
 
     def wait(self, work: Coroutine[Any, Any, T]) -> T:
         """Run work in the loop and block the executor: for transitions, whose callbacks are synchronous."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from typing import Any
 
 from control_msgs.action import ParallelGripperCommand
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
@@ -22,8 +23,23 @@ from ..translation.joints import GoalError, Targets, targets
 from ..translation.settings import Settings
 from .bridge import Bridge
 from .publishing import JointStates
+from .unasked import UnaskedGoals
 
 Configured = tuple[Connection, JointStates, Settings]
+
+
+class _Server(ActionServer):  # type: ignore[misc]  # rclpy is not here
+    """Calls ``asked``, in the executor's thread, when a client's request for the result of a goal has come."""
+
+    def __init__(self, *arguments: Any, asked: Callable[[bytes], object], **options: Any) -> None:
+        self._asked = asked
+        super().__init__(*arguments, **options)
+
+    async def execute(self, taken_data: dict[str, Any]) -> None:
+        await super().execute(taken_data)
+        if "result" in taken_data:
+            _, request = taken_data["result"]
+            self._asked(bytes(request.goal_id.uuid))
 
 
 class GripperAction:
@@ -42,7 +58,8 @@ class GripperAction:
         self._warned = False
         self._accepted: dict[bytes, tuple[Configured, int]] = {}
         """The configuration for each accepted goal by its key, and the number of stops at that time."""
-        self._server = ActionServer(
+        self._unasked = unasked = UnaskedGoals()
+        self._server = _Server(
             node,
             ParallelGripperCommand,
             "~/gripper_cmd",
@@ -51,7 +68,14 @@ class GripperAction:
             handle_accepted_callback=self._begin,
             cancel_callback=self._cancel,
             callback_group=group,
+            asked=lambda key: bridge.tell(unasked.asked, key),
         )
+
+    async def results_asked(self) -> None:
+        """Wait, in the loop, until clients have asked for the results of their goals, for seconds at most."""
+        if number := self._unasked.number:
+            self._log.info(f"results that no client has asked for yet: {number}; the node waits for that")
+        await self._unasked.wait()
 
     async def _check(self, request: ParallelGripperCommand.Goal) -> GoalResponse:
         # A rejection has no text in ROS, so the log gives the reason.
@@ -72,6 +96,7 @@ class GripperAction:
         # The goal belongs to the present connection and number of stops: a later stop ends it before it
         # begins.
         try:
+            self._bridge.tell(self._unasked.accepted, _key(handle))
             configured = self._configured()
             self._accepted[_key(handle)] = configured, configured[0].stops
         except Exception as error:  # noqa: BLE001  # would end the executor
@@ -100,6 +125,7 @@ class GripperAction:
         self._accepted.pop(_key(handle), None)
         result.stalled, result.reached_goal = outcome.stalled, outcome.reached
         self._finish(handle, outcome)
+        self._bridge.tell(self._unasked.ended, _key(handle))
         return result
 
     async def _run(self, handle: ServerGoalHandle, result: ParallelGripperCommand.Result) -> Outcome:

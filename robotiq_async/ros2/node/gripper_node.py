@@ -93,6 +93,10 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
         if self._current is not None:
             await self._disconnect(self._current[0], "the node is shutting down")
 
+    async def results_asked(self) -> None:
+        """Wait, in the loop, until clients have asked for the results of their goals, for seconds at most."""
+        await self._action.results_asked()
+
     def _transition(self, what: str, work: Callable[[], str]) -> TransitionCallbackReturn:
         # ROS would swallow the error of a transition.
         try:

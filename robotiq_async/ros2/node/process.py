@@ -1,6 +1,7 @@
 """The process of the node: the event loop in the main thread, ROS's executor in a second one.
 
-It ends in this order: the hand stops, results are sent, the executor ends, then the node, then ROS.
+It ends in this order: the hand stops, results are sent, also those that clients ask for a little later, the
+executor ends, then the node, then ROS.
 """
 
 from __future__ import annotations
@@ -105,6 +106,7 @@ async def _end(node: GripperNode, bridge: Bridge, spinner: Spinner) -> None:
     try:
         await node.close()
         await bridge.drained(ANSWERS_S)
+        await node.results_asked()
         await asyncio.sleep(LINGER_S)
     finally:
         await spinner.end()

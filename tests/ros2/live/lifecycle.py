@@ -10,7 +10,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
 from robotiq_async.ros2.translation.settings import PARAMETERS
-from tests.ros2.live.bench import ABORTED, SUCCEEDED, Client, active
+from tests.ros2.live.bench import ABORTED, SUCCEEDED, Client, Goal, active, waited
 from tests.ros2.live.goals import begun, position
 from tests.ros2.live.processes import node
 from tests.ros2.live.simulated import Simulator
@@ -135,3 +135,15 @@ def test_a_signal_during_a_goal(simulator: Simulator, number: signal.Signals, sh
         assert not simulator.request.go, "rGTO"
         assert position(simulator) == there
         assert "Traceback" not in process.text
+
+
+def test_a_client_that_asks_for_the_result_while_the_node_ends(simulator: Simulator) -> None:
+    """On a busy machine the request came 0.1 s after the end of the goal, and the client waited forever."""
+    with active(simulator.address) as (process, client):
+        accepting, feedback = client.begin_goal(["fingers"], [2.8])
+        handle = waited(accepting)
+        feedback.wait(new=False)
+        process.send(signal.SIGINT)
+        process.prints("results that no client has asked for yet: 1")
+        assert Goal(client, handle, feedback).ends()[0] == ABORTED
+        assert process.ends() == 0

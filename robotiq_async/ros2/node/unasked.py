@@ -1,0 +1,51 @@
+"""UnaskedGoals: goals whose result no client has asked for yet. Does not import ROS."""
+
+# In ROS a client asks for the result of a goal with a request of its own, after the goal was accepted. A client
+# whose request comes after the end of the node waits forever, so the end waits for these requests.
+
+from __future__ import annotations
+
+import asyncio
+import math
+from contextlib import suppress
+from typing import Final
+
+from ...runtime.clock import now
+
+ASKING_S: Final = 3.0
+"""Seconds after its end in which a client may ask for the result of a goal. On a busy machine a request took
+more than 0.2 s; a launch kills its nodes 10 s after the first signal."""
+
+
+class UnaskedGoals:
+    """The goals that were accepted, less those that a client has asked for. Belongs to the event loop."""
+
+    def __init__(self) -> None:
+        self._until: dict[bytes, float] = {}  # when the end of the node no longer waits for it, by its key
+        self._asked = asyncio.Event()
+
+    @property
+    def number(self) -> int:
+        """How many goals :meth:`wait` would wait for."""
+        return sum(until > now() for until in self._until.values())
+
+    def accepted(self, key: bytes) -> None:
+        self._until = {each: until for each, until in self._until.items() if until > now()}
+        self._until[key] = math.inf
+
+    def ended(self, key: bytes) -> None:
+        if key in self._until:
+            self._until[key] = now() + ASKING_S
+
+    def asked(self, key: bytes) -> None:
+        self._until.pop(key, None)
+        self._asked.set()
+
+    async def wait(self) -> None:
+        """Wait until a client has asked for each of them, or until ASKING_S after the last has ended."""
+        at_most = now() + ASKING_S  # also for a goal that has not ended, because the executor hangs
+        with suppress(TimeoutError):
+            while self._until:
+                self._asked.clear()
+                async with asyncio.timeout(min(at_most, max(self._until.values())) - now()):
+                    await self._asked.wait()
