@@ -6,16 +6,21 @@ end the executor, so each one catches all.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
+from typing import Any, Final
 
+from action_msgs.msg import GoalStatusArray
 from control_msgs.action import ParallelGripperCommand
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import CallbackGroup
+from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.qos import qos_profile_action_status_default
 
+from ...runtime.clock import now
 from ...values.errors import NotStartedError
 from ..gripper.connection import Connection, RefusedError
 from ..gripper.goals import Ending, Outcome
@@ -26,20 +31,20 @@ from .publishing import JointStates
 from .unasked import UnaskedGoals
 
 Configured = tuple[Connection, JointStates, Settings]
+RECEIPT_S: Final = 3.0  # seconds for clients to receive results: milliseconds, unless one has crashed
+RECEIPT_LOOK_S: Final = 0.01  # seconds between two looks at that
 
 
 class _Server(ActionServer):  # type: ignore[misc]  # rclpy is not here
-    """Calls ``asked``, in the executor's thread, when a client's request for the result of a goal has come."""
+    """Calls ``asked``, in the executor's thread, when a client has asked for the result of a goal."""
 
-    def __init__(self, *arguments: Any, asked: Callable[[bytes], object], **options: Any) -> None:
-        self._asked = asked
-        super().__init__(*arguments, **options)
+    asked: Callable[[bytes], object]
 
     async def execute(self, taken_data: dict[str, Any]) -> None:
         await super().execute(taken_data)
         if "result" in taken_data:
             _, request = taken_data["result"]
-            self._asked(bytes(request.goal_id.uuid))
+            self.asked(bytes(request.goal_id.uuid))
 
 
 class GripperAction:
@@ -58,6 +63,11 @@ class GripperAction:
         self._warned = False
         self._accepted: dict[bytes, tuple[Configured, int]] = {}
         """The configuration for each accepted goal by its key, and the number of stops at that time."""
+        # ROS does not tell whether a result has been received, but it does for a topic. Every client of an
+        # action reads this one, and receives in order: who has its last message has the results, too.
+        self._last = node.create_publisher(
+            GoalStatusArray, "~/gripper_cmd/_action/status", qos_profile_action_status_default
+        )
         self._unasked = unasked = UnaskedGoals()
         self._server = _Server(
             node,
@@ -68,14 +78,30 @@ class GripperAction:
             handle_accepted_callback=self._begin,
             cancel_callback=self._cancel,
             callback_group=group,
-            asked=lambda key: bridge.tell(unasked.asked, key),
         )
+        self._server.asked = lambda key: bridge.tell(unasked.asked, key)
 
     async def results_asked(self) -> None:
         """Wait, in the loop, until clients have asked for the results of their goals, for seconds at most."""
         if number := self._unasked.number:
             self._log.info(f"results that no client has asked for yet: {number}; the node waits for that")
         await self._unasked.wait()
+        self._last.publish(GoalStatusArray())
+
+    async def results_received(self) -> None:
+        """Wait, in the loop, until clients have the results, for seconds at most: one may have crashed."""
+        if self._is_received():
+            return
+        self._log.info("a client has not received the last messages yet; the node waits for that")
+        until = now() + RECEIPT_S
+        while not self._is_received() and now() < until:  # noqa: ASYNC110  # ROS has no event for it
+            await asyncio.sleep(RECEIPT_LOOK_S)
+
+    def _is_received(self) -> bool:
+        try:
+            return bool(self._last.wait_for_all_acked(Duration()))
+        except Exception:  # noqa: BLE001  # a middleware that cannot tell
+            return True
 
     async def _check(self, request: ParallelGripperCommand.Goal) -> GoalResponse:
         # A rejection has no text in ROS, so the log gives the reason.

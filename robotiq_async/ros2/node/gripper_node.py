@@ -97,6 +97,10 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
         """Wait, in the loop, until clients have asked for the results of their goals, for seconds at most."""
         await self._action.results_asked()
 
+    async def results_received(self) -> None:
+        """Wait, in the loop, until clients have the results that were sent, for seconds at most."""
+        await self._action.results_received()
+
     def _transition(self, what: str, work: Callable[[], str]) -> TransitionCallbackReturn:
         # ROS would swallow the error of a transition.
         try:

@@ -26,7 +26,7 @@ from .bridge import Bridge
 from .gripper_node import GripperNode
 
 ANSWERS_S: Final = 2.0  # seconds to answer what the end has aborted: milliseconds, unless the executor hangs
-LINGER_S: Final = 0.1  # seconds for sent messages to leave: ROS does not report when they have
+LINGER_S: Final = 0.1  # seconds for sent messages to leave: of services ROS does not report when they have
 JOIN_S: Final = 2.0  # seconds for the executor to shut down, and for its thread to end
 MOST_FAILURES: Final = 20  # failing callbacks per second: with more, the executor itself is broken
 
@@ -108,6 +108,7 @@ async def _end(node: GripperNode, bridge: Bridge, spinner: Spinner) -> None:
         await bridge.drained(ANSWERS_S)
         await node.results_asked()
         await asyncio.sleep(LINGER_S)
+        await node.results_received()
     finally:
         await spinner.end()
 

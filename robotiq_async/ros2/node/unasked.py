@@ -1,7 +1,7 @@
 """UnaskedGoals: goals whose result no client has asked for yet. Does not import ROS."""
 
-# In ROS a client asks for the result of a goal with a request of its own, after the goal was accepted. A client
-# whose request comes after the end of the node waits forever, so the end waits for these requests.
+# In ROS a client asks for the result of a goal with a request of its own, after the goal was accepted. If the
+# request comes after the end of the node, the client waits forever, so the end waits for these requests.
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from typing import Final
 from ...runtime.clock import now
 
 ASKING_S: Final = 3.0
-"""Seconds after its end in which a client may ask for the result of a goal. On a busy machine a request took
-more than 0.2 s; a launch kills its nodes 10 s after the first signal."""
+"""Seconds after the end of a goal in which its client may ask for the result. On a busy machine requests came
+0.3 s after they had been sent; a launch kills its nodes 10 s after the first signal."""
 
 
 class UnaskedGoals:

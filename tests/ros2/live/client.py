@@ -1,6 +1,6 @@
 """A client in a process of its own, to be killed, or to call without a pause.
 
-python -m tests.ros2.live.client goal RADIANS       sends it, says how it went, and waits
+python -m tests.ros2.live.client goal RADIANS       sends it, says that it began and how it ended, and waits
 python -m tests.ros2.live.client hammer SERVICE N   calls it N times, ten at a time
 """
 
@@ -13,8 +13,10 @@ from tests.ros2.live.bench import Client, waited
 
 
 def goal(client: Client, radians: str) -> None:
-    client.move(float(radians)).feedback.wait(new=False)
+    sent = client.move(float(radians))
+    sent.feedback.wait(new=False)
     print("under way", flush=True)  # noqa: T201
+    print(f"ended: {sent.ends()[0]}", flush=True)  # noqa: T201
     time.sleep(3600)
 
 

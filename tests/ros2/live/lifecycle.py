@@ -12,7 +12,7 @@ from lifecycle_msgs.srv import ChangeState
 from robotiq_async.ros2.translation.settings import PARAMETERS
 from tests.ros2.live.bench import ABORTED, SUCCEEDED, Client, Goal, active, waited
 from tests.ros2.live.goals import begun, position
-from tests.ros2.live.processes import node
+from tests.ros2.live.processes import Process, node
 from tests.ros2.live.simulated import Simulator
 
 
@@ -146,4 +146,17 @@ def test_a_client_that_asks_for_the_result_while_the_node_ends(simulator: Simula
         process.send(signal.SIGINT)
         process.prints("results that no client has asked for yet: 1")
         assert Goal(client, handle, feedback).ends()[0] == ABORTED
+        assert process.ends() == 0
+
+
+def test_a_client_that_is_held_up_while_the_node_ends(simulator: Simulator) -> None:
+    """Results that it had not read when the node was gone were lost."""
+    other = ("-m", "tests.ros2.live.client", "goal", "2.8")
+    with active(simulator.address) as (process, _), Process(*other) as held:
+        held.prints("under way")
+        held.send(signal.SIGSTOP)
+        process.send(signal.SIGINT)
+        process.prints("a client has not received the last messages yet")
+        held.send(signal.SIGCONT)
+        held.prints(f"ended: {ABORTED}")
         assert process.ends() == 0
