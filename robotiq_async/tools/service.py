@@ -200,7 +200,7 @@ async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator
 
 
 def _without_stopped(error: NotStartedError | BaseExceptionGroup[BaseException]) -> BaseException | None:
-    """What a stop does not explain; None if there is nothing. Each task of a group has an error of its own."""
+    """What a stop does not explain; None for nothing. Each task of a group has an error of its own."""
     return error.split(NotStartedError)[1] if isinstance(error, BaseExceptionGroup) else None
 
 
