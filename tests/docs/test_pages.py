@@ -36,6 +36,7 @@ from tests.docs.pages import (
     run_prompt,
 )
 from tests.docs.test_tutorial import agree
+from tests.patience import patience
 
 FRONT = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")]
 FIXTURES = DOCS / "how-to" / "testing.md"
@@ -147,6 +148,21 @@ async def test_the_first_move_of_a_real_gripper_ends_wherever_its_fingers_are(cl
             await run_prompt(compiled(page, block, server.address), {})
     assert printed.getvalue().count("<MoveResult A=") == block.text.count("await hand.") > 0
     assert gripper.position(Finger.B) > 200 or not closed, "only A has moved"
+
+
+async def test_the_program_of_the_readme_ends_with_its_part(tmp_path: Path) -> None:
+    (example,) = blocks(read(ROOT / "README.md"), "python")
+    program = tmp_path / "example.py"
+    async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
+        server.gripper.place_object(Finger.ABC, position=150)
+        program.write_text(example.text.replace("tcp://192.168.1.11", server.address), encoding="utf-8")
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, str(program)), env={"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE
+        )
+        printed, _ = await asyncio.wait_for(process.communicate(), patience(30))
+    assert process.returncode == 0
+    assert printed.startswith(b"holding it with A|B|C after ")
+    assert printed.count(b"\n") > 2, "and what was read while A opened"
 
 
 def test_the_code_for_typed_projects_passes_mypy_strict(tmp_path: Path) -> None:
