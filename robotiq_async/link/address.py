@@ -204,11 +204,12 @@ def parse_address(address: object) -> Address:
         raise ValueError(
             f"{address!r} is a gripper on another host: use robotiq_async.fleet.RemoteHand; accepted: {FORMS}"
         )
-    raise ValueError(f"malformed address {address!r}; accepted: {FORMS}")
+    meant = f": {guess}" if scheme == "sim" and (guess := _meant(rest)) else ""
+    raise ValueError(f"malformed address {address!r}{meant}; accepted: {FORMS}")
 
 
 def _meant(address: str) -> str:
-    """A guess at an address without a scheme that names no host; empty if it may be one."""
+    """A guess at an address without a scheme, or a simulated one, that names no host; empty if it may be one."""
     if re.fullmatch(r"com[0-9]{1,3}", address, re.IGNORECASE):
         return f"a serial port is rtu://{address.upper()}"
     if address.startswith("/dev/"):

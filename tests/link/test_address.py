@@ -199,6 +199,7 @@ def test_a_character_has_ten_to_twelve_bits() -> None:
         ("2f85", "tcp://192.168.1.11?model=2f85"),
         ("2F-140", "?model=2f140"),
         ("HandE", "?model=hand-e"),
+        ("sim://2f85", "sim://?model=2f85"),
         ("rtu:///dev/ttyUSB0?baudrate=9600", "no option 'baudrate' of a serial port; did you mean baud?"),
         ("rtu://COM3?baudrate=9600&model=2f85", "did you mean baud?"),
         ("rtu:///dev/ttyUSB0?modle=2f85", "did you mean model?"),
