@@ -209,7 +209,7 @@ def parse_address(address: object) -> Address:
 
 
 def _meant(address: str) -> str:
-    """A guess at an address without a scheme, or a simulated one, that names no host; empty if it may be one."""
+    """A guess at an address that names no host, and no scheme or a simulation; empty if it may be one."""
     if re.fullmatch(r"com[0-9]{1,3}", address, re.IGNORECASE):
         return f"a serial port is rtu://{address.upper()}"
     if address.startswith("/dev/"):
