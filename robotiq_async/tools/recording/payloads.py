@@ -141,7 +141,7 @@ def mark_fields(label: str, values: Mapping[str, object], timestamp: float) -> F
     """
     if not isinstance(label, str):
         raise TypeError(f"label must be a str, got {repr_of(label)}")
-    plain = {name: _plain(name, value) for name, value in values.items()}
+    plain = {name: _plain(name, value) for name, value in values.items() if value is not None}
     return {"kind": "mark", "timestamp": timestamp, "label": _plain("label", label), "values": plain}
 
 

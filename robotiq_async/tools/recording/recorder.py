@@ -213,7 +213,7 @@ class Recorder:
         self._caller.check_process()
         self._caller.wait(lambda: self.__aexit__(kind, error, trace))
 
-    def mark(self, label: str, **values: str | float | bool) -> None:
+    def mark(self, label: str, **values: str | float | bool | None) -> None:
         """Write a mark: everything from now on has this label, until the next mark.
 
         It never waits for the file. With a blocking hand it waits for a turn of the hand's event loop.
@@ -223,7 +223,8 @@ class Recorder:
 
         Args:
             label: such as ``"grasp 7"``.
-            **values: such as ``object="cup"``; text, finite numbers and truth values, also numpy's.
+            **values: such as ``object="cup"``; text, finite numbers and truth values, also numpy's. What is
+                None is left out, as the width of an empty grasp.
 
         Raises:
             TypeError: a label or a value of another type.
