@@ -128,6 +128,26 @@ def test_stroke_asks_for_figures_that_fall_until_the_fingertips_meet(call: Call,
     assert gripper.writes[-1].registers[0] & 0x0800 == 0, "the jaw is stopped at the end"
 
 
+@pytest.mark.parametrize(
+    ("figures", "is_doubted"),
+    [
+        (b"8.5\n6.6\n4.3\n2.1\n0\n", True),
+        (b"850\n660\n430\n210\n0\n", True),
+        (b"120\n98\n75\n52\n31\n", False),
+    ],
+)
+def test_stroke_doubts_figures_that_are_no_millimetres(
+    figures: bytes, is_doubted: bool, call: Call, tmp_path: Path
+) -> None:
+    """Centimetres made a table like any other, and 8 mm then was an open jaw."""
+    with served(SimulatedGripper(speedup=20, model="2f85")) as server:
+        file = tmp_path / "s.csv"
+        outcome = call("measure", "stroke", "--yes", server.address, "--output", str(file), stdin=figures)
+    outcome.assert_succeeded()
+    assert outcome.out.count("If the\ncalliper is not in millimetres, press Ctrl-C") == is_doubted
+    assert file.exists(), "it may be right"
+
+
 def test_stroke_does_not_measure_what_it_cannot_write(call: Call, tmp_path: Path) -> None:
     outcome = call("measure", "stroke", "sim://?model=2f85", "--output", str(tmp_path / "none" / "s.csv"))
     outcome.assert_failed(1, f"{tmp_path}/none/s.csv: its folder does not exist, or cannot be written to")

@@ -31,6 +31,11 @@ MET: Final = """The fingertips met at {position} counts: that is the closed end.
 press Ctrl-C, take it out and begin again."""
 OPEN_IS_ZERO: Final = "an open jaw cannot have an opening of 0 mm"
 TOUCH: Final = "The fingertips touch at {position} counts: that is the closed end."
+DOUBT: Final = """From {first} to {last} counts this falls by {mm:g} mm, nominal are {nominal:.1f}. If the
+calliper is not in millimetres, press Ctrl-C and begin again: nothing is written yet."""
+DOUBTFUL: Final = 2.0
+"""The ratio of a fall to the nominal one, either way, that is doubted. Fingertips of one's own make the
+opening wider or narrower, and hardly change by how much it falls."""
 FORM: Final = r"[0-9]{1,3}(?:\.[0-9]{1,2})?"
 
 Calliper = Callable[[int], Awaitable[float]]  # takes the position, in counts
@@ -111,6 +116,8 @@ async def measured(hand: Hand, count: int, calliper: Calliper) -> Points:
         # At its ends, and after a small step, the jaw is where it was.
         if not points or position > points[-1][0]:
             points.append(await _point_after(points, calliper, position))
+            if len(points) == 2:
+                _doubt(hand, *points)
         is_closed = points[-1][1] == 0
         if is_closed and not has_met:
             print(TOUCH.format(position=position), flush=True)
@@ -119,6 +126,14 @@ async def measured(hand: Hand, count: int, calliper: Calliper) -> Points:
     if len(points) < 2:
         raise CommandError(f"the jaw did not move on from {points[0][0]} counts")
     return tuple(points)
+
+
+def _doubt(hand: Hand, first: Point, last: Point) -> None:
+    """Say so if the first two figures look like inches or centimetres."""
+    opening_mm = hand.model.stroke.opening_mm
+    mm, nominal = first[1] - last[1], opening_mm(first[0]) - opening_mm(last[0])
+    if not nominal / DOUBTFUL <= mm <= nominal * DOUBTFUL:
+        print(DOUBT.format(first=first[0], last=last[0], mm=mm, nominal=nominal), flush=True)
 
 
 async def _point_after(points: Sequence[Point], calliper: Calliper, position: int) -> Point:
