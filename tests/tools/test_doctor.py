@@ -156,6 +156,12 @@ async def test_nothing_listens() -> None:
 
 STRANGERS: dict[str, tuple[Callable[[bytes], bytes], str, Level, str]] = {
     "no Modbus": (lambda _: b"HTTP/1.1 400 Bad\r\n\r\n", "Modbus", Level.BAD, "not this gripper"),
+    "a gateway": (
+        lambda request: reply(request, bytes((request[7] | 0x80, 11))),
+        "Modbus",
+        Level.BAD,
+        "the gripper behind it does not",
+    ),
     "zeros": (lambda request: registers_in(request, bytes(16)), "gripper", Level.DOUBT, "have no power"),
     "ones": (
         lambda request: registers_in(request, b"\xff" * 16),
@@ -301,11 +307,17 @@ def status_of(request: bytes) -> bytes:
     return with_crc(bytes((request[0], request[1], size)) + block[:size])
 
 
+def refusal_of(request: bytes, code: int) -> bytes:
+    return with_crc(bytes((request[0], request[1] | 0x80, code)))
+
+
 ON_A_LINE: dict[str, tuple[Callable[[bytes], bytes], str]] = {
     "silence": (lambda _: b"", "Nothing answers: check the gripper's power, A and B"),
     "echo alone": (echoing(lambda _: b""), "The line echoes what is sent, and nothing else answers"),
     "damage": (lambda request: status_of(request)[:-1] + b"\0", "Replies come damaged"),
     "another rate": (lambda _: bytes.fromhex("f8 00 e0 fe"), "another rate or parity"),
+    "a gateway": (lambda request: refusal_of(request, 11), "the gripper behind it does not"),
+    "a refusal": (lambda request: refusal_of(request, 2), "refuses to be read"),
     "7 bits": (lambda request: bytes(each & 0x7F for each in status_of(request)[1:]), "7 data bits"),
 }
 
@@ -323,7 +335,7 @@ async def test_a_line_without_an_answer_gets_advice_for_lines(fault: str) -> Non
 @pytest.mark.parametrize(
     ("words", "level", "advice"),
     [
-        ("silence", Level.BAD, "check the gripper's power, A and B (swapped?), its rate (?baud=)"),
+        ("silence", Level.BAD, "power, A and B (swapped?), its rate (?baud=) and unit id (--device-id)"),
         ("wrong-checksum for ever", Level.BAD, "check shield, ground, termination and length of the cable"),
         ("byte-before for ever", Level.BAD, "Bytes come that are no reply"),
         ("byte-after for ever", Level.BAD, "Bytes come that are no reply"),
@@ -512,6 +524,17 @@ async def test_a_link_that_is_lost_in_the_middle() -> None:
         asyncio.get_running_loop().call_later(1.0, go_away)
         found = await findings(server.address)
     assert found["link"].level is Level.BAD
+
+
+async def test_a_line_that_is_lost_in_the_middle_drops_no_packets(monkeypatch: pytest.MonkeyPatch) -> None:
+    line, loop = VirtualLine(monkeypatch), asyncio.get_running_loop()
+    async with SerialSimulatorServer(line.FAR, SimulatedGripper(loop.time)) as server:
+        loop.call_later(1.0, setattr, server, "policy", lambda frame: [(0.0, frame + b"\0")])
+        found = (await findings(f"rtu://{line.NEAR}", seconds=120))["link"]
+    assert found.level is Level.BAD
+    assert "1 bytes more than the answer" in found.found
+    assert "shield, ground and termination" in found.advice
+    assert not re.search("network|switch|client|packets", found.advice)
 
 
 @pytest.mark.parametrize("what", ["slow", "pulled out", "read by another program"])

@@ -39,6 +39,8 @@ LOST_PORT: Final = (
     "Is the plug firm? fuser -v DEVICE shows who else has the port: ModemManager, brltty or a terminal."
 )
 
+DAMAGED: Final = "Replies get lost or damaged: check cable, shield, ground and termination."
+
 
 class Answering(NamedTuple):
     """A gripper that answers."""
@@ -231,7 +233,7 @@ def _answers(address: Address, failure: RobotiqConnectionError | None, tries: in
         advice = f"It closed the connection without an answer. {ALONE}: is another program connected?"
         advice = LOST_PORT if address.kind == "rtu" else advice
     elif address.kind == "rtu":
-        advice = "Replies get lost or damaged: check cable, shield, ground and termination."
+        advice = DAMAGED
     else:
         advice = (
             "Replies get lost or damaged: check cable and switch, and look for another client. "
@@ -245,6 +247,11 @@ def _echoes(link: Link) -> bool:
 
 
 def _advice_for_silence(address: Address, error: RobotiqConnectionError, echoes: bool) -> str:
+    if "the gateway refuses" in str(error):
+        return (
+            "A gateway answers, and the gripper behind it does not: check that gripper's power and unit id "
+            "(--device-id), A and B (swapped?), and the rate that the gateway has."
+        )
     if address.is_rtu and isinstance(error, ResponseTimeoutError | ProtocolError):
         return _advice_for_a_line(error, echoes)
     if isinstance(error, ResponseTimeoutError):
@@ -264,8 +271,14 @@ def _advice_for_a_line(error: RobotiqConnectionError, echoes: bool) -> str:
     if isinstance(error, ResponseTimeoutError):
         heard = "The line echoes what is sent, and nothing else answers" if echoes else "Nothing answers"
         return (
-            f"{heard}: check the gripper's power, A and B (swapped?), its rate (?baud=), and whether another "
-            "program has the line. At a UR the tool I/O must belong to the user, and Robotiq's URCap be off."
+            f"{heard}: check the gripper's power, A and B (swapped?), its rate (?baud=) and unit id "
+            "(--device-id), and whether another program has the line. At a UR the tool I/O must belong to "
+            "the user, and Robotiq's URCap be off."
+        )
+    if "refuses" in str(error):
+        return (
+            "Something answers, and refuses to be read: another device, or one that has its registers "
+            "elsewhere (request_address, status_address)."
         )
     if "checksum" in str(error):
         return (

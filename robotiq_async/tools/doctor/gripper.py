@@ -23,7 +23,7 @@ from ...values.model import MODELS, Model, model_of, names_that_fit
 from ...values.registers import Registers
 from ...values.statistics import percentile
 from ...values.status import RobotiqStatus
-from .answer import LOST_PORT, REACH_S, find_gripper, long_enough
+from .answer import DAMAGED, LOST_PORT, REACH_S, find_gripper, long_enough
 from .findings import Finding, GiveUpError, Level, Report
 from .urcap import find_urcap
 
@@ -60,11 +60,17 @@ async def examine(address: Address, report: Report, *, device_id: int | None = N
     except GiveUpError:
         pass
     except RobotiqConnectionError as error:
-        advice = "Check cable, switch and power: something on the way to the gripper drops packets."
-        if isinstance(error, ConnectionLostError):
-            advice = "It closed the connection: it serves one client and another came, or it lost power."
-            advice = LOST_PORT if address.kind == "rtu" else advice
+        advice = _advice_for_a_loss(address, error)
         report(Finding(Level.BAD, "link", f"lost during the examination: {error}", advice))
+
+
+def _advice_for_a_loss(address: Address, error: RobotiqConnectionError) -> str:
+    if isinstance(error, ConnectionLostError):
+        closed = "It closed the connection: it serves one client and another came, or it lost power."
+        return LOST_PORT if address.kind == "rtu" else closed
+    if address.is_rtu:
+        return f"{DAMAGED} A second master on the line does that, too, and so does a gripper without power."
+    return "Check cable, switch and power: something on the way to the gripper drops packets."
 
 
 def _check_model(model: Model, registers: Registers, report: Report) -> None:
