@@ -164,6 +164,21 @@ def test_a_part_is_met_where_it_is(model: Model, scene: str, mm: float) -> None:
 
 
 @JAWS
+def test_a_light_ball_is_held_still_with_full_force(model: Model) -> None:
+    """One of 2 g trembled at 130 N, and the motion did not end."""
+    bench = active("sphere:20,0.001", model)
+    bench.move(255)
+    bench.run(0.5)
+    forces = []
+    for _ in range(100):
+        bench.run(POLL_S)
+        forces.append(bench.physics.grip_force)
+    assert bench.status.finger_status(JAW) is ObjectStatus.CONTACT_CLOSING
+    assert forces == pytest.approx([model.forces_n[1]] * 100, rel=0.05)
+    assert bench.physics.opening_mm == pytest.approx(20, abs=1)
+
+
+@JAWS
 def test_what_is_held_comes_along_and_what_is_too_heavy_slips(model: Model) -> None:
     held = active(BOX, model)
     held.move(255, force=255)

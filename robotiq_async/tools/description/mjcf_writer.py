@@ -30,6 +30,9 @@ _GAINS: Final = {False: (500.0, 7.0, 0.02), True: (30_000.0, 500.0, 2.0)}
 _SHARED_GAINS: Final = (150.0, 2.5, 0.006)
 """The same of a drive that pulls a tendon."""
 _DAMPING: Final = {False: 0.02, True: 5.0}
+_PAD_HARDNESS: Final = {False: "0.999 0.9999 0.0005", True: "0.99 0.9999 0.0005"}
+"""The softness of a contact grows as the mass of the part and the number of points shrink: between softer
+pads a ball of 2 g trembled. Fingers that pull tendons lose their hold on a part with pads that are harder."""
 _HARD: Final = {"solref": "0.004 1", "solimp": "0.95 0.999 0.001"}
 
 
@@ -66,17 +69,17 @@ def write_mjcf(model: HandModel, note: str) -> str:
 
 
 def _add_bodies(world: ET.Element, model: HandModel) -> None:
-    bodies = {model.root: _body(world, model.links[model.root], model.stand)}
+    bodies = {model.root: _body(world, model, model.root, model.stand)}
     for joint in model.joints:
-        link = model.links[joint.child]
-        body = _body(bodies[joint.parent], link, joint.origin)
+        body = _body(bodies[joint.parent], model, joint.child, joint.origin)
         bodies[joint.child] = body
         if joint.axis is not None:
             # After the inertial element, before the shapes: the order that MuJoCo's own files have.
             body.insert(1, _joint(model, joint))
 
 
-def _body(parent: ET.Element, link: Link, pose: Pose) -> ET.Element:
+def _body(parent: ET.Element, model: HandModel, name: str, pose: Pose) -> ET.Element:
+    link = model.links[name]
     body = ET.SubElement(parent, "body", name=link.name, pos=numbers(pose.position), quat=_quaternion(pose))
     centre, moments, products = inertia(link)
     ET.SubElement(
@@ -87,11 +90,11 @@ def _body(parent: ET.Element, link: Link, pose: Pose) -> ET.Element:
         fullinertia=numbers([*moments, *products]),
     )
     for shape in link.shapes:
-        body.append(_geom(link, shape))
+        body.append(_geom(model, link, shape))
     return body
 
 
-def _geom(link: Link, shape: Shape) -> ET.Element:
+def _geom(model: HandModel, link: Link, shape: Shape) -> ET.Element:
     halved = {
         "box": [edge / 2 for edge in shape.size],
         "cylinder": [shape.size[0], shape.size[-1] / 2],
@@ -113,9 +116,8 @@ def _geom(link: Link, shape: Shape) -> ET.Element:
         geom.set("friction", numbers(_PAD_FRICTION))
         geom.set("condim", "4")
         geom.set("priority", "1")
-        # Hard: the softness of a contact grows as the mass of the part and the number of points shrink.
         geom.set("solref", "0.004 1")
-        geom.set("solimp", "0.99 0.9999 0.0005")
+        geom.set("solimp", _PAD_HARDNESS[bool(model.tendons)])
     else:
         geom.set("friction", numbers(_BODY_FRICTION))
     return geom
