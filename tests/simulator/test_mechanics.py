@@ -152,6 +152,28 @@ def test_pads_press_with_the_force_of_the_table(model: Model, force: int) -> Non
 
 
 @JAWS
+def test_a_thin_part_is_pressed_with_all_of_the_force_and_let_go_at_the_target(model: Model) -> None:
+    """Near the target the servo gave less: 56 N of 130 on 8 mm."""
+    bench = active("box:8x40x50,0.05", model)
+    bench.move(255)
+    bench.run(0.5)
+    assert bench.physics.grip_force == pytest.approx(model.forces_n[1], rel=0.15)
+    met = bench.status.position(JAW)
+    bench.move(0)
+    bench.move(met + 4)
+    assert bench.status.finger_status(JAW) is ObjectStatus.CONTACT_CLOSING
+    bench.run(0.5)
+    bench.physics.take_away()
+    farthest = 0
+    for _ in range(200):
+        bench.run(POLL_S)
+        farthest = max(farthest, bench.status.position(JAW))
+    assert bench.status.finger_status(JAW) is ObjectStatus.AT_POSITION
+    assert bench.status.position(JAW) == pytest.approx(met + 4, abs=1)
+    assert farthest <= met + 24, "it does not go on"
+
+
+@JAWS
 @pytest.mark.parametrize(
     ("scene", "mm"), [(BOX, 30), ("cylinder:12x60,0.03", 12), ("box:8x40x50,0.05", 8), ("sphere:40,0.1", 40)]
 )

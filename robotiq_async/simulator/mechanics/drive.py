@@ -38,6 +38,12 @@ _LOCK: Final = 4.0
 """Times its full force that a locked motor withstands (ESTIMATE): gears that lock themselves."""
 _LET_GO: Final = 4.0
 """Counts that an axis goes back to let go of a part (ESTIMATE)."""
+_BLOCKED_S: Final = 0.02
+"""Seconds of rest before its target after which an axis is blocked."""
+_BEYOND: Final = 255.0
+"""Counts beyond its target that the reference of a blocked axis may go, for the force of the request."""
+_GONE: Final = 4.0
+"""Counts that a blocked axis moves on when what was in its way has gone: more than a part yields."""
 _LEAD: Final = 1.3
 """Share of the way at which the servo gives its full force that the reference may be ahead."""
 
@@ -78,8 +84,9 @@ class MotorDrive:
         self._force = 0
         self._has_goal = False
         self._is_locked = True
+        self._is_blocked = False
         self._rested = 0.0
-        self._rests_at = self._counted_at = self.position
+        self._rests_at = self._counted_at = self._blocked_at = self.position
         self._ended_at = 0.0
 
     @property
@@ -120,7 +127,7 @@ class MotorDrive:
             self._reference = self._farthest = self.position
         # A new request in the same direction does not restart the pressing: a loop of 50 Hz sends many.
         if turns or not self._is_going:
-            self._rested = 0.0
+            self._rested, self._is_blocked = 0.0, False
         self.clears = clears
         self.outcome = ObjectStatus.IN_MOTION
         self._has_goal, self._is_locked = True, False
@@ -139,7 +146,8 @@ class MotorDrive:
             return self._value(self._reference), _LOCK * self._full_force()
         limit = self._limit()
         back = self._pushed_back()
-        way = self._aim - self._reference
+        # However near the target is: what is in the way is pressed with the force of the request.
+        way = self._aim + self._sign * _BEYOND * self._is_blocked - self._reference
         moved = min(max(way, -self._rate * step_s), self._rate * step_s)
         lead = _LEAD * limit / self._stiffness + back + 2 * self._rate * step_s
         self._reference = min(max(self._reference + moved, self.position - lead), self.position + lead)
@@ -149,14 +157,12 @@ class MotorDrive:
 
     @property
     def _has_its_force(self) -> bool:
-        """Whether it presses with all of the force of the request, or its target lies too near for that.
+        """Whether it presses with all of the force of the request.
 
         The servo of a slow motor gets its force bit by bit. A finger that locks before is left with less:
         with 22 N of 60 if it bends around an edge from there on.
         """
-        if not self._locks or self._reference == self._aim:
-            return True
-        return abs(self._reference - self.position) * self._stiffness >= self._limit()
+        return not self._locks or abs(self._reference - self.position) * self._stiffness >= self._limit()
 
     def _pushed_back(self) -> float:
         """Counts that a finger was pushed back.
@@ -205,6 +211,7 @@ class MotorDrive:
             self.travel += abs(position - self._counted_at)
             self._counted_at = position
         self.position = position
+        self._see_blocked()
         if abs(position - self._rests_at) <= _RESTING:
             self._rested += step_s
         else:
@@ -219,13 +226,23 @@ class MotorDrive:
             self.outcome = ObjectStatus.IN_MOTION
             self._rested = 0.0
 
+    def _see_blocked(self) -> None:
+        if self._is_blocked:
+            on, beyond = self.position - self._blocked_at, self.position - self._target
+            if self._sign * on > _GONE or self._sign * beyond > _NEAR:  # what was in the way has gone
+                self._is_blocked = False
+                self._reference = self._sign * min(self._sign * self._reference, self._sign * self._aim)
+        elif self._rested >= _BLOCKED_S and not (self._is_near or self._is_locked):
+            self._is_blocked, self._blocked_at = True, self.position
+
     @property
     def _has_moved_on(self) -> bool:
         """Whether a jaw leaves its place: a part slips or has gone, or one was put back between its pads."""
         return abs(self.position - self._ended_at) > _SLIPPED or (self.outcome.is_contact and self._is_near)
 
     def _judge(self) -> None:
-        if self._is_near and self._reference == self._aim and self._rested >= _ARRIVED_S:
+        is_all = self._is_blocked or self._reference == self._aim
+        if self._is_near and is_all and self._rested >= _ARRIVED_S:
             self.outcome = ObjectStatus.AT_POSITION
             self._ended_at = self.position
         elif self._rested >= _CONTACT_S and not self._is_near and self._has_its_force:
