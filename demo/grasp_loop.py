@@ -33,7 +33,9 @@ def main(address: str) -> None:
         if found is None:
             print("nothing there")
         else:
-            print(f"held at {found} counts: about {hand.units.mm(found):.0f} mm, {hand.units.stroke.source}")
+            part = hand.part
+            width = None if part is None else part.width_mm  # only a jaw has one, and it is nominal
+            print(f"held at {found} counts" + (f": about {width:.0f} mm" if width is not None else ""))
         hand.open()
 
 
