@@ -81,6 +81,54 @@ def test_the_gripper_is_mounted_in_a_world_of_ones_own(tmp_path: Path) -> None:
     assert bench.physics.opening_mm == pytest.approx(40, abs=4)
 
 
+ARM = """<mujoco><worldbody>
+  <geom type="plane" size="1 1 0.1"/>
+  <body name="arm" pos="0 0 0.17"><joint name="z" type="slide" axis="0 0 1"/>
+    <geom type="box" size="0.02 0.02 0.02" pos="0 0 0.05" mass="1" contype="0" conaffinity="0"/>
+    <site name="gripper" quat="0 1 0 0"/></body>
+  <body name="can" pos="0 0 0.03"><freejoint/><geom type="cylinder" size="0.02 0.03" mass="0.1"/></body>
+</worldbody><actuator>
+  <position name="lift" joint="z" kp="20000" kv="1000" ctrllimited="true" ctrlrange="0 0.2"/>
+</actuator></mujoco>"""
+
+
+def test_an_arm_of_ones_own_carries_the_gripper_and_the_part(tmp_path: Path) -> None:
+    file = tmp_path / "cell.xml"
+    file.write_text(ARM, encoding="utf-8")
+    bench = active(str(file))
+    bench.move(255, force=200)
+    before = bench.physics.part
+    assert before is not None
+    for step in range(1, 101):
+        bench.physics.control("lift", 0.001 * step)
+        bench.run(0.02)
+    bench.run(0.5)
+    assert bench.physics.joint("z") == pytest.approx(0.1, abs=0.002)
+    assert bench.physics.part == pytest.approx((before[0], before[1], before[2] + 100), abs=4)
+    assert bench.status.finger_status(JAW) is ObjectStatus.CONTACT_CLOSING
+
+
+def test_a_control_that_cannot_be_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "cell.xml"
+    file.write_text(ARM, encoding="utf-8")
+    physics = Bench(str(file)).physics
+    for name in ("gripper/A", "z", ""):
+        with pytest.raises(ValueError, match=r"actuator must be one of \['lift'\]"):
+            physics.control(name, 0.1)
+    for value in (0.3, -0.1, float("nan")):
+        with pytest.raises(ValueError, match=r"the control of 'lift' must be a number in 0.0..0.2"):
+            physics.control("lift", value)
+    with pytest.raises(ValueError, match=r"joint must be one of \['z'\], got 'can'"):
+        physics.joint("can")
+    for call in (lambda: physics_of_table().control("mount", 1), lambda: physics_of_table().joint("mount")):
+        with pytest.raises(RuntimeError, match="only a scene of a file"):
+            call()
+
+
+def physics_of_table() -> Physics:
+    return Bench("table").physics
+
+
 def test_a_part_of_several_bodies_is_out_of_the_way_as_a_whole(tmp_path: Path) -> None:
     file = tmp_path / "cell.xml"
     geom = '<geom type="cylinder" size="0.02 0.03" mass="0.1"/>'

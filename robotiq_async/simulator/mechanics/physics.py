@@ -169,6 +169,31 @@ class Physics:
         with self._lock:
             self._made.lift(height)
 
+    def control(self, actuator: str, value: float) -> None:
+        """Set the control of an actuator of the scene's file: of an arm that carries the gripper.
+
+        Args:
+            actuator: its name in the file.
+            value: in its own unit, within its range.
+
+        Raises:
+            TypeError: not a number.
+            ValueError: the file has no actuator of this name, or the value is outside of its range.
+            RuntimeError: the scene is not a file.
+        """
+        with self._lock:
+            self._made.control(actuator, value)
+
+    def joint(self, name: str) -> float:
+        """The place of a hinge or slide of the scene's file, in radians or metres.
+
+        Raises:
+            ValueError: the file has none of this name.
+            RuntimeError: the scene is not a file.
+        """
+        with self._lock:
+            return self._made.joint(name)
+
     def take_away(self) -> None:
         """Take the parts away, out of the fingers too."""
         with self._lock:

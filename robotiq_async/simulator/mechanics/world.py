@@ -6,8 +6,8 @@ One step is 2 ms, or that of the user's file. Nothing here knows a clock.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from math import isnan
+from collections.abc import Iterable, Iterator
+from math import inf, isnan
 from typing import TYPE_CHECKING, Any, Final
 
 from robotiq_async.runtime.extras import install
@@ -19,6 +19,7 @@ except ModuleNotFoundError as error:
 
 import numpy as np
 
+from robotiq_async.values.checks import check_number
 from robotiq_async.values.enums import Finger
 
 from .alone import levers_of, pads, put_at, reach
@@ -145,6 +146,31 @@ class World:
                 "physics: a gripper in a scene of a file is not lifted: it is where the site is"
             )
         self._height = millimetres / 1000
+
+    def control(self, actuator: str, value: float) -> None:
+        """Set the control of an actuator of the user's world."""
+        model = self._model
+        names = self._own(model.actuator(number).name for number in range(model.nu))
+        if actuator not in names:
+            raise ValueError(f"physics: actuator must be one of {names}, got {actuator!r:.100}")
+        index = model.actuator(actuator).id
+        low, high = model.actuator_ctrlrange[index] if model.actuator_ctrllimited[index] else (-inf, inf)
+        self._controls[index] = check_number(f"the control of {actuator!r}", value, low, high)
+
+    def joint(self, name: str) -> float:
+        """The place of a hinge or slide of the user's world."""
+        model = self._model
+        single = np.flatnonzero(model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE))  # or hinge
+        names = self._own(model.joint(each).name for each in single)
+        if name not in names:
+            raise ValueError(f"physics: joint must be one of {names}, got {name!r:.100}")
+        return float(self._data.joint(name).qpos[0])
+
+    def _own(self, names: Iterable[str]) -> list[str]:
+        """Those of the user, who has named them."""
+        if self._mount is not None:
+            raise RuntimeError("physics: only a scene of a file has actuators and joints of its own")
+        return [name for name in names if name and not name.startswith(OURS)]
 
     def take_away(self) -> None:
         """Take the parts away, out of the fingers too."""
