@@ -133,6 +133,9 @@ SEQUENCES: Final = frozenset(
 )
 """The states of an activation, a release and a reset. Clearing rGTO ends none of these."""
 
+_ADVICE: Final = "activate() waits for it, and recover() also resets a gripper that is stuck"
+"""For a motion that an activation refuses."""
+
 
 def states_allowing(trigger: Trigger) -> frozenset[State]:
     return frozenset(
@@ -203,8 +206,10 @@ def refusal(
             return GripperFaultError(Fault.NONE if status is None else status.fault)
     allowed = states_allowing(trigger)
     names = ", ".join(sorted(each.name for each in allowed))
+    is_activating = state in (State.DO_ACTIVATION, State.WF_ACTIVATION)
     return InvalidStateError(
         f"{trigger.value} is not possible in state {state.name}; possible in: {names or 'none'}",
         state,
         allowed,
+        advice=_ADVICE if is_activating and trigger is Trigger.ASK_COMMAND else "",
     )

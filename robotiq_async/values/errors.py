@@ -96,10 +96,12 @@ class InvalidStateError(RobotiqStateError):
         allowed: the states in which the call is possible.
     """
 
-    def __init__(self, message: str, state: State, allowed: Iterable[State] = ()) -> None:
+    def __init__(
+        self, message: str, state: State, allowed: Iterable[State] = (), *, advice: str = ""
+    ) -> None:
         self.state = state
         self.allowed = frozenset(allowed)
-        super().__init__(message)
+        super().__init__(message, advice=advice)
 
 
 class NotActivatedError(RobotiqStateError):

@@ -156,6 +156,9 @@ async def test_a_command_during_an_activation(here: Bench, hand: Hand) -> None:
         hand.command(position=3)
     assert caught.value.state is State.WF_ACTIVATION
     assert State.RUNNING_IDLE in caught.value.allowed
+    assert str(caught.value).endswith(
+        "activate() waits for it, and recover() also resets a gripper that is stuck"
+    )
     with pytest.raises(InvalidStateError) as awaited:
         await hand.set_position(3)
     assert str(awaited.value) == str(caught.value)
