@@ -20,8 +20,13 @@ from ..failures import normal_end, usage
 from ..output.messages import tell
 
 if TYPE_CHECKING:
-    from ...simulator import Physics, SimulatedGripper, Trouble
-    from ...simulator.server.endpoint import SimulatorEndpoint
+    from ...simulator import (
+        Physics,
+        SerialSimulatorServer,
+        SimulatedGripper,
+        SimulatorServer,
+        Trouble,
+    )
 
 
 _EXHAUSTED: Final = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
@@ -159,7 +164,7 @@ async def simulate(
         raise RobotiqError(f"cannot listen on {host}:{port}: {error.strerror or error}") from error
 
 
-async def _play(server: SimulatorEndpoint, plan: Sequence[Trouble]) -> None:
+async def _play(server: SimulatorServer | SerialSimulatorServer, plan: Sequence[Trouble]) -> None:
     """Carry out a plan, and go on until the physics of the gripper fails."""
     playing = asyncio.ensure_future(
         server.fault_injector.run(plan, lambda trouble: tell(f"trouble: {trouble}"))
