@@ -21,7 +21,7 @@ SITE := $(VENV)-site
 RELEASE := $(VENV)-release
 
 # The caller's environment must not leak into ours: an active venv or a PYTHONPATH would shadow it, and without
-# bytecode each of the hundreds of processes that the tests start compiles all of its modules anew.
+# bytecode each of the hundreds of processes that the tests start compiles all of its modules again.
 unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH PYTHONSTARTUP PIP_USER PIP_TARGET PIP_PREFIX UV_PYTHON
 unexport PYTHONDONTWRITEBYTECODE
 

@@ -19,7 +19,7 @@ from .failures import CommandError, UsageError
 LONGEST: Final = 1000
 """Bytes of a line at most."""
 _typed: Final[WeakKeyDictionary[TextIO, bytearray]] = WeakKeyDictionary()
-"""What came from a stream after the last line that was read."""
+"""The bytes that came from a stream after the last line that was read."""
 NOTE = "Nothing here has run on real hardware yet: keep a hand on the emergency stop."
 
 

@@ -255,7 +255,7 @@ def _split(text: str) -> tuple[str, str, str]:
 
 
 _WINDOWS_PATH: Final = "\\\\?\\"
-"""How the path of a serial port may begin there."""
+"""The path of a serial port may begin with this on Windows."""
 
 
 def _device_and_line(text: str) -> tuple[str, Line]:

@@ -105,7 +105,7 @@ class Connection:
         self._strays = strays
         self._users: set[object] = set()
         self._holders: WeakSet[object] = WeakSet()
-        """Who opens it again after a loss: those whose line it is, whether they are users at this moment."""
+        """Those whose line it is, and who open it again after a loss, whether they are users now or not."""
         self._rests: WeakKeyDictionary[object, float] = WeakKeyDictionary()
         """The time of the next turn of a user whose gripper did not answer, by the clock of the loop."""
         self._client: Client | None = None
@@ -116,7 +116,7 @@ class Connection:
         self._failure: RobotiqConnectionError | None = None
         """An error of the link between two exchanges; the next exchange raises it."""
         self._end: RobotiqConnectionError | None = None
-        """Why the last connection has ended for all of its users, if it has."""
+        """The reason for which the last connection has ended for all of its users, if it has."""
         self._is_hushing = False
         """Whether arriving bytes are dropped as the rest of a damaged reply."""
         self._is_disturbed = False

@@ -137,7 +137,7 @@ class Poller:
                 self._polling.deadline = self._loop.time() + IN_FLIGHT_S
             self._refuse_requests()
         elif level > self._level:
-            self._log.info("a stronger stop came meanwhile: the fingers are %s", level.done)
+            self._log.info("a stronger stop came: the fingers are %s", level.done)
             self._level = level
             self._end_by = self._loop.time() + STOP_S
             if level is StopLevel.SHUTDOWN:

@@ -1,5 +1,21 @@
 """One run of a hand, from start() to stop(): its controller, its poller task and the callers that wait."""
 
+# Theory of operation
+#
+# The controller decides and knows no task. The poller is the one task that uses the link. Callers run in
+# tasks of their own, and never touch the link: ask() gives a request to the controller in the caller's turn
+# of the loop, publishes the changes of state that follow, and wakes the poller if something is due. A caller
+# then waits for a future. The controller answers the future of a request or a move; StateWaiters answers
+# that of a state.
+#
+# A wait is in vain in DISCONNECTED and in DO_SHUTDOWN. An activation has further states that end it. Only
+# wait_for_state() waits all of them out.
+#
+# A run ends once, in _end(): after a stop, when the link is given up, or when the poller fails by a mistake
+# of ours. It ends in the turn of the loop in which the poller does. The gripper is given back before SHUTDOWN
+# is published, because a reader of that may start a hand, and every future that is left fails. If the event
+# loop was closed, no turn is left: abandon() ends the run and does not touch the futures of that loop.
+
 from __future__ import annotations
 
 import asyncio

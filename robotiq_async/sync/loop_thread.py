@@ -276,7 +276,7 @@ class _Call(Generic[T]):
             if is_closed:
                 return None
             if until is not None and time.monotonic() > until:
-                raise LateError("the call goes on")
+                raise LateError("the call continues")
 
 
 LOOP_THREAD: Final = LoopThread()  # the one of this process

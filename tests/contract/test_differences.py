@@ -189,7 +189,7 @@ async def figures_of_another_start(here: Bench) -> str:
         await hand.move(30, A)
         await asyncio.sleep(1.1)
         await hand.stop()
-    return {1: "begin anew", 2: "go on"}[hand.statistics.moves["reached"]]
+    return {1: "start at 0", 2: "continue"}[hand.statistics.moves["reached"]]
 
 
 async def names(here: Bench) -> str:

@@ -190,7 +190,7 @@ async def test_a_halt_finds_its_way_through_a_crowd() -> None:
         pages = Pages(hand)
         for _ in range(MAX_COMMANDS + 1):
             pages.do("recover", confirm=True)
-        assert "already under way" in (await pages.answer())["words"]
+        assert "already running" in (await pages.answer())["words"]
         pages.do("halt")
         words = [(await pages.answer())["words"] for _ in range(MAX_COMMANDS + 1)]
         assert "every axis has stopped" in words

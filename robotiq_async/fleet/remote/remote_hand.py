@@ -164,7 +164,7 @@ class RemoteHand(Hand):
             bus = await open_bus(self._route.configuration(), self._address)
             if self._opening is not opening:
                 await bus.close()
-                raise NotStartedError("stop() was called meanwhile")
+                raise NotStartedError("stop() was called during the start")
         finally:
             if self._opening is opening:
                 self._opening = None

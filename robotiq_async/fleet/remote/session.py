@@ -1,5 +1,25 @@
 """RemoteSession: one run of a remote hand, from its start to its stop."""
 
+# Theory of operation
+#
+# The agent has the gripper. A run here has three things, which change for different reasons:
+#
+# * the mirror: what the agent said last about the gripper (mirror.py). Every message names its gripper and
+#   the run of its agent. One about another gripper is dropped, and so is one that is older than the last.
+# * the lease: whether this client commands (lease_state.py). The keeper renews it several times in a window.
+# * requests without an answer: commands (outbox.py), halts and cancellations (stops.py).
+#
+# Silence ends control on both sides. Without renewals for a window the agent holds what moves; when nothing
+# was heard for a window the lease here is lost, and requests get no answer any more. If this loop was held
+# up, that is no silence: the messages that have arrived are handled first. A new run of the agent ends the
+# lease at once.
+#
+# Events are numbered, and the network may drop some: the missing ones are fetched, as far as the agent still
+# has them.
+#
+# The end takes 2 s at most. It sends nothing but what ends motion, and the lease goes with the strongest
+# level that was requested: a halt or a hold without an answer makes a gentle one stronger.
+
 from __future__ import annotations
 
 import asyncio
@@ -274,7 +294,7 @@ class RemoteSession:
             due = now() + interval
             await asyncio.sleep(interval)
             woken = now()
-            # After a delay of this loop, messages that arrived meanwhile are handled first.
+            # After a delay of this loop, the messages that have arrived are handled first.
             if woken - due < interval and woken - self.mirror.received_at > self.client.window:
                 self._fall_silent(woken)
             if self.mirror.is_silent and woken - self._arrived_at < interval:

@@ -64,7 +64,7 @@ class Physics:
         self._threaded = threaded
         self._stepper: Stepper | None = None
         self._users = 0
-        """How many have started the thread and not stopped it."""
+        """The number of users that have started the thread and not stopped it."""
         self._was_stopped = False
         self._lock = threading.Lock()
         self._world: World | None = None

@@ -186,7 +186,7 @@ class SimulatedGripper(Surroundings):
 
     @property
     def physics(self) -> Mechanism | None:
-        """What moves its axes; None for straight lines in time."""
+        """The drive of its axes; None for straight lines in time."""
         return self._physics
 
     @property

@@ -142,7 +142,7 @@ def report_state(status: RobotiqStatus, report: Report) -> None:
     elif status.activation_echo:
         report(
             Finding(
-                Level.DOUBT, "activation", "under way, or ended in a fault", "Wait, and run doctor again."
+                Level.DOUBT, "activation", "not finished, or ended in a fault", "Wait, and run doctor again."
             )
         )
     else:

@@ -163,7 +163,7 @@ class PageCommands:
         if name != HALT and not 0 <= monotonic() - request["at"] <= FRESH_S:
             raise ValueError("this arrived too late and was not carried out: the connection was delayed")
         if name != HALT and len(self._tasks.get(page, ())) > MAX_COMMANDS:
-            raise ValueError(f"{MAX_COMMANDS} commands of this page are already under way")
+            raise ValueError(f"{MAX_COMMANDS} commands of this page are already running")
         if not 0 <= request["hand"] < len(self._operators):
             raise ValueError(f"there is no hand {request['hand']}")
         return await call(self._operators[request["hand"]], name, request["arguments"])
