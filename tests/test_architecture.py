@@ -27,6 +27,13 @@ def test_every_room_has_its_layer_and_says_what_it_is_for() -> None:
     assert [room for room, purpose in rows.items() if len(purpose) <= 20] == []
 
 
+def test_what_stands_around_the_core_uses_no_private_names_of_it() -> None:
+    """Lint finds each use (SLF001); here none may be allowed. import-linter keeps the modules."""
+    around = [PACKAGE / room for room in ("cli", "fleet", "ros2", "tools")] + [ROOT / "pytest_robotiq_async"]
+    files = [path for folder in around for path in folder.rglob("*.py")]
+    assert [str(path) for path in files if "SLF001" in path.read_text(encoding="utf-8")] == []
+
+
 def test_no_module_is_too_long_to_read() -> None:
     """A class is not cut into a chain of files to stay short; what must stay short is a function."""
     long = {

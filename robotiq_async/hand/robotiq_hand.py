@@ -263,9 +263,15 @@ class RobotiqHand(Hand):
         else:
             await session.answered(session.controller.halt)
 
-    def _drop_requests(self, why: str) -> None:
-        """Drop the requests that were not sent, except holds and halts, for a client that lost control."""
+    def drop_requests(self, why: str) -> None:
+        """Drop the requests that were not sent, except holds and halts: for a client that has lost control.
+
+        A speed or a force that is not written yet would take effect under the next client. Calls that wait
+        for what is dropped raise MoveSupersededError with ``why``. What was sent continues: :meth:`hold`
+        ends it. A hand that does not run has nothing to drop.
+        """
         if self._session is not None and not self._session.is_over:
+            self._session.check_loop("hand.drop_requests()")
             self._session.ask(self._session.controller.drop_requests, MoveSupersededError(why))
 
     # -- activation, faults ----------------------------------------------------------------------------

@@ -422,6 +422,9 @@ class RobotiqHand:
     ) -> Stream[GripEvent]:
         return self._opened(lambda: self._inner.grip_events(fingers, since=since, slip=slip))
 
+    def drop_requests(self, why: str) -> None:
+        self._caller.tell(lambda: self._inner.drop_requests(why))
+
     def add_listener(
         self, callback: Callable[[RobotiqStatus | Transition | SentRequest], None]
     ) -> Callable[[], None]:

@@ -277,7 +277,7 @@ class ServedHand:
         self._requests.cancel_all(reason)
         # A hold affects only what moves. A speed or a force that is not written yet would take effect under
         # the next holder, or, after a freeze of this process, seconds late.
-        self._hand._drop_requests(f"the lease has ended: {reason}")  # noqa: SLF001  # the agent's own
+        self._hand.drop_requests(f"the lease has ended: {reason}")
         axes, self._commanded = self._commanded, Finger(0)
         if axes and not self._is_ending:  # else stop() stops the fingers
             self._requests.spawn(self._hold(axes))
