@@ -26,7 +26,7 @@ from ..gripper.connection import Connection, RefusedError
 from ..gripper.goals import Ending, Outcome
 from ..translation.joints import GoalError, Targets, targets
 from ..translation.settings import Settings
-from .bridge import Bridge
+from .bridge import Bridge, ClosedError
 from .publishing import JointStates
 from .unasked import UnaskedGoals
 
@@ -109,7 +109,7 @@ class GripperAction:
             connection, _, settings = self._configured()
             _targets(request, connection, settings)
             await self._bridge.ask(connection.check_goal())
-        except (GoalError, RefusedError) as error:
+        except (GoalError, RefusedError, ClosedError) as error:
             self._log.warning(f"goal rejected: {error}")
             return GoalResponse.REJECT
         except Exception as error:  # noqa: BLE001  # would end the executor

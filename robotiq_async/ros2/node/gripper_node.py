@@ -105,7 +105,10 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
         # ROS would swallow the error of a transition.
         try:
             self.get_logger().info(work())
-        except (RobotiqError, ValueError, OSError, ClosedError) as error:
+        except ClosedError as error:  # no error: a launch asks for the shutdown, and sends a signal at once
+            self.get_logger().warning(f"cannot {what}: {error}")
+            return _FAILURE
+        except (RobotiqError, ValueError, OSError) as error:
             self.get_logger().error(f"cannot {what}: {error}")
             return _FAILURE
         except Exception as error:  # noqa: BLE001  # ROS would swallow it

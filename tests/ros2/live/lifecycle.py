@@ -145,8 +145,14 @@ def test_a_client_that_asks_for_the_result_while_the_node_ends(simulator: Simula
         feedback.wait(new=False)
         process.send(signal.SIGINT)
         process.prints("results that no client has asked for yet: 1")
+        assert client.send(["fingers"], [0.0]) is None
+        assert client.call("activate").message == "the node is shutting down"
+        assert not client.change("shutdown")
         assert Goal(client, handle, feedback).ends()[0] == ABORTED
         assert process.ends() == 0
+        assert "goal rejected: the node is shutting down" in process.text
+        assert "cannot shut down: the node is shutting down" in process.text
+        assert "[ERROR]" not in process.text
 
 
 def test_a_client_that_is_held_up_while_the_node_ends(simulator: Simulator) -> None:
