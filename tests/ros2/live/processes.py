@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -15,14 +16,33 @@ PATIENCE_S: Final = 20.0
 """Seconds for anything. The machine may be busy with something else."""
 BOOTSTRAP: Final = ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE")
 """Variables that the wheels leave in the environment; a child has to begin without them."""
+DOMAINS: Final = range(1, 102)
+"""The domains of ROS for which Linux has ports, without the one that everybody has."""
+_claims: Final[list[socket.socket]] = []
 OF_ROS: Final = "module 'sre_"
 """Beginnings of warnings that its parser causes."""
 
 
 def isolate() -> None:
     """Keep the messages of this process and its children among themselves. Before ROS is initialized."""
-    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)  # tests that run side by side have others
+    os.environ["ROS_DOMAIN_ID"] = str(_claim_domain())
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+
+def _claim_domain() -> int:
+    """A domain for this process alone: another run beside this one would give its goals to our node."""
+    for offset in range(len(DOMAINS)):
+        # Not the same one after the other: nodes that were killed are seen for 20 s.
+        number = DOMAINS[(os.getpid() + offset) % len(DOMAINS)]
+        claim = socket.socket(socket.AF_UNIX)
+        try:
+            claim.bind(f"\0robotiq_async ros domain {number}")  # abstract: it ends with the process
+        except OSError:
+            claim.close()
+        else:
+            _claims.append(claim)
+            return number
+    raise RuntimeError(f"{len(DOMAINS)} runs of these tests have all domains")
 
 
 class Process:
