@@ -168,6 +168,16 @@ assert CAN in OWN
         (OWN.replace("<worldbody>", '<option timestep="0.01"/><worldbody>'), "must be in 0.0001..0.004 s"),
         (OWN.replace("<worldbody>", '<option timestep="0"/><worldbody>'), "must be in 0.0001..0.004 s"),
         (OWN.replace(CAN, CAN.replace("0 0 0.03", "0.04 0 0.05")), "no room for the part 'can'"),
+        (
+            OWN.replace("</mujoco>", '<keyframe><key qpos="0 0"/></keyframe></mujoco>'),
+            "must have 8 qpos, got 2",
+        ),
+        (OWN.replace('mass="0.1"', 'mass="inf"'), "not finite"),
+        (
+            OWN.replace("<worldbody>", '<option><flag actuation="disable"/></option><worldbody>'),
+            "s actuation",
+        ),
+        (OWN.replace("<worldbody>", '<option><flag contact="disable"/></option><worldbody>'), "s contact"),
     ],
     ids=lambda each: each[:30],
 )

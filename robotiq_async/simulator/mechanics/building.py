@@ -10,16 +10,26 @@ from typing import TYPE_CHECKING, Any, Final
 import mujoco
 import numpy as np
 
+from .scene import Scene
+
 if TYPE_CHECKING:
     from robotiq_async.values.model import Model
 
-    from .scene import Part, Scene
+    from .scene import Part
 
 OURS: Final = "gripper/"
 """Before the names of all that belongs to the gripper."""
 _TIMESTEP: Final = 0.002
 _TIMESTEPS: Final = (0.0001, 0.004)
 """Those of a user's own world: with 10 ms no motion of a gripper ends, and with 20 ms it flies apart."""
+_NEEDED: Final = {
+    "constraint": mujoco.mjtDisableBit.mjDSBL_CONSTRAINT,
+    "equality": mujoco.mjtDisableBit.mjDSBL_EQUALITY,
+    "limit": mujoco.mjtDisableBit.mjDSBL_LIMIT,
+    "contact": mujoco.mjtDisableBit.mjDSBL_CONTACT,
+    "actuation": mujoco.mjtDisableBit.mjDSBL_ACTUATION,
+}
+"""What a file must not disable: no finger would move, or nothing would be met."""
 _CLEARANCE: Final = 0.006
 """Distance in metres between the table and the lowest point that the fingertips reach."""
 _FRICTION: Final = (0.6, 0.005, 0.0001)
@@ -65,8 +75,8 @@ def in_own_world(text: str, file: str) -> Any:
     """The gripper at the site ``gripper`` of a file.
 
     Raises:
-        ValueError: there is no such file, MuJoCo cannot read it, it has no such site, or its timestep is too
-            long or too short.
+        ValueError: there is no such file, MuJoCo cannot read it, it has no such site, it disables what a
+            gripper needs, or its timestep is too long or too short.
     """
     if not Path(file).is_file():
         raise ValueError(f"physics: there is no file {file!r:.100}")
@@ -74,6 +84,16 @@ def in_own_world(text: str, file: str) -> Any:
         spec = mujoco.MjSpec.from_file(file)
     except ValueError as error:
         raise ValueError(f"physics: MuJoCo cannot read {file!r:.100}: {_in_one_line(error)}") from error
+    _check_fit(spec, file)
+    gripper = mujoco.MjSpec.from_string(text)
+    for option in ("timestep", "integrator", "cone", "impratio"):  # those of the file, without a complaint
+        setattr(gripper.option, option, getattr(spec.option, option))
+    spec.attach(gripper, site="gripper", prefix=OURS)
+    return spec
+
+
+def _check_fit(spec: Any, file: str) -> None:
+    """Refuse a world in which the gripper has no place, or would not work."""
     if not any(site.name == "gripper" for site in spec.sites):
         raise ValueError(f"physics: {file!r:.100} has no site named gripper, where the gripper is mounted")
     shortest, longest = _TIMESTEPS
@@ -82,11 +102,15 @@ def in_own_world(text: str, file: str) -> Any:
             f"physics: the timestep of {file!r:.100} must be in {shortest:g}..{longest:g} s, with which a"
             f" gripper is stable, got {spec.option.timestep:g}"
         )
-    gripper = mujoco.MjSpec.from_string(text)
-    for option in ("timestep", "integrator", "cone", "impratio"):  # those of the file, without a complaint
-        setattr(gripper.option, option, getattr(spec.option, option))
-    spec.attach(gripper, site="gripper", prefix=OURS)
-    return spec
+    for what, flag in _NEEDED.items():
+        if spec.option.disableflags & int(flag):
+            raise ValueError(f"physics: {file!r:.100} disables {what}, without which a gripper does not grip")
+    if spec.keys:  # MuJoCo would leave out one that is too short or too long, without a word
+        places = compiled(spec.copy(), Scene(file=file)).nq
+        for key in spec.keys:
+            if len(key.qpos) not in (0, places):
+                got = len(key.qpos)
+                raise ValueError(f"physics: a keyframe of {file!r:.100} must have {places} qpos, got {got}")
 
 
 def compiled(spec: Any, scene: Scene) -> Any:

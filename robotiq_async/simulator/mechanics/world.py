@@ -76,6 +76,8 @@ class World:
         for drive in self.drives.values():
             put_at(self._model, self._data, [drive.index], drive.share)
         mujoco.mj_forward(self._model, self._data)
+        if not (np.isfinite(self._data.qpos).all() and np.isfinite(self._data.qacc).all()):
+            raise ValueError(f"physics: {scene.file!r:.100} has a place or a mass that is not finite")
         self._start = self._data.qpos.copy()
         root = root_of(self._model)
         self.root: str = self._model.body(root).name.removeprefix(OURS)
