@@ -102,6 +102,16 @@ async def test_a_device_that_refuses_the_function_is_written_with_16(
     assert "read_function" not in said, "that would ask with another function"
 
 
+async def test_what_was_refused_is_decided_again(jaw: ModbusTransport, device: Device) -> None:
+    """A stop may have come while the refusal was on its way."""
+    device.has_23, device.refuses = False, True
+    await jaw.open()
+    asked, images = len(device.requests), [None, IMAGE]
+    assert await jaw.send_and_read(images.pop) is None
+    assert functions(device, asked) == [23], "nothing is written in its place"
+    assert jaw.is_open
+
+
 async def test_a_device_that_does_not_answer_the_function_is_written_with_16_from_then_on(
     jaw: ModbusTransport, device: Device, caplog: pytest.LogCaptureFixture
 ) -> None:
