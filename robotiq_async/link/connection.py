@@ -13,6 +13,7 @@ ends for all users.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable
 from typing import Any, Final, TypeVar
 from weakref import WeakKeyDictionary, WeakSet, WeakValueDictionary
@@ -163,6 +164,7 @@ class Connection:
                 raise
 
     async def _connect(self, seconds: float) -> None:
+        _disconnect_abandoned()
         self._loop = loop = asyncio.get_running_loop()
         self.clock = clock_of(loop)
         self._watchdog = Watchdog(loop, lambda: self._is_waiting, self._on_timeout)
@@ -174,6 +176,7 @@ class Connection:
         except TimeoutError:
             raise ConnectFailedError(str(self._address), f"no connection within {seconds:g} s") from None
         self._client, self._transport = client, client.ctx.transport
+        _connected[id(self)] = self
         self.silence.heard = self.clock()  # whatever the line carried for the last connection
 
     async def _settle(self) -> None:
@@ -213,6 +216,12 @@ class Connection:
         if client is not None:
             self._watchdog.stop()
             disconnect(client)
+
+    def disconnect_if_abandoned(self) -> None:
+        """Disconnect if the loop was closed before."""
+        if self._client is not None and self._loop.is_closed():
+            with contextlib.suppress(RuntimeError):  # asyncio's sockets tell the loop that they close
+                self._disconnect()
 
     # -- one exchange, by the user whose turn it is -----------------------------------------------------
 
@@ -368,6 +377,17 @@ class Connection:
         if not connected:
             why = " closed the connection" if self._address.is_socket else f": {GONE}"
             self._fail(ConnectionLostError(f"{self._address}{why}"))
+
+
+_connected: Final[WeakValueDictionary[int, Connection]] = WeakValueDictionary()
+"""The connections that have been made, of all loops."""
+
+
+def _disconnect_abandoned() -> None:
+    """Close the connections of loops that were closed under their hands: a serial port has one owner."""
+    for reference in _connected.valuerefs():  # a copy: threads make connections at any time
+        if (connection := reference()) is not None:
+            connection.disconnect_if_abandoned()
 
 
 _shared: WeakValueDictionary[tuple[asyncio.AbstractEventLoop, str], Connection] = WeakValueDictionary()

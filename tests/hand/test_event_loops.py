@@ -7,16 +7,19 @@ import gc
 import sys
 import threading
 from asyncio.subprocess import PIPE
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from robotiq_async import ConnectFailedError, Finger, NotStartedError, RobotiqHand, State, Transition
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
 from tests.calls import COMMANDS, called
 from tests.patience import patience
+from tests.serial_line import SerialLine
 from tests.virtual import run
 
 ROOT = Path(__file__).parents[2]
@@ -175,16 +178,15 @@ asyncio.run(main())
 # -- a loop that is closed under a hand ---------------------------------------------------------------------
 
 
-@pytest.fixture
-def address() -> Iterator[str]:
-    """A simulated gripper whose server has a loop and a thread of its own."""
+@contextmanager
+def served(place: Callable[[], AbstractAsyncContextManager[str]]) -> Iterator[str]:
+    """The address of a simulated gripper whose server has a loop and a thread of its own."""
     ready: dict[str, Any] = {}
     listens = threading.Event()
 
     async def serve() -> None:
         ready["loop"], ready["end"] = asyncio.get_running_loop(), asyncio.Event()
-        async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
-            ready["address"] = server.address
+        async with place() as ready["address"]:
             listens.set()
             await ready["end"].wait()
 
@@ -194,6 +196,25 @@ def address() -> Iterator[str]:
     yield ready["address"]
     ready["loop"].call_soon_threadsafe(ready["end"].set)
     thread.join()
+
+
+@asynccontextmanager
+async def over_tcp() -> AsyncIterator[str]:
+    async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
+        yield server.address
+
+
+@asynccontextmanager
+async def over_a_line(folder: Path) -> AsyncIterator[str]:
+    with SerialLine(folder) as line:
+        async with SerialSimulatorServer(line.far, SimulatedGripper(speedup=20), paced=False):
+            yield f"rtu://{line.near}"
+
+
+@pytest.fixture
+def address() -> Iterator[str]:
+    with served(over_tcp) as address:
+        yield address
 
 
 def abandoned(address: str) -> RobotiqHand:
@@ -206,9 +227,16 @@ def abandoned(address: str) -> RobotiqHand:
     return hand
 
 
-@pytest.fixture(params=["tcp", "sim"])
-def place(request: pytest.FixtureRequest, address: str) -> str:
-    return address if request.param == "tcp" else "sim://"
+NO_LINE = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo terminals")
+
+
+@pytest.fixture(params=["tcp", pytest.param("rtu", marks=NO_LINE), "sim"])
+def place(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+    if request.param == "sim":
+        yield "sim://"
+        return
+    with served(over_tcp if request.param == "tcp" else partial(over_a_line, tmp_path)) as address:
+        yield address
 
 
 @pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning")
@@ -303,12 +331,13 @@ class TestClosedLoop:
         asyncio.run(end())
         del waiting
 
-    def test_another_hand_takes_the_address_over(self, address: str) -> None:
-        left = abandoned(address)
+    def test_another_hand_takes_the_address_over(self, place: str) -> None:
+        """A serial port that the closed loop had left open was that of another program for ever."""
+        left = abandoned(place)
 
         async def other() -> None:
             async with asyncio.timeout(patience(5)):
-                another = RobotiqHand(address)
+                another = RobotiqHand(place)
                 await another.start(activate=False)
                 await another.stop()
 
