@@ -155,8 +155,12 @@ async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator
             before the block, in place of cancelling.
 
     Raises:
+        TypeError: a hand is a blocking one, or none.
         RuntimeError: not in the main thread.
     """
+    for each in hands:
+        if not isinstance(each, Hand):
+            raise TypeError(f"hands must be hands for asyncio, got {each!r}")
     if threading.current_thread() is not threading.main_thread():
         raise RuntimeError("signals reach the main thread alone: enter stops_on_signals() there")
     loop, signals, stopping = asyncio.get_running_loop(), Signals(), list[asyncio.Task[None]]()

@@ -182,6 +182,15 @@ async def test_a_start_is_taken_back() -> None:
     assert hand.state is State.SHUTDOWN
 
 
+async def test_a_blocking_hand_is_refused_and_not_only_at_the_signal() -> None:
+    """At the signal its stop was no coroutine: the block was never left."""
+    before = signal.getsignal(signal.SIGTERM)
+    with pytest.raises(TypeError, match="hands must be hands for asyncio, got <RobotiqHand sim://"):
+        async with stops_on_signals(BlockingHand("sim://")):  # type: ignore[arg-type]
+            pytest.fail("entered")
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
 async def test_signals_reach_the_main_thread_alone() -> None:
     async def elsewhere() -> None:
         with pytest.raises(RuntimeError, match="the main thread alone"):
