@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+import robotiq_async
 from robotiq_async import (
     ConnectionLostError,
     Finger,
@@ -78,6 +79,12 @@ def test_a_gripper_that_is_reset_moves_only_when_that_was_asked_for(caplog: pyte
     thread.join(PATIENCE)
     assert part.is_connected
     part.disconnect()
+
+
+def test_a_hand_for_asyncio_is_refused_before_it_connects() -> None:
+    """Its start is a coroutine that nobody awaits, and "not started" explains nothing: both have one name."""
+    with pytest.raises(TypeError, match=r"a blocking one, of robotiq_async\.sync, got <RobotiqHand"):
+        GripperPart(robotiq_async.RobotiqHand("sim://"))  # type: ignore[arg-type]
 
 
 def test_connecting_twice_is_refused_and_ends_nothing(part: GripperPart) -> None:
@@ -173,7 +180,7 @@ def test_what_is_outside_the_scale_is_refused(part: GripperPart, wire: Wire, pos
 
 
 def test_what_is_no_number_is_refused(part: GripperPart) -> None:
-    for value in (None, "50", True, [50.0]):
+    for value in (None, "50", True, [50.0], np.array([50.0, 60.0])):
         with pytest.raises(TypeError, match="pos must be percent in"):
             part.act(value)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import time
+from contextlib import suppress
 from typing import Final
 
 from ...runtime.log import Log
@@ -38,13 +39,15 @@ class GripperPart:
         lost_after: age of the newest status, in 0.05..60 s, from which :meth:`observe` and :meth:`act` raise.
 
     Raises:
-        TypeError, ValueError: ``lost_after`` is not a number, or outside its range.
+        TypeError, ValueError: ``lost_after`` is not a number, or outside its range; no blocking hand.
     """
 
     OBSERVATIONS: Final = ("gripper.pos", "gripper.current", "gripper.contact")
     """Keys of an observation."""
 
     def __init__(self, hand: RobotiqHand, *, lost_after: float = LOST_AFTER_S) -> None:
+        if not isinstance(hand, RobotiqHand):
+            raise TypeError(f"hand must be a blocking one, of robotiq_async.sync, got {hand!r}")
         self._hand = hand
         self._lost_after = check_seconds("lost_after", lost_after, 0.05, 60.0)
         self._is_connected = False
@@ -154,5 +157,6 @@ def percent(name: str, value: object) -> float:
     """A number in 0..100; that of an array or a tensor with one value, too, as LeRobot's replay has them."""
     item = getattr(value, "item", None)
     if as_float(value) is None and callable(item):
-        value = item()
+        with suppress(ValueError, RuntimeError):  # numpy's and torch's, of an array of several values
+            value = item()
     return check_number(name, value, 0.0, 100.0, "percent")
