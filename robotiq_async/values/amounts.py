@@ -38,7 +38,10 @@ def position_of(
         ValueError: outside its range, or millimetres or a fraction for the scissor.
     """
     if mm is None and open_fraction is None:
-        return check_optional_byte(name, counts)
+        try:
+            return check_optional_byte(name, counts)
+        except TypeError as error:
+            raise TypeError(f"{error}; millimetres are mm=40.5") from None
     _check_one({name: counts, "mm": mm, "open_fraction": open_fraction})
     if Finger.SCISSOR in axes:
         given = "open_fraction" if mm is None else "mm"

@@ -126,6 +126,11 @@ REFUSED: dict[str, Refusal] = {
         ValueError,
         "label_n must be newton of a label (no measured force) in 20.0..130.0, got 131",
     ),
+    "no counts": (
+        lambda hand: hand.move(40.5),
+        TypeError,
+        "position must be an int in 0..255, got 40.5; millimetres are mm=40.5",
+    ),
     "both": (
         lambda hand: hand.move(3, mm=40),
         TypeError,
