@@ -1,7 +1,8 @@
 """Shell lines of the pages name things that exist: commands, options, make's targets, extras, files.
 
-It is parsed and not run: most of it is for a gripper, a second machine or a ROS. What runs are the commands
-themselves (tests/cli), the targets (CI) and the Python code (test_pages, environments).
+It is parsed and not run: most of it is for a gripper, a second machine or a ROS. What runs are the lines that
+end by themselves (tests/cli/test_pages.py), the commands (tests/cli), the targets (CI) and the Python code
+(test_pages, environments).
 """
 
 from __future__ import annotations
