@@ -56,6 +56,10 @@ def run(arguments: Sequence[str]) -> int:
             tell(" ".join(line.split()))
     except OSError:  # the terminal is gone
         forget(sys.stderr)
+    try:
+        sys.stdout.flush()
+    except OSError:  # at the exit it would end the process with 120
+        forget(sys.stdout)
     return code
 
 
