@@ -337,8 +337,8 @@ async def _fingers(doing: Doing, resting: asyncio.Task[float], began: float) -> 
 def check_commands(doing: Doing) -> None:
     """Nothing of a control loop was carried out twice, out of turn, or later than a window after that."""
     done = commands(doing)
-    order = list(doing.asked)
-    numbers = [order.index(what) for _, what in done]
+    order = {what: number for number, what in enumerate(doing.asked)}
+    numbers = [order[what] for _, what in done]
     assert all(one < other for one, other in pairwise(numbers)), "carried out twice, or out of turn"
     late = [(at - doing.asked[what]) for at, what in done]
     assert all(each <= WINDOW_S + PROMPT_S for each in late), f"carried out late: {max(late):.2f} s"
