@@ -1,7 +1,8 @@
 """The command line as a user runs it: in this process (`call`), and in one of its own (`shell`, `beside`).
 
-A process takes half a second of a CPU to start. It is for what needs one: signals, terminals, streams that
-are closed, what happens at an import, a second program that runs at the same time, and once for each command.
+A process takes half a second of a CPU to start, and a tenth where it is forked (tests/cli/forked.py). It is
+for what needs one: signals, terminals, streams that are closed, what happens at an import, a second program
+that runs at the same time, and once for each command.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 from mcap.writer import Writer
@@ -32,7 +34,8 @@ from robotiq_async import Finger, RobotiqHand, State
 from robotiq_async.cli import main
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.recording.recorder import Recorder
-from tests.cli.terminal import ROOT, Terminal
+from tests.cli.forked import CAN_FORK, ROOT, Forked
+from tests.cli.terminal import Terminal
 from tests.patience import patience
 from tests.virtual import VirtualLoop
 
@@ -43,6 +46,7 @@ from robotiq_async.cli import main
 sys.exit(main({}))
 """
 """A command line that does not find a module."""
+PROCESS: Any = Forked if CAN_FORK else subprocess.Popen
 PATIENCE = 30.0
 """Seconds after which a command counts as hanging."""
 
@@ -214,7 +218,7 @@ class Beside:
     def __init__(self, *arguments: str) -> None:
         command = [sys.executable, "-m", "robotiq_async", *arguments]
         environment = os.environ | {"PYTHONPATH": str(ROOT)}
-        self.process = subprocess.Popen(
+        self.process: subprocess.Popen[str] = PROCESS(
             command,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
@@ -268,7 +272,8 @@ class Shell:
 
     async def start(self, *arguments: str, stdin: int = DEVNULL) -> Process:
         """Start a command."""
-        return await self.python("-m", "robotiq_async", *arguments, stdin=stdin)
+        with patch.object(subprocess, "Popen", PROCESS):  # asyncio's
+            return await self.python("-m", "robotiq_async", *arguments, stdin=stdin)
 
     async def python(self, *arguments: str, stdin: int = DEVNULL) -> Process:
         """Start this interpreter."""

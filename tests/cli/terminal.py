@@ -10,12 +10,13 @@ import signal
 import struct
 import sys
 import termios
-from pathlib import Path
 from typing import ClassVar
 
+from tests.cli.forked import CAN_FORK, ROOT, fork
 from tests.patience import patience
 
-ROOT = Path(__file__).parents[2]
+SIZE = struct.pack("HHHH", 30, 100, 0, 0)
+"""Lines and columns."""
 
 
 class Terminal:
@@ -25,11 +26,17 @@ class Terminal:
 
     def __init__(self, *arguments: str) -> None:
         self.out = b""
-        self._process, self._fd = pty.fork()
-        if self._process == 0:
-            fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack("HHHH", 30, 100, 0, 0))
-            os.environ |= {"TERM": "xterm-256color", "PYTHONPATH": str(ROOT)}
-            os.execv(sys.executable, [sys.executable, *arguments])
+        environment = os.environ | {"TERM": "xterm-256color", "PYTHONPATH": str(ROOT)}
+        if CAN_FORK:
+            self._fd, there = pty.openpty()
+            fcntl.ioctl(there, termios.TIOCSWINSZ, SIZE)
+            self._process = fork(arguments, environment, [there] * 3, terminal=True)
+            os.close(there)
+        else:
+            self._process, self._fd = pty.fork()
+            if self._process == 0:
+                fcntl.ioctl(0, termios.TIOCSWINSZ, SIZE)
+                os.execve(sys.executable, [sys.executable, *arguments], environment)
         self.running.add(self._process)
         asyncio.get_running_loop().add_reader(self._fd, self._read)
         self._read_something = asyncio.Event()

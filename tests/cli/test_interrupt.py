@@ -19,7 +19,7 @@ from robotiq_async.cli.run import _Signals
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.values.request import Request
 from tests import conftest
-from tests.cli.terminal import ROOT
+from tests.cli.forked import ROOT
 from tests.grippers import active_gripper, until
 
 if TYPE_CHECKING:

@@ -1,0 +1,153 @@
+"""Commands in processes of their own, without the third of a second of a CPU that their imports take.
+
+A process that has imported the command line (``python -m tests.cli.forked``) forks for each of them. What
+begins then has its own streams, signals, environment and end, as a process that is started has; only where a
+test is about an import it has to be started (``Shell.python``). Linux makes such a process a child of who
+asked for it; elsewhere each is started.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import fcntl
+import gc
+import importlib
+import inspect
+import json
+import os
+import runpy
+import socket
+import sys
+import termios
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from subprocess import Popen
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+CAN_FORK = sys.platform == "linux"
+PR_SET_CHILD_SUBREAPER = 36
+IMPORTED = ("robotiq_async.cli.run", "robotiq_async.simulator", "anyio._backends._asyncio", "rich.table")
+MOST = 1 << 20
+"""Bytes of a request."""
+
+
+# -- here --------------------------------------------------------------------------------------------------
+
+
+@cache
+def _nursery() -> socket.socket:
+    """The end here of the connection to the process that forks; it ends with this one."""
+    ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with there:
+        command = [sys.executable, "-m", "tests.cli.forked", str(there.fileno())]
+        environment = os.environ | {"PYTHONPATH": str(ROOT)}
+        _started.append(Popen(command, pass_fds=[there.fileno()], env=environment))
+    return here
+
+
+_started: list[Popen[bytes]] = []
+
+
+def fork(
+    arguments: Sequence[str],
+    environment: Mapping[str, str],
+    streams: Sequence[int],
+    *,
+    terminal: bool = False,
+) -> int:
+    """Run Python with these arguments (``-m module``, ``-c code`` or a file); return its process ID."""
+    what = {"arguments": arguments, "environment": dict(environment), "folder": os.getcwd()}
+    request = json.dumps({**what, "terminal": terminal}).encode()
+    nursery = _nursery()
+    socket.send_fds(nursery, [request], streams)
+    process = int(nursery.recv(20))
+    nursery.recv(1)  # from now on it is a child of this one
+    return process
+
+
+class Forked(Popen[Any]):
+    """A process that is forked in place of started; all of its streams must be given."""
+
+    def _execute_child(self, *arguments: object) -> None:
+        of = inspect.signature(super()._execute_child).bind(*arguments).arguments  # type: ignore[misc]
+        pipes = ("p2cread", "p2cwrite", "c2pread", "c2pwrite", "errread", "errwrite")
+        try:
+            self.pid = fork(of["args"][1:], of["env"], [of[each] for each in (pipes[0], *pipes[3::2])])
+            self._child_created = True
+        finally:
+            self._close_pipe_fds(*(of[each] for each in pipes))  # type: ignore[attr-defined]
+
+
+# -- in the process that forks -----------------------------------------------------------------------------
+
+
+def _next(connection: socket.socket) -> tuple[dict[str, Any], list[int]] | None:
+    """Fork for each request. Returns in each child with its request, and here at the end with None."""
+    while True:
+        message, streams, _, _ = socket.recv_fds(connection, MOST, 3)
+        if not message:
+            return None
+        # The first child ends at once, and whoever asked inherits the second.
+        if (between := os.fork()) == 0:
+            if (process := os.fork()) == 0:
+                connection.close()
+                return json.loads(message), streams
+            connection.send(str(process).encode())
+            os._exit(0)
+        os.waitpid(between, 0)
+        connection.send(b".")
+        for stream in streams:
+            os.close(stream)
+
+
+def _take(streams: list[int], *, terminal: bool) -> None:
+    """Take them in place of the standard streams, as an interpreter does that starts."""
+    if terminal:
+        os.setsid()
+    for number, stream in enumerate(streams):
+        os.dup2(stream, number)
+    for stream in {*streams} - {0, 1, 2}:
+        os.close(stream)
+    if terminal:
+        fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+    sys.stdin = open(0, encoding="utf-8", closefd=False)  # noqa: SIM115
+    sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
+    sys.stderr = open(  # noqa: SIM115
+        2, "w", buffering=1, encoding="utf-8", errors="backslashreplace", closefd=False
+    )
+
+
+def _run(arguments: list[str]) -> None:
+    match arguments:
+        case ["-m", module, *_]:
+            sys.argv = arguments[1:]
+            runpy.run_module(module, run_name="__main__", alter_sys=True)
+        case ["-c", code, *_]:
+            sys.argv = ["-c", *arguments[2:]]
+            exec(code, {"__name__": "__main__"})
+        case [file, *_]:
+            sys.argv = arguments
+            runpy.run_path(file, run_name="__main__")
+
+
+def _main() -> None:
+    for module in IMPORTED:
+        importlib.import_module(module)
+    gc.collect()
+    gc.freeze()
+    request = _next(socket.socket(fileno=int(sys.argv[1])))
+    if request is None:
+        return
+    what, streams = request
+    os.environ.clear()
+    os.environ.update(what["environment"])
+    os.chdir(what["folder"])
+    _take(streams, terminal=what["terminal"])
+    _run(what["arguments"])
+
+
+if __name__ == "__main__":
+    _main()
