@@ -37,6 +37,12 @@ def test_one_version() -> None:
     assert re.findall(r"^version: (.+)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE) == released[:1]
 
 
+def test_the_metadata_are_of_a_version_that_the_package_index_is_known_to_take() -> None:
+    """Hatchling's default follows the newest standard; uploads have been refused for that."""
+    for target in ("wheel", "sdist"):
+        assert HATCH["build"]["targets"][target]["core-metadata-version"] == "2.4"
+
+
 def test_the_script_is_the_command_line() -> None:
     script = EntryPoint("robotiq-async", PROJECT["scripts"]["robotiq-async"], "console_scripts")
     assert script.load() is main

@@ -42,6 +42,8 @@ IN_THE_WHEEL: Final = (
     "robotiq_async/data/robotiq_3f.urdf",
     "robotiq_async/data/robotiq_2f85.xml",
 )
+METADATA: Final = "Metadata-Version: 2.4\n"
+"""What everything that uploads and installs understands."""
 LAST_PART: Final = "What the hand went through"
 """The demo's heading of its last part."""
 
@@ -68,6 +70,10 @@ def build() -> list[Path]:
         raise FailedError(f"{wheel.name} installs {strange}")
     with zipfile.ZipFile(wheel) as archive:
         described = archive.read(f"{name}.dist-info/METADATA").decode()
+    if not described.startswith(METADATA):
+        raise FailedError(
+            f"{wheel.name} begins with {described.splitlines()[0]}, and not with {METADATA.strip()}"
+        )
     if dead := relative(described):
         raise FailedError(f"the description has links that lead nowhere on the package index: {dead}")
     run(sys.executable, "-m", "twine", "check", "--strict", str(sdist), str(wheel))
