@@ -29,7 +29,8 @@
 # A stop goes before all else: a halt, a reset, the end of the hand. It is written at once, again until it is
 # seen, and is over when its write acts and a status shows it; stops.py has what that is for each level. A
 # halt that does not show after two writes fails. A halt and a reset fail with the link, too: sent
-# later they would stop another client, or drop a part. The end of a hand begins its stop again on a new link.
+# later they would stop another client, or drop a part. Once it is back, what we move is held instead. The end
+# of a hand begins its stop again on a new link.
 #
 # Procedures raise rACT or rATR. While one runs, it alone judges what a status shows. When it ends, no write
 # of ours is on its way, and the ledger begins with what shows then. An activation of ours is remembered until

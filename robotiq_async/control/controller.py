@@ -566,6 +566,9 @@ class Controller:
         error.__cause__ = why
         if self._stop is not None:
             self._stop.fail(error)
+            # A halt and a reset are not sent again: once the link is back, what we move is held instead.
+            if self._stop.level in (StopLevel.HALT, StopLevel.RESET):
+                self._requests.pending.merge_hold(Finger.ALL)
         self._requests.lost(error)
         self._procedure, self._stop = None, None
         self._evidence.lost()

@@ -350,10 +350,13 @@ class Hand(Kind):
     async def halt(self) -> None:
         """Stop every axis now (rGTO = 0). The next command sets rGTO again, and moves only the axes it names.
 
+        But an axis that held something presses on then, and closes if that was taken out meanwhile.
+
         Returns when the gripper reports that it has stopped, at most 1 s after the acknowledgement. Awaited
-        moves end with MoveSupersededError. When cancelled, the halt is sent all the same. In RESET and
-        ATR_DONE nothing moves and nothing is sent. rGTO does not stop an activation or an automatic release:
-        during these, halt() clears rACT, as :meth:`reset` does, and returns in RESET.
+        moves end with MoveSupersededError. When cancelled, the halt is sent all the same. If the link goes
+        down before the acknowledgement, it is not sent again: once the link is back, what this hand moves is
+        held. In RESET and ATR_DONE nothing moves and nothing is sent. rGTO does not stop an activation or an
+        automatic release: during these, halt() clears rACT, as :meth:`reset` does, and returns in RESET.
 
         Raises:
             MoveSupersededError: reset() took over before it was sent.
@@ -385,7 +388,7 @@ class Hand(Kind):
         """Reset the gripper (rACT = 0): this clears faults and lets go of the part. Returns in RESET.
 
         It also ends an activation or a release. Awaited moves end with MoveSupersededError. When
-        cancelled, the reset continues.
+        cancelled, the reset continues. A lost link ends it as it ends a :meth:`halt`.
 
         Raises:
             StateTimeoutError: the gripper did not report the reset within 5 s.

@@ -9,7 +9,7 @@ import pytest
 from robotiq_async import ConnectionLostError, Finger, State
 from robotiq_async.control.pending import Command
 from robotiq_async.values.request import AxisRequest, Request
-from tests.control.other_client import activated_by_another, image
+from tests.control.other_client import activated_by_another, going_to, image
 from tests.control.scan import POLL_S, Scan, started
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
@@ -215,6 +215,46 @@ def test_a_cancelled_move_is_held_although_what_took_over_its_axis_is_lost(
         scan.blink()
     scan.run(10)
     assert [abs(scan.positions()[axis] - at[axis]) <= 10 for axis in (A, B)] == [True, True]
+
+
+@pytest.mark.parametrize("is_written", [False, True])
+@pytest.mark.parametrize("stop", ["halt", "reset"])
+def test_what_a_lost_stop_was_to_end_is_held_once_the_link_is_back(
+    scan: Scan, stop: str, is_written: bool
+) -> None:
+    """The fingers went on to the end, also if the caller was cancelled and never saw the error."""
+    scan.gripper.place_object(B, 60)
+    scan.moved(255, B)
+    scan.command(A, 200, speed=0)
+    scan.run(0.5)
+    at = scan.positions()[A]
+    if stop == "halt":
+        scan.halt()
+    else:
+        scan.controller.reset()
+    if is_written:
+        scan.forgets = 1
+        scan.step(answer=False)
+        scan.come_back(0.05)
+    else:
+        scan.blink()
+    scan.run(10)
+    assert scan.positions()[A] < at + 10
+    assert scan.latest.go_echo
+    assert scan.gripper.grips == B
+
+
+def test_a_lost_halt_does_not_stop_another_client_later(scan: Scan) -> None:
+    scan.command(A, 200, speed=0)
+    scan.run(0.5)
+    scan.halt()
+    scan.controller.lost(None)
+    scan.gripper.write(0, going_to(255, speed=0))
+    scan.come_back(1.0)
+    written = len(scan.written)
+    scan.run(15)
+    assert len(scan.written) == written
+    assert scan.positions()[A] >= 240
 
 
 def test_a_lost_hold_is_dropped_when_the_gripper_comes_back_reset(scan: Scan) -> None:
