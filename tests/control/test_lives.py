@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 from collections import Counter
+from functools import reduce
+from operator import or_
 from typing import Final, NamedTuple
 
 import pytest
@@ -13,7 +15,7 @@ from hypothesis import strategies as st
 from robotiq_async import Finger, State
 from robotiq_async.control.motion import Move
 from robotiq_async.control.state_machine import RUNNING, SEQUENCES
-from robotiq_async.values.enums import Trigger
+from robotiq_async.values.enums import NO_AXES, Trigger
 from robotiq_async.values.errors import RobotiqError
 from robotiq_async.values.model import THREE_FINGER, TOLERANCE
 from robotiq_async.values.request import Request
@@ -21,7 +23,7 @@ from tests.control.other_client import image
 from tests.control.scan import Outcome, Scan
 
 AXES: Final = THREE_FINGER.axes
-OURS: Final = ("move", "move", "command", "cancel", "hold", "halt")
+OURS: Final = ("move", "move", "command", "cancel", "overtake", "hold", "halt")
 KINDS: Final = {
     "ours": (*OURS, "place", "forget"),
     "link": (*OURS, "lose", "lose"),
@@ -100,6 +102,8 @@ class Life:
         """Number of requests for an axis to go to a position."""
         self.stays: dict[Finger, float] = {}
         """The axes without any request to move, with the travel of each."""
+        self.given_up = NO_AXES
+        """The axes whose last request was to stand: a hold, a halt, or the end of a cancelled move."""
 
     def begin(self) -> None:
         self.scan.motions = Counter()
@@ -111,6 +115,19 @@ class Life:
             if axis in axes:
                 self.asked[axis, position] += 1
                 self.stays.pop(axis, None)
+        self.given_up &= ~axes
+
+    def live_move(self, step: Step) -> tuple[Move, Outcome] | None:
+        """One of the moves that have no answer yet."""
+        live = [each for each in self.moves if not each[1].is_answered]
+        return live[int(step.chance * len(live))] if live else None
+
+    def cancel(self, move: Move, outcome: Outcome, taken: Finger = NO_AXES) -> None:
+        """The caller of a move is cancelled, in the turn in which a command has taken over some axes."""
+        self.scan.controller.abandon(move, unseen=bool(taken))
+        self.calls.remove(outcome)
+        self.moves.remove((move, outcome))
+        self.given_up |= move.axes & ~taken
 
     def happen(self, what: str, step: Step) -> None:
         scan, gripper, axes, position = self.scan, self.scan.gripper, step.axes, step.position
@@ -124,24 +141,29 @@ class Life:
             case "command":
                 is_motion = step.chance < 0.6
                 self.calls.append(scan.command(axes, position if is_motion else None, force=position))
+                self.given_up &= ~axes  # more force presses again
                 if is_motion:
                     self.ask(axes, position)
             case "cancel":
-                live = [each for each in self.moves if not each[1].is_answered]
-                if live:
-                    move, outcome = live[int(step.chance * len(live))]
-                    scan.controller.abandon(move)
-                    self.calls.remove(outcome)
-                    self.moves.remove((move, outcome))
+                if live := self.live_move(step):
+                    self.cancel(*live)
+            case "overtake":
+                if live := self.live_move(step):
+                    self.calls.append(scan.command(axes, position))
+                    self.ask(axes, position)
+                    self.cancel(*live, taken=axes & live[0].axes)
             case "hold":
                 self.calls.append(scan.hold(axes))
+                self.given_up |= axes
             case "halt":
                 if scan.state in SEQUENCES:
                     scan.controller.reset(Trigger.ASK_HALT)
                 else:
                     self.calls.append(scan.halt())
+                    self.given_up = Finger.ALL
             case "place":
                 gripper.place_object(axes, 20 + position * 210 // 255)
+                self.given_up &= ~axes  # it may have been taken from a finger, which presses on after a halt
             case "forget":
                 scan.forgets += 1
             case "lose":
@@ -154,11 +176,13 @@ class Life:
                 scan.controller.reset()
             case "activate" | "foreign activation" | "power" | "release" | "foreign reset":
                 self.stays.clear()  # these move every axis, or may
+                self.given_up = NO_AXES
                 self.move_all(what)
             case "foreign":
                 wanted = {axis: (position + 67 * number) % 256 for number, axis in enumerate(AXES)}
                 gripper.write(0, image(wanted, go=step.chance < 0.7))
                 self.stays.clear()
+                self.given_up = NO_AXES
 
     def move_all(self, what: str) -> None:
         scan = self.scan
@@ -184,10 +208,13 @@ class Life:
     def live(self, actions: tuple[str, ...], life: list[Step]) -> None:
         self.begin()
         for step in life:
+            forgets = self.scan.forgets
             with contextlib.suppress(RobotiqError):
                 self.happen(actions[step.what % len(actions)], step)
             self.scan.hurry()
             self.scan.run(step.pause)
+            if forgets:  # a hold may be among what it has forgotten, and is not sent again
+                self.given_up = NO_AXES
             travels = self.scan.travels()
             assert all(travels[axis] == travel for axis, travel in self.stays.items()), "nobody asked it"
 
@@ -196,11 +223,14 @@ class Life:
         scan = self.scan
         scan.gripper.clear_faults()
         scan.run(1.0)
+        before = scan.travels()
         if scan.state in RUNNING:
             scan.until(lambda: not scan.controller.is_moving, 60)
             scan.run(0.6)
             assert not scan.gripper.is_moving
             assert all(each.is_answered for each in self.calls), "a caller waits for ever"
+            moved = [axis for axis, travel in scan.travels().items() if travel > before[axis] + TOLERANCE]
+            assert not self.given_up & reduce(or_, moved, NO_AXES), "it goes on, and was to stand"
         scan.forgets, is_active = 0, scan.state in RUNNING
         scan.stop(keep_grip=keep_grip)
         assert all(each.is_answered for each in self.calls), "the stop leaves a caller waiting"
