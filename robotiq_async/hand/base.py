@@ -349,7 +349,8 @@ class Hand(Kind):
 
     async def halt(self) -> None:
         """Stop every axis now (rGTO = 0). The next command sets rGTO again, and moves only the axes it names.
-        But an axis that held something presses on then, and closes if the part was taken out.
+
+        But an axis that held something presses on with that command, and closes if the part was taken out.
 
         Returns when the gripper reports that it has stopped, at most 1 s after the acknowledgement. Awaited
         moves end with MoveSupersededError. When cancelled, the halt is sent all the same. If the link goes
