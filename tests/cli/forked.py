@@ -8,6 +8,7 @@ asked for it; elsewhere each is started.
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import fcntl
 import gc
@@ -44,11 +45,14 @@ def _nursery() -> socket.socket:
     with there:
         command = [sys.executable, "-m", "tests.cli.forked", str(there.fileno())]
         environment = os.environ | {"PYTHONPATH": str(ROOT)}
-        _started.append(Popen(command, pass_fds=[there.fileno()], env=environment))
+        process = Popen(command, pass_fds=[there.fileno()], env=environment)
+    atexit.register(_end, here, process)
     return here
 
 
-_started: list[Popen[bytes]] = []
+def _end(connection: socket.socket, process: Popen[bytes]) -> None:
+    connection.close()
+    process.wait()
 
 
 def fork(
