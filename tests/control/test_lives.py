@@ -153,8 +153,9 @@ class Life:
                     self.ask(axes, position)
                     self.cancel(*live, taken=axes & live[0].axes)
             case "hold":
+                held = NO_AXES if scan.state in SEQUENCES else axes  # in one there is nothing to hold
                 self.calls.append(scan.hold(axes))
-                self.given_up |= axes
+                self.given_up |= held
             case "halt":
                 if scan.state in SEQUENCES:
                     scan.controller.reset(Trigger.ASK_HALT)
@@ -211,6 +212,7 @@ class Life:
             forgets = self.scan.forgets
             with contextlib.suppress(RobotiqError):
                 self.happen(actions[step.what % len(actions)], step)
+            forgets += self.scan.forgets
             self.scan.hurry()
             self.scan.run(step.pause)
             if forgets:  # a hold may be among what it has forgotten, and is not sent again
