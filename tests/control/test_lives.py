@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections import Counter
 from functools import reduce
 from operator import or_
@@ -13,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robotiq_async import Finger, State
+from robotiq_async.control.ledger import WINDOW_S
 from robotiq_async.control.motion import Move
 from robotiq_async.control.state_machine import RUNNING, SEQUENCES
 from robotiq_async.values.enums import NO_AXES, Trigger
@@ -104,6 +106,8 @@ class Life:
         """The axes without any request to move, with the travel of each."""
         self.given_up = NO_AXES
         """The axes whose last request was to stand: a hold, a halt, or the end of a cancelled move."""
+        self.disturbed = -math.inf
+        """The time at which something else than a request of ours moved an axis, or could."""
 
     def begin(self) -> None:
         self.scan.motions = Counter()
@@ -127,7 +131,17 @@ class Life:
         self.scan.controller.abandon(move, unseen=bool(taken))
         self.calls.remove(outcome)
         self.moves.remove((move, outcome))
-        self.given_up |= move.axes & ~taken
+        self.stand(move.axes & ~taken)
+
+    def stand(self, axes: Finger) -> None:
+        """The axes are to stand; what others have asked and no status shows yet, no request can end."""
+        if self.scan.now - self.disturbed > WINDOW_S:
+            self.given_up |= axes
+
+    def disturb(self) -> None:
+        self.disturbed = self.scan.now
+        self.stays.clear()
+        self.given_up = NO_AXES
 
     def happen(self, what: str, step: Step) -> None:
         scan, gripper, axes, position = self.scan, self.scan.gripper, step.axes, step.position
@@ -155,13 +169,13 @@ class Life:
             case "hold":
                 held = NO_AXES if scan.state in SEQUENCES else axes  # in one there is nothing to hold
                 self.calls.append(scan.hold(axes))
-                self.given_up |= held
+                self.stand(held)
             case "halt":
                 if scan.state in SEQUENCES:
                     scan.controller.reset(Trigger.ASK_HALT)
                 else:
                     self.calls.append(scan.halt())
-                    self.given_up = Finger.ALL
+                    self.stand(Finger.ALL)
             case "place":
                 gripper.place_object(axes, 20 + position * 210 // 255)
                 self.given_up &= ~axes  # it may have been taken from a finger, which presses on after a halt
@@ -176,14 +190,12 @@ class Life:
             case "reset":
                 scan.controller.reset()
             case "activate" | "foreign activation" | "power" | "release" | "foreign reset":
-                self.stays.clear()  # these move every axis, or may
-                self.given_up = NO_AXES
+                self.disturb()  # these move every axis, or may
                 self.move_all(what)
             case "foreign":
                 wanted = {axis: (position + 67 * number) % 256 for number, axis in enumerate(AXES)}
                 gripper.write(0, image(wanted, go=step.chance < 0.7))
-                self.stays.clear()
-                self.given_up = NO_AXES
+                self.disturb()
 
     def move_all(self, what: str) -> None:
         scan = self.scan
