@@ -238,9 +238,9 @@ async def main(address):
         while not operator.hand.is_activated:
             await pilot.press("y")  # one that comes too early does not count
             await pilot.pause(0.05)
-        await pilot.press("c")
         while operator.hand.status.position(Finger.A) < 200:
-            await asyncio.sleep(0.05)
+            await pilot.press("c")  # neither does this before the answer to the activation
+            await pilot.pause(0.05)
         await pilot.press("space", "q")
     await operator.leave()
 
