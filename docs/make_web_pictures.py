@@ -21,7 +21,8 @@ ROOT: Final = Path(__file__).parents[1]
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
-from robotiq_async import WIDTH_NORMAL, WIDTH_WIDE, Finger, RobotiqHand  # noqa: E402
+from demo import grasp_loop  # noqa: E402
+from robotiq_async import WIDTH_NORMAL, WIDTH_WIDE, Finger, RobotiqHand, RobotiqStatus  # noqa: E402
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer  # noqa: E402
 from robotiq_async.tools.actions import Operator  # noqa: E402
 from robotiq_async.tools.web.server import PageServer  # noqa: E402
@@ -75,16 +76,38 @@ async def animation(browser: Browser, hand: RobotiqHand, gripper: SimulatedGripp
     await asyncio.to_thread(save, "web", frames, durations)  # the hand is polled meanwhile
 
 
+class FromThread:
+    """The hand of a page, for a program in another thread, which takes it for a blocking one."""
+
+    def __init__(self, hand: RobotiqHand) -> None:
+        self._hand = hand
+        self._loop = asyncio.get_running_loop()
+
+    @property
+    def status(self) -> RobotiqStatus:
+        """The newest one."""
+        return self._hand.status
+
+    def command(self, *, position: int) -> None:
+        """The one call of the loop that moves."""
+        self._loop.call_soon_threadsafe(lambda: self._hand.command(position=position))
+
+    def hold(self) -> None:
+        """The end of the loop."""
+        asyncio.run_coroutine_threadsafe(self._hand.hold(), self._loop).result()
+
+
 async def part(browser: Browser) -> None:
-    """A part that bodies grip and let go of."""
+    """A part that bodies grip and let go of, by the loop of demo/grasp_loop.py."""
     address = f"sim://?model=2f85&speedup={1 / SLOWER}&physics=box:30x40x60,0.3"
-    async with RobotiqHand(address) as hand:
+    grasp_loop.PERIOD_S *= SLOWER
+    async with RobotiqHand(address, speed=grasp_loop.SPEED, force=grasp_loop.FORCE) as hand:
         settings = PageSettings(port=0, addresses=("sim://?model=2f85&physics=box:30x40x60,0.3",))
 
         async def play() -> None:
-            await hand.close(speed=60, force=128, timeout=PATIENCE_S)
+            await asyncio.to_thread(grasp_loop.close_until_contact, FromThread(hand))
             await asyncio.sleep(SLOWER)
-            await hand.open(speed=60, timeout=PATIENCE_S)
+            await hand.open(timeout=PATIENCE_S)
 
         async with PageServer([hand], settings) as page:
             await resize(browser, 1040, 600)
