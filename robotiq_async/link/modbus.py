@@ -162,11 +162,15 @@ class ModbusTransport:
             RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
         """
         with await self._connection.turn(self):
-            await self._prepare_write()
-            registers = decide()
-            if registers is None:
-                return False
-            await self._ask(write_request(self._map, registers))
+            return await self._send_alone(decide)
+
+    async def _send_alone(self, decide: Callable[[], Sequence[int] | None]) -> bool:
+        """Write what ``decide`` returns with function 16, in a turn; return whether there was anything."""
+        await self._prepare_write()
+        registers = decide()
+        if registers is None:
+            return False
+        await self._ask(write_request(self._map, registers))
         return True
 
     @property
@@ -203,12 +207,8 @@ class ModbusTransport:
                     self._writes_with_23 = False
                     self._log.warning("%s is written with function 16: %s", self._address, plain(error))
                 is_refused = isinstance(error, RefusedError) and error.is_unknown_function
-                if is_refused:
-                    await self._prepare_write()
-                    registers = decide()
-                    if registers is None:
-                        return None
-                    await self._ask(write_request(self._map, registers))
+                if is_refused and not await self._send_alone(decide):
+                    return None
             else:
                 self._has_23 = True
                 return Answer(self._status_in(reply), None)
