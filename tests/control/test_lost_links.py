@@ -198,6 +198,16 @@ def test_a_hold_outlives_what_has_replaced_it_and_was_lost(scan: Scan, how: str)
     assert abs(scan.positions()[A] - at) <= 4
 
 
+def lose_the_link(scan: Scan, *, is_written: bool) -> None:
+    """The link goes down before what is pending is written, or with its write, which the gripper forgets."""
+    if not is_written:
+        scan.blink()
+        return
+    scan.forgets = 1
+    scan.step(answer=False)
+    scan.come_back(0.05)
+
+
 @pytest.mark.parametrize("is_written", [False, True])
 def test_a_cancelled_move_is_held_although_what_took_over_its_axis_is_lost(
     scan: Scan, is_written: bool
@@ -207,12 +217,7 @@ def test_a_cancelled_move_is_held_although_what_took_over_its_axis_is_lost(
     scan.command(A, position=10)
     scan.controller.abandon(move, unseen=True)
     at = scan.positions()
-    if is_written:
-        scan.forgets = 1
-        scan.step(answer=False)
-        scan.come_back(0.05)
-    else:
-        scan.blink()
+    lose_the_link(scan, is_written=is_written)
     scan.run(10)
     assert [abs(scan.positions()[axis] - at[axis]) <= 10 for axis in (A, B)] == [True, True]
 
@@ -232,12 +237,7 @@ def test_what_a_lost_stop_was_to_end_is_held_once_the_link_is_back(
         scan.halt()
     else:
         scan.controller.reset()
-    if is_written:
-        scan.forgets = 1
-        scan.step(answer=False)
-        scan.come_back(0.05)
-    else:
-        scan.blink()
+    lose_the_link(scan, is_written=is_written)
     scan.run(10)
     assert scan.positions()[A] < at + 10
     assert scan.latest.go_echo
