@@ -6,17 +6,9 @@
 # TESTS: what pytest is to run (tests/lerobot/live.py)
 set -eu
 cd "$(dirname "$0")/../.."
-PYTHON=${PYTHON:-python3}
+name=lerobot
+. tests/environment.sh
 LEROBOT='lerobot[core_scripts]==0.6.1'
-venv=.venv-lerobot
-python=$venv/bin/python
-unset PYTHONPATH VIRTUAL_ENV
-
-skip() {
-    rm -rf "$venv"
-    echo "test-lerobot: SKIPPED: $1"
-    exit 0
-}
 
 fits() { # pyenv's commands do nothing unless they know which version is meant
     PYENV_VERSION=${2:-} "$1" -c 'import sys; sys.exit(sys.version_info < (3, 12))' 2>/dev/null
@@ -32,9 +24,6 @@ interpreter() { # print one that LeRobot can have
     fi
 }
 
-for source in pyproject.toml tests/lerobot/run.sh; do
-    [ "$venv/.complete" -nt "$source" ] || rm -f "$venv/.complete"
-done
 if [ ! -f "$venv/.complete" ]; then
     free=$(df -Pk . | awk 'NR == 2 { print int($4 / 1024 / 1024) }')
     [ "$free" -ge 14 ] || skip "the environment needs 14 GB while it is made, and $free GB are free"

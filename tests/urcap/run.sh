@@ -6,20 +6,9 @@
 # TESTS: what pytest is to run (tests/urcap/live.py and tests/link/test_urcap_clients.py)
 set -eu
 cd "$(dirname "$0")/../.."
-PYTHON=${PYTHON:-python3}
-venv=.venv-urcap
-python=$venv/bin/python
-unset PYTHONPATH VIRTUAL_ENV
+name=urcap
+. tests/environment.sh
 
-skip() {
-    rm -rf "$venv"
-    echo "test-urcap: SKIPPED: $1"
-    exit 0
-}
-
-for source in pyproject.toml tests/urcap/run.sh; do
-    [ "$venv/.complete" -nt "$source" ] || rm -f "$venv/.complete"
-done
 if [ ! -f "$venv/.complete" ]; then
     echo "Setting up $venv, once (this takes a minute)"
     "$PYTHON" -m venv --clear "$venv"

@@ -7,21 +7,10 @@
 # TESTS: what pytest is to run (tests/urdf/live.py)
 set -eu
 cd "$(dirname "$0")/../.."
-PYTHON=${PYTHON:-python3}
-venv=.venv-urdf
-python=$venv/bin/python
-unset PYTHONPATH VIRTUAL_ENV
-
-skip() {
-    rm -rf "$venv"
-    echo "test-urdf: SKIPPED: $1"
-    exit 0
-}
+name=urdf
+. tests/environment.sh
 
 [ "$(uname -s)-$(uname -m)" = Linux-x86_64 ] || skip "tried on Linux on x86-64 alone"
-for source in pyproject.toml tests/urdf/run.sh; do
-    [ "$venv/.complete" -nt "$source" ] || rm -f "$venv/.complete"
-done
 if [ ! -f "$venv/.complete" ]; then
     echo "Setting up $venv, once (this takes a minute)"
     "$PYTHON" -m venv --clear "$venv"
