@@ -1,9 +1,9 @@
 """An event loop whose time is not real: it jumps ahead when nothing is left to do.
 
 Seconds of polling pass in milliseconds, a timeout takes no time, two runs take the same course, and
-a wait for something that will never come is an error at once. Connections made in such a loop
-are made of memory; real descriptors (the fake serial line) work too, as long as what is written to one
-can be read from the other at once.
+a wait for something that will never come is an error at once. Connections made in such a loop, and
+its serial ports (tests/virtual_line.py), are made of memory; real descriptors work too, as long as what
+is written to one can be read from the other at once.
 """
 
 from __future__ import annotations
@@ -138,6 +138,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         super().__init__(self._virtual)
         self._listeners: dict[int, _Listener] = {}
         self._next_port = 20000
+        self._files: dict[int, MemoryFile] = {}
         self.complaints: list[str] = []
         self.set_exception_handler(lambda _, context: self.complaints.append(repr(context)))
 
@@ -170,6 +171,32 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         self._virtual.now += seconds
 
     # The signatures are asyncio's; what pymodbus and the simulator pass is all that is looked at.
+
+    def number(self, file: MemoryFile) -> int:
+        """Make up a descriptor, one that no real file has."""
+        number = -2 - len(self._files)
+        self._files[number] = file
+        return number
+
+    def add_reader(self, fd: Any, callback: Callable[..., Any], *args: Any) -> Any:  # type: ignore[override]
+        if (file := self._files.get(fd)) is not None:
+            return file.watch("read", functools.partial(callback, *args))
+        return super().add_reader(fd, callback, *args)
+
+    def remove_reader(self, fd: Any) -> Any:
+        if (file := self._files.get(fd)) is not None:
+            return file.watch("read", None)
+        return super().remove_reader(fd)
+
+    def add_writer(self, fd: Any, callback: Callable[..., Any], *args: Any) -> Any:  # type: ignore[override]
+        if (file := self._files.get(fd)) is not None:
+            return file.watch("write", functools.partial(callback, *args))
+        return super().add_writer(fd, callback, *args)
+
+    def remove_writer(self, fd: Any) -> Any:
+        if (file := self._files.get(fd)) is not None:
+            return file.watch("write", None)
+        return super().remove_writer(fd)
 
     async def create_server(self, factory: Any, _host: Any = None, port: Any = None, **_: Any) -> Any:  # type: ignore[override]
         if not port:
@@ -291,6 +318,61 @@ class MemoryTransport(asyncio.Transport):
     def setsockopt(self, _level: int, option: int, _value: object) -> None:
         """One option counts here, the simulator's: to reset the connection in place of closing it."""
         self._resets |= option == socket.SO_LINGER
+
+
+class MemoryFile:
+    """What a virtual loop watches like a file: it calls back in each turn in which there is something to do.
+
+    Looking at a real descriptor costs a system call in every turn of the loop, and two for every write.
+    """
+
+    def __init__(self, loop: VirtualLoop) -> None:
+        self._loop = loop
+        self._number = loop.number(self)
+        self._inbox = b""
+        self._has_ended = False
+        self._wanted: dict[str, Callable[[], object]] = {}
+        self._is_due = False
+
+    def fileno(self) -> int:
+        return self._number
+
+    def arrive(self, data: bytes) -> None:
+        """Here are bytes to be read."""
+        self._inbox += data
+        self._look()
+
+    def end(self) -> None:
+        """There will be no more."""
+        self._has_ended = True
+        self._look()
+
+    def read(self, size: int) -> bytes:
+        """Some of what has arrived."""
+        data, self._inbox = self._inbox[:size], self._inbox[size:]
+        return data
+
+    def watch(self, what: str, call: Callable[[], object] | None) -> bool:
+        """Watch for something to "read" or for room to "write"; whether that was watched for before."""
+        was_wanted = self._wanted.pop(what, None) is not None
+        if call is not None:
+            self._wanted[what] = call
+            self._look()
+        return was_wanted
+
+    def _look(self) -> None:
+        is_readable = "read" in self._wanted and (self._inbox or self._has_ended)
+        if not self._is_due and (is_readable or "write" in self._wanted):
+            self._is_due = True
+            self._loop.call_soon(self._call)
+
+    def _call(self) -> None:
+        self._is_due = False
+        if "read" in self._wanted and (self._inbox or self._has_ended):
+            self._wanted["read"]()
+        if "write" in self._wanted:
+            self._wanted["write"]()
+        self._look()
 
 
 def run(main: Callable[[], Coroutine[Any, Any, T]], limit: float = math.inf) -> T:

@@ -1,14 +1,16 @@
-"""A serial line for the virtual loop: what pyserial would open is a pair of sockets."""
+"""A serial line for the virtual loop: what pyserial would open is made of memory."""
 
 from __future__ import annotations
 
 import asyncio
-import socket
+import warnings
 from typing import Any
 
 import pytest
 import serial
 from pymodbus.transport.serialtransport import SerialTransport
+
+from tests.virtual import MemoryFile, VirtualLoop
 
 
 class VirtualLine:
@@ -20,7 +22,9 @@ class VirtualLine:
     NEAR, FAR = "/dev/ttyNEAR", "/dev/ttyFAR"
 
     def __init__(self, patch: pytest.MonkeyPatch) -> None:
-        self._loop = asyncio.get_running_loop()
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, VirtualLoop)
+        self._loop = loop
         self._ports: list[_Port] = []
         self._is_plugged = True
         # pyserial is below the code under test; pymodbus requests a port of it and gets one of ours.
@@ -59,25 +63,19 @@ class VirtualLine:
         return [port for port in self._ports if port.url == url]
 
 
-class _Port:
+class _Port(MemoryFile):
     """The part of serial.Serial that pymodbus uses."""
 
-    def __init__(self, line: VirtualLine, url: str, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(self, line: VirtualLine, url: str, loop: VirtualLoop) -> None:
+        super().__init__(loop)
         self.url = url
         self.timeout = self.write_timeout = 0
-        self._line, self._loop = line, loop
-        self._mine, self._cable = socket.socketpair()
-        self._mine.setblocking(False)
-
-    def fileno(self) -> int:
-        return self._mine.fileno()
+        self._line = line
+        self._is_closed = False
 
     def read(self, size: int) -> bytes:
-        try:
-            data = self._mine.recv(size)
-        except BlockingIOError:
-            return b""
-        if not data:
+        data = super().read(size)
+        if not data and self._has_ended:
             raise serial.SerialException("device reports readiness to read but returned no data")
         return data
 
@@ -86,14 +84,14 @@ class _Port:
         self._loop.call_soon(self._line.carry, self.url, data)
         return len(data)
 
-    def arrive(self, data: bytes) -> None:
-        self._cable.send(data)
-
     def lose(self) -> None:
         self._line.closed(self)
-        self._cable.close()
+        self.end()
 
     def close(self) -> None:
         self._line.closed(self)
-        self._mine.close()
-        self._cable.close()
+        self._is_closed = True
+
+    def __del__(self) -> None:
+        if not self._is_closed:
+            warnings.warn(f"unclosed port {self.url}", ResourceWarning, source=self, stacklevel=1)
