@@ -103,12 +103,13 @@ class _Selector(selectors.DefaultSelector):
         self.ends = math.inf
         self.turns = 0
         self.at_turn: tuple[int, Callable[[], object]] | None = None
-        self.hold = HoldWatch()
+        self.hold: HoldWatch | None = None
         self._watched = self.get_map()
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-        self.hold.turn()
-        # Without a serial line there is nothing to look at but the descriptor by which other threads wake the
+        if self.hold is not None:
+            self.hold.turn()
+        # Most loops have nothing to look at but the descriptor by which other threads wake the
         # loop: what they want done is among the callbacks already, and only who waits for nothing else looks.
         events = super().select(0) if timeout is None or len(self._watched) > 1 else []
         self.turns += 1
@@ -127,7 +128,8 @@ class _Selector(selectors.DefaultSelector):
 
     def close(self) -> None:
         super().close()
-        self.hold.close()
+        if self.hold is not None:
+            self.hold.close()
 
 
 class VirtualLoop(asyncio.SelectorEventLoop):
@@ -145,9 +147,14 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def time(self) -> float:
         return self._virtual.now
 
+    def watch_holds(self) -> None:
+        """Measure from here on for how long callbacks keep the loop, which takes a while in every turn."""
+        self._virtual.hold = HoldWatch()
+
     @property
     def longest_hold(self) -> float:
-        """The longest time, in real seconds, that callbacks have kept the loop."""
+        """The longest time, in real seconds, that callbacks have kept the loop since :meth:`watch_holds`."""
+        assert self._virtual.hold is not None, "holds are not watched"
         return self._virtual.hold.longest
 
     @property

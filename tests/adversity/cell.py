@@ -42,6 +42,7 @@ async def outcome(world: World, phase: Phase, words: str) -> str:
     Raises:
         AssertionError: a promise was broken.
     """
+    world.loop.watch_holds()
     call = await phase.reach(world)
     if call is not None and phase.name == "connecting" and words in ("reset", "close"):
         call = await _begun(world, call)  # there must be a connection to lose
