@@ -6,6 +6,7 @@ import asyncio
 import itertools
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from typing import TypeVar
 
 from robotiq_async.control.controller import Controller
@@ -42,7 +43,9 @@ class Published(Channel[T]):
 class Polled:
     """A poller with what it owns, and what it has published."""
 
-    def __init__(self, policy: ReconnectPolicy | None, *, activate: bool = False) -> None:
+    def __init__(
+        self, policy: ReconnectPolicy | None, *, activate: bool = False, poll_interval: float = POLL_S
+    ) -> None:
         self.wire = Wire()
         self.changes: list[tuple[State, State, Trigger]] = []
         self.machine = StateMachine(lambda *change: self.changes.append(change))
@@ -55,13 +58,16 @@ class Polled:
         channels.statuses = Published(self.publish)
         channels.requests = Published(self.requests.append)
         channels.numbers = itertools.count(7)
-        self.poller = Poller(self.wire, self.controller, self.counters, channels, options(self.wire, policy))
+        given = replace(options(self.wire, policy), poll_interval=poll_interval)
+        self.poller = Poller(self.wire, self.controller, self.counters, channels, given)
         self.at_next_status: Callable[[], None] | None = None
+        self._published = asyncio.Event()
         self.task: asyncio.Task[None]
 
     def publish(self, status: RobotiqStatus) -> None:
         assert self.controller.status is status, "the controller comes first"
         self.statuses.append(status)
+        self._published.set()
         call, self.at_next_status = self.at_next_status, None
         if call is not None:
             call()
@@ -73,8 +79,10 @@ class Polled:
         """Wait until so many more statuses have come."""
         until = len(self.statuses) + count
         async with asyncio.timeout(patience(30)):
-            while len(self.statuses) < until:  # noqa: ASYNC110  # there is no event to wait for
-                await asyncio.sleep(0.0001)
+            while len(self.statuses) < until:
+                self._published.clear()
+                await self._published.wait()
+            await asyncio.sleep(0.0001)  # the cycle of the last one goes on
 
     async def end(self, within: float = STOP_S + 0.1) -> None:
         """Wait for the end; it comes in time whatever happens."""
@@ -97,9 +105,10 @@ async def polled(
     *,
     activate: bool = False,
     active: bool = True,
+    poll_interval: float = POLL_S,
 ) -> AsyncIterator[Polled]:
     """A poller that has had its first contact with a gripper, active or just switched on."""
-    here = Polled(policy, activate=activate)
+    here = Polled(policy, activate=activate, poll_interval=poll_interval)
     if active:
         await here.wire.activate()
     here.start()

@@ -13,7 +13,7 @@ import pytest
 from robotiq_async.control.pending import Command
 from robotiq_async.session.opening import SHORTEST_S, Opener
 from robotiq_async.session.options import LATE_POLLS, HandOptions, ReconnectPolicy
-from robotiq_async.session.poller import READS, STOP_S
+from robotiq_async.session.poller import LATE_WARNING_S, READS, STOP_S
 from robotiq_async.values.enums import Finger, State
 from robotiq_async.values.errors import (
     ConnectFailedError,
@@ -168,26 +168,36 @@ async def test_in_a_loop_that_is_always_held_up_something_is_written_in_the_end(
     here.at_next_status = None
 
 
+async def late(here: Polled, seconds: float, times: int) -> None:
+    """Hold up the loop so often, each time during a poll."""
+    for _ in range(times):
+        here.at_next_status = lambda: here.loop.hold_up(seconds)
+        await here.polls(3)
+
+
+async def test_late_polls_are_warned_of_once_a_minute_and_counted(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.WARNING, "robotiq_async")
+    async with polled(poll_interval=0.1) as here:  # a minute has fewer of them
+        await late(here, 0.3, 5)
+        await asyncio.sleep(LATE_WARNING_S - 10)
+        await late(here, 0.3, 4)
+        await asyncio.sleep(10)
+        await late(here, 0.4, 3)
+    first, second = [each for each in caplog.messages if LATE_POLLS in each]
+    assert "late, 200 ms: something holds up the event loop" in first
+    assert "late, 9 times, at most 300 ms" in second
+
+
 @pytest.mark.parametrize("in_ipython", [False, True])
-async def test_late_polls_are_warned_of_once_a_minute_and_counted(
+async def test_a_late_poll_may_be_a_prompt_of_ipython(
     here: Polled, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch, in_ipython: bool
 ) -> None:
     caplog.set_level(logging.WARNING, "robotiq_async")
     ipython = types.SimpleNamespace(get_ipython=lambda: object() if in_ipython else None)
     monkeypatch.setitem(sys.modules, "IPython", ipython)
-
-    async def late(seconds: float, times: int) -> None:
-        for _ in range(times):
-            here.at_next_status = lambda: here.loop.hold_up(seconds)
-            await here.polls(3)
-
-    await late(0.2, 10)
-    await asyncio.sleep(70)
-    await late(0.3, 3)
-    first, second = [each for each in caplog.messages if LATE_POLLS in each]
-    assert "late, 190 ms: something holds up the event loop" in first
-    assert "late, 10 times, at most 290 ms" in second
-    assert ("IPython" in first) is in_ipython
+    await late(here, 0.2, 1)
+    (said,) = [each for each in caplog.messages if LATE_POLLS in each]
+    assert ("IPython" in said) is in_ipython
 
 
 # -- the first contact -------------------------------------------------------------------------------------
@@ -231,7 +241,7 @@ async def test_a_failed_first_contact_is_reported_and_ends_the_task(
 async def test_the_start_and_the_policy_may_activate_and_nothing_else_does_unasked(
     activate: bool, policy: ReconnectPolicy, active: bool, at_first: State, after_a_power_cut: State
 ) -> None:
-    async with polled(policy, activate=activate, active=active) as here:
+    async with polled(policy, activate=activate, active=active, poll_interval=0.05) as here:
         await asyncio.sleep(10)
         assert here.machine.state is at_first
         written = len(here.requests)
