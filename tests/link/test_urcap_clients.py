@@ -12,6 +12,7 @@ import pytest
 
 from robotiq_async import JAW, TWO_FINGER_85, RobotiqHand
 from robotiq_async.simulator import SimulatedGripper, UrcapSimulatorServer
+from tests.grippers import shows
 
 
 @pytest.fixture
@@ -49,6 +50,6 @@ async def test_pyrobotiqur_beside_a_hand_is_another_client(server: UrcapSimulato
     async with RobotiqHand(server.address) as hand:
         await hand.open()
         await asyncio.to_thread(use)
-        assert hand.status.requested_position(JAW) == 80
+        await shows(hand, lambda status: status.requested_position(JAW) == 80)
         assert hand.statistics.foreign_commands >= 1
         await hand.close()
