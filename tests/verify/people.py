@@ -29,7 +29,7 @@ async def threads() -> AsyncIterator[None]:
 
     async def turn() -> None:
         while True:
-            await asyncio.sleep(0.001)
+            await asyncio.sleep(0.05)
             for thread in threading.enumerate():
                 if thread.name == "robotiq_async":
                     thread.join(0.01)

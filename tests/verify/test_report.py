@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -29,6 +29,7 @@ from robotiq_async.tools.verify.report import SCHEMA, lines, page, sentences
 from tests.docs.pages import read, table
 from tests.register_words import status_of
 from tests.verify.people import SHORT, Helper, Roll, served, threads, verified
+from tests.virtual import run
 
 HARDWARE = read("hardware.md")
 
@@ -50,32 +51,6 @@ async def recorded(path: Path, **plan: Any) -> tuple[Report, Folder]:
         return report, folder
 
 
-@pytest.mark.virtual_time
-async def test_the_files_hold_the_run(tmp_path: Path) -> None:
-    report, folder = await recorded(tmp_path / "new" / "folder", last=3)
-    fields = json.loads((folder.path / JSON).read_text())
-    assert fields == json.loads(json.dumps(report.as_dict()))
-    assert fields["schema"] == SCHEMA
-    assert fields["ended"]["why"] == "done"
-    assert fields["stages"] == [0, 1, 2, 3]
-    text = (folder.path / PAGE).read_text()
-    for sentence in sentences(report):
-        assert sentence in text
-    for name in report.checks:
-        assert f"`{name}`" in text
-    assert not list(folder.path.glob(".*"))
-
-
-@pytest.mark.virtual_time
-async def test_without_the_extra_for_pictures_the_page_says_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    monkeypatch.delitem(sys.modules, "robotiq_async.tools.verify.pictures", raising=False)
-    _, folder = await recorded(tmp_path, last=1)
-    assert "pictures need matplotlib" in (folder.path / PAGE).read_text()
-
-
 class Both(Roll):
     """Keeps frames on a roll and in a recording."""
 
@@ -92,19 +67,71 @@ class Both(Roll):
         self._recording.begin(stage)
 
 
+class Kept(NamedTuple):
+    """A run up to the activation, and what was on the disk each time that the report was saved."""
+
+    report: Report
+    path: Path
+    frames: list[Frame]
+    stages: list[list[int]]
+    pages: list[str]
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Kept:
+    """It is made once, for tests that only look at it."""
+    path = tmp_path_factory.mktemp("run") / "new" / "folder"
+
+    async def main() -> Kept:
+        async with served() as server, threads():
+            address = parse_address(server.address)
+            folder = Folder(path, address)
+            roll = Both(folder.recording)
+            stages: list[list[int]] = []
+            pages: list[str] = []
+
+            def save(report: Report) -> None:
+                folder.save(report)
+                stages.append(json.loads((path / JSON).read_text())["stages"])
+                pages.append((path / PAGE).read_text())
+
+            report = await Runner(Plan(address, last=3, lengths=SHORT), Helper(server), roll, save).run()
+            assert not await folder.end(report)
+            return Kept(report, path, roll.frames, stages, pages)
+
+    return run(main)
+
+
+def test_the_files_hold_the_run(kept: Kept) -> None:
+    fields = json.loads((kept.path / JSON).read_text())
+    assert fields == json.loads(json.dumps(kept.report.as_dict()))
+    assert fields["schema"] == SCHEMA
+    assert fields["ended"]["why"] == "done"
+    assert fields["stages"] == [0, 1, 2, 3]
+    text = (kept.path / PAGE).read_text()
+    for sentence in sentences(kept.report):
+        assert sentence in text
+    for name in kept.report.checks:
+        assert f"`{name}`" in text
+    assert not list(kept.path.glob(".*"))
+
+
 @pytest.mark.virtual_time
-async def test_the_recording_has_every_frame(tmp_path: Path) -> None:
-    async with served() as server, threads():
-        address = parse_address(server.address)
-        folder = Folder(tmp_path, address)
-        roll = Both(folder.recording)
-        runner = Runner(Plan(address, last=3, lengths=SHORT), Helper(server), roll, folder.save)
-        await folder.end(await runner.run())
-    entries = [(entry.topic, json.loads(entry.data)) for entry in read_recording(folder.path / NAME)]
+async def test_without_the_extra_for_pictures_the_page_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    monkeypatch.delitem(sys.modules, "robotiq_async.tools.verify.pictures", raising=False)
+    _, folder = await recorded(tmp_path, last=1)
+    assert "pictures need matplotlib" in (folder.path / PAGE).read_text()
+
+
+def test_the_recording_has_every_frame(kept: Kept) -> None:
+    entries = [(entry.topic, json.loads(entry.data)) for entry in read_recording(kept.path / NAME)]
     for topic, kind in (("/gripper/status", "status"), ("/gripper/command", "command")):
-        kept = [fields["registers"] for name, fields in entries if name == topic]
-        assert kept == [list(frame.registers) for frame in roll.frames if frame.kind == kind]
-        assert kept
+        registers = [fields["registers"] for name, fields in entries if name == topic]
+        assert registers == [list(frame.registers) for frame in kept.frames if frame.kind == kind]
+        assert registers
     stages = [fields["target"] for name, fields in entries if fields.get("kind") == "state"]
     assert stages == [f"verify stage {number}" for number in range(4)]
 
@@ -201,48 +228,25 @@ async def test_a_report_that_cannot_be_written_ends_the_run_after_the_stage() ->
         assert (report.why, report.stages) == ("disk", [0])
 
 
-@pytest.mark.virtual_time
-async def test_after_each_stage_the_report_is_on_the_disk(tmp_path: Path) -> None:
+def test_after_each_stage_the_report_is_on_the_disk(kept: Kept) -> None:
     """So a run that is killed leaves its findings."""
-    seen: list[list[int]] = []
-    async with served() as server, threads():
-        address = parse_address(server.address)
-        folder = Folder(tmp_path, address)
-
-        def save(report: Report) -> None:
-            folder.save(report)
-            seen.append(json.loads((tmp_path / JSON).read_text())["stages"])
-
-        runner = Runner(Plan(address, last=3, lengths=SHORT), Helper(server), folder.recording, save)
-        await folder.end(await runner.run())
-    assert seen == [[0], [0, 1], [0, 1], [0, 1, 2], [0, 1, 2], [0, 1, 2, 3]], "and before each that writes"
+    assert kept.stages == [[0], [0, 1], [0, 1], [0, 1, 2], [0, 1, 2], [0, 1, 2, 3]], (
+        "and before each that writes"
+    )
 
 
-@pytest.mark.virtual_time
-async def test_a_run_that_is_killed_in_a_stage_that_writes_says_that_the_fingers_may_move(
-    tmp_path: Path,
-) -> None:
+def test_a_run_that_is_killed_in_a_stage_that_writes_says_that_the_fingers_may_move(kept: Kept) -> None:
     """It read "nothing speaks against using this gripper ... it was killed: -."."""
-    pages: list[str] = []
-    async with served() as server, threads():
-        address = parse_address(server.address)
-        folder = Folder(tmp_path, address)
-
-        def save(report: Report) -> None:
-            folder.save(report)
-            pages.append((tmp_path / PAGE).read_text())
-
-        runner = Runner(Plan(address, last=2, lengths=SHORT), Helper(server), folder.recording, save)
-        await folder.end(await runner.run())
-    after_0, after_1, before_2, after_2 = pages
-    assert "THE FINGERS MAY STILL MOVE: stage 2 has begun, and the run has not ended" in before_2
-    for text in pages:
+    after_0, after_1, before_2, after_2, before_3, after_3 = kept.pages
+    for stage, text in (2, before_2), (3, before_3):
+        assert f"THE FINGERS MAY STILL MOVE: stage {stage} has begun, and the run has not ended" in text
+    for text in kept.pages:
         assert "The run has not ended, or was killed." in text
         assert "nothing speaks against" not in text
         assert "Lines to paste" not in text
-    for text in (after_0, after_1, after_2):
+    for text in (after_0, after_1, after_2, after_3):
         assert "FINGERS MAY" not in text
-    assert "Lines to paste" in (tmp_path / PAGE).read_text(), "of a run that has ended"
+    assert "Lines to paste" in (kept.path / PAGE).read_text(), "of a run that has ended"
 
 
 def test_above_do_not_use_there_are_no_lines_to_paste() -> None:
