@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from robotiq_async import HAND_E, JAW, THREE_FINGER, TWO_FINGER_85, Finger
+from robotiq_async import HAND_E, JAW, TWO_FINGER_85, TWO_FINGER_140, Finger
 from robotiq_async.hand import Hand
 from robotiq_async.values.status import Part
 from tests.contract.bench import Bench, at_rest, contract, on_model
 
-jaw, three = on_model(TWO_FINGER_85), on_model(THREE_FINGER)
+jaw = on_model(TWO_FINGER_85, TWO_FINGER_140, HAND_E)
 
 
 @jaw
@@ -85,7 +85,6 @@ async def test_what_is_not_held_has_no_width(here: Bench, hand: Hand) -> None:
     assert grasp.move.opening_mm(JAW) == pytest.approx(0, abs=1)
 
 
-@three
 @contract
 async def test_fingers_of_a_3_finger_have_openings_and_no_width(here: Bench, hand: Hand) -> None:
     here.gripper.place_object(Finger.ABC, position=150)
@@ -171,7 +170,6 @@ async def test_what_is_refused_is_refused_in_its_unit_and_nothing_is_sent(
     assert here.writes == writes
 
 
-@three
 @contract
 async def test_the_scissor_has_neither_millimetres_nor_a_fraction(here: Bench, hand: Hand) -> None:
     writes = here.writes

@@ -30,7 +30,7 @@ GAINED, SLIPPED, LOST, RELEASED = GripChange
 
 async def heard(events: Stream[GripEvent], count: int) -> list[GripEvent]:
     """The next events; they come soon, or not at all."""
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(5):
         return [await anext(events) for _ in range(count)]
 
 
