@@ -26,7 +26,7 @@ async def test_speed_and_force_start_no_motion(here: Bench, hand: Hand) -> None:
     await hand.set_force(9, B)
     assert [axis.speed for axis in here.last_write.axes] == [7, 128, 128, 7]
     assert [axis.force for axis in here.last_write.axes] == [64, 9, 64, 64]
-    await asyncio.sleep(2)
+    await asyncio.sleep(0.5)
     assert here.travels == travels
 
 
@@ -126,9 +126,9 @@ async def test_nothing_commanded_before_a_halt_comes_after_it(here: Bench, hand:
         hand.command(position=255 - value)
     await hand.halt()
     assert not hand.is_moving
-    await asyncio.sleep(1)
+    await asyncio.sleep(0.2)
     travels = here.travels
-    await asyncio.sleep(1)
+    await asyncio.sleep(0.5)
     assert here.travels == travels
     assert not here.last_write.go
 

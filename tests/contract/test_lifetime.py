@@ -163,7 +163,7 @@ async def test_stop_may_leave_the_fingers_to_what_they_do(here: Bench, hand: Han
     await here.moves()
     writes = here.writes
     await hand.stop(halt=False)
-    await asyncio.sleep(10)
+    await asyncio.sleep(2)
     assert here.writes == writes
     assert here.gripper.position(A) >= 195
 
@@ -175,7 +175,7 @@ async def test_stop_may_keep_a_grip(here: Bench, hand: Hand) -> None:
     writes = here.writes
     await hand.stop(keep_grip=True)
     assert hand.state is State.SHUTDOWN
-    await asyncio.sleep(5)
+    await asyncio.sleep(1)
     assert here.gripper.grips == B | C
     assert here.writes == writes
 
@@ -189,7 +189,7 @@ async def test_a_stop_that_keeps_a_grip_holds_what_moves(here: Bench, hand: Hand
     await here.moves()
     await hand.stop(keep_grip=True)
     assert not here.gripper.is_moving
-    await asyncio.sleep(5)
+    await asyncio.sleep(1)
     assert here.gripper.position(A) < 40
     assert here.gripper.grips == B | C
 
