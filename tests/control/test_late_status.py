@@ -17,7 +17,10 @@ A, B, C, S = THREE_FINGER.axes
 ABC = Finger.ABC
 MOVING, OPENING, CLOSING, THERE = ObjectStatus
 LAGS = pytest.mark.parametrize("lag", [0, 1, 8])
-CYCLES = pytest.mark.parametrize("device_cycle", [0.005, 0.2])
+LAGS_AND_CYCLES = pytest.mark.parametrize(
+    ("lag", "device_cycle"), [(0, 0.2), (1, 0.005), (8, 0.005), (8, 0.2)]
+)
+"""Without a lag, the usual device cycle is that of all other tests."""
 FEW_POLLS_S = 6 * POLL_S
 
 
@@ -30,7 +33,7 @@ def ended(scan: Scan, outcome: Outcome) -> MoveResult:
     axes = list(result.outcomes)
     travels = scan.travels()
     assert not set(axes) & set(moves)
-    scan.run(1.0)
+    scan.run(0.5)
     for axis in axes:
         assert scan.gripper.travel(axis) - travels[axis] <= 2, f"{axis} went on"
         assert scan.latest.finger_status(axis) is result.outcomes[axis], axis
@@ -41,7 +44,7 @@ def ready(lag: int, device_cycle: float = 0.005) -> Scan:
     """A hand that is open, and reports it: after an activation alone gDT is 0, as in a motion."""
     scan = started(device_cycle, lag=lag)
     scan.moved(0)
-    scan.run(2 * LAG_S)
+    scan.run(LAG_S + 0.1)
     return scan
 
 
@@ -56,23 +59,21 @@ def holding(lag: int, device_cycle: float = 0.005) -> Scan:
 # -- lag x what happens ------------------------------------------------------------------------------------
 
 
-@LAGS
-@CYCLES
-@pytest.mark.parametrize("position", [255, 200, 20, 12])
-def test_a_move_ends_there(lag: int, device_cycle: float, position: int) -> None:
+@LAGS_AND_CYCLES
+@pytest.mark.parametrize(("position", "speed"), [(255, 255), (20, 128), (12, 128)])
+def test_a_move_ends_there(lag: int, device_cycle: float, position: int, speed: int) -> None:
     scan = ready(lag, device_cycle)
-    result = ended(scan, scan.move(position)[1])
+    result = ended(scan, scan.move(position, speed=speed)[1])
     assert set(result.outcomes.values()) == {THERE}
     assert all(abs(at - min(position, 241)) <= 2 for at in result.positions.values())
 
 
-@LAGS
-@CYCLES
+@LAGS_AND_CYCLES
 @pytest.mark.parametrize("at", [9, 60, 150])
 def test_a_move_ends_in_contact(lag: int, device_cycle: float, at: int) -> None:
     scan = ready(lag, device_cycle)
     scan.gripper.place_object(ABC, at)
-    result = ended(scan, scan.move(255)[1])
+    result = ended(scan, scan.move(255, speed=255)[1])
     assert result.contacts == ABC
     assert all(position == pytest.approx(at, abs=1) for position in result.positions.values())
 
@@ -92,8 +93,7 @@ def test_a_move_of_nothing_ends_within_a_few_polls(lag: int, what: str) -> None:
     assert ended(scan, outcome).contacts == (ABC if what == "latched" else Finger(0))
 
 
-@LAGS
-@CYCLES
+@LAGS_AND_CYCLES
 def test_a_move_that_supersedes_another_ends_where_it_was_sent(lag: int, device_cycle: float) -> None:
     """It comes at every moment of the first one: at its start, in between, at its end, and after it."""
     for seconds in (0.005, 0.02, 0.05, 0.85, 0.9, 1.2):
@@ -107,8 +107,7 @@ def test_a_move_that_supersedes_another_ends_where_it_was_sent(lag: int, device_
         assert first.is_answered
 
 
-@LAGS
-@CYCLES
+@LAGS_AND_CYCLES
 def test_a_part_that_is_let_go_of_is_no_contact(lag: int, device_cycle: float) -> None:
     """`open()` of a held part reported a contact while closing, and ended before it began."""
     scan = holding(lag, device_cycle)
@@ -117,8 +116,7 @@ def test_a_part_that_is_let_go_of_is_no_contact(lag: int, device_cycle: float) -
     assert all(position <= 7 for position in result.positions.values())
 
 
-@LAGS
-@CYCLES
+@LAGS_AND_CYCLES
 @pytest.mark.parametrize("polls", [1, 3, 8, 60])
 def test_a_part_that_is_let_go_of_and_gripped_again_at_once(
     lag: int, device_cycle: float, polls: int
@@ -136,8 +134,7 @@ def test_a_part_that_is_let_go_of_and_gripped_again_at_once(
     assert all(result.positions[axis] >= 240 for axis in result.outcomes if axis not in latched)
 
 
-@LAGS
-@CYCLES
+@LAGS_AND_CYCLES
 @pytest.mark.parametrize("polls", [1, 3, 8])
 def test_an_axis_sent_away_from_a_part_and_back_is_stopped_by_a_hold(
     lag: int, device_cycle: float, polls: int
@@ -152,14 +149,13 @@ def test_an_axis_sent_away_from_a_part_and_back_is_stopped_by_a_hold(
     scan.hold()
     scan.run(2 * device_cycle + 0.1)
     travels = scan.travels()
-    scan.run(3.0)
+    scan.run(1.0)
     after = scan.travels()
     if was_moving:
         assert all(after[axis] - travels[axis] <= 2 for axis in THREE_FINGER.axes), "it went on after a hold"
 
 
-@LAGS
-@CYCLES
+@LAGS_AND_CYCLES
 def test_a_hold_keeps_a_grip(lag: int, device_cycle: float) -> None:
     scan = holding(lag, device_cycle)
     scan.move(200, S)
@@ -170,8 +166,7 @@ def test_a_hold_keeps_a_grip(lag: int, device_cycle: float) -> None:
     assert scan.last_image.position(S) < 200
 
 
-@LAGS
-@CYCLES
+@LAGS_AND_CYCLES
 @pytest.mark.parametrize("seconds", [0.0, 0.01, 0.03, 0.3])
 def test_a_motion_that_is_held_stops(lag: int, device_cycle: float, seconds: float) -> None:
     scan = ready(lag, device_cycle)
@@ -182,14 +177,13 @@ def test_a_motion_that_is_held_stops(lag: int, device_cycle: float, seconds: flo
     scan.run(0.5)
     assert isinstance(outcome.error, MoveSupersededError)
     travels = scan.travels()
-    scan.run(2.0)
+    scan.run(1.0)
     assert scan.travels() == travels
     result = ended(scan, scan.move(60, A)[1])
     assert abs(result.positions[A] - 60) <= 2
 
 
-@LAGS
-@CYCLES
+@LAGS_AND_CYCLES
 def test_two_moves_at_once_end_each_in_its_time(lag: int, device_cycle: float) -> None:
     scan = ready(lag, device_cycle)
     scan.gripper.place_object(B, 60)
@@ -208,8 +202,7 @@ def test_two_moves_at_once_end_each_in_its_time(lag: int, device_cycle: float) -
     assert results[0].duration < results[1].duration < results[2].duration
 
 
-@LAGS
-@CYCLES
+@LAGS_AND_CYCLES
 @pytest.mark.parametrize("after", ["more force", "a halt"])
 def test_a_second_try_sees_that_the_part_is_gone(lag: int, device_cycle: float, after: str) -> None:
     """This is a program's test whether a part is still there: the contact of before must not answer."""
@@ -228,8 +221,12 @@ def test_a_second_try_sees_that_the_part_is_gone(lag: int, device_cycle: float, 
 
 SHORT = [1, 3, 8, 15, 30]
 PAUSES_S = [0.0, 0.03, 0.12, 0.3]
-SHORT_LAGS = pytest.mark.parametrize("lag", [4, 20, 48])  # polls: 0.02 to 0.24 s
-MODELS = pytest.mark.parametrize("model", [THREE_FINGER, TWO_FINGER_85], ids=lambda model: model.name)
+MODELS_AND_LAGS = pytest.mark.parametrize(
+    ("model", "lag"),
+    [(THREE_FINGER, 4), (TWO_FINGER_85, 20), (THREE_FINGER, 48)],
+    ids=["3f-4", "2f85-20", "3f-48"],
+)
+"""The lag in polls: 0.02 to 0.24 s."""
 
 
 def at_100(lag: int, model: Model) -> Scan:
@@ -242,9 +239,8 @@ def at_100(lag: int, model: Model) -> Scan:
 def back_at_100(scan: Scan) -> Scan:
     """The same, after the part is gone."""
     scan.gripper.remove_object(A)
-    scan.moved(0, A)
     scan.moved(100, A)
-    scan.run(1.0)
+    scan.run(0.4)
     return scan
 
 
@@ -259,8 +255,7 @@ def each_short_motion(lag: int, model: Model) -> Iterator[Scan]:
             back_at_100(scan)
 
 
-@SHORT_LAGS
-@MODELS
+@MODELS_AND_LAGS
 def test_a_move_after_a_short_one_ends_where_it_was_sent(lag: int, model: Model) -> None:
     """The late object status of the first motion, moving and then at position, is not that of the second."""
     for scan in each_short_motion(lag, model):
@@ -269,8 +264,7 @@ def test_a_move_after_a_short_one_ends_where_it_was_sent(lag: int, model: Model)
         assert result.reached == A
 
 
-@SHORT_LAGS
-@MODELS
+@MODELS_AND_LAGS
 def test_a_part_that_is_met_after_a_short_motion_is_held(lag: int, model: Model) -> None:
     for scan in each_short_motion(lag, model):
         scan.gripper.place_object(A, 180)
@@ -278,8 +272,7 @@ def test_a_part_that_is_met_after_a_short_motion_is_held(lag: int, model: Model)
         assert scan.gripper.grips == A
 
 
-@SHORT_LAGS
-@MODELS
+@MODELS_AND_LAGS
 def test_a_part_is_let_go_of_after_a_short_motion(lag: int, model: Model) -> None:
     scan = at_100(lag, model)
     scan.moved(108, A)
@@ -294,8 +287,7 @@ def test_a_part_is_let_go_of_after_a_short_motion(lag: int, model: Model) -> Non
         assert ended(scan, scan.move(60, A)[1]).reached == A
 
 
-@SHORT_LAGS
-@MODELS
+@MODELS_AND_LAGS
 def test_a_hold_after_a_short_motion_stops_the_second(lag: int, model: Model) -> None:
     for scan in each_short_motion(lag, model):
         _, second = scan.move(250, A)
@@ -304,12 +296,11 @@ def test_a_hold_after_a_short_motion_stops_the_second(lag: int, model: Model) ->
         scan.run(0.05)
         assert second.is_answered
         travel = scan.gripper.travel(A)
-        scan.run(1.0)
+        scan.run(0.5)
         assert scan.gripper.travel(A) - travel <= 2, "it went on after a hold"
 
 
-@SHORT_LAGS
-@MODELS
+@MODELS_AND_LAGS
 def test_a_stop_that_keeps_a_grip_leaves_no_motion_after_a_short_one(lag: int, model: Model) -> None:
     for counts in (3, 15):
         for pause in (0.0, 0.12):
@@ -324,7 +315,7 @@ def test_a_stop_that_keeps_a_grip_leaves_no_motion_after_a_short_one(lag: int, m
             assert scan.gripper.travel(A) == travel, (counts, pause)
 
 
-@SHORT_LAGS
+@pytest.mark.parametrize("lag", [4, 20, 48])
 @pytest.mark.parametrize("pause", [0.0, 0.03, 0.12])
 def test_a_short_motion_of_another_client_does_not_end_ours(lag: int, pause: float) -> None:
     scan = at_100(lag, THREE_FINGER)
@@ -353,8 +344,7 @@ def test_an_axis_at_a_software_limit_ends_when_the_lag_is_over(lag: int) -> None
 # -- every reader -----------------------------------------------------------------------------------------
 
 
-@LAGS
-@CYCLES
+@LAGS_AND_CYCLES
 def test_a_hand_that_was_sent_off_is_moving_until_it_has_stopped(lag: int, device_cycle: float) -> None:
     scan = ready(lag, device_cycle)
     scan.run(1.0)
@@ -365,8 +355,7 @@ def test_a_hand_that_was_sent_off_is_moving_until_it_has_stopped(lag: int, devic
     scan.until(lambda: not scan.controller.is_moving, 1.0)
 
 
-@LAGS
-@CYCLES
+@LAGS_AND_CYCLES
 def test_a_grip_is_kept_and_what_was_just_sent_off_is_held(lag: int, device_cycle: float) -> None:
     scan = holding(lag, device_cycle)
     scan.command(S, position=200)
@@ -401,13 +390,13 @@ def test_the_first_write_beside_another_clients_leaves_it_what_it_has_just_asked
     scan.gripper.write(0, [0x0100])
     scan.now += 10
     scan.gripper.write(0, image({B: 255}))
-    for _ in range(1000):
+    for _ in range(500):
         scan.now += POLL_S
         scan.status()
     scan.gripper.write(0, image({B: target}))
     scan.come_back(0.01)
     scan.command(S, position=100)
-    scan.run(10)
+    scan.run(3)
     assert scan.gripper.position(B) == pytest.approx(6 if target == 0 else 150, abs=2)
     assert scan.last_image.position(B) == target
 
