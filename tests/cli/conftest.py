@@ -1,6 +1,6 @@
 """The command line as a user runs it: in this process (`call`), and in one of its own (`shell`, `beside`).
 
-A process takes half a second of a CPU to start, and a tenth where it is forked (tests/cli/forked.py). It is
+A process takes half a second of a CPU to start, and a tenth where it is forked (tests/forked.py). It is
 for what needs one: signals, terminals, streams that are closed, what happens at an import, a second program
 that runs at the same time, and once for each command.
 """
@@ -34,8 +34,8 @@ from robotiq_async import Finger, RobotiqHand, State
 from robotiq_async.cli import main
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.recording.recorder import Recorder
-from tests.cli.forked import CAN_FORK, ROOT, Forked
 from tests.cli.terminal import Terminal
+from tests.forked import CAN_FORK, ROOT, Forked
 from tests.patience import patience
 from tests.virtual import VirtualLoop
 
@@ -272,8 +272,12 @@ class Shell:
 
     async def start(self, *arguments: str, stdin: int = DEVNULL) -> Process:
         """Start a command."""
+        return await self.forked("-m", "robotiq_async", *arguments, stdin=stdin)
+
+    async def forked(self, *arguments: str, stdin: int = DEVNULL) -> Process:
+        """Start this interpreter with the command line imported."""
         with patch.object(subprocess, "Popen", PROCESS):  # asyncio's
-            return await self.python("-m", "robotiq_async", *arguments, stdin=stdin)
+            return await self.python(*arguments, stdin=stdin)
 
     async def python(self, *arguments: str, stdin: int = DEVNULL) -> Process:
         """Start this interpreter."""
@@ -337,6 +341,16 @@ async def grasp(tmp_path: Path) -> Path:
         gripper.clear_faults()
         await hand.wait_for_state(State.RUNNING_IDLE)
     return file
+
+
+def draw_nothing(patch: pytest.MonkeyPatch) -> None:
+    """Let matplotlib write empty pictures: to draw one takes longer than all else that a command does."""
+    patch.setattr("matplotlib.figure.Figure.draw", lambda *_: None)
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    draw_nothing(monkeypatch)
 
 
 @pytest.fixture

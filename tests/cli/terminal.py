@@ -12,7 +12,7 @@ import sys
 import termios
 from typing import ClassVar
 
-from tests.cli.forked import CAN_FORK, ROOT, fork
+from tests.forked import CAN_FORK, ROOT, fork
 from tests.patience import patience
 
 SIZE = struct.pack("HHHH", 30, 100, 0, 0)

@@ -16,8 +16,8 @@ from robotiq_async.cli.commands.measure_force import force
 from robotiq_async.cli.commands.measure_stroke import stroke
 from robotiq_async.cli.commands.verify import verify
 from robotiq_async.simulator import SimulatorServer
-from tests.cli.forked import ROOT
 from tests.cli.terminal import Terminal
+from tests.forked import ROOT
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Call, Shell

@@ -35,7 +35,7 @@ async def test_at_an_address(shell: Shell, form: list[str]) -> None:
     root = Path(__file__).parents[2]
     arguments = [str(root / form[0]) if form[0].endswith(".py") else form[0], *form[1:]]
     async with SimulatorServer(SimulatedGripper(speedup=SPEEDUP)) as server:
-        outcome = await shell.finish(await shell.python(*arguments, "--yes", server.address))
+        outcome = await shell.finish(await shell.forked(*arguments, "--yes", server.address))
     outcome.assert_succeeded()
     for part in PARTS:
         assert part in outcome.out

@@ -19,7 +19,7 @@ from robotiq_async.cli.run import _Signals
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.values.request import Request
 from tests import conftest
-from tests.cli.forked import ROOT
+from tests.forked import ROOT
 from tests.grippers import active_gripper, until
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ sys.exit(main(["simulate", "--port", "0"]))
 
 
 async def test_a_signal_wakes_an_idle_loop(shell: Shell) -> None:
-    process = await shell.python("-c", ASLEEP)
+    process = await shell.forked("-c", ASLEEP)
     assert (await shell.read_line(process)).startswith("tcp://")
     process.send_signal(signal.SIGTERM)
     assert (await shell.finish(process)).code == 0

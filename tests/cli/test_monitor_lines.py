@@ -17,7 +17,7 @@ from robotiq_async import Fault, Finger, RobotiqHand
 from robotiq_async.cli.output.lines import print_objects
 from robotiq_async.session.options import LATE_POLLS
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.cli.forked import ROOT
+from tests.forked import ROOT
 from tests.grippers import shows, until
 from tests.patience import patience
 

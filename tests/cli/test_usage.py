@@ -217,7 +217,7 @@ async def test_a_simulation_with_physics_names_the_extra_that_it_needs(
     address, file = "sim://?physics=box:30x40x60,0.3", tmp_path / "FLEET.toml"
     file.write_text(f'site = "lab"\n[grippers.left]\naddress = "{address}"\n', encoding="utf-8")
     arguments = ["agent", "--check", str(file)] if command == "agent" else [command, address]
-    outcome = await shell.finish(await shell.python("-c", WITHOUT.format("mujoco", arguments)))
+    outcome = await shell.finish(await shell.forked("-c", WITHOUT.format("mujoco", arguments)))
     outcome.assert_failed(2 if command == "agent" else 1, "pip install 'mujoco")
 
 

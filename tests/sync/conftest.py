@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import signal
+import subprocess
 import sys
 import threading
 import time
-from asyncio.subprocess import PIPE, STDOUT
+from asyncio.subprocess import DEVNULL, PIPE, STDOUT
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
+from unittest.mock import patch
 
 import pytest
 
@@ -22,11 +25,15 @@ from robotiq_async.values.errors import ConnectionLostError
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import AxisRequest, Request
 from tests.conftest import Clock
-from tests.docs.pages import ROOT
+from tests.forked import CAN_FORK, CORE, ROOT, Forked
 from tests.patience import patience
 
 T = TypeVar("T")
 PATIENCE = 5.0
+
+
+class _Forked(Forked):
+    imported = CORE
 
 
 class Wire:
@@ -105,9 +112,14 @@ async def run_to_its_end(program: str) -> tuple[SimulatedGripper, str]:
     gripper.write(0, Request(activate=True).registers)
     clock.ahead += 10
     async with SimulatorServer(gripper) as server:
-        process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-c", program, server.address), cwd=ROOT, stdout=PIPE, stderr=STDOUT
-        )
+        with patch.object(subprocess, "Popen", _Forked if CAN_FORK else subprocess.Popen):  # asyncio's
+            process = await asyncio.create_subprocess_exec(
+                *(sys.executable, "-c", program, server.address),
+                env=os.environ | {"PYTHONPATH": str(ROOT)},
+                stdin=DEVNULL,
+                stdout=PIPE,
+                stderr=STDOUT,
+            )
         try:
             async with asyncio.timeout(patience(20)):
                 printed, _ = await process.communicate()

@@ -1,16 +1,15 @@
-"""Commands in processes of their own, without the third of a second of a CPU that their imports take.
+"""Programs in processes of their own, without the third of a second of a CPU that their imports take.
 
-A process that has imported the command line (``python -m tests.cli.forked``) forks for each of them. What
-begins then has its own streams, signals, environment and end, as a process that is started has; only where a
-test is about an import it has to be started (``Shell.python``). Linux makes such a process a child of who
-asked for it; elsewhere each is started.
+A process that has imported the library (``python -m tests.forked``) forks for each of them. What begins then
+has its own streams, signals, environment and end, as a process that is started has; only where a test is
+about an import it has to be started (``Shell.python`` of tests/cli). Linux makes such a process a child of
+who asked for it; elsewhere each is started.
 """
 
 from __future__ import annotations
 
 import atexit
 import ctypes
-import fcntl
 import gc
 import importlib
 import inspect
@@ -19,17 +18,23 @@ import os
 import runpy
 import socket
 import sys
-import termios
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from subprocess import Popen
-from typing import Any
+from types import ModuleType
+from typing import Any, ClassVar
 
-ROOT = Path(__file__).parents[2]
+if sys.platform != "win32":
+    import fcntl
+    import termios
+
+ROOT = Path(__file__).parents[1]
 CAN_FORK = sys.platform == "linux"
 PR_SET_CHILD_SUBREAPER = 36
-IMPORTED = ("robotiq_async.cli.run", "robotiq_async.simulator", "anyio._backends._asyncio", "rich.table")
+CORE = ("robotiq_async.simulator", "anyio._backends._asyncio")
+COMMAND_LINE = (*CORE, "robotiq_async.cli.run", "rich.table")
+"""What is imported before."""
 MOST = 1 << 20
 """Bytes of a request."""
 
@@ -38,12 +43,12 @@ MOST = 1 << 20
 
 
 @cache
-def _nursery() -> socket.socket:
+def _nursery(imported: tuple[str, ...]) -> socket.socket:
     """The end here of the connection to the process that forks; it ends with this one."""
     ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with there:
-        command = [sys.executable, "-m", "tests.cli.forked", str(there.fileno())]
+        command = [sys.executable, "-m", "tests.forked", str(there.fileno()), *imported]
         environment = os.environ | {"PYTHONPATH": str(ROOT)}
         process = Popen(command, pass_fds=[there.fileno()], env=environment)
     atexit.register(_end, here, process)
@@ -61,11 +66,12 @@ def fork(
     streams: Sequence[int],
     *,
     terminal: bool = False,
+    imported: tuple[str, ...] = COMMAND_LINE,
 ) -> int:
     """Run Python with these arguments (``-m module``, ``-c code`` or a file); return its process ID."""
     what = {"arguments": arguments, "environment": dict(environment), "folder": os.getcwd()}
     request = json.dumps({**what, "terminal": terminal}).encode()
-    nursery = _nursery()
+    nursery = _nursery(imported)
     socket.send_fds(nursery, [request], streams)
     process = int(nursery.recv(20))
     nursery.recv(1)  # from now on it is a child of this one
@@ -75,11 +81,14 @@ def fork(
 class Forked(Popen[Any]):
     """A process that is forked in place of started; all of its streams must be given."""
 
+    imported: ClassVar = COMMAND_LINE
+
     def _execute_child(self, *arguments: object) -> None:
         of = inspect.signature(super()._execute_child).bind(*arguments).arguments  # type: ignore[misc]
         pipes = ("p2cread", "p2cwrite", "c2pread", "c2pwrite", "errread", "errwrite")
         try:
-            self.pid = fork(of["args"][1:], of["env"], [of[each] for each in (pipes[0], *pipes[3::2])])
+            streams = [of[each] for each in (pipes[0], *pipes[3::2])]
+            self.pid = fork(of["args"][1:], of["env"], streams, imported=self.imported)
             self._child_created = True
         finally:
             self._close_pipe_fds(*(of[each] for each in pipes))  # type: ignore[attr-defined]
@@ -131,14 +140,16 @@ def _run(arguments: list[str]) -> None:
             runpy.run_module(module, run_name="__main__", alter_sys=True)
         case ["-c", code, *_]:
             sys.argv = ["-c", *arguments[2:]]
-            exec(code, {"__name__": "__main__"})
+            # What a program leaves in its module is there until the interpreter ends.
+            sys.modules["__main__"] = ModuleType("__main__")
+            exec(code, vars(sys.modules["__main__"]))
         case [file, *_]:
             sys.argv = arguments
             runpy.run_path(file, run_name="__main__")
 
 
 def _main() -> None:
-    for module in IMPORTED:
+    for module in sys.argv[2:]:
         importlib.import_module(module)
     gc.collect()
     gc.freeze()
