@@ -55,6 +55,7 @@ def adds(words: list[str]) -> list[str] | None:
 PAGES_WITH_SOME = [page for page in [ROOT / "README.md", *PAGES] if typed(page)]
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("page", PAGES_WITH_SOME, ids=named)
 def test_the_lines_of_a_page_can_be_typed_in_their_order(
     page: Path, call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

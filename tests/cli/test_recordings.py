@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.reader import make_reader
 from mcap.records import Chunk, Header
@@ -131,7 +130,7 @@ sys.exit(main(["record", {!r}, {!r}]))
 async def test_a_disk_that_is_full_is_one_line(shell: Shell, server: SimulatorServer, tmp_path: Path) -> None:
     file = tmp_path / "it.mcap"
     async with RobotiqHand(server.address) as hand:
-        outcome = await shell.finish(await shell.python("-c", FULL.format(str(file), server.address)))
+        outcome = await shell.finish(await shell.forked("-c", FULL.format(str(file), server.address)))
         assert hand.state is State.RUNNING_IDLE
     outcome.assert_failed(1, "it.mcap: File too large")
     assert file.stat().st_size == 12_000
@@ -209,14 +208,14 @@ def test_pandas_takes_it(grasp: Path, call: Call) -> None:
     assert table["is_moving"].dtype.kind == "b"
 
 
-@pytest.mark.parametrize("command", ["plot", "replay --plot"])
-def test_a_plot_is_drawn(grasp: Path, call: Call, command: str) -> None:
-    outcome = call(*command.split(), str(grasp))
+def test_a_plot_is_drawn(grasp: Path, call: Call) -> None:
+    outcome = call("plot", str(grasp))
     assert outcome.out.splitlines() == [str(grasp.with_suffix(suffix)) for suffix in (".png", ".svg")]
     drawn = grasp.with_suffix(".svg").read_bytes()
     assert b"COMMUNICATION_NOT_READY" in drawn or drawn.count(b"<use ") > 50, "words are drawn as glyphs"
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_name_of_a_picture_may_have_its_suffix(grasp: Path, call: Call) -> None:
     call("plot", str(grasp), str(grasp.with_name("there.png"))).assert_succeeded()
     assert grasp.with_name("there.png").exists()
@@ -235,6 +234,7 @@ def test_recover_makes_a_broken_one_whole(grasp: Path, call: Call) -> None:
     call("recover", str(grasp)).assert_failed(1, "File exists")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_part_of_a_recording_is_drawn(grasp: Path, call: Call) -> None:
     call("plot", str(grasp), "--from", "0", "--to", "1e6").assert_succeeded()
     picture = str(grasp.with_name("part"))
@@ -242,6 +242,7 @@ def test_a_part_of_a_recording_is_drawn(grasp: Path, call: Call) -> None:
     call("plot", str(grasp), picture, "--from", "2", "--to", "1").assert_failed(2, "less than --to")
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("command", ["replay", "plot"])
 def test_of_a_broken_one_it_is_said_that_it_is(command: str, grasp: Path, call: Call) -> None:
     assert call(command, str(grasp)).err == ""
@@ -252,6 +253,7 @@ def test_of_a_broken_one_it_is_said_that_it_is(command: str, grasp: Path, call: 
     outcome.assert_failed(0, "grasp.mcap ends too early, after ", "robotiq-async recover")
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("command", ["plot", "replay --plot", "export"])
 def test_an_existing_file_is_replaced_only_with_overwrite(command: str, grasp: Path, call: Call) -> None:
     there = grasp.with_suffix(".csv" if command == "export" else ".svg")
@@ -260,7 +262,9 @@ def test_an_existing_file_is_replaced_only_with_overwrite(command: str, grasp: P
     call(*command.split(), str(grasp)).assert_failed(1, f"{there}: File exists; --overwrite replaces it")
     assert there.read_text() == "mine"
     assert set(grasp.parent.iterdir()) == before, "not half of it either"
-    call(*command.split(), str(grasp), "--overwrite").assert_succeeded()
+    outcome = call(*command.split(), str(grasp), "--overwrite")
+    outcome.assert_succeeded()
+    assert str(there) in outcome.out
     assert there.read_text(encoding="utf-8") != "mine"
 
 
@@ -383,8 +387,7 @@ def test_nothing_to_show_is_said(foreign: Callable[..., Path], command: str, wor
     assert not file.with_suffix(".csv").exists()
 
 
-@pytest.mark.parametrize("words", ["$\\frac{", "x" * 100_000, STEERING])
-def test_words_of_others_are_drawn_as_they_are(grasp: Path, words: str, call: Call) -> None:
+def test_words_of_others_are_drawn_as_they_are(grasp: Path, call: Call) -> None:
     with grasp.open("rb") as stream:
         first = next(make_reader(stream).iter_messages(topics=["/gripper/status"]))[2]
     file = grasp.with_name("foreign.mcap")
@@ -393,7 +396,7 @@ def test_words_of_others_are_drawn_as_they_are(grasp: Path, words: str, call: Ca
         writer.start()
         for topic in ("/gripper/status", "/gripper/event"):
             writer.register_channel(topic, "json", 0)
-        for second in range(3):
+        for second, words in enumerate(("$\\frac{", "x" * 100_000, STEERING)):
             writer.add_message(1, first.log_time + second * 10**9, first.data, 0)
             writer.add_message(2, first.log_time + second * 10**9, event(kind="state", target=words), 0)
         writer.finish()  # type: ignore[no-untyped-call]
@@ -409,15 +412,21 @@ print(*(main([command, {!r}]) for command in ("replay", "recover", "plot")))
 """Runs commands with 1.5 GB of addresses; matplotlib takes most of them."""
 
 
+def zeros(count: int) -> bytes:
+    """So many, as a frame of Zstandard (RFC 8878): blocks that say which byte is repeated how often."""
+    blocks = count // 2**17
+    heads = (2**17 << 3 | 1 << 1 | (block == blocks - 1) for block in range(blocks))
+    return b"\x28\xb5\x2f\xfd\x00\x58" + b"".join(head.to_bytes(3, "little") + b"\0" for head in heads)
+
+
 async def test_two_gigabytes_in_a_small_chunk_are_one_line(shell: Shell, tmp_path: Path) -> None:
     file = tmp_path / "bomb.mcap"
-    compressor = zstandard.ZstdCompressor().compressobj()
-    data = b"".join(compressor.compress(bytes(2**20)) for _ in range(2048)) + compressor.flush()
+    data = zeros(2**31)
     builder = RecordBuilder()
     Header("", "").write(builder)
     Chunk("zstd", data, 0, 0, 0, 2**31).write(builder)
     file.write_bytes(b"\x89MCAP0\r\n" + builder.end())  # type: ignore[no-untyped-call]
-    outcome = await shell.finish(await shell.python("-c", LITTLE_MEMORY.format(str(file))))
+    outcome = await shell.finish(await shell.forked("-c", LITTLE_MEMORY.format(str(file))))
     assert (outcome.code, outcome.out) == (0, "1 1 1\n"), outcome.err
     lines = outcome.err.splitlines()
     assert len(lines) == 3
