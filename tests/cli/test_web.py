@@ -52,8 +52,9 @@ async def test_it_prints_where_to_look_and_leaves_the_fingers_alone(
     async with RobotiqHand(server.address) as hand:
         await hand.move(50)
         before = gripper.request_registers
-        process = await shell.start("web", "--port", "0", "--control", server.address)
-        url = await shell.read_line(process)
+        nobody = "tcp://127.0.0.1:1"
+        process = await shell.start("web", "--port", "0", "--control", server.address, nobody)
+        url = await shell.read_line(process)  # of several grippers one may be missing
         assert url.startswith("http://127.0.0.1:")
         assert await asyncio.to_thread(status, url) == 303
         assert await asyncio.to_thread(status, url[:-1]) == 403
@@ -64,17 +65,9 @@ async def test_it_prints_where_to_look_and_leaves_the_fingers_alone(
         assert gripper.request_registers == before
 
 
-async def test_of_several_grippers_one_may_be_missing(shell: Shell, server: SimulatorServer) -> None:
-    process = await shell.start("web", "--port", "0", server.address, "tcp://127.0.0.1:1")
-    assert await asyncio.to_thread(status, await shell.read_line(process)) == 303
-    process.send_signal(signal.SIGTERM)
-    assert (await shell.finish(process)).code == 0
-
-
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (["tcp://127.0.0.1:1"], 1, "cannot connect to tcp://127.0.0.1:1"),
         (["tcp://127.0.0.1:1", "tcp://127.0.0.1:2"], 1, "127.0.0.1:2"),
         (["tcp://127.0.0.1:1", "127.0.0.1:1"], 2, "is given twice"),
         (["gripper:x"], 2, "gripper:x"),

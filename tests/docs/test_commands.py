@@ -19,6 +19,7 @@ from robotiq_async.cli.app import build
 from tests.docs.pages import PAGES, ROOT, blocks, named, read
 
 READ = [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
+COMMAND_LINE = build()
 OTHERS = {
     *("cp", "curl", "export", "ls", "python3", "python3.12", "ros2", "socat", "source", "sudo"),
     *("lerobot-record", "lerobot-replay", "lerobot-teleoperate"),
@@ -59,7 +60,7 @@ def check(line: str) -> None:
     words = words_of(line)
     program = Path(words[0]).name
     if program == "robotiq-async":
-        build().parse_args(words[1:], print_error=False, exit_on_error=False)
+        COMMAND_LINE.parse_args(words[1:], print_error=False, exit_on_error=False)
     elif program == "make":
         assert {word for word in words[1:] if "=" not in word} <= TARGETS
     elif program == "pip" and words[1] == "install":

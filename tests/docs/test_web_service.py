@@ -97,12 +97,27 @@ async def stops(here: Service, number: signal.Signals) -> None:
         each.close()
 
 
+async def halts(here: Service) -> None:
+    """A halt ends a pick, and the refused request is a 409."""
+    async with asyncio.timeout(patience(30)):
+        picking, picker = await here.ask("POST", "/pick?speed=0")
+        await until(lambda: here.gripper.is_moving)
+        halting, halter = await here.ask("POST", "/halt")
+        assert b" 200 " in await halting.readline()
+        assert b" 409 " in await picking.readline()
+        assert not here.gripper.is_moving
+        for each in (picker, halter):
+            each.close()
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
 async def test_a_signal_stops_the_fingers_while_a_client_watches(
     number: signal.Signals, tmp_path: Path
 ) -> None:
     """The server waits for its clients before the lifespan ends: the fingers moved on for as long."""
     async with service(active_gripper(1.0), tmp_path) as here:
+        if number is signal.SIGTERM:
+            await halts(here)
         await stops(here, number)
 
 
@@ -113,15 +128,3 @@ async def test_a_signal_during_the_activation_takes_it_back(tmp_path: Path) -> N
         process.send_signal(signal.SIGINT)
         await process.wait()
         assert not gripper.is_moving
-
-
-async def test_a_halt_ends_a_pick_and_a_refused_request_is_a_409(tmp_path: Path) -> None:
-    async with service(active_gripper(1.0), tmp_path) as here, asyncio.timeout(patience(30)):
-        picking, picker = await here.ask("POST", "/pick?speed=0")
-        await until(lambda: here.gripper.is_moving)
-        halting, halter = await here.ask("POST", "/halt")
-        assert b" 200 " in await halting.readline()
-        assert b" 409 " in await picking.readline()
-        assert not here.gripper.is_moving
-        for each in (picker, halter):
-            each.close()
