@@ -14,14 +14,27 @@ def rows(heading: str) -> list[list[str]]:
 
 
 HABITS = rows("A gripper with another habit")
-STAGES = ((1,), (2,), (3,), range(4, 9), (9,))
-"""Those of each column."""
-EVENTS = [
-    (trouble.strip(" `"), stage, cell)
+EVENTS_BY_ROW = [
+    (trouble.strip(" `"), cells)
     for troubles, *cells in rows("Something happens in a stage")
     for trouble in troubles.split(",")
-    for stages, cell in zip(STAGES, cells, strict=True)
-    for stage in stages
+]
+
+
+def stages(row: int) -> list[tuple[int, ...]]:
+    """Those of each column.
+
+    Five stages, which all move an active gripper, share a column: each trouble has two of them, and each of
+    them has six of the fifteen troubles.
+    """
+    return [(1,), (2,), (3,), (4 + row % 5, 4 + (row + 2) % 5), (9,)]
+
+
+EVENTS = [
+    (trouble, stage, cell)
+    for row, (trouble, cells) in enumerate(EVENTS_BY_ROW)
+    for of_column, cell in zip(stages(row), cells, strict=True)
+    for stage in of_column
 ]
 
 

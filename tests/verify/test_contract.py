@@ -1,6 +1,7 @@
 """With the option that the report names, a hand keeps its contract on a gripper with the habit.
 
 A scene is tried in one of its forms: they differ in what the hand is asked, and not in the gripper's habit.
+Of a habit that shows in some files of the contract only, these are tried (``WHERE``).
 """
 
 from __future__ import annotations
@@ -53,6 +54,30 @@ OF_OTHERS = ("test_differences", "test_physics", "test_shared_line", "test_units
 """Hands on other hosts, and what has no scene of its own."""
 ASKING = [file for file in FILES if file not in ("test_arguments", *OF_OTHERS)]
 """All but what is refused before the gripper is asked anything."""
+WHERE = {
+    # Without the option no scene finds its gripper. With it they differ in the function code of a read alone:
+    # the first connection, the next ones, and each kind of answer.
+    "function-3-only": ("test_lifetime", "test_observation"),
+    # The files with an activation while the habit lasts: with one that takes too long, scenes of these fail.
+    "slow-activation 35": (
+        "test_commands",
+        "test_faults",
+        "test_grasping",
+        "test_lifetime",
+        "test_streams",
+        "test_waiting",
+    ),
+    # The files with scenes that fail where a hand keeps no distance between writes.
+    "write-spacing": ("test_commands", "test_lifetime", "test_streams"),
+}
+"""Files in which a habit shows; every file, where there is no entry."""
+CELLS = [(*row, file) for row in ROWS for file in WHERE.get(row[0], ASKING)]
+ENDLESS = {
+    "test_a_transition_finds_the_status_that_made_it",
+    "test_the_state_and_what_it_comes_from_are_there",
+    "test_a_cancelled_wait_leaves_nothing",
+}
+"""Of the exceptions, those that would wait for all the time that a scene may take: they are not tried."""
 
 
 def scenes(file: str) -> Iterator[tuple[str, partial[None]]]:
@@ -78,15 +103,17 @@ def choices(mark: pytest.Mark) -> list[dict[str, Any]]:
     return [dict(zip(names, each, strict=True)) for each in several]
 
 
-@pytest.mark.parametrize("file", ASKING)
-@pytest.mark.parametrize(("trouble", "option"), ROWS)
+@pytest.mark.parametrize(("trouble", "option", "file"), CELLS)
 def test_with_its_option_a_hand_keeps_its_contract(trouble: str, option: str, file: str) -> None:
     # 35 s at 200 Hz for every scene would be most of the time that these take.
     slowly = {"poll_interval": 0.061} if trouble.startswith("slow-activation") else {}
     habit = HABIT.set((parse_troubles(trouble)[0], slowly | options(option)))
+    exceptions = EXCEPT.get(trouble, {}).keys()
     failed, tried = set(), set()
     try:
         for name, scene in dict(scenes(file)).items():
+            if name in exceptions & ENDLESS:
+                continue
             tried.add(name)
             try:
                 scene()
@@ -95,7 +122,7 @@ def test_with_its_option_a_hand_keeps_its_contract(trouble: str, option: str, fi
     finally:
         HABIT.reset(habit)
     assert tried
-    assert failed == EXCEPT.get(trouble, {}).keys() & tried
+    assert failed == exceptions & tried
 
 
 def test_no_exception_is_of_a_scene_that_there_is_not() -> None:

@@ -13,7 +13,7 @@ from robotiq_async.link.address import parse_address
 from robotiq_async.simulator import SimulatorServer, Trouble
 from robotiq_async.simulator.troubles.like_hardware import like_hardware, own_habits
 from robotiq_async.tools.verify import Plan, Report, Runner, Verdict
-from robotiq_async.tools.verify.catalogue import HARMLESS, LAST, checks_of
+from robotiq_async.tools.verify.catalogue import HARMLESS, checks_of
 from robotiq_async.tools.verify.motions import REACHED, UNREACHED
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
 from robotiq_async.values.registers import rGTO
@@ -22,21 +22,25 @@ from tests.verify.people import SHORT, Helper, Roll, assert_as_assumed, differin
 from tests.virtual import VirtualLoop
 
 pytestmark = pytest.mark.virtual_time
-STROKES = 6
-"""The stage that moves all axes from end to end."""
+AXES, STROKES = 4, 6
+"""The stages that move one axis after the other, and all of them from end to end."""
+OUTSIDE_MOTIONS = {
+    *("silence-fault", "slow-activation", "slow-activation 35", "function-3-only", "one-connection-only")
+}
+"""Habits that show in a connection, after a silence or in an activation: no motion is like or unlike them."""
 
 
-@pytest.mark.parametrize(("trouble", "check", "option"), HABITS)
+@pytest.mark.parametrize(("trouble", "check", "option"), [row for row in HABITS if row[0] != "none"])
 async def test_a_habit_is_found_and_nothing_else(trouble: str, check: str, option: str) -> None:
-    """With none, and like hardware (below), to the end; else up to strokes, or the stage that finds it."""
+    """Up to motions, or the stage that finds it; like hardware, to the end (below). None: test_whole_run."""
     checks = checks_of(THREE_FINGER, "tcp")
-    last = LAST if check == "-" else max(STROKES, checks[check].stage)
-    async with served(*([] if trouble == "none" else [trouble])) as server:
+    last = max(AXES if trouble in OUTSIDE_MOTIONS else STROKES, checks[check].stage)
+    async with served(trouble) as server:
         helper = Helper(server)
         report = await verified(server, helper, last=last)
         assert not server.gripper.is_moving
     assert report.why == ("inactive" if trouble == "idle-reset" else "done"), report.words
-    assert differing(report) == ({} if check == "-" else {check: options(option)})
+    assert differing(report) == {check: options(option)}
     assert report.options == options(option)
     if report.why == "done":
         assert not report.inconclusive
