@@ -23,7 +23,7 @@ pytestmark = pytest.mark.virtual_time
     ids=lambda value: "serial" if value is True else "tcp" if value is False else value.name,
 )
 async def test_a_plain_gripper_is_as_assumed_in_every_stage(serial: bool, model: Model) -> None:
-    # As often as in earnest once, with a jaw: it moves for less time. The 2F-85: test_with_physics, test_replay.
+    # As often as in earnest once, with a jaw: it moves for less time. The 2F-85: with physics, and replayed.
     lengths = replace(SHORT, interval=None) if model is TWO_FINGER_140 else SHORT
     async with served(serial=serial, model=model) as server:
         helper, roll = Helper(server), Roll()
