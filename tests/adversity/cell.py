@@ -25,7 +25,7 @@ LINE_PULLED = "line pulled"
 PATIENCE_S = 2.0
 """Seconds that a trouble lasts when the call does not end because of it; then it ends, and the call may."""
 IDLE_S = 1.0
-"""Seconds that a trouble lasts when there is no call."""
+"""Seconds that a trouble lasts when there is no call, and that one for ever goes on after the call."""
 ESCALATION_S = 5.0
 """Interference is a major fault after this time (20 s of the gripper, which is five times as fast)."""
 STOP_S = 2.0
@@ -51,7 +51,7 @@ async def outcome(world: World, phase: Phase, words: str) -> str:
         task = None if call is None else asyncio.ensure_future(call())
         await asyncio.wait({task or asyncio.ensure_future(asyncio.sleep(IDLE_S))}, timeout=PATIENCE_S)
         if words.endswith("for ever"):
-            await asyncio.sleep(ESCALATION_S)
+            await asyncio.sleep(ESCALATION_S if words.startswith("interference") else IDLE_S)
         else:
             await end()
         kind, bound = words.split()[0], phase.bound

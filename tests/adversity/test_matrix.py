@@ -49,6 +49,8 @@ def form(cell: Cell) -> str:
 
 CELLS = in_turn(EVERY)
 OF_A_URCAP = in_turn(cells_of_a_urcap())
+POLL_S = 0.03 if HABITS else 0.06
+"""Seconds between polls. A trouble lasts for some thirty of them: more reveal no more, but for a habit."""
 OF_A_JAW = [
     *("drop once", "silence for 60", "line pulled", "power-cut for 60", "foreign 128"),
     *("fault 14 for ever", "release", "e-stop for 60", "status-lag 0.2 for 60"),
@@ -106,7 +108,7 @@ def usual(cell: Cell) -> str:
 
 def tried(cell: Cell, model: Model, patch: pytest.MonkeyPatch) -> str:
     async def main() -> str:
-        async with world(cell.link, monkeypatch=patch, model=model) as here:
+        async with world(cell.link, monkeypatch=patch, model=model, poll_interval=POLL_S) as here:
             return await outcome(here, cell.phase, cell.trouble)
 
     # Virtual time takes the same course again: what the code does to the loop it does each time. The machine,
