@@ -83,10 +83,10 @@ async def test_a_loop_that_commands_at_every_status(here: Bench, hand: Hand) -> 
     async for _ in hand.statuses():
         value += 1
         hand.command(position=value)
-        if value == 100:
+        if value == 40:
             break
     await at_rest(hand)
-    assert here.last_write.position(A) == 100
+    assert here.last_write.position(A) == 40
 
 
 @contract

@@ -155,7 +155,7 @@ async def test_cancelled_at_any_moment(here: Bench, hand: Hand, turns: int) -> N
         await asyncio.sleep(0)
     moving.cancel()
     assert isinstance(await ended(moving), asyncio.CancelledError)
-    await asyncio.sleep(0.3)
+    await asyncio.sleep(0.1)
     assert not here.gripper.is_moving, turns
     await at_rest(hand)
     assert here.gripper.position(A) < 100
