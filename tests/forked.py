@@ -81,7 +81,7 @@ def fork(
 class Forked(Popen[Any]):
     """A process that is forked in place of started; all of its streams must be given."""
 
-    imported: ClassVar = COMMAND_LINE
+    imported: ClassVar[tuple[str, ...]] = COMMAND_LINE
 
     def _execute_child(self, *arguments: object) -> None:
         of = inspect.signature(super()._execute_child).bind(*arguments).arguments  # type: ignore[misc]
