@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import random
 import re
 from collections.abc import Callable, Coroutine, Iterator
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import groupby, pairwise
+from operator import attrgetter
 from typing import Any, Final, NamedTuple
 
 from robotiq_async import ConnectionLostError, Finger, RobotiqError, State
@@ -23,7 +25,7 @@ Trouble = Callable[[World], Coroutine[Any, Any, None]]
 NAMED = re.compile(r"`(.+?)`")
 GRADUAL = re.compile(r"(`[^`]+`(?: and `[^`]+`)*) end like (`[^`]+`(?:(?:, | or )`[^`]+`)*)")
 TARGET = 130
-RATE_S = 0.01
+RATE_S = 0.02
 SETTLE_S = 2.5
 """Seconds after the trouble in which everything has to come right by itself, and nothing may come late."""
 
@@ -129,9 +131,10 @@ def _swap(key: str) -> str:
 
 async def cuts(world: World) -> None:
     """One direction or both, for about a lease, again and again, while keys are mixed up."""
-    network, chance = world.network, world.network.random
-    network.wrong_key = lambda key: _swap(key) if chance.random() < 0.1 else key
-    for _ in range(24):
+    # Of its own: the course shall not depend on how many messages there are.
+    network, chance = world.network, random.Random(1)
+    network.wrong_key = lambda key: _swap(key) if network.random.random() < 0.1 else key
+    for _ in range(12):
         out, back = chance.choice(((True, False), (False, True), (True, True)))
         network.keeps_links = chance.random() < 0.5
         world.cut(world.holder, out=out, back=back)
@@ -189,7 +192,7 @@ TROUBLES: Final[dict[str, Trouble]] = {
     "another client takes": other_takes,
     "another client halts": other_halts,
     "a third under the wrong key": wrong_keys,
-    "24 cuts around the lease, a tenth under the wrong key": cuts,
+    "12 cuts around the lease, a tenth under the wrong key": cuts,
 }
 
 
@@ -252,6 +255,8 @@ PHASES: dict[str, Callable[[Doing], Coroutine[Any, Any, None]]] = {
     "a control loop": looping,
     "holding a grip": gripping,
 }
+QUIET = ("idle", "holding a grip")
+"""The phases in which nothing is commanded."""
 
 
 async def outcome(world: World, phase: str, trouble: Trouble) -> tuple[str, float | None]:
@@ -405,13 +410,15 @@ async def works(world: World) -> None:
 
 
 class Cell(NamedTuple):
-    """One cell.
+    """A trouble in one cell.
 
     Attributes:
+        row: of the table; the sentences about gradual troubles are rows as well.
         outcomes: the words of each outcome that there may be.
         held_after: the limit in seconds; None for none.
     """
 
+    row: int
     trouble: str
     phase: str
     outcomes: tuple[str, ...]
@@ -419,22 +426,35 @@ class Cell(NamedTuple):
 
 
 def cells() -> Iterator[Cell]:
-    """Every cell of the table; and of the gradual troubles, which end like one of several rows."""
+    """Every trouble in every cell of the table; the gradual ones end like one of several rows."""
     head, *rows = table("fleet-under-fault.md")
     told: dict[str, list[str]] = {}
-    for troubles, *outcomes, limit in rows:
+    for row, (troubles, *outcomes, limit) in enumerate(rows):
         held_after = None if limit == "-" else float(limit.removesuffix(" s"))
         for trouble in NAMED.findall(troubles):
             told[trouble] = outcomes
             for phase, outcome in zip(head[1:-1], outcomes, strict=True):
-                yield Cell(trouble, phase, (outcome,), held_after)
+                yield Cell(row, trouble, phase, (outcome,), held_after)
     gradual = GRADUAL.findall(" ".join(read("fleet-under-fault.md").split()))
     assert len(gradual) == 2, "the sentences about gradual troubles"
-    for troubles, others in gradual:
+    for row, (troubles, others) in enumerate(gradual, len(rows)):
         alike = [told[each] for each in NAMED.findall(others)]
         for trouble in NAMED.findall(troubles):
             for phase, *each in zip(head[1:-1], *alike, strict=True):
-                yield Cell(trouble, phase, tuple(each), None)
+                yield Cell(row, trouble, phase, tuple(each), None)
+
+
+def tried() -> Iterator[Cell]:
+    """The cells that are tried: every trouble with commands, and by turns in one phase without.
+
+    Without commands the troubles of a row differ in nothing but the renewals of the lease. Each cell of the
+    table is tried by one trouble at least.
+    """
+    for _, row in groupby(cells(), attrgetter("row")):
+        troubles = [list(each) for _, each in groupby(row, attrgetter("trouble"))]
+        for number, each in enumerate(troubles):
+            left_out = QUIET[number % 2] if len(troubles) > 1 else None
+            yield from (cell for cell in each if cell.phase != left_out)
 
 
 # -- a motion that lasts, and requests by hand -------------------------------------------------------------

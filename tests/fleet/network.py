@@ -26,6 +26,7 @@ IN_ORDER_S = 1e-8
 """Seconds from one message to the next: timers of the same instant come in any order."""
 
 
+@functools.cache
 def matches(expression: str, key: str) -> bool:
     """Whether a key matches: ``*`` is one part of it, ``**`` any number."""
     pattern = re.escape(expression).replace(r"\*\*", ".+").replace(r"\*", "[^/]+")

@@ -28,7 +28,9 @@ PROMPT_S = 0.2
 """Allowed beside the window."""
 LOOK_S = 0.04
 POLL_S = 0.05
-"""Seldom enough for a few hundred cells to take no more than half a minute."""
+"""As seldom as the stories allow: the polls are most of what they cost."""
+IDLE_POLL_S = 0.1
+"""Of the gripper beside it, that does nothing; the longest that there is."""
 NAMES = ("left", "right")
 
 
@@ -166,8 +168,10 @@ class ServingAgent:
 
         async def serve() -> None:
             self.hands = {
-                name: RobotiqHand(f"tcp://127.0.0.{place}:{server.port}", poll_interval=POLL_S)
-                for name, server in self.world.servers.items()
+                name: RobotiqHand(f"tcp://127.0.0.{place}:{server.port}", poll_interval=interval)
+                for (name, server), interval in zip(
+                    self.world.servers.items(), (POLL_S, IDLE_POLL_S), strict=True
+                )
             }
             options = {"window": WINDOW_S, "records": self.world.records, **self.options}
             self.agent = Agent("lab", "cell", self.hands, self.bus, **options)
