@@ -30,7 +30,7 @@ class Lengths:
     alone: tuple[float, ...] = (10.0, 60.0, 300.0)  # seconds without a client in stage 8
     soak: float = 600.0  # seconds of reading in stage 9
     commands: float = 5.0  # seconds of commands at each rate in stage 9
-    interval: float | None = None  # seconds between two reads of moving fingers; None: as usual
+    interval: float | None = None  # seconds between two reads in a watch; None: as usual
 
 
 @dataclass

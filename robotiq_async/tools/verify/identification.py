@@ -69,8 +69,9 @@ async def check_before_writing(bench: Bench) -> RobotiqStatus:
     """End the run unless the gripper may be written to; returns the newest status."""
     loop, first = asyncio.get_running_loop(), await bench.link.read()
     until, not_ready, last = loop.time() + WATCH_S, 0, first
+    interval = bench.lengths.interval or 2 * POLL_INTERVAL_S
     while loop.time() < until:
-        await asyncio.sleep(2 * POLL_INTERVAL_S)
+        await asyncio.sleep(interval)
         last = await bench.link.read()
         if why := why_no_gripper(last):
             raise EndError("refused", f"what answers may be another device: {why}")

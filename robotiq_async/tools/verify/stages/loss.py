@@ -148,7 +148,7 @@ async def _back(bench: Bench) -> tuple[list[RobotiqStatus], float]:
     answered = loop.time() - began
     while loop.time() - began - answered < AFTER_S:
         statuses.append(await bench.link.read())
-        await watch.pause(POLL_INTERVAL_S)
+        await watch.pause(bench.lengths.interval or POLL_INTERVAL_S)
     bench.link.expect(statuses[-1].echo)
     return statuses, answered
 
