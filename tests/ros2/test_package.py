@@ -11,6 +11,8 @@ import tomllib
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
+import pytest
+
 from robotiq_async.ros2.gripper.connection import COMMANDS
 from robotiq_async.ros2.translation.settings import PARAMETERS
 from robotiq_async.tools.description import urdf
@@ -56,10 +58,10 @@ def test_the_page_has_every_parameter_and_service() -> None:
     assert {f"~/{name}" for name in COMMANDS} <= rows
 
 
-def test_the_description_for_robot_state_publisher_is_one() -> None:
+def test_the_description_for_robot_state_publisher_is_one(capsys: pytest.CaptureFixture[str]) -> None:
     (script,) = re.findall(r'^python -c "(.*)" > hand\.urdf$', PAGE, re.MULTILINE)
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert done.stdout == f"{urdf()}\n"
+    exec(script, {})
+    assert capsys.readouterr().out == f"{urdf()}\n"
 
 
 def test_without_ros_it_says_what_to_do() -> None:
