@@ -43,12 +43,13 @@ async def outcome(work: Awaitable[object], word: str) -> str:
 
 async def network_down(here: Bench, seconds: float) -> None:
     """Nothing gets through for a while; messages sent in that time come late."""
-    streams = [] if here.lab is None else here.lab.network.both("client 0", "agent")
+    if here.lab is None:  # there is no network
+        return
+    streams = here.lab.network.both("client 0", "agent")
     for stream in streams:
         stream.is_cut = True
     await asyncio.sleep(seconds)
-    if here.lab is not None:
-        here.lab.network.mend(*streams)
+    here.lab.network.mend(*streams)
 
 
 # -- the rows ----------------------------------------------------------------------------------------------

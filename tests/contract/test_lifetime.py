@@ -351,12 +351,12 @@ async def test_the_wait_of_a_start_ends_at_once(here: Bench, how: str) -> None:
 
 
 async def starting_without_power(here: Bench, wait: float) -> tuple[Hand, asyncio.Task[None]]:
-    """A hand that has been waiting for its gripper for 20 s."""
+    """A hand that has been waiting for its gripper for 8 s; a start that does not wait gives up after 5."""
     here.server.refuse()
     here.server.cut()
     await until(lambda: here.lab is None or here.lab.local.state is State.DISCONNECTED)
     hand = here.make()
     starting = asyncio.create_task(hand.start(activate=False, wait=wait))
-    await asyncio.sleep(20.0)
+    await asyncio.sleep(8.0)
     assert not starting.done()
     return hand, starting
