@@ -21,7 +21,7 @@ from robotiq_async.values.request import Request
 from tests.register_words import with_object_status
 
 POLL_S = 0.005
-ACTIVATING_S = 0.05
+ACTIVATING_S = 0.2
 """Between two polls of an activation that is only a beginning: it takes many seconds."""
 
 

@@ -177,7 +177,7 @@ def test_a_motion_that_is_held_stops(lag: int, device_cycle: float, seconds: flo
     scan.run(0.5)
     assert isinstance(outcome.error, MoveSupersededError)
     travels = scan.travels()
-    scan.run(1.0)
+    scan.run(0.5)
     assert scan.travels() == travels
     result = ended(scan, scan.move(60, A)[1])
     assert abs(result.positions[A] - 60) <= 2

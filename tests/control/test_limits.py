@@ -26,19 +26,25 @@ LAGS = pytest.mark.parametrize("lag", [0, 2, 8])
 def echoing(device_cycle: float = 0.005, lag: int = 0) -> Scan:
     """A gripper whose scissor has a range of 20..220, and that echoes a limit for requests beyond."""
     habits = Habits(echoes_limits=True)
-    scan = Scan(device_cycle=device_cycle, lag=lag, scissor_limit=(LOW, HIGH), habits=habits)
+    scan = Scan(device_cycle=device_cycle, speed=255, lag=lag, scissor_limit=(LOW, HIGH), habits=habits)
     scan.start()
     scan.moved(130, S)
-    scan.run(1.0)
+    scan.run(0.6)
     return scan
 
 
 # -- limits ------------------------------------------------------------------------------------------------
 
 
-@CYCLES
-@LAGS
-@pytest.mark.parametrize(("request_", "limit"), [(255, HIGH), (230, HIGH), (0, LOW)])
+@pytest.mark.parametrize(
+    ("device_cycle", "lag", "request_", "limit"),
+    [
+        *((0.0, 0, 255, HIGH), (0.0, 2, 230, HIGH), (0.0, 8, 0, LOW)),
+        *((0.005, 0, 230, HIGH), (0.005, 2, 0, LOW), (0.005, 8, 255, HIGH)),
+        *((0.03, 0, 0, LOW), (0.03, 2, 255, HIGH), (0.03, 8, 230, HIGH)),
+        *((0.2, 0, 255, HIGH), (0.2, 2, 230, HIGH), (0.2, 8, 0, LOW)),
+    ],
+)  # each pair of values
 def test_a_move_beyond_a_limit_ends_with_what_it_reached(
     device_cycle: float, lag: int, request_: int, limit: int
 ) -> None:

@@ -13,12 +13,16 @@ from tests.control.scan import POLL_S, Scan, started
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 
 
-@pytest.mark.parametrize("individual", [True, False])
-@pytest.mark.parametrize("into_motion", [0.0, 0.3, 5.0])
-@pytest.mark.parametrize("speed", [0, 255])
-@pytest.mark.parametrize("objects", [Finger(0), B, A | B | C])
+@pytest.mark.parametrize(
+    ("into_motion", "objects", "individual", "speed"),
+    [
+        *((0.0, Finger(0), True, 60), (0.0, B, False, 255), (0.0, A | B | C, True, 255)),
+        *((0.3, Finger(0), False, 255), (0.3, B, True, 60), (0.3, A | B | C, False, 60)),
+        *((3.0, Finger(0), True, 255), (3.0, B, False, 60), (3.0, A | B | C, True, 60)),
+    ],
+)  # each pair of values once
 def test_the_first_command_leaves_the_other_axes_what_they_do(
-    individual: bool, into_motion: float, speed: int, objects: Finger
+    into_motion: float, objects: Finger, individual: bool, speed: int
 ) -> None:
     """Whatever the previous client did, only the addressed axis changes its ways."""
     # The hand's own speed is that of the client: speeds have no echo.
@@ -32,7 +36,7 @@ def test_the_first_command_leaves_the_other_axes_what_they_do(
     scan.connect()
     # The scissor, so that A, B and C are all un-addressed.
     scan.command(S, position=180)
-    scan.run(5 if speed else 12)
+    scan.run(3 if speed == 255 else 6)
     undisturbed.now = scan.now
     for axis in (A, B, C):
         assert scan.gripper.position(axis) == pytest.approx(undisturbed.gripper.position(axis), abs=2), axis
@@ -147,12 +151,18 @@ def test_our_write_that_shows_after_another_clients_is_what_counts() -> None:
     assert moved == {B}
 
 
-SLOW_CYCLES = pytest.mark.parametrize("device_cycle", [0.02, 0.05, 0.2])
+ORDERS = pytest.mark.parametrize(
+    ("device_cycle", "before_ours", "between"),
+    [
+        *((0.02, 0.0, 0.005), (0.02, 0.005, 0.01), (0.02, 0.01, 0.005)),
+        *((0.05, 0.0, 0.01), (0.05, 0.005, 0.005), (0.05, 0.01, 0.01)),
+        *((0.2, 0.0, 0.005), (0.2, 0.005, 0.01), (0.2, 0.01, 0.005)),
+    ],
+)
+"""Slow cycles, and the times from the other client's write to ours and from that to our second: each pair."""
 
 
-@SLOW_CYCLES
-@pytest.mark.parametrize("before_ours", [0.0, 0.005, 0.01])
-@pytest.mark.parametrize("between", [0.005, 0.01])
+@ORDERS
 def test_a_halt_that_another_client_overtakes_stays_a_halt(
     device_cycle: float, before_ours: float, between: float
 ) -> None:
@@ -174,9 +184,7 @@ def test_a_halt_that_another_client_overtakes_stays_a_halt(
     assert {axis for axis, travel in scan.travels().items() if travel != before[axis]} == {B}
 
 
-@SLOW_CYCLES
-@pytest.mark.parametrize("before_ours", [0.0, 0.005, 0.01])
-@pytest.mark.parametrize("between", [0.005, 0.01])
+@ORDERS
 def test_two_writes_that_another_client_overtakes_leave_what_they_have_asked(
     device_cycle: float, before_ours: float, between: float
 ) -> None:
