@@ -78,29 +78,32 @@ async def test_a_hand_with_a_late_object_status_is_used_as_any(lag: float) -> No
         assert {event.change for event in events.drain()} == {GripChange.RELEASED}
 
 
-@pytest.mark.parametrize("lag", [0.02, 0.2])
-@pytest.mark.parametrize("model", [TWO_FINGER_85, THREE_FINGER], ids=lambda model: model.name)
+@pytest.mark.parametrize(
+    ("model", "lag", "counts", "pause"),
+    [
+        *((TWO_FINGER_85, 0.02, 3, 0.03), (TWO_FINGER_85, 0.2, 8, 0.0)),
+        *((THREE_FINGER, 0.02, 8, 0.03), (THREE_FINGER, 0.2, 3, 0.0)),
+    ],
+    ids=["2f85-0.02", "2f85-0.2", "3f-0.02", "3f-0.2"],
+)  # every pair is tried in tests/control/test_late_status.py
 async def test_a_move_and_a_grasp_after_a_short_move_end_when_the_fingers_have_arrived(
-    model: Model, lag: float
+    model: Model, lag: float, counts: int, pause: float
 ) -> None:
     """At 20 ms of lag, a move to 200 after one of 8 counts ended after 0.03 s, at 117."""
     late = Wire(model=model, habits=Habits(status_lag=lag))
     async with RobotiqHand(late, model=model.name, speed=255) as hand:
-        # Every pair is tried in tests/control/test_late_status.py.
-        for counts, pause in ((3, 0.0), (8, 0.03)) if model is THREE_FINGER else ((3, 0.03), (8, 0.0)):
-            late.gripper.remove_object(Finger.A)
-            await hand.move(100, Finger.A)
-            await asyncio.sleep(0.5)
-            await hand.move(100 + counts, Finger.A)
-            await asyncio.sleep(pause)
-            result = await hand.move(200, Finger.A)
-            assert result.reached == Finger.A
-            assert not hand.is_moving
-            await hand.move(200 - counts, Finger.A)
-            await asyncio.sleep(pause)
-            late.gripper.place_object(Finger.A, 215)
-            assert await hand.grasp(Finger.A)
-            assert (await hand.open(Finger.A)).reached == Finger.A
+        await hand.move(100, Finger.A)
+        await asyncio.sleep(0.5)
+        await hand.move(100 + counts, Finger.A)
+        await asyncio.sleep(pause)
+        result = await hand.move(200, Finger.A)
+        assert result.reached == Finger.A
+        assert not hand.is_moving
+        await hand.move(200 - counts, Finger.A)
+        await asyncio.sleep(pause)
+        late.gripper.place_object(Finger.A, 215)
+        assert await hand.grasp(Finger.A)
+        assert (await hand.open(Finger.A)).reached == Finger.A
 
 
 # -- a fault in passing ------------------------------------------------------------------------------------

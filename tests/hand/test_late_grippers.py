@@ -64,7 +64,7 @@ async def test_a_gripper_that_does_not_come_gives_an_error_and_leaves_nothing_ru
         await here.hand.start()  # and may be started again
 
 
-@pytest.mark.parametrize("after", [0.0, 0.01, 0.3, 1.0, 5.0])
+@pytest.mark.parametrize("after", [0.0, 0.3, 5.0])
 @pytest.mark.parametrize("how", ["cancel", "timeout", "stop"])
 @pytest.mark.parametrize("trouble", ABSENT, ids=lambda trouble: trouble.kind)
 async def test_waiting_ends_at_once(trouble: Trouble, how: str, after: float) -> None:

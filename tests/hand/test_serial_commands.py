@@ -56,9 +56,10 @@ async def at_a_line(
     poll_interval: float = 0.005,
     write_function: int | None = None,
     device: type[SerialSimulatorServer] = SerialSimulatorServer,
+    speedup: float = 1.0,
 ) -> AsyncIterator[tuple[RobotiqHand, Replies]]:
     cable = VirtualLine(monkeypatch)
-    gripper = SimulatedGripper(asyncio.get_running_loop().time, model=model_of(model))
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, model=model_of(model), speedup=speedup)
     async with device(cable.FAR, gripper) as server:
         await activate_beforehand(gripper)
         address = f"rtu://{cable.NEAR}?model={model}"
@@ -133,7 +134,7 @@ async def test_a_status_from_before_the_loop_was_held_up_is_read_anew(
 async def test_a_reset_begins_with_a_read_unless_it_is_a_stop(
     monkeypatch: pytest.MonkeyPatch, model: str
 ) -> None:
-    async with at_a_line(monkeypatch, model) as (hand, replies):
+    async with at_a_line(monkeypatch, model, speedup=20) as (hand, replies):
         await hand.reset()
         asked = await between_polls(hand)
         await hand.activate()
