@@ -78,6 +78,7 @@ async def test_it_is_called_before_any_reader_and_any_caller_goes_on(hand: Robot
         assert order.index(f"told {what.split()[1]}") < order.index(what)
 
 
+@pytest.mark.virtual_time
 async def test_a_command_of_a_listener_goes_out_in_the_same_turn(
     hand: RobotiqHand, server: SimulatorServer
 ) -> None:
