@@ -117,7 +117,7 @@ async def test_it_is_noticed_although_the_reset_shows_late(reads: int, offset: f
     """While gIMC was still 3, gACT was 0 and 1 again: one condition, and no news."""
     wire, hand = await active(Trailing(reads))
     calling = await crossed(wire, hand, "a control loop", offset)
-    await asyncio.sleep(2)
+    await asyncio.sleep(0.8)
     assert hand.state is State.RESET
     assert not wire.gripper.is_moving
     await asyncio.gather(calling, return_exceptions=True)
@@ -147,7 +147,7 @@ async def test_closed_fingers_do_not_open(stop: bool) -> None:
     await asyncio.sleep(1)
     if stop:
         await hand.stop()
-    await asyncio.sleep(6)
+    await asyncio.sleep(4)
     assert wire.gripper.position(B) > 200
     assert not wire.gripper.is_moving
     await asyncio.gather(calling, return_exceptions=True)

@@ -64,7 +64,7 @@ class Rogue(Wire):
     exchange_s = 0.0
 
     def __init__(self, call: str, what: str) -> None:
-        super().__init__(speedup=20)
+        super().__init__(speedup=100)
         self.call, self.what = call, what
         self.is_rogue = False
         self.released = asyncio.Event()
