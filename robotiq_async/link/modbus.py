@@ -155,6 +155,32 @@ class ModbusTransport:
         registers = registers_in(answer, serial=self._rtu)
         return registers[: self._map.count] + self._rest if self._rest else registers
 
+    @property
+    def is_shared(self) -> bool:
+        return self._connection.is_shared
+
+    async def stop_or_read(self, decide: Callable[[], Sequence[int] | None]) -> Registers | None:
+        """Write what ``decide`` returns when the turn comes, if anything; else read the status.
+
+        After a disturbance of the line it reads, which brings the line in step before a write.
+
+        Raises:
+            RobotiqConnectionError: no clean answer in time; the transport is closed.
+        """
+        connection = self._connection
+        try:
+            with await connection.turn(self):
+                await connection.pause(self)
+                if not connection.has_noise():
+                    connection.check_open(self)
+                    if (registers := decide()) is not None:
+                        await self._ask(write_request(self._map, registers))
+                        return None
+                answer = await self._ask(self._poll, bears=self._can_repeat)
+        except StillOpenError as borne:
+            answer = await self._read_again(plain(borne.error))
+        return self._status_in(answer)
+
     async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
         """Write what ``decide`` returns, if anything; on a serial line after the silence between frames.
 
@@ -298,8 +324,8 @@ class ModbusTransport:
     async def _try_short_silence(self) -> None:
         """Read a few times after 3.5 characters of silence; take the longer one if an answer is missing."""
         try:
-            with await self._connection.turn(self):
-                for _ in range(SHORT_READS):
+            for _ in range(SHORT_READS):
+                with await self._connection.turn(self):  # one for each: a slow gripper keeps others waiting
                     await self._resynchronise(bears=self._can_repeat)
         except StillOpenError as borne:
             if self._connection.is_noise(borne.error):

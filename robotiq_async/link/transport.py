@@ -105,3 +105,25 @@ class CyclicLink(Link, Protocol):
         Raises:
             RobotiqConnectionError: no clean answer in time, and no status after it; the transport is closed.
         """
+
+
+@runtime_checkable
+class SharedLink(Link, Protocol):
+    """A link that may have to wait for its turn on a line that others use."""
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether others use the line now."""
+
+    async def stop_or_read(self, decide: Callable[[], Sequence[int] | None]) -> Registers | None:
+        """Write what ``decide`` returns, exactly once, if it returns anything; else read the status.
+
+        ``decide`` is called when the turn has come: a stop from the time of waiting leaves in this turn, and
+        not after one more of every other user.
+
+        Returns:
+            The status registers; None if something was written, and acknowledged.
+
+        Raises:
+            RobotiqConnectionError: no clean answer in time; the transport is closed.
+        """

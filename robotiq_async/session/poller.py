@@ -5,6 +5,8 @@ what the gripper has just shown. What stops the gripper does not wait for the re
 slow link (a serial line, a URCap) while the newest status is fresh: a read takes as long there as the status
 is old, and the read after the write shows the command's echo.
 
+On a line that several grippers share, a poll waits for its turn. A stop that comes meanwhile takes that turn.
+
 No other task touches the transport: callers leave their requests with the controller and wait. So no exchange
 is cancelled in flight, except when a stop has waited for it long enough; then the link is closed with it.
 start() and stop() may be called from different tasks.
@@ -24,7 +26,7 @@ import anyio
 
 from ..control.controller import Controller, Due
 from ..control.waiters import fail, resolve
-from ..link.transport import CyclicLink, Link
+from ..link.transport import CyclicLink, Link, SharedLink
 from ..link.watchdog import HELD_S
 from ..runtime.tick import Tick
 from ..values.enums import StopLevel
@@ -95,6 +97,7 @@ class Poller:
         self._wait = wait
         self._transport = transport
         self._cyclic = transport if isinstance(transport, CyclicLink) else None
+        self._line = transport if isinstance(transport, SharedLink) else None
         self._controller = controller
         self._counters = counters
         self._channels = channels
@@ -274,7 +277,7 @@ class Poller:
                     await self._poll_once()
                 return
         for _ in range(READS):
-            await self._poll_once()
+            await self._stop_or_poll()
             due = self._controller.due(self._tick.time())
             if due is None or not await self._is_soon(due, SOON_S):
                 return  # most cycles end here
@@ -347,7 +350,11 @@ class Poller:
         except RobotiqConnectionError:
             self._note_unacknowledged()
             raise
-        if not is_written or self._decided is None:
+        if is_written:
+            self._note_acknowledged(began)
+
+    def _note_acknowledged(self, began: float) -> None:
+        if self._decided is None:
             return
         answered = self._tick.time()
         self._counters.note_write(answered - began, self._decided[1] - self._asked)
@@ -371,6 +378,31 @@ class Poller:
         if self._decided is None:
             return self._decide()
         return None if self._stopping or self._controller.has_request else self._decided[0].registers
+
+    def _decide_stop(self) -> Registers | None:
+        """The image to write, if it is that of a stop."""
+        due = self._controller.due(self._tick.time())
+        is_stop = due is not None and due.is_urgent and not due.wait
+        return self._decide() if is_stop and not self._is_held_up() else None
+
+    async def _stop_or_poll(self) -> None:
+        """Poll; before that write a stop that has come while others had the line."""
+        if self._line is None or not self._line.is_shared:
+            await self._poll_once()
+            return
+        self._decided, self._tick.late = None, 0.0
+        asked = self._tick.time()
+        try:
+            registers = await self._line.stop_or_read(self._decide_stop)
+        except RobotiqConnectionError:
+            if self._decided is not None:
+                self._note_unacknowledged()
+            raise
+        if registers is None:
+            self._note_acknowledged(asked)
+            await self._poll_once()
+        else:
+            self._take(self._status(registers, self._tick.time()), asked)
 
     async def _poll_once(self, *, is_first: bool = False) -> None:
         self._tick.late = 0.0

@@ -28,6 +28,8 @@ from typing import Any
 
 from robotiq_async import JAW, Finger, Model, MoveResult, RobotiqError, RobotiqHand, State
 from robotiq_async.control.state_machine import RUNNING
+from robotiq_async.link.connection import LONGEST_HUSH_S
+from robotiq_async.session.options import RESPONSE_TIMEOUT_S
 from robotiq_async.simulator import KINDS, Trouble
 from robotiq_async.values.model import MODELS, THREE_FINGER, model_of
 from robotiq_async.values.registers import RTU_REGISTERS
@@ -38,6 +40,12 @@ from tests.serial_line import SerialLine
 
 SPEEDUP = 5.0
 CYCLE_S = (4.0, 12.0)
+WRITE_S = 1.0
+"""Longest write of a hand that has its line alone: a poll without an answer, the repeated read, the write."""
+TURNS = 3
+"""The turns of a line that these take. Before each one every other hand may have a turn."""
+TURN_S = LONGEST_HUSH_S + RESPONSE_TIMEOUT_S
+"""Longest turn of a hand whose gripper does not answer."""
 TROUBLES = [
     *(Trouble(kind) for kind in ("drop", "late", "half", "twice", "wrong-function", "wrong-length")),
     *(Trouble(kind) for kind in ("wrong-count", "wrong-unit", "wrong-echo", "release", "foreign")),
@@ -69,6 +77,8 @@ class Soak:
     rng: random.Random
     loop: LoopWatch
     writes: WriteWatch
+    write_s: float
+    """Longest time that a write may take."""
     figures: Counter[str] = field(default_factory=Counter)
     broken: list[str] = field(default_factory=list)
     longest_stall: float = 0.0
@@ -144,7 +154,7 @@ class Soak:
             self.hand.command(axes, speed=speed, force=force)  # leaves with the position
             await self.hand.set_position(self.rng.randrange(256), axes)
 
-        await self.bounded("write", 1.0, self.checked("write", write))
+        await self.bounded("write", self.write_s, self.checked("write", write))
 
     async def control_loop(self, axes: Finger) -> None:
         for _ in range(self.rng.randrange(1, 40)):
@@ -252,11 +262,13 @@ async def soaks(link: str, model: Model, hands: int, seed: int, loop: LoopWatch)
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(dir=memory)))
             line = stack.enter_context(SerialLine(folder, hands))
         them = []
+        others = hands - 1 if line is not None else 0
+        write_s = WRITE_S + others * TURNS * TURN_S
         for number in range(hands):
             gripper = StampedGripper(speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP, model=model)
             world = await stack.enter_async_context(started(gripper, link, line, number))
             pulled = line if number == 0 else None
-            them.append(Soak(world, pulled, random.Random(seed + number), loop, WriteWatch(model)))
+            them.append(Soak(world, pulled, random.Random(seed + number), loop, WriteWatch(model), write_s))
         yield them
 
 

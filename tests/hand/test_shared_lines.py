@@ -17,6 +17,7 @@ from robotiq_async import (
     RobotiqHand,
     State,
 )
+from robotiq_async.link.connection import HUSH_S
 from robotiq_async.simulator import SimulatedGripper, Trouble
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
 from tests.grippers import activate_beforehand
@@ -116,6 +117,28 @@ async def test_statuses_of_a_silent_gripper_that_come_late_reach_nobody(bus: Bus
         for seen, there in zip(await asyncio.gather(*watching), (220, 30), strict=True):
             assert seen
             assert all(abs(position - there) <= 3 for position in seen)
+
+
+@pytest.mark.parametrize("phase", range(0, 10, 3))
+@pytest.mark.parametrize(
+    ("trouble", "longest"), [(Trouble("delay", 0.2), 0.2), (Trouble("silence"), RESPONSE_S + HUSH_S)], ids=str
+)
+async def test_a_stop_waits_for_one_turn_of_the_other_and_not_for_two(
+    bus: Bus, trouble: Trouble, longest: float, phase: int
+) -> None:
+    """It may come while the line is the other's and a poll waits for its turn: it takes that turn."""
+    loop = asyncio.get_running_loop()
+    async with bus.hand(LEFT), bus.hand(RIGHT) as right:
+        right.command(position=255, speed=0)
+        await until(lambda: bus.gripper(RIGHT).is_moving)
+        async with bus.servers[LEFT].fault_injector.making(trouble):
+            await asyncio.sleep(1 + longest * phase / 10)
+            began = loop.time()
+            halting = asyncio.create_task(right.halt())
+            await until(lambda: not bus.gripper(RIGHT).is_moving)
+            assert loop.time() - began < longest + 0.03
+            await halting
+        assert right.statistics.reconnects == 0
 
 
 async def test_a_stop_arrives_although_the_other_is_silent(bus: Bus) -> None:

@@ -98,3 +98,57 @@ async def test_each_request_has_the_line_alone(pair: Pair, device: Device) -> No
     await asyncio.gather(left.read(), right.read(), left.write(IMAGE), right.write(IMAGE))
     assert [request[0] for request in device.requests] == [LEFT, RIGHT, LEFT, RIGHT]
     assert loop.time() - began == pytest.approx(0.02, abs=0.003)
+
+
+async def test_a_slow_gripper_that_opens_has_one_exchange_a_turn(pair: Pair, device: Device) -> None:
+    left, right = pair
+    device.late[LEFT] = 0.04
+    loop, longest = asyncio.get_running_loop(), 0.0
+    opening = asyncio.create_task(left.open())
+    while not opening.done():
+        began = loop.time()
+        await right.read()
+        longest = max(longest, loop.time() - began)
+        await asyncio.sleep(0.001)
+    assert 0.039 < longest < 0.05
+
+
+@pytest.mark.parametrize(("image", "function"), [(IMAGE, 16), (None, 3)])
+async def test_a_stop_or_a_read_is_decided_when_the_turn_comes(
+    pair: Pair, device: Device, image: tuple[int, ...] | None, function: int
+) -> None:
+    left, right = pair
+    device.late[LEFT] = 0.04
+    loop, asked = asyncio.get_running_loop(), list[float]()
+
+    def decide() -> tuple[int, ...] | None:
+        asked.append(loop.time())
+        return image
+
+    reading = asyncio.create_task(left.read())
+    await asyncio.sleep(0.001)
+    began = loop.time()
+    registers = await right.stop_or_read(decide)
+    assert (registers is None) == (image is not None)
+    assert [at - began for at in asked] == [pytest.approx(0.04, abs=0.005)]
+    assert device.requests[-1][:2] == bytes((RIGHT, function))
+    await reading
+
+
+async def test_a_disturbed_line_is_read_before_a_stop_is_written(pair: Pair, device: Device) -> None:
+    _, right = pair
+    device.send(b"\x00\x01")
+    await asyncio.sleep(0.01)
+    assert await right.stop_or_read(lambda: IMAGE) is not None
+    assert all(request[1] == 3 for request in device.requests)
+    assert await right.stop_or_read(lambda: IMAGE) is None
+
+
+async def test_a_link_that_was_lost_decides_nothing(pair: Pair, device: Device) -> None:
+    _, right = pair
+    await right.close()
+    asked: list[None] = []
+    with pytest.raises(RobotiqConnectionError, match="not connected"):
+        await right.stop_or_read(lambda: asked.append(None))
+    assert not asked
+    assert not device.requests
