@@ -34,7 +34,7 @@ from robotiq_async.values.request import AxisRequest, Request
 
 pytestmark = pytest.mark.virtual_time
 
-REPLIES = int(os.environ.get("REPLIES", "2000"))
+REPLIES = int(os.environ.get("REPLIES", "400"))
 """That are late or damaged."""
 ALL = ["ACT", "GTO", "PRE", "ACT", "GTO", "OBJ", "STA", "FLT", "POS"]
 """The variables in a read of everything."""
