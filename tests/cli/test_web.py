@@ -1,5 +1,7 @@
 """``robotiq-async web``, and the demo with its own page."""
 
+# ruff: noqa: E402  # what follows needs(...) cannot be imported without the extra
+
 from __future__ import annotations
 
 import asyncio
@@ -20,8 +22,9 @@ from robotiq_async import Finger, NotStartedError, RobotiqHand, State
 from robotiq_async.cli.browser import opened
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.tools.actions import Operator
+from tests.extras import needs
 
-pytest.importorskip("nicegui", reason="the page needs the extra web")
+needs("nicegui", "the page needs the extra web")
 
 from robotiq_async.cli.commands.web import AGAIN_S, _leave_all, _try_again
 from robotiq_async.tools.web.server import PageServer

@@ -1,5 +1,7 @@
 """The server from outside: by plain clients, which may lie."""
 
+# ruff: noqa: E402  # what follows needs(...) cannot be imported without the extra
+
 from __future__ import annotations
 
 import asyncio
@@ -12,13 +14,14 @@ from urllib.parse import urlsplit
 import pytest
 import pytest_asyncio
 
-pytest.importorskip("nicegui", reason="the page needs the extra web")
+from tests.extras import needs
+
+needs("nicegui", "the page needs the extra web")
 from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidStatus
 from websockets.typing import Origin
 
 from robotiq_async.tools.actions import ACTIONS
-from robotiq_async.tools.web.page.serve import MOST
 from robotiq_async.tools.web.server import PageServer
 from robotiq_async.tools.web.settings import PageSettings
 from robotiq_async.values.errors import ViewerError
@@ -146,6 +149,8 @@ async def test_headers_without_end_are_not_kept(page: PageServer) -> None:
 
 async def test_connections_that_ask_nothing_keep_nobody_out(page: PageServer) -> None:
     """A thousand of them took the files of the page, and browsers that were there lost their connection."""
+    from robotiq_async.tools.web.page.serve import MOST  # noqa: PLC0415  # it imports NiceGUI
+
     folder, cookie = await let_in(page)
     parts = urlsplit(page.url)
     async with asyncio.timeout(patience(30)):

@@ -1,5 +1,7 @@
 """The parts of the page, without a browser: commands, updates, the mirror, the heartbeat."""
 
+# ruff: noqa: E402  # what follows needs(...) cannot be imported without the extra
+
 from __future__ import annotations
 
 import asyncio
@@ -13,7 +15,9 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("nicegui", reason="the page needs the extra web")
+from tests.extras import needs
+
+needs("nicegui", "the page needs the extra web")
 
 from robotiq_async import CLOSED, HAND_E, Fault, Finger, RobotiqHand, RobotiqStatus, State
 from robotiq_async.control.state_machine import TABLE, Verdict, refusal
@@ -22,7 +26,6 @@ from robotiq_async.tools.actions import Operator
 from robotiq_async.tools.web.commands import BUTTONS, FRESH_S, MAX_COMMANDS, PageCommands
 from robotiq_async.tools.web.page.heartbeat import LOST_S, Heartbeat
 from robotiq_async.tools.web.page.mirror import HISTORY_S, HandMirror, Mirror
-from robotiq_async.tools.web.page.widgets.panels import _axis_row
 from robotiq_async.tools.web.page.widgets.words import event_words, fault_words, state_words
 from robotiq_async.tools.web.server import HandUpdates, PageServer
 from robotiq_async.tools.web.settings import PageSettings
@@ -376,6 +379,8 @@ def test_a_process_of_the_page_without_settings_ends_and_leaves_no_folder(tmp_pa
 
 
 def test_a_row_without_a_current_shows_none() -> None:
+    from robotiq_async.tools.web.page.widgets.panels import _axis_row  # noqa: PLC0415  # it imports NiceGUI
+
     told, untold = (
         _axis_row(
             HandMirror(
