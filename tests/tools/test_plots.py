@@ -44,7 +44,7 @@ def test_fingers_that_are_alike_are_one_curve_that_says_so(tmp_path: Path) -> No
 
 @pytest.mark.parametrize(
     ("step", "drawn"),
-    [(25, [0, 125, 250]), (85, [0, 85, 255]), (128, [0, 128]), (255, [0, 255]), (1, [0, 125, 250])],
+    [(25, [0, 125, 250]), (85, [0, 85, 255]), (128, [0, 128])],
 )
 def test_currents_over_time_are_drawn_near_the_usual_force_values(
     step: int, drawn: list[int], tmp_path: Path
@@ -82,6 +82,7 @@ def test_events_are_written_above_the_curves(tmp_path: Path) -> None:
         assert places[0] < text.index(f"<!-- {name} -->") < places[1], "not above the positions"
     assert all(before < after for before, after in pairwise(places))
     assert Finger.A.name in words(picture)
+    assert "opening, mm" not in words(picture), "three fingers have none"
 
 
 def test_a_part_is_drawn_with_the_times_of_the_whole(tmp_path: Path) -> None:
@@ -115,5 +116,3 @@ def test_a_jaw_has_its_opening_beside_its_counts(tmp_path: Path) -> None:
     _, picture = plot_recording(tmp_path / "it", entries)
     assert {"jaw", "opening, mm"} <= set(words(picture))
     assert "A" not in words(picture)
-    _, picture = plot_recording(tmp_path / "three", recorded())
-    assert "opening, mm" not in words(picture)

@@ -56,7 +56,7 @@ def table(file: Path) -> list[dict[str, str]]:
 async def test_every_poll_is_recorded(hand: RobotiqHand, file: Path) -> None:
     async with Recorder(hand, file) as recorder:
         first = hand.status.sequence
-        await hand.move(200)
+        await hand.move(50)
         await hand.move(0)
         last = hand.status.sequence
     polls = {fields["sequence"]: fields for fields in statuses(file)}
