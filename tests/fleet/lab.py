@@ -24,6 +24,8 @@ from tests.grippers import activate_beforehand
 from tests.virtual import until
 
 SPEEDUP = 5.0
+POLL_S = 0.02
+"""Of the agent's hand: its polls are most of what a test costs, and no story here needs more of them."""
 LEFT = GripperName("lab", "cell", "left")
 
 
@@ -121,7 +123,9 @@ async def lab(
     async with kind_of_server(gripper) as server:
         if active:
             await activate_beforehand(gripper)
-        hand = RobotiqHand(server.address, keep_grip=keep_grip, model=model, stroke=stroke)
+        hand = RobotiqHand(
+            server.address, keep_grip=keep_grip, model=model, stroke=stroke, poll_interval=POLL_S
+        )
         agent = Agent("lab", "cell", {"left": hand}, network.bus(name), window=window)
         async with serving(agent) as task:
             yield Lab(network, gripper, server, hand, agent, task)
