@@ -36,7 +36,7 @@ AXIS_STOPS_WITHIN = 48
 """Counts: at this speed an axis moves 10 in a poll of 10 ms, and two polls and a device cycle may pass."""
 
 Way = Literal["task.cancel", "asyncio.timeout", "anyio"]
-WAYS: dict[Way, int] = {"task.cancel": 1, "anyio": 2, "asyncio.timeout": 6}
+WAYS: dict[Way, int] = {"task.cancel": 1, "anyio": 3, "asyncio.timeout": 6}
 """With the turns from one cancellation to the next. A time-out calls ``task.cancel()`` once, and what else it
 does it does outside the call: nothing in here distinguishes the two. A scope of anyio cancels until it is
 left."""
@@ -86,7 +86,7 @@ async def nothing(world: World) -> None:
 
 
 async def whole_life(world: World) -> None:
-    async with RobotiqHand(world.server.address) as hand:
+    async with RobotiqHand(world.server.address, poll_interval=0.03) as hand:
         await hand.move(TARGET, A, speed=0)
 
 

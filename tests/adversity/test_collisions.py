@@ -1,6 +1,6 @@
-"""Two calls at once: the second comes in every third turn of the loop while the first runs.
+"""Two calls at once: the second comes in every sixth turn of the loop while the first runs.
 
-The turns between are those of the two calls before it in the table.
+The turns between are those of the five calls before it in the table: something comes in each turn of a call.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ A, B = Finger.A, Finger.B
 FAST = 2000.0
 """The gripper does everything within a poll or two: all there is to walk through is what the hand does."""
 MOST_TURNS = 60
+STEP = 6
 POLL_S = 0.02
 """The steps are turns of the loop, of which a poll has as many however often it comes."""
 
@@ -50,12 +51,12 @@ READY: dict[str, tuple[Callable[[World], Awaitable[None]], tuple[str, ...]]] = {
 @pytest.mark.parametrize(
     ("ready", "first"), [(ready, call) for ready, (_, calls) in READY.items() for call in calls]
 )
-def test_a_second_call_in_every_third_turn(
+def test_a_second_call_in_every_sixth_turn(
     ready: str, first: str, second: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.CRITICAL, logger="robotiq_async")
-    first_turn = 2 + [*CALLS].index(second) % 3
-    for turn in count(first_turn, 3):
+    first_turn = 2 + [*CALLS].index(second) % STEP
+    for turn in count(first_turn, STEP):
         if not run(lambda: collide(ready, first, second, turn)) or turn > MOST_TURNS:  # noqa: B023  # run at once
             break
     assert turn > first_turn, "the first call was over at once"
