@@ -8,7 +8,7 @@ import os
 import signal
 import time
 from asyncio.subprocess import Process
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +19,9 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.conftest import PATIENCE, Beside, Call, Shell
 
 pytest.importorskip("zenoh")
+import zenoh
+
+from robotiq_async.fleet.network.configuration import session_configuration
 from tests.fleet.sessions import free_port
 from tests.grippers import until
 from tests.patience import patience
@@ -188,12 +191,29 @@ async def test_an_agent_that_gets_sigterm_stops_the_fingers(
     assert (await shell.finish(moving)).code == 1
 
 
+@pytest.fixture
+def router(endpoint: str) -> Iterator[zenoh.Session]:
+    """A router at the endpoint, in this process."""
+    configuration = session_configuration([endpoint], []) | {"mode": "router"}
+    with zenoh.open(zenoh.Config.from_json5(json.dumps(configuration))) as session:
+        yield session
+
+
 def test_a_second_agent_is_refused(
-    call: Call, serving: Callable[..., Beside], endpoint: str, tmp_path: Path
+    call: Call,
+    beside: Callable[..., Beside],
+    there: SimulatorServer,
+    endpoint: str,
+    router: zenoh.Session,
+    tmp_path: Path,
 ) -> None:
-    assert serving().read_line() == ADDRESS
-    second = fleet_file(tmp_path, endpoint, "sim://", "connect")
-    call("agent", str(second)).assert_failed(1, f"another agent serves {ADDRESS}")
+    """It hears of the first one from the router, which knows it by then, however slow the first one is."""
+    file = str(fleet_file(tmp_path, endpoint, there.address, "connect"))
+    assert beside("agent", file).read_line() == ADDRESS
+    by = time.monotonic() + patience(PATIENCE)
+    while not list(router.liveliness().get("robotiq/v1/lab/cell/left/alive/*", timeout=1.0)):
+        assert time.monotonic() < by, "the router has not heard of the first agent"
+    call("agent", file).assert_failed(1, f"another agent serves {ADDRESS}")
 
 
 def test_an_agent_that_waits_for_its_router_says_so_and_can_be_ended(
