@@ -141,6 +141,19 @@ async def test_a_stop_waits_for_one_turn_of_the_other_and_not_for_two(
         assert right.statistics.reconnects == 0
 
 
+async def test_a_command_waits_for_a_new_status_where_a_stop_does_not(bus: Bus) -> None:
+    async with (
+        bus.hand(LEFT),
+        bus.hand(RIGHT) as right,
+        bus.servers[LEFT].fault_injector.making(Trouble("delay", 0.2)),
+    ):
+        await asyncio.sleep(1.1)
+        before = right.status
+        right.command(position=200)
+        await until(lambda: bus.gripper(RIGHT).target(A) == 200)
+        assert right.status.timestamp > before.timestamp
+
+
 async def test_a_stop_arrives_although_the_other_is_silent(bus: Bus) -> None:
     loop = asyncio.get_running_loop()
     async with bus.hand(LEFT), bus.hand(RIGHT) as right:
