@@ -420,7 +420,7 @@ async def test_a_recording_has_the_one_axis_and_can_be_read(tmp_path: Path) -> N
     path = tmp_path / "jaw.mcap"
     async with RobotiqHand("sim://?model=2f85&speedup=20") as hand:
         async with Recorder(hand, path) as recorder:
-            await hand.close()
+            await hand.close(speed=0)
         assert recorder.recorded > 3
     entries = [*read_recording(path)]
     topics = {"/gripper/status", "/gripper/command", "/gripper/event", "/joint_states"}
