@@ -80,6 +80,8 @@ class Ledger:
         self._entries = deque([self.shown])
         # Those before them. No status shows them, but a late gDT may be from their time.
         self._past: deque[Entry] = deque()
+        # One of ours that showed after a reset, and so was adopted as another client's: it may activate.
+        self._mistaken: Entry | None = None
         # Follows the entry of another client as long as that is the last.
         self._adoption: Adoption | None = None
         # The masks and the flag spare a poll the questions whose answers are known. A write that changes the
@@ -147,8 +149,9 @@ class Ledger:
 
     def may_activate(self, status: RobotiqStatus) -> bool:
         """Whether a write of ours with rACT begins to act only in a status, or a short time before it."""
-        recent = (each for each in self._entries if self.now.time - each.time < WINDOW_S)
-        return any(each.is_ours and each.image.activate and each.echo == status.echo for each in recent)
+        ours = (each for each in (*self._entries, self._mistaken) if each is not None and each.is_ours)
+        recent = (each for each in ours if self.now.time - each.time < WINDOW_S)
+        return any(each.image.activate and each.echo == status.echo for each in recent)
 
     @property
     def may_set_go(self) -> bool:
@@ -382,6 +385,7 @@ class Ledger:
         self.ours = NO_AXES if is_found else self.ours & ~_compared(before, image)[0]
         waiting = self._waiting()
         self._past.extend(each for each in self._entries if each.number <= self.shown.number)
+        self._mistaken = self.match or self._mistaken
         self._entries, self.shown, self.match = deque([other, *waiting]), other, other
         for number, each in enumerate(waiting, other.number + 1):
             each.number, each.is_doubtful = number, True
@@ -403,6 +407,7 @@ class Ledger:
         self.shown = self.match = Entry(number, image, image, status.echo, True, time, time, LONG_AGO)
         self._entries, self._has_doubtful = deque([self.shown]), False
         self._past.clear()
+        self._mistaken = None
         self.unrested = self._unproven = self._may_start = NO_AXES
         self.ours = Finger.ALL
         return status.echo == image.echo and not image.release
