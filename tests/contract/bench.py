@@ -95,7 +95,8 @@ class Bench:
 async def bench(where: str, *, active: bool = True) -> AsyncIterator[Bench]:
     """A gripper that is active, or reset, and a way to make hands on it."""
     if where == REMOTE:
-        async with lab(active=active, model=MODEL.get(), kind_of_server=SERVER.get()) as here:
+        setup = lab(active=active, model=MODEL.get(), kind_of_server=SERVER.get(), poll_interval=0.005)
+        async with setup as here:
             # Until the agent has its gripper.
             await until(lambda: here.local.state not in (State.DISCONNECTED, State.SHUTDOWN))
             names = iter(range(1000))

@@ -25,7 +25,7 @@ from tests.virtual import until
 
 SPEEDUP = 5.0
 POLL_S = 0.02
-"""Of the agent's hand: its polls are most of what a test costs, and no story here needs more of them."""
+"""Of the agent's hand: its polls are most of what a test costs, and few stories need more of them."""
 LEFT = GripperName("lab", "cell", "left")
 
 
@@ -115,6 +115,7 @@ async def lab(
     model: Model = THREE_FINGER,
     stroke: Points | None = None,
     kind_of_server: type[SimulatorServer] = SimulatorServer,
+    poll_interval: float = POLL_S,
 ) -> AsyncIterator[Lab]:
     """An agent that serves zenoh://lab/cell/left, under a name in a network, by default one of its own."""
     network = network or Network()
@@ -124,7 +125,7 @@ async def lab(
         if active:
             await activate_beforehand(gripper)
         hand = RobotiqHand(
-            server.address, keep_grip=keep_grip, model=model, stroke=stroke, poll_interval=POLL_S
+            server.address, keep_grip=keep_grip, model=model, stroke=stroke, poll_interval=poll_interval
         )
         agent = Agent("lab", "cell", {"left": hand}, network.bus(name), window=window)
         async with serving(agent) as task:
