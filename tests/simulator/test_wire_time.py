@@ -157,7 +157,7 @@ async def test_how_often_a_hand_polls(
         address = f"rtu://{cable.NEAR}?model={model}"
         async with RobotiqHand(address, write_spacing=0.0, **interval) as hand:  # type: ignore[arg-type]
             await asyncio.sleep(0.1)
-            seconds, before = 5.0, hand.statistics
+            seconds, before = 5.0 if streaming else 1.0, hand.statistics
             until = loop.time() + seconds
             while loop.time() < until:
                 if streaming:
@@ -203,7 +203,7 @@ async def test_a_hand_works_on_lines_as_they_are(
         plan = asyncio.create_task(server.fault_injector.run(parse_troubles(words)))
         await asyncio.sleep(0)
         async with RobotiqHand(f"rtu://{cable.NEAR}?model={model}") as hand:
-            for position in (200, 40, 120):
+            for position in (100, 40, 70):
                 result = await hand.move(position, Finger.A)
                 assert result.positions[Finger.A] == pytest.approx(position, abs=3)
             assert hand.statistics.reconnects == 0
