@@ -158,7 +158,7 @@ class Controller:
     def next_event(self) -> float:
         """The time of the next event without a request; infinite if there is none."""
         step_ends = self._step_lasts_until if self._steps and self._is_done(self._steps[0]) else math.inf
-        return min(self.faults.changes_at, step_ends, *(axis.ends_at for axis in self.axes))
+        return min(self.faults.changes_at, step_ends, *[axis.ends_at for axis in self.axes])
 
     def update(self, time: float) -> None:
         """Apply the events of this time, and drive the axes accordingly."""
@@ -221,18 +221,16 @@ class Controller:
         return self._is_stopped or self._resets_needed > 0
 
     @property
-    def echoes(self) -> tuple[int, ...]:
+    def echoes(self) -> list[int]:
         """The gPR of each axis: its own register, even where simple control drives it by another."""
-        positions = tuple(axis.position for axis in self.request.axes)
-        if not self.model.has_modes:
-            return positions
-        *fingers, scissor = positions
-        if self.habits.echoes_limits and self.progress is Initialization.COMPLETE:
+        positions = [axis.position for axis in self.request.axes]
+        is_limited = self.model.has_modes and self.progress is Initialization.COMPLETE
+        if self.habits.echoes_limits and is_limited:
             if (limit := control.finger_limit(self._mode)) is not None:
-                fingers = [min(limit, position) for position in fingers]
+                positions[:3] = [min(limit, position) for position in positions[:3]]
             if self.request.individual_scissor:
-                scissor = self.axes[-1].within_stops(scissor)
-        return *fingers, scissor
+                positions[3] = self.axes[3].within_stops(positions[3])
+        return positions
 
     def shown_statuses(self, time: float) -> Statuses:
         if self.progress is not Initialization.COMPLETE:

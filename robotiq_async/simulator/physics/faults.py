@@ -14,25 +14,28 @@ _RANK: Final = {Severity.NONE: 0, Severity.PRIORITY: 1, Severity.MINOR: 2, Sever
 
 
 class PresentFaults:
-    """A set of faults with end times. Times are simulated seconds."""
+    """A set of faults with end times. Times are simulated seconds.
+
+    Attributes:
+        worst: the most serious fault; NONE without any.
+        changes_at: the time at which one ends or becomes another; infinite if none does.
+    """
 
     def __init__(self) -> None:
         self._ends: dict[Fault, float] = {}
-        self._escalates_at = math.inf
+        self.clear()
 
     def begin(self, fault: Fault, time: float, duration: float | None) -> None:
         """Add a fault, for a while or (None) until it is cleared."""
         self._ends[fault] = math.inf if duration is None else time + duration
         if fault is Fault.SCISSOR_INTERFERENCE:
             self._escalates_at = time + BLOCKED_AFTER
+        self._weigh()
 
     def clear(self) -> None:
         self._ends.clear()
         self._escalates_at = math.inf
-
-    @property
-    def changes_at(self) -> float:
-        return min(self._escalates_at, min(self._ends.values(), default=math.inf))
+        self._weigh()
 
     def update(self, time: float) -> None:
         """End what ends at this time; interference that has lasted 20 s becomes the major fault."""
@@ -41,13 +44,12 @@ class PresentFaults:
             self._escalates_at = math.inf
         elif self._escalates_at <= time:
             del self._ends[Fault.SCISSOR_INTERFERENCE]
-            self.begin(Fault.SCISSOR_BLOCKED, time, None)
-            self._escalates_at = math.inf
+            self._ends[Fault.SCISSOR_BLOCKED] = self._escalates_at = math.inf
+        self._weigh()
 
-    @property
-    def worst(self) -> Fault:
-        """The most serious fault; NONE without any."""
-        return max(self._ends, key=lambda fault: _RANK[fault.severity], default=Fault.NONE)
+    def _weigh(self) -> None:
+        self.worst = max(self._ends, key=lambda fault: _RANK[fault.severity], default=Fault.NONE)
+        self.changes_at = min(self._escalates_at, min(self._ends.values(), default=math.inf))
 
     @property
     def stops_scissor(self) -> bool:
