@@ -12,6 +12,7 @@ import asyncio
 import contextlib
 import functools
 import gc
+import heapq
 import inspect
 import math
 import os
@@ -176,6 +177,15 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def hold_up(self, seconds: float) -> None:
         """Let time pass in which nothing else can happen in this loop, as a blocking call does."""
         self._virtual.now += seconds
+
+    def add(self, handle: asyncio.Handle) -> None:
+        """Let a handle run in its turn, as it is."""
+        self._ready.append(handle)  # type: ignore[attr-defined]
+
+    def add_timer(self, timer: asyncio.TimerHandle) -> None:
+        """Let a timer run at its time, as it is."""
+        heapq.heappush(self._scheduled, timer)  # type: ignore[attr-defined]
+        timer._scheduled = True  # type: ignore[attr-defined]
 
     # The signatures are asyncio's; what pymodbus and the simulator pass is all that is looked at.
 

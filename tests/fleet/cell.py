@@ -25,7 +25,8 @@ Trouble = Callable[[World], Coroutine[Any, Any, None]]
 NAMED = re.compile(r"`(.+?)`")
 GRADUAL = re.compile(r"(`[^`]+`(?: and `[^`]+`)*) end like (`[^`]+`(?:(?:, | or )`[^`]+`)*)")
 TARGET = 130
-RATE_S = 0.02
+RATE_S = 0.03
+"""Below the interval between two polls: of some commands only the newest is written."""
 SETTLE_S = 2.5
 """Seconds after the trouble in which everything has to come right by itself, and nothing may come late."""
 
@@ -321,7 +322,7 @@ async def rest(world: World) -> float:
     """The time when the fingers last moved."""
     since = world.now()
     while True:
-        await asyncio.sleep(0.02)  # a tenth of what is allowed beside the window
+        await asyncio.sleep(0.04)  # a fifth of what is allowed beside the window
         if world.gripper.is_moving:
             since = world.now()
         elif world.now() - since > 1.0:

@@ -35,8 +35,9 @@ class Host(_Loop):
         self.is_dead = False
         self.slept = 0.0
         """Seconds for which its clock has stood still."""
-        self._outer = outer
-        self._due: deque[asyncio.Handle] = deque()
+        self.outer = outer
+        self.due: deque[asyncio.Handle] = deque()
+        """What became due while the gate was shut."""
         self._transports: list[MemoryTransport] = []
 
     # -- what is done to it ----------------------------------------------------------------------------
@@ -49,8 +50,8 @@ class Host(_Loop):
         """SIGCONT."""
         self.is_frozen = False
         # In one go, with no turn of another task in between: they are all due.
-        for _ in range(len(self._due)):
-            self._run(self._due.popleft())
+        for _ in range(len(self.due)):
+            self.due.popleft()._run()
 
     def wake(self, seconds: float) -> None:
         """It was suspended for so long and not only frozen: its clock knows nothing of that time."""
@@ -86,42 +87,26 @@ class Host(_Loop):
             raise
         return task.result()
 
-    # -- the gate --------------------------------------------------------------------------------------
-
-    def _run(self, handle: asyncio.Handle) -> None:
-        if self.is_frozen:
-            self._due.append(handle)
-        elif isinstance(handle, asyncio.TimerHandle) and handle.when() > self.time() + EARLY_S:
-            # By its clock it is not due yet.
-            self._outer.call_at(handle.when() + self.slept, self._run, handle)
-        elif not handle.cancelled():
-            before = asyncio._get_running_loop()
-            asyncio._set_running_loop(self)
-            try:
-                handle._run()
-            finally:
-                asyncio._set_running_loop(before)
-
     # -- the loop for programs -------------------------------------------------------------------------
 
     def time(self) -> float:
-        return self._outer.time() - self.slept
+        return self.outer.time() - self.slept
 
     def call_soon(  # type: ignore[override]
         self, callback: Callable[..., object], *args: Any, context: Context | None = None
     ) -> asyncio.Handle:
-        handle = asyncio.Handle(callback, args, self, context)
-        self._outer.call_soon(self._run, handle)
-        return handle
+        entry = _Entry(callback, args, self, context)
+        self.outer.add(entry)
+        return entry
 
     call_soon_threadsafe = call_soon  # type: ignore[assignment]
 
     def call_at(  # type: ignore[override]
         self, when: float, callback: Callable[..., object], *args: Any, context: Context | None = None
     ) -> asyncio.TimerHandle:
-        handle = asyncio.TimerHandle(when, callback, args, self, context)
-        self._outer.call_at(when + self.slept, self._run, handle)
-        return handle
+        timer = _Timer(when + self.slept, callback, args, self, context)
+        self.outer.add_timer(timer)
+        return timer
 
     def call_later(  # type: ignore[override]
         self, delay: float, callback: Callable[..., object], *args: Any, context: Context | None = None
@@ -129,7 +114,7 @@ class Host(_Loop):
         return self.call_at(self.time() + delay, callback, *args, context=context)
 
     def _timer_handle_cancelled(self, handle: asyncio.TimerHandle) -> None:
-        pass
+        self.outer._timer_handle_cancelled(handle)  # type: ignore[attr-defined]
 
     def create_future(self) -> asyncio.Future[Any]:
         return asyncio.Future(loop=self)
@@ -142,9 +127,9 @@ class Host(_Loop):
         if self.is_dead:
             raise ConnectionRefusedError(111, "this host is dead")
         protocol = factory()
-        asyncio._set_running_loop(self._outer)
+        asyncio._set_running_loop(self.outer)
         try:
-            transport = self._outer.connect(lambda: _Gate(self, protocol), port)
+            transport = self.outer.connect(lambda: _Gate(self, protocol), port)
         finally:
             asyncio._set_running_loop(self)
         self._transports.append(transport)
@@ -152,7 +137,7 @@ class Host(_Loop):
         return transport, protocol
 
     def call_exception_handler(self, context: Any) -> None:
-        self._outer.call_exception_handler(context)
+        self.outer.call_exception_handler(context)
 
     def get_debug(self) -> bool:
         return False
@@ -162,6 +147,48 @@ class Host(_Loop):
 
     def is_closed(self) -> bool:
         return False
+
+
+class _Entry(asyncio.Handle):
+    """A callback of a host, among those of the virtual loop: it runs when the gate is open."""
+
+    __slots__ = ()
+    _loop: Host
+
+    def _run(self) -> None:
+        host = self._loop
+        if host.is_frozen:
+            host.due.append(self)
+        elif not self._cancelled:
+            asyncio._set_running_loop(host)
+            try:
+                super()._run()
+            finally:
+                asyncio._set_running_loop(host.outer)
+
+
+class _Timer(asyncio.TimerHandle, _Entry):
+    """The same at its time, which is the virtual loop's."""
+
+    __slots__ = ("_slept",)
+    _when: float
+
+    def __init__(
+        self, when: float, callback: Callable[..., object], args: Any, host: Host, context: Context | None
+    ) -> None:
+        super().__init__(when, callback, args, host, context)
+        self._slept = host.slept
+
+    def _run(self) -> None:
+        host = self._loop
+        slept = host.slept - self._slept
+        if slept and not host.is_frozen and self._when + slept > host.outer.time() + EARLY_S:
+            # By its clock it is not due yet.
+            self._when += slept
+            self._slept = host.slept
+            host.outer.add_timer(self)
+        else:
+            super()._run()
 
 
 class _Gate:

@@ -129,8 +129,6 @@ class World:
     def check(self) -> None:
         """Check the promises that hold whatever happens."""
         assert not any(self.moved(axis, "right") for axis in THREE_FINGER.axes), "the wrong gripper moved"
-        for client in self.clients:
-            client.check()
 
 
 class MemoryRecords:
@@ -203,7 +201,8 @@ class Client:
         self.states: list[State] = []
         self.statuses: list[RobotiqStatus] = []
         self.had_control: list[bool] = []
-        self._watching: asyncio.Task[None] | None = None
+        self._looking: asyncio.Handle | None = None
+        """The next look; what one of them finds is a complaint of the loop."""
 
     async def start(self, **options: Any) -> None:
         async def begin() -> None:
@@ -212,7 +211,7 @@ class Client:
             self.hand_statuses = self.hand.statuses(100_000)
 
         await self.do(begin())
-        self._watching = self.host.create_task(self._watch())
+        self._looking = self.host.call_soon(self._look)
 
     async def do(self, work: Coroutine[Any, Any, T]) -> T:
         return await self.host.do(work)
@@ -225,23 +224,25 @@ class Client:
 
     async def stop(self) -> None:
         if not self.host.is_dead:
-            assert self._watching is not None
-            self._watching.cancel()
+            assert self._looking is not None
+            self._looking.cancel()
             with suppress(RobotiqError):
                 await self.do(self.hand.stop())
             self.statuses = await self.do(_all_of(self.hand_statuses))
 
-    async def _watch(self) -> None:
+    def _look(self) -> None:
         """Look at the hand as a program would, and compare the observation with the truth."""
-        while True:
-            state = self.hand.state
-            if not self.states or self.states[-1] is not state:
-                self.states.append(state)
-            if not self.had_control or self.had_control[-1] is not self.hand.is_in_control:
-                self.had_control.append(self.hand.is_in_control)
-            if state is not State.DISCONNECTED and not self.host.slept:  # else its clock is another
-                self._check_current(self.hand.status)
-            await asyncio.sleep(LOOK_S)
+        if self.host.is_dead:
+            return
+        # A turn after its time, as whatever waits: after a freeze everything is due at once.
+        self._looking = self.host.call_later(LOOK_S, self.host.call_soon, self._look)
+        state = self.hand.state
+        if not self.states or self.states[-1] is not state:
+            self.states.append(state)
+        if not self.had_control or self.had_control[-1] is not self.hand.is_in_control:
+            self.had_control.append(self.hand.is_in_control)
+        if state is not State.DISCONNECTED and not self.host.slept:  # else its clock is another
+            self._check_current(self.hand.status)
 
     def _check_current(self, status: RobotiqStatus) -> None:
         """A status given without a warning is no older than the window and one look for silence."""
@@ -258,11 +259,6 @@ class Client:
             if each == number:
                 return at
         raise AssertionError("a status that this gripper never gave out")
-
-    def check(self) -> None:
-        assert self._watching is None or not self._watching.done() or self._watching.cancelled(), (
-            self._watching.exception()
-        )
 
 
 async def _all_of(stream: Any) -> list[RobotiqStatus]:
