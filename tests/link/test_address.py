@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 
 from robotiq_async.link.address import FORMS, Address, Line, Simulation, parse_address
 
+ANY = st.characters(exclude_categories=["Cs"])
+"""What UTF-8 holds; to try all of that codec, as st.text() does by itself, takes a second."""
 NAMES = st.from_regex(r"[a-z0-9_][a-z0-9_-]{0,62}", fullmatch=True).filter(
     lambda name: not re.fullmatch("[0-9]+|0x[0-9a-f]*", name)
 )
@@ -106,7 +108,7 @@ def test_any_simulated_gripper_is_found_again_in_the_full_form(speedup: float, p
     assert parse_address(str(address)) == address
 
 
-@given(st.text() | st.text("?&=.0123456789speduobjct").map("sim://".__add__))
+@given(st.text(ANY) | st.text("?&=.0123456789speduobjct").map("sim://".__add__))
 def test_any_text_is_an_address_or_a_value_error_that_shows_the_forms(text: str) -> None:
     try:
         address = parse_address(text)
