@@ -29,7 +29,14 @@ settings.register_profile("suite", derandomize=True, **NO_QUICK_MACHINE)
 settings.register_profile("explore", max_examples=1000, print_blob=True, **NO_QUICK_MACHINE)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
 
-MADE_ONCE = ("test_replay.py", "test_guard.py", "test_access.py", "test_roles.py", "test_examination.py")
+MADE_ONCE = (
+    "test_replay.py",
+    "test_report.py",
+    "test_guard.py",
+    "test_access.py",
+    "test_roles.py",
+    "test_examination.py",
+)
 """Files with fixtures that take long and are made once for all of their tests: these stay together."""
 STDERR = pytest.StashKey[int]()
 """The one of this process, while what a test writes is captured."""

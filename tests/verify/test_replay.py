@@ -147,7 +147,7 @@ CHANGES = [
     (6, 0x0040, "gPOS"),
 ]
 """Register, bits, and the field that they are of."""
-EVERY = 20
+EVERY = 15
 """Statuses from one change to the next."""
 
 

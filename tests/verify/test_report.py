@@ -42,15 +42,6 @@ def begun(path: Path, server: SimulatorServer, **plan: Any) -> tuple[Folder, Run
     return folder, Runner(wanted, Helper(server), folder.recording, folder.save)
 
 
-async def recorded(path: Path, **plan: Any) -> tuple[Report, Folder]:
-    """A run that leaves files."""
-    async with served() as server, threads():
-        folder, runner = begun(path, server, **plan)
-        report = await runner.run()
-        assert not await folder.end(report)
-        return report, folder
-
-
 class Both(Roll):
     """Keeps frames on a roll and in a recording."""
 
@@ -78,7 +69,16 @@ class Kept(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def kept(tmp_path_factory: pytest.TempPathFactory) -> Kept:
+def no_pictures() -> Iterator[None]:
+    """Without the extra: test_replay has them, and they take longer than a run."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(sys.modules, "matplotlib.figure", None)
+        patch.delitem(sys.modules, "robotiq_async.tools.verify.pictures", raising=False)
+        yield
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory, no_pictures: None) -> Kept:
     """It is made once, for tests that only look at it."""
     path = tmp_path_factory.mktemp("run") / "new" / "folder"
 
@@ -116,14 +116,8 @@ def test_the_files_hold_the_run(kept: Kept) -> None:
     assert not list(kept.path.glob(".*"))
 
 
-@pytest.mark.virtual_time
-async def test_without_the_extra_for_pictures_the_page_says_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    monkeypatch.delitem(sys.modules, "robotiq_async.tools.verify.pictures", raising=False)
-    _, folder = await recorded(tmp_path, last=1)
-    assert "pictures need matplotlib" in (folder.path / PAGE).read_text()
+def test_without_the_extra_for_pictures_the_page_says_so(kept: Kept) -> None:
+    assert "pictures need matplotlib" in (kept.path / PAGE).read_text()
 
 
 def test_the_recording_has_every_frame(kept: Kept) -> None:
@@ -140,6 +134,7 @@ def test_the_recording_has_every_frame(kept: Kept) -> None:
 
 
 @pytest.mark.virtual_time
+@pytest.mark.usefixtures("no_pictures")
 @pytest.mark.parametrize("trouble", ["one-connection-only", "silence", "drop"])
 async def test_no_address_host_or_user_is_in_it(tmp_path: Path, trouble: str) -> None:
     """Errors of the link name the address, and reach all three files."""

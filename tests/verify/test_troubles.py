@@ -115,7 +115,7 @@ async def with_trouble(
             what = Trouble(kind, float(value) if value else None)
             begun.append(asyncio.ensure_future(server.fault_injector.begin(what)))
 
-    cue = Cue(25, act)
+    cue = Cue(22, act)
     plan = Plan(parse_address(server.address), first=stage, last=stage, lengths=SHORT)
     runner = Runner(plan, helper, cue, lambda _: None)
     running = asyncio.ensure_future(runner.run())
