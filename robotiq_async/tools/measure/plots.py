@@ -313,4 +313,5 @@ def _figure(
         target = path.with_name(f"{path.name}.{suffix}")
         with mpl.rc_context({"svg.hashsalt": "robotiq_async"}):
             figure.savefig(target, **options)
+        figure.set_layout_engine("none")  # the next one is laid out alike
         files.append(target)
