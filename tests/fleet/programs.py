@@ -24,10 +24,13 @@ from robotiq_async.fleet.network.configuration import (
 )
 from robotiq_async.fleet.network.zenoh_bus import open_bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
+from robotiq_async.session.options import POLL_INTERVAL_S
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.request import AxisRequest, Request
 
 NAMES = ("left", "right")
+POLL_S = 0.02
+"""Of a hand in a process: its polls are half of what the process costs."""
 B_STANDS = {"left": 0, "right": 100}
 OWN = {"left": Finger.A, "right": Finger.C}
 """The finger that is commanded."""
@@ -40,9 +43,12 @@ def say(*words: object) -> None:
     sys.stdout.flush()
 
 
-async def agent(endpoint: str, *addresses: str, router: str = "") -> None:
+async def agent(endpoint: str, *addresses: str, router: str = "", poll_interval: float = POLL_S) -> None:
     """Serve grippers until SIGTERM, where clients come in or by a router."""
-    hands = {name: RobotiqHand(address) for name, address in zip(NAMES, addresses, strict=False)}
+    hands = {
+        name: RobotiqHand(address, poll_interval=poll_interval)
+        for name, address in zip(NAMES, addresses, strict=False)
+    }
     listen, connect = ([], [router]) if router else ([endpoint], [])
     bus = await open_bus(agent_configuration("lab", "cell", listen, connect, insecure=True), endpoint)
     served = Agent("lab", "cell", hands, bus, records=file_records())
@@ -86,7 +92,7 @@ async def served(endpoint: str) -> None:
             grippers[name] = gripper
         servers = [await stack.enter_async_context(SimulatorServer(each)) for each in grippers.values()]
         before = {name: grippers[name].travel(STRANGER[name]) for name in NAMES}
-        await agent(endpoint, *(server.address for server in servers))
+        await agent(endpoint, *(server.address for server in servers), poll_interval=POLL_INTERVAL_S)
         moved = {name: grippers[name].travel(STRANGER[name]) - before[name] for name in NAMES}
         writes = {name: len(grippers[name].writes) for name in NAMES}
     say(json.dumps({"moved by the wrong client": moved, "writes": writes}))

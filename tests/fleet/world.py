@@ -54,7 +54,7 @@ class World:
         self.agents: list[ServingAgent] = []
         self.holder = Client(self, "holder", "left")
         self.other = Client(self, "other", "left")
-        self.neighbour = Client(self, "neighbour", "right")
+        self.neighbour = Client(self, "neighbour", "right", IDLE_POLL_S)
 
     @property
     def gripper(self) -> StampedGripper:
@@ -192,8 +192,9 @@ class ServingAgent:
 class Client:
     """A client on a host, and what it could see."""
 
-    def __init__(self, world: World, name: str, gripper: str) -> None:
+    def __init__(self, world: World, name: str, gripper: str, looks: float = LOOK_S) -> None:
         self.world = world
+        self.looks = looks
         self.gripper = gripper
         self.host = Host(name)
         self.bus: MemoryBus = world.network.bus(name, self.host)
@@ -235,7 +236,7 @@ class Client:
         if self.host.is_dead:
             return
         # A turn after its time, as whatever waits: after a freeze everything is due at once.
-        self._looking = self.host.call_later(LOOK_S, self.host.call_soon, self._look)
+        self._looking = self.host.call_later(self.looks, self.host.call_soon, self._look)
         state = self.hand.state
         if not self.states or self.states[-1] is not state:
             self.states.append(state)

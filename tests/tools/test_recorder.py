@@ -384,6 +384,7 @@ async def test_a_full_disk_ends_the_recording_and_nothing_else(
     assert 0 < recorder.saved == len(statuses(file)) <= recorder.recorded
     with pytest.raises(ZeroDivisionError):  # noqa: PT012  # an exception of the block is not hidden
         async with FullDisk(hand, file.with_name("other.mcap")) as other:
+            other.room = 0
             await other.failure()
             raise ZeroDivisionError
 
@@ -473,7 +474,7 @@ asyncio.run(main())
     assert process.stdout is not None
     last = 0
     async with asyncio.timeout(patience(60)):
-        while last < 600:
+        while last < 400:
             last = int(await process.stdout.readline())
     process.send_signal(signal.SIGKILL)
     rest, _ = await process.communicate()
