@@ -325,7 +325,7 @@ def test_ports_are_listed_as_addresses(call: Call, monkeypatch: pytest.MonkeyPat
     assert outcome.out.splitlines() == ["rtu:///dev/ttyS0", "rtu:///dev/ttyUSB1  FT232R USB UART"]
 
 
-@pytest.mark.parametrize("command", ["status", "monitor", "web"])
+@pytest.mark.parametrize("command", ["status", "monitor"])
 def test_the_error_for_a_missing_port_names_those_that_there_are(
     call: Call, monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:

@@ -29,6 +29,8 @@ needs("nicegui", "the page needs the extra web")
 from robotiq_async.cli.commands.web import AGAIN_S, _leave_all, _try_again
 from robotiq_async.tools.web.server import PageServer
 from robotiq_async.tools.web.settings import PageSettings
+from tests.cli.conftest import Outcome
+from tests.grippers import until
 from tests.patience import patience
 
 if TYPE_CHECKING:
@@ -66,6 +68,16 @@ async def test_it_prints_where_to_look_and_leaves_the_fingers_alone(
         assert (outcome.code, outcome.out) == (0, "")
         assert "The fingers were left as they are: no command from here moved them." in outcome.err
         assert gripper.request_registers == before
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
+async def test_sigterm_ends_it_as_ctrl_c_does(shell: Shell, server: SimulatorServer) -> None:
+    """Here while the page is starting, which costs less than a page that is there."""
+    process = await shell.start("web", "--port", "0", server.address)
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    await until(lambda: bool(children.read_text()), within=30)
+    process.send_signal(signal.SIGTERM)
+    assert await shell.finish(process) == Outcome(0, "", "")
 
 
 @pytest.mark.parametrize(
