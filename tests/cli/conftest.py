@@ -41,7 +41,10 @@ from tests.virtual import VirtualLoop
 
 WITHOUT = """
 import sys
-sys.modules["{}"] = None
+missing = "{}"
+for name in [each for each in sys.modules if each.startswith(missing + ".")]:
+    sys.modules[name] = None
+sys.modules[missing] = None
 from robotiq_async.cli import main
 sys.exit(main({}))
 """
@@ -326,9 +329,23 @@ def no_terminal_is_left() -> Iterator[None]:
 
 
 @pytest.fixture
-async def grasp(tmp_path: Path) -> Path:
+def grasp(recorded: bytes, tmp_path: Path) -> Path:
     """A recording of a grasp with a fault."""
-    gripper, file = SimulatedGripper(speedup=20), tmp_path / "grasp.mcap"
+    file = tmp_path / "grasp.mcap"
+    file.write_bytes(recorded)
+    return file
+
+
+@pytest.fixture(scope="session")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The same for all tests, which have files of their own."""
+    file = tmp_path_factory.mktemp("recorded") / "grasp.mcap"
+    asyncio.run(_record(file))
+    return file.read_bytes()
+
+
+async def _record(file: Path) -> None:
+    gripper = SimulatedGripper(speedup=20)
     gripper.place_object(Finger.ABC, 150)
     async with (
         SimulatorServer(gripper) as server,
@@ -340,7 +357,6 @@ async def grasp(tmp_path: Path) -> Path:
         await hand.wait_for_state(State.FAULT)
         gripper.clear_faults()
         await hand.wait_for_state(State.RUNNING_IDLE)
-    return file
 
 
 def draw_nothing(patch: pytest.MonkeyPatch) -> None:
