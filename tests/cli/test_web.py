@@ -70,12 +70,27 @@ async def test_it_prints_where_to_look_and_leaves_the_fingers_alone(
         assert gripper.request_registers == before
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
-async def test_sigterm_ends_it_as_ctrl_c_does(shell: Shell, server: SimulatorServer) -> None:
-    """Here while the page is starting, which costs less than a page that is there."""
-    process = await shell.start("web", "--port", "0", server.address)
-    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-    await until(lambda: bool(children.read_text()), within=30)
+PATHS = """
+import os, sys
+os.environ["PYTHONPATH"] = {!r}
+from robotiq_async.cli import main
+sys.exit(main(["web", "--port", "0", {!r}]))
+"""
+UVICORN = """
+import os
+open({!r}, "w").close()
+while os.read(0, 65536):
+    pass
+raise SystemExit
+"""
+"""A web server that takes long to start: it ends when its pipe does, before it has served a page."""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Windows has no SIGTERM for another process")
+async def test_sigterm_ends_it_as_ctrl_c_does(shell: Shell, server: SimulatorServer, tmp_path: Path) -> None:
+    (tmp_path / "uvicorn.py").write_text(UVICORN.format(str(tmp_path / "imported")))
+    process = await shell.forked("-c", PATHS.format(str(tmp_path), server.address))
+    await until((tmp_path / "imported").exists, within=30)
     process.send_signal(signal.SIGTERM)
     assert await shell.finish(process) == Outcome(0, "", "")
 
