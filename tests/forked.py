@@ -17,8 +17,10 @@ import json
 import os
 import runpy
 import socket
+import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from subprocess import Popen
@@ -33,7 +35,13 @@ ROOT = Path(__file__).parents[1]
 CAN_FORK = sys.platform == "linux"
 PR_SET_CHILD_SUBREAPER = 36
 CORE = ("robotiq_async.simulator", "anyio._backends._asyncio")
-COMMAND_LINE = (*CORE, "robotiq_async.cli.run", "rich.table")
+RUN = "robotiq_async.cli.run"
+COMMAND_LINE = (
+    *(*CORE, RUN, "robotiq_async.cli.connect", "robotiq_async.cli.output.tables"),
+    "robotiq_async.tools.verify",
+    *("cyclopts.help", "mcap.reader", "mcap.writer", "rich.console", "rich.table"),
+    *("textual.app", "textual.drivers.linux_driver", "textual.widgets"),
+)
 """What is imported before."""
 MOST = 1 << 20
 """Bytes of a request."""
@@ -43,13 +51,13 @@ MOST = 1 << 20
 
 
 @cache
-def _nursery(imported: tuple[str, ...]) -> socket.socket:
+def _nursery(imported: tuple[str, ...], variables: tuple[tuple[str, str], ...]) -> socket.socket:
     """The end here of the connection to the process that forks; it ends with this one."""
     ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with there:
         command = [sys.executable, "-m", "tests.forked", str(there.fileno()), *imported]
-        environment = os.environ | {"PYTHONPATH": str(ROOT)}
+        environment = os.environ | {"PYTHONPATH": str(ROOT)} | dict(variables)
         process = Popen(command, pass_fds=[there.fileno()], env=environment)
     atexit.register(_end, here, process)
     return here
@@ -66,12 +74,14 @@ def fork(
     streams: Sequence[int],
     *,
     terminal: bool = False,
+    folder: str = "",
     imported: tuple[str, ...] = COMMAND_LINE,
+    variables: tuple[tuple[str, str], ...] = (),
 ) -> int:
     """Run Python with these arguments (``-m module``, ``-c code`` or a file); return its process ID."""
-    what = {"arguments": arguments, "environment": dict(environment), "folder": os.getcwd()}
+    what = {"arguments": arguments, "environment": dict(environment), "folder": folder or os.getcwd()}
     request = json.dumps({**what, "terminal": terminal}).encode()
-    nursery = _nursery(imported)
+    nursery = _nursery(imported, variables)
     socket.send_fds(nursery, [request], streams)
     process = int(nursery.recv(20))
     nursery.recv(1)  # from now on it is a child of this one
@@ -82,16 +92,38 @@ class Forked(Popen[Any]):
     """A process that is forked in place of started; all of its streams must be given."""
 
     imported: ClassVar[tuple[str, ...]] = COMMAND_LINE
+    variables: ClassVar[tuple[tuple[str, str], ...]] = ()
+    """Those of the environment that an interpreter, or what is imported, reads only once."""
 
     def _execute_child(self, *arguments: object) -> None:
         of = inspect.signature(super()._execute_child).bind(*arguments).arguments  # type: ignore[misc]
         pipes = ("p2cread", "p2cwrite", "c2pread", "c2pwrite", "errread", "errwrite")
         try:
             streams = [of[each] for each in (pipes[0], *pipes[3::2])]
-            self.pid = fork(of["args"][1:], of["env"], streams, imported=self.imported)
+            self.pid = fork(
+                of["args"][1:],
+                of["env"],
+                streams,
+                folder=str(of["cwd"] or ""),
+                imported=self.imported,
+                variables=self.variables,
+            )
             self._child_created = True
         finally:
             self._close_pipe_fds(*(of[each] for each in pipes))  # type: ignore[attr-defined]
+
+
+@contextmanager
+def forking(imported: tuple[str, ...], variables: Mapping[str, str] | None = None) -> Iterator[None]:
+    """Let what asyncio starts in this block be forked, where that can be."""
+    before = subprocess.Popen
+    if CAN_FORK:
+        of = {"imported": imported, "variables": tuple((variables or {}).items())}
+        subprocess.Popen = type("_Forked", (Forked,), of)  # type: ignore[misc, assignment]
+    try:
+        yield
+    finally:
+        subprocess.Popen = before  # type: ignore[misc]
 
 
 # -- in the process that forks -----------------------------------------------------------------------------
@@ -148,9 +180,22 @@ def _run(arguments: list[str]) -> None:
             runpy.run_path(file, run_name="__main__")
 
 
+def _keep(modules: dict[str, ModuleType]) -> None:
+    """Let the interpreter end without what was imported before: to take that apart takes 20 ms."""
+    apart = {*sys.builtin_module_names, "__main__"}
+    for name, module in modules.items():
+        if name not in apart:
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(module))
+            sys.modules.pop(name, None)
+
+
 def _main() -> None:
+    modules: dict[str, ModuleType] = {}
+    atexit.register(_keep, modules)  # the first one is called last
     for module in sys.argv[2:]:
         importlib.import_module(module)
+    if RUN in sys.modules:  # the end of others is what their tests look at
+        modules |= sys.modules
     gc.collect()
     gc.freeze()
     request = _next(socket.socket(fileno=int(sys.argv[1])))

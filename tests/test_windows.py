@@ -11,12 +11,14 @@ import pytest
 
 from robotiq_async import Finger
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from tests.forked import ROOT, forking
 from tests.patience import patience
+from tests.windows import THEIRS
 
-ROOT = Path(__file__).parents[1]
-BEGIN = "import sys\nfrom tests.windows import Winmm, become\nbecome(coarse={}, commands={})\n"
+BEGIN = "import sys\nfrom tests.windows import Winmm, become\nbecome(coarse={})\n"
 ENVIRONMENT = {
     "PYTHONPATH": str(ROOT),
+    "PYTHONWARNDEFAULTENCODING": "1",
     # The one for Windows wants a console of it.
     "TEXTUAL_DRIVER": "textual.drivers.headless_driver:HeadlessDriver",
 }
@@ -25,17 +27,17 @@ if sys.platform == "win32":
     pytest.skip("the core's own tests run there", allow_module_level=True)
 
 
-async def on_windows(program: str, *arguments: str, coarse: bool = False, commands: bool = False) -> str:
+async def on_windows(program: str, *arguments: str, coarse: bool = False) -> str:
     """The output of a program there; it must end well, and complain of nothing but late polls."""
-    process = await asyncio.create_subprocess_exec(
-        *(sys.executable, "-X", "warn_default_encoding"),
-        *("-c", BEGIN.format(coarse, commands) + program, *arguments),
-        cwd=ROOT,
-        env=os.environ | ENVIRONMENT,
-        stdin=asyncio.subprocess.DEVNULL,
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.PIPE,
-    )
+    with forking(THEIRS, ENVIRONMENT):
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-c", BEGIN.format(coarse) + program, *arguments),
+            cwd=ROOT,
+            env=os.environ | ENVIRONMENT,
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
+        )
     try:
         async with asyncio.timeout(patience(30)):
             out, err = (each.decode() for each in await process.communicate())
@@ -89,7 +91,7 @@ for found in pkgutil.walk_packages(robotiq_async.__path__, "robotiq_async."):
         count += 1
 assert count > 140, count
 """
-    await on_windows(program, commands=True)
+    await on_windows(program)
 
 
 @pytest.mark.parametrize("coarse", [False, True], ids=["fine clock", "coarse clock"])
@@ -214,7 +216,7 @@ interrupted("record", f"{folder}/second.mcap", address)
 async def test_the_commands_run(tmp_path: Path) -> None:
     """One process for all of them: what it imports takes longer than they do."""
     async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
-        await on_windows(COMMANDS, server.address, str(tmp_path), commands=True)
+        await on_windows(COMMANDS, server.address, str(tmp_path))
 
 
 async def test_the_monitor_is_driven_by_keys() -> None:
@@ -242,4 +244,4 @@ async def main(address):
 asyncio.run(main(sys.argv[1]))
 """
     async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
-        await on_windows(program, server.address, commands=True)
+        await on_windows(program, server.address)

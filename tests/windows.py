@@ -43,11 +43,10 @@ LOOP = "add_reader add_writer add_signal_handler remove_signal_handler"
 THEIRS = (
     *("anyio._backends._asyncio", "platform", "pymodbus.client", "pymodbus.server"),
     *("serial.tools.list_ports", "shutil", "subprocess", "tempfile"),
-)
-OF_COMMANDS = (
     *("cyclopts", "mcap.reader", "mcap.writer", "rich.live", "webbrowser"),
     *("textual.app", "textual.drivers.headless_driver", "textual.widgets"),
 )
+"""What the library imports."""
 
 
 class Winmm:
@@ -77,14 +76,13 @@ class Winmm:
         return 0
 
 
-def become(*, coarse: bool = False, commands: bool = False) -> None:
+def become(*, coarse: bool = False) -> None:
     """Give up what Windows has not.
 
     Args:
         coarse: have the clock of Python before 3.13, too.
-        commands: import what the command line imports, which takes a while.
     """
-    for name in (*THEIRS, *(OF_COMMANDS if commands else ())):
+    for name in THEIRS:
         importlib.import_module(name)
     importlib.import_module("pymodbus.transport.serialtransport").SerialTransport.force_poll = True
     ctypes.WinDLL = Winmm  # type: ignore[attr-defined]

@@ -7,7 +7,7 @@ import contextlib
 import re
 import signal
 import sys
-from asyncio.subprocess import PIPE, STDOUT
+from asyncio.subprocess import DEVNULL, PIPE, STDOUT
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -16,6 +16,7 @@ import pytest
 
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from tests.docs.pages import DOCS, blocks, read
+from tests.forked import CORE, forking
 from tests.grippers import active_gripper, until
 from tests.patience import patience
 
@@ -28,9 +29,16 @@ PAGE = DOCS / "how-to" / "service.md"
 async def running(address: str, folder: Path) -> AsyncIterator[asyncio.subprocess.Process]:
     program = folder / "cell_service.py"
     program.write_text(PROGRAM, encoding="utf-8")
-    process = await asyncio.create_subprocess_exec(
-        sys.executable, str(program), env={"GRIPPER": address}, cwd=folder, stdout=PIPE, stderr=STDOUT
-    )
+    with forking(CORE):
+        process = await asyncio.create_subprocess_exec(
+            sys.executable,
+            str(program),
+            env={"GRIPPER": address},
+            cwd=folder,
+            stdin=DEVNULL,
+            stdout=PIPE,
+            stderr=STDOUT,
+        )
     try:
         async with asyncio.timeout(patience(60)):
             yield process

@@ -7,7 +7,7 @@ import contextlib
 import re
 import signal
 import sys
-from asyncio.subprocess import PIPE, STDOUT
+from asyncio.subprocess import DEVNULL, PIPE, STDOUT
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -17,11 +17,13 @@ import pytest
 
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.docs.pages import DOCS, blocks, read
+from tests.forked import CORE, forking
 from tests.grippers import active_gripper, until
 from tests.patience import patience
 
 PAGE = DOCS / "how-to" / "web-service.md"
 (PROGRAM,) = (each.text for each in blocks(read(PAGE), "python"))
+IMPORTED = (*CORE, "fastapi", "uvicorn.protocols.http.auto")
 STOP_S = 0.5
 """Between the signal and fingers that stand still: a poll or two, on a busy machine."""
 
@@ -50,9 +52,11 @@ async def launched(
     program.write_text(PROGRAM, encoding="utf-8")
     async with SimulatorServer(gripper) as server:
         variables = {"GRIPPER": server.address, "PORT": "0", "PATH": "/usr/bin:/bin"}
-        process = await asyncio.create_subprocess_exec(
-            python, str(program), env=variables, cwd=folder, stdout=PIPE, stderr=STDOUT
-        )
+        # A Python of another environment has to be started.
+        with forking(IMPORTED) if python == sys.executable else contextlib.nullcontext():
+            process = await asyncio.create_subprocess_exec(
+                python, str(program), env=variables, cwd=folder, stdin=DEVNULL, stdout=PIPE, stderr=STDOUT
+            )
         try:
             yield process
         finally:
