@@ -301,7 +301,7 @@ async def test_a_closed_standard_stream_does_no_harm(
 ) -> None:
     command = [sys.executable, "-m", "robotiq_async", "status", server.address]
     code = f"import os; os.close({closed}); os.execv({sys.executable!r}, {command!r})"
-    (await shell.finish(await shell.python("-c", code))).assert_succeeded()
+    (await shell.finish(await shell.forked("-c", code))).assert_succeeded()
 
 
 # -- ports -------------------------------------------------------------------------------------------------

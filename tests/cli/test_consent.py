@@ -78,7 +78,7 @@ async def test_a_stream_that_is_closed_is_no_terminal(
 ) -> None:
     code = f"import os; os.close({closed}); os.execv({{0!r}}, [{{0!r}}, '-m', 'robotiq_async', *{{1!r}}])"
     outcome = await shell.finish(
-        await shell.python("-c", code.format(sys.executable, ["move", "30", server.address]))
+        await shell.forked("-c", code.format(sys.executable, ["move", "30", server.address]))
     )
     outcome.assert_failed(2, "--yes")
     assert not server.gripper.writes

@@ -6,16 +6,10 @@ import re
 import tomllib
 from importlib.metadata import EntryPoint, packages_distributions
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import robotiq_async
-from robotiq_async import Finger
 from robotiq_async.cli import main
 from robotiq_async.cli.app import build
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-
-if TYPE_CHECKING:
-    from tests.cli.conftest import Shell
 
 ROOT = Path(__file__).parents[2]
 SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -125,14 +119,3 @@ def test_the_extra_that_is_a_command_brings_the_command_line() -> None:
 def test_no_package_index_is_named() -> None:
     for name in ("pyproject.toml", "Makefile", "mkdocs.yml", ".ci/run"):
         assert not re.search(r"index-url|find-links|simple/|://[^\s]*pypi", (ROOT / name).read_text()), name
-
-
-async def test_the_example_of_the_readme_runs(shell: Shell) -> None:
-    (example,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
-    async with SimulatorServer(SimulatedGripper(speedup=20.0)) as server:
-        server.gripper.place_object(Finger.ABC, position=150)
-        program = example.replace("tcp://192.168.1.11", server.address)
-        outcome = await shell.finish(await shell.python("-c", program))
-    outcome.assert_succeeded()
-    assert outcome.out.startswith("holding it with ")
-    assert outcome.out.count("\n") > 3
