@@ -17,6 +17,8 @@ pytestmark = pytest.mark.virtual_time
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
 HELD = B | C
+POLL_S = 0.02
+"""The fate of a grip does not depend on how often the hand looks."""
 
 
 def rows() -> dict[str, tuple[str, str]]:
@@ -36,7 +38,7 @@ class Bench:
     @asynccontextmanager
     async def holding(self) -> AsyncIterator[RobotiqHand]:
         """The first program: B and C hold something."""
-        async with RobotiqHand(self.server.address, keep_grip=self.keeps) as hand:
+        async with RobotiqHand(self.server.address, keep_grip=self.keeps, poll_interval=POLL_S) as hand:
             self.gripper.place_object(HELD, 150)
             await hand.close(HELD)
             assert self.gripper.grips == HELD
@@ -176,7 +178,7 @@ async def power_lost(here: Bench) -> str:
 async def next_connects(here: Bench) -> str:
     async with here.holding():
         pass
-    hand = RobotiqHand(here.server.address)
+    hand = RobotiqHand(here.server.address, poll_interval=POLL_S)
     await hand.start()
     word = here.word
     await hand.stop(halt=False)
@@ -187,7 +189,7 @@ async def next_connects(here: Bench) -> str:
 async def next_moves_another(here: Bench) -> str:
     async with here.holding():
         pass
-    async with RobotiqHand(here.server.address) as hand:
+    async with RobotiqHand(here.server.address, poll_interval=POLL_S) as hand:
         await hand.move(100, A)
         asked = {hand.status.requested_position(axis) == 255 for axis in (B, C)}
         assert asked == {here.keeps}, "its own position, unless the echo is to be believed"
@@ -197,10 +199,10 @@ async def next_moves_another(here: Bench) -> str:
 async def next_ends(here: Bench) -> str:
     async with here.holding():
         pass
-    async with RobotiqHand(here.server.address, keep_grip=here.keeps):
+    async with RobotiqHand(here.server.address, keep_grip=here.keeps, poll_interval=POLL_S):
         pass
     assert here.word == ("grip" if here.keeps else "stays"), "unless it keeps the grip as well"
-    async with RobotiqHand(here.server.address):
+    async with RobotiqHand(here.server.address, poll_interval=POLL_S):
         pass
     return here.word
 
