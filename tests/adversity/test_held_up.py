@@ -125,8 +125,8 @@ async def test_a_stall_anywhere_in_a_poll_delays_the_write_until_a_new_status(
         here.hand.command(A, position=100)
 
     here.loop.after_turns(turns, hold_up)
-    await asyncio.sleep(2.0)
-    await here.nothing_moves_for(6)
+    await asyncio.sleep(1.5)
+    await here.nothing_moves_for(2)  # an activation takes as long
     assert not Request.from_registers(here.gripper.request_registers).activate
 
 
