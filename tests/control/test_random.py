@@ -16,7 +16,14 @@ from tests.register_words import only_holds
 
 masks = st.integers(1, 15).map(Finger)
 values = st.integers(0, 255)
+WAITS_S = 0.02
+"""Seconds between polls while nothing is asked and everything comes to rest."""
 PAUSES = st.sampled_from([0.0, 0.005, 0.01, 0.05])
+
+
+def wait(scan: Scan, seconds: float) -> None:
+    for _ in range(round(seconds / WAITS_S)):
+        scan.step(poll=WAITS_S)
 
 
 class RandomUse(RuleBasedStateMachine):
@@ -102,7 +109,7 @@ class RandomUse(RuleBasedStateMachine):
         writes = len(self.scan.gripper.writes)
         self.scan.now += away
         self.scan.connect(activate=False)
-        self.scan.run(1.5)  # a hold may have to bring an axis back that had begun to move
+        wait(self.scan, 1.5)  # a hold may have to bring an axis back that had begun to move
         assert only_holds(self.scan.gripper, writes), "something was replayed"
 
     @rule(fault=st.sampled_from([0x09, 0x0C, 0x0E]))
@@ -111,12 +118,12 @@ class RandomUse(RuleBasedStateMachine):
         self.scan.gripper.inject_fault(fault)
         self.scan.run(0.02)  # 0x09 is one when it lasts
         assert self.scan.state is State.FAULT
-        self.scan.run(1.0)
+        wait(self.scan, 1.0)
         assert all(outcome.is_answered for _, outcome in self.outcomes), "a caller waits for ever"
         at = {axis: self.scan.gripper.position(axis) for axis in self.model.axes}
         contacts = self.scan.latest.contacts
         self.scan.gripper.clear_faults()
-        self.scan.run(1.0)
+        wait(self.scan, 1.0)
         assert self.scan.state is State.RUNNING_IDLE
         for axis in self.model.axes:
             if axis not in contacts:
@@ -127,8 +134,8 @@ class RandomUse(RuleBasedStateMachine):
     @precondition(lambda self: self.running)
     def everything_comes_to_rest(self) -> None:
         self.scan.step()  # an object taken away sets axes in motion without a command
-        self.scan.until(lambda: not self.scan.controller.is_moving, 60)
-        self.scan.run(0.6)  # what has no echo is given half a second to act
+        self.scan.until(lambda: not self.scan.controller.is_moving, 60, WAITS_S)
+        wait(self.scan, 0.6)  # what has no echo is given half a second to act
         assert not self.scan.gripper.is_moving
         for move, outcome in self.outcomes:
             assert outcome.is_answered
@@ -187,13 +194,13 @@ class BesideAnotherClient(RuleBasedStateMachine):
 
     @rule(axes=masks, position=values)
     def a_command_at_rest_moves_the_axes_that_it_names(self, axes: Finger, position: int) -> None:
-        self.scan.run(1.0)
-        self.scan.until(lambda: not self.scan.gripper.is_moving, 60)
+        wait(self.scan, 1.0)
+        self.scan.until(lambda: not self.scan.gripper.is_moving, 60, WAITS_S)
         self.scan.run(0.3)
         assert not self.scan.controller.is_moving
         before = self.scan.travels()
         self.scan.command(axes, position=position)
-        self.scan.run(0.5)
+        wait(self.scan, 0.5)
         moved = {axis for axis, travel in self.scan.travels().items() if travel != before[axis]}
         assert all(axis in axes for axis in moved), f"{moved} moved"
 
