@@ -24,7 +24,7 @@ FAST = 2000.0
 """The gripper does everything within a poll or two: all there is to walk through is what the hand does."""
 MOST_TURNS = 60
 STEP = 6
-POLL_S = 0.02
+POLL_S = 0.04
 """The steps are turns of the loop, of which a poll has as many however often it comes."""
 
 Call = Callable[[World], Awaitable[Any]]
