@@ -17,7 +17,7 @@ from robotiq_async.simulator import parse_troubles
 from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values.registers import Registers
 from tests.adversity.phases import PHASES, TARGET, Call, Phase
-from tests.adversity.world import World
+from tests.adversity.world import HABITS, World
 from tests.docs.pages import read, table
 
 LINE_PULLED = "line pulled"
@@ -26,6 +26,8 @@ PATIENCE_S = 2.0
 """Seconds that a trouble lasts when the call does not end because of it; then it ends, and the call may."""
 IDLE_S = 1.0
 """Seconds that a trouble lasts when there is no call, and that one for ever goes on after the call."""
+REST_S = 0.6 if HABITS else 0.3
+"""Seconds for which a hand at rest stays in its state: five polls, and longer than any status lags."""
 ESCALATION_S = 5.0
 """Interference is a major fault after this time (20 s of the gripper, which is five times as fast)."""
 STOP_S = 2.0
@@ -150,7 +152,7 @@ async def _rest(world: World, settled: Collection[State]) -> None:
     async with asyncio.timeout(40):
         while True:
             state = world.hand.state
-            await asyncio.sleep(0.6)
+            await asyncio.sleep(REST_S)
             if world.hand.state is state and state in settled and not world.gripper.is_moving:
                 return
 
