@@ -69,6 +69,18 @@ LETS_GO = ("power-cut", "foreign", "fault", "release", "e-stop")
 """Troubles that end a grip if no other axis can move. Else a stop writes nothing that could fail."""
 CONNECTION_LOST = [("tcp", "silence once"), ("tcp", "reset"), ("tcp", "close"), ("rtu", "echo for 60")]
 """Troubles of links that do so too, as with a 3-Finger: the fate of the grip cannot be seen in time."""
+PASSES = "fault 9 for 60"
+"""A poll sees it once, so it does not end a grip."""
+OF_AN_AXIS = {
+    # The first exchange reads all registers, which a jaw may refuse or not answer: it is made again.
+    **{
+        ("tcp", "connecting", f"{kind} once"): "done → RUNNING_IDLE"
+        for kind in ("drop", "half", "exception", "silence")
+    },
+    # The first command shows it, and is not sent again: it may have been carried out.
+    ("rtu", "command pending", "no-function-23 for 60"): "ConnectionLost → RUNNING_IDLE",
+}
+"""Outcomes of cells on a jaw."""
 WITH_FUNCTION_23 = {
     # By the status read after the damage the write was carried out.
     ("command pending", f"{trouble} {lasts}"): "done → RUNNING_IDLE"
@@ -99,13 +111,15 @@ def kind_of(cell: Cell) -> str:
 
 def expected(cell: Cell, model: Model) -> str:
     if len(model.axes) == 1 and cell.phase.name == "keeping a grip":
-        lets_go = kind_of(cell) in LETS_GO or (cell.link, cell.trouble) in CONNECTION_LOST
+        lets_go = kind_of(cell) in LETS_GO and cell.trouble != PASSES
+        lets_go = lets_go or (cell.link, cell.trouble) in CONNECTION_LOST
         # With a lag that grows the closing is seen once more: an axis that moves is held where it is.
         lets_go = lets_go or kind_of(cell) == "status-lag" in {habit.kind for habit in HABITS}
         return f"done, {'let go' if lets_go else 'kept'} → SHUTDOWN"
     if len(model.axes) == 1 and cell.link == "rtu" and (cell.phase.name, cell.trouble) in WITH_FUNCTION_23:
         return WITH_FUNCTION_23[cell.phase.name, cell.trouble]
-    return usual(cell)
+    place = cell.link, cell.phase.name, cell.trouble
+    return OF_AN_AXIS.get(place, usual(cell)) if len(model.axes) == 1 else usual(cell)
 
 
 def usual(cell: Cell) -> str:
