@@ -168,17 +168,21 @@ async def test_a_hand_says_why_its_simulated_gripper_answers_no_more(unstable: s
 
 def test_the_command_ends_with_the_error(unstable: str) -> None:
     command = [sys.executable, "-m", "robotiq_async", "simulate", "--model", "2f85", "--port", "0"]
-    run = subprocess.Popen(
+    with subprocess.Popen(
         [*command, "--physics", unstable], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    try:
-        assert run.stdout is not None
-        address = run.stdout.readline().strip()
-        with pytest.raises(RobotiqConnectionError), sync.RobotiqHand(address, reconnect=False) as hand:
-            hand.activate()
-        _, complaint = run.communicate(timeout=patience(30))
-    finally:
-        run.kill()
+    ) as run:
+        try:
+            assert run.stdout is not None
+            address = run.stdout.readline().strip()
+            if address:  # on a busy machine they are unstable before anybody can connect
+                with (
+                    pytest.raises(RobotiqConnectionError),
+                    sync.RobotiqHand(address, reconnect=False) as hand,
+                ):
+                    hand.activate()
+            _, complaint = run.communicate(timeout=patience(30))
+        finally:
+            run.kill()
     assert run.returncode == 1
     assert "unstable after" in complaint
     assert "Traceback" not in complaint
