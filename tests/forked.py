@@ -42,7 +42,7 @@ COMMAND_LINE = (
     *("cyclopts.help", "mcap.reader", "mcap.writer", "rich.console", "rich.table"),
     *("textual.app", "textual.drivers.linux_driver", "textual.widgets"),
 )
-"""What is imported before."""
+"""Modules of the command line, imported before."""
 MOST = 1 << 20
 """Bytes of a request."""
 
@@ -114,8 +114,10 @@ class Forked(Popen[Any]):
 
 
 @contextmanager
-def forking(imported: tuple[str, ...], variables: Mapping[str, str] | None = None) -> Iterator[None]:
-    """Let what asyncio starts in this block be forked, where that can be."""
+def forking(
+    imported: tuple[str, ...] = COMMAND_LINE, variables: Mapping[str, str] | None = None
+) -> Iterator[None]:
+    """Fork in place of starting processes in this block, asyncio's too, where that can be."""
     before = subprocess.Popen
     if CAN_FORK:
         of = {"imported": imported, "variables": tuple((variables or {}).items())}

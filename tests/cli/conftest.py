@@ -25,7 +25,6 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 import pytest
 from mcap.writer import Writer
@@ -35,7 +34,7 @@ from robotiq_async.cli import main
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.recording.recorder import Recorder
 from tests.cli.terminal import Terminal
-from tests.forked import CAN_FORK, ROOT, Forked
+from tests.forked import ROOT, forking
 from tests.patience import patience
 from tests.virtual import VirtualLoop
 
@@ -49,7 +48,6 @@ from robotiq_async.cli import main
 sys.exit(main({}))
 """
 """A command line that does not find a module."""
-PROCESS: Any = Forked if CAN_FORK else subprocess.Popen
 PATIENCE = 30.0
 """Seconds after which a command counts as hanging."""
 
@@ -221,14 +219,15 @@ class Beside:
     def __init__(self, *arguments: str) -> None:
         command = [sys.executable, "-m", "robotiq_async", *arguments]
         environment = os.environ | {"PYTHONPATH": str(ROOT)}
-        self.process: subprocess.Popen[str] = PROCESS(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env=environment,
-            text=True,
-        )
+        with forking():
+            self.process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                env=environment,
+                text=True,
+            )
 
     def read_line(self) -> str:
         """The next line of its standard output, which is empty when it has ended."""
@@ -279,7 +278,7 @@ class Shell:
 
     async def forked(self, *arguments: str, stdin: int = DEVNULL) -> Process:
         """Start this interpreter with the command line imported."""
-        with patch.object(subprocess, "Popen", PROCESS):  # asyncio's
+        with forking():
             return await self.python(*arguments, stdin=stdin)
 
     async def python(self, *arguments: str, stdin: int = DEVNULL) -> Process:

@@ -6,14 +6,12 @@ import asyncio
 import contextlib
 import os
 import signal
-import subprocess
 import sys
 import threading
 import time
 from asyncio.subprocess import DEVNULL, PIPE, STDOUT
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
-from unittest.mock import patch
 
 import pytest
 
@@ -25,15 +23,11 @@ from robotiq_async.values.errors import ConnectionLostError
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import AxisRequest, Request
 from tests.conftest import Clock
-from tests.forked import CAN_FORK, CORE, ROOT, Forked
+from tests.forked import CORE, ROOT, forking
 from tests.patience import patience
 
 T = TypeVar("T")
 PATIENCE = 5.0
-
-
-class _Forked(Forked):
-    imported = CORE
 
 
 class Wire:
@@ -112,7 +106,7 @@ async def run_to_its_end(program: str) -> tuple[SimulatedGripper, str]:
     gripper.write(0, Request(activate=True).registers)
     clock.ahead += 10
     async with SimulatorServer(gripper) as server:
-        with patch.object(subprocess, "Popen", _Forked if CAN_FORK else subprocess.Popen):  # asyncio's
+        with forking(CORE):
             process = await asyncio.create_subprocess_exec(
                 *(sys.executable, "-c", program, server.address),
                 env=os.environ | {"PYTHONPATH": str(ROOT)},
