@@ -24,9 +24,8 @@ from robotiq_async.fleet.wire.names import ROOT, GripperName, check_name
 from robotiq_async.link.address import is_remote
 from robotiq_async.runtime.extras import install
 from tests.patience import patience
+from tests.strategies import ANY
 
-ANY = st.characters(exclude_categories=["Cs"])
-"""What UTF-8 holds; to try all of that codec, as st.text() does by itself, takes a second."""
 GOOD = st.from_regex(r"[A-Za-z0-9_.-]{1,64}", fullmatch=True)
 BAD = ["", "a" * 65, "*", "$*", "a/b", "é", "a\n"]
 NAME = GripperName("lab", "cell-1", "left")

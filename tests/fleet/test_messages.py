@@ -41,9 +41,7 @@ from robotiq_async.values.model import MODELS
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.statistics import Statistics
 from tests.fleet.lab import instantly
-
-ANY = st.characters(exclude_categories=["Cs"])
-"""What UTF-8 holds; to try all of that codec, as st.text() does by itself, takes a second."""
+from tests.strategies import ANY
 
 
 def trees(numbers: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:

@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.link.address import FORMS, Address, Line, Simulation, parse_address
+from tests.strategies import ANY
 
-ANY = st.characters(exclude_categories=["Cs"])
-"""What UTF-8 holds; to try all of that codec, as st.text() does by itself, takes a second."""
 NAMES = st.from_regex(r"[a-z0-9_][a-z0-9_-]{0,62}", fullmatch=True).filter(
     lambda name: not re.fullmatch("[0-9]+|0x[0-9a-f]*", name)
 )
