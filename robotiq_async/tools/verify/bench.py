@@ -70,9 +70,13 @@ class Bench:
         )
         return RecordedLink(transport, keep or self.keep, self.model)
 
+    @property
+    def interval(self) -> float:
+        """Seconds between two reads in a watch."""
+        return self.lengths.interval or POLL_INTERVAL_S
+
     def watch(self, seconds: float) -> Watch:
-        interval = self.lengths.interval or POLL_INTERVAL_S
-        return Watch(self.link, self.person, seconds=seconds, interval=interval, spacing=self.spacing)
+        return Watch(self.link, self.person, seconds=seconds, interval=self.interval, spacing=self.spacing)
 
     # -- results ---------------------------------------------------------------------------------------------
 

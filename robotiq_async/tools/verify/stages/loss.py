@@ -6,7 +6,6 @@ import asyncio
 from dataclasses import replace
 from typing import Final
 
-from ....session.options import POLL_INTERVAL_S
 from ....values.enums import Fault, Finger
 from ....values.errors import RobotiqConnectionError
 from ....values.request import Request
@@ -148,7 +147,7 @@ async def _back(bench: Bench) -> tuple[list[RobotiqStatus], float]:
     answered = loop.time() - began
     while loop.time() - began - answered < AFTER_S:
         statuses.append(await bench.link.read())
-        await watch.pause(bench.lengths.interval or POLL_INTERVAL_S)
+        await watch.pause(bench.interval)
     bench.link.expect(statuses[-1].echo)
     return statuses, answered
 
