@@ -338,7 +338,7 @@ class MemoryTransport(asyncio.Transport):
 
 
 class MemoryFile:
-    """What a virtual loop watches like a file: it calls back in each turn in which there is something to do.
+    """A file to a virtual loop, which calls back in each turn in which there is something to do.
 
     Looking at a real descriptor costs a system call in every turn of the loop, and two for every write.
     """

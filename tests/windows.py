@@ -46,7 +46,7 @@ THEIRS = (
     *("cyclopts", "mcap.reader", "mcap.writer", "rich.live", "webbrowser"),
     *("textual.app", "textual.drivers.headless_driver", "textual.widgets"),
 )
-"""What the library imports."""
+"""Modules that the library imports."""
 
 
 class Winmm:

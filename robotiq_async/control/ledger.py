@@ -80,7 +80,8 @@ class Ledger:
         self._entries = deque([self.shown])
         # Those before them. No status shows them, but a late gDT may be from their time.
         self._past: deque[Entry] = deque()
-        # One of ours that showed after a reset, and so was adopted as another client's: it may activate.
+        # The entry that showed as a status was adopted. If it is ours, it may activate: after a reset our own
+        # image is taken for another client's.
         self._mistaken: Entry | None = None
         # Follows the entry of another client as long as that is the last.
         self._adoption: Adoption | None = None

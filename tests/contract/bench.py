@@ -14,6 +14,7 @@ import pytest
 
 from robotiq_async import RobotiqHand, State
 from robotiq_async.hand import Hand
+from robotiq_async.session.options import POLL_INTERVAL_S
 from robotiq_async.simulator import Physics, SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.values.model import THREE_FINGER, Model
 from robotiq_async.values.request import Request
@@ -95,7 +96,9 @@ class Bench:
 async def bench(where: str, *, active: bool = True) -> AsyncIterator[Bench]:
     """A gripper that is active, or reset, and a way to make hands on it."""
     if where == REMOTE:
-        setup = lab(active=active, model=MODEL.get(), kind_of_server=SERVER.get(), poll_interval=0.005)
+        setup = lab(
+            active=active, model=MODEL.get(), kind_of_server=SERVER.get(), poll_interval=POLL_INTERVAL_S
+        )
         async with setup as here:
             # Until the agent has its gripper.
             await until(lambda: here.local.state not in (State.DISCONNECTED, State.SHUTDOWN))

@@ -37,7 +37,7 @@ class Host(_Loop):
         """Seconds for which its clock has stood still."""
         self.outer = outer
         self.due: deque[asyncio.Handle] = deque()
-        """What became due while the gate was shut."""
+        """Callbacks that became due while the gate was shut."""
         self._transports: list[MemoryTransport] = []
 
     # -- what is done to it ----------------------------------------------------------------------------
