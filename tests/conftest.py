@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import faulthandler
 import gc
 import inspect
 import logging
@@ -20,7 +19,7 @@ from hypothesis import HealthCheck, settings
 
 from robotiq_async import RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.patience import patience
+from tests.patience import HangWatch
 from tests.virtual import VirtualLoop
 
 # The suite tries the same examples every time; HYPOTHESIS_PROFILE=explore tries new ones, and more.
@@ -38,12 +37,17 @@ MADE_ONCE = (
     "test_examination.py",
 )
 """Files with fixtures that take long and are made once for all of their tests: these stay together."""
-STDERR = pytest.StashKey[int]()
-"""The one of this process, while what a test writes is captured."""
+HANG_WATCH = pytest.StashKey[HangWatch]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addini(
+        "hangs_after", "seconds after which a test hangs, and ends the run; 0 for never", default="60"
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.stash[STDERR] = os.dup(2)
+    config.stash[HANG_WATCH] = HangWatch(float(config.getini("hangs_after")))
     hear_ignored_signals()
 
 
@@ -58,22 +62,20 @@ def hear_ignored_signals() -> None:
             signal.signal(number, lambda *_: None)
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_runtest_setup(item: pytest.Item) -> None:
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
     """In place of pytest's own limit, which knows nothing of the machine."""
-    end_if_it_hangs(item.config)
+    watch = item.config.stash[HANG_WATCH]
+    watch.begin()
+    try:
+        return (yield)
+    finally:
+        watch.end()
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_call(item: pytest.Item) -> None:
-    end_if_it_hangs(item.config)
-
-
-def end_if_it_hangs(config: pytest.Config) -> None:
-    """Give what begins now its seconds, and more of them on a busy machine; 0 is no limit."""
-    limit = float(config.getini("faulthandler_timeout") or 0)
-    if limit:
-        faulthandler.dump_traceback_later(patience(limit), exit=True, file=config.stash[STDERR])
+    item.config.stash[HANG_WATCH].go_on()
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -124,24 +126,30 @@ def state_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]
         yield
 
 
-@pytest_asyncio.fixture
-async def nothing_left_running(caplog: pytest.LogCaptureFixture) -> AsyncIterator[None]:
+@pytest_asyncio.fixture  # type: ignore[type-var]  # gives plain ones the loop of the test, too
+def nothing_left_running(caplog: pytest.LogCaptureFixture) -> Iterator[None]:
+    """Not asynchronous, which would run the loop twice, with a handler of signals each time."""
     with watched(caplog):
         yield
+        loop = asyncio.get_event_loop()
+        # One more turn: what ends in it is not left, and what it complains about counts.
+        loop.call_soon(loop.stop)
+        loop.run_forever()
 
 
 @contextlib.contextmanager
 def watched(caplog: pytest.LogCaptureFixture, *, tasks: bool = True) -> Iterator[None]:
     """Fail a test that the event loop had to complain about, or that leaves a task behind."""
     caplog.set_level(logging.ERROR, logger="asyncio")
-    before = asyncio.all_tasks()
+    loop = asyncio.get_event_loop()
+    before = asyncio.all_tasks(loop)
     yield
-    left = [task for task in asyncio.all_tasks() - before - {asyncio.current_task()} if not task.done()]
+    here = {asyncio.current_task(loop)}
+    left = [task for task in asyncio.all_tasks(loop) - before - here if not task.done()]
     for task in left if tasks else ():
         task.cancel()
     assert not (tasks and left), f"tasks left running: {left}"
     complaints = [record.getMessage() for record in caplog.get_records("call") if record.name == "asyncio"]
-    loop = asyncio.get_running_loop()
     if isinstance(loop, VirtualLoop):
         complaints += loop.complaints
     assert not complaints, f"the event loop complained: {complaints}"

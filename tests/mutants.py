@@ -230,7 +230,7 @@ class Tree:
         # A compiled mistake would be taken for the file that it was made in.
         variables = {**os.environ, "PYTHONPATH": str(self.root), "PYTHONDONTWRITEBYTECODE": "1"}
         process = subprocess.Popen(
-            [*command, "-ofaulthandler_timeout=0", *tests],
+            [*command, "-ohangs_after=0", *tests],
             cwd=self.root,
             env=variables,
             text=True,

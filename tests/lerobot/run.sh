@@ -39,4 +39,4 @@ if [ ! -f "$venv/.complete" ]; then
 fi
 echo "== $("$python" -c 'from importlib.metadata import version as v; print("lerobot", v("lerobot"), "torch", v("torch"))')"
 # shellcheck disable=SC2086
-"$python" -m pytest -o faulthandler_timeout=300 ${TESTS:-tests/lerobot/live.py}
+"$python" -m pytest -o hangs_after=300 ${TESTS:-tests/lerobot/live.py}
