@@ -35,6 +35,7 @@ MADE_ONCE = (
     "test_access.py",
     "test_roles.py",
     "test_examination.py",
+    "fleet/test_processes.py",
 )
 """Files with fixtures that take long and are made once for all of their tests: these stay together."""
 HANG_WATCH = pytest.StashKey[HangWatch]()

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import signal
 import socket
 import sys
-from asyncio.subprocess import PIPE, Process
+from asyncio.subprocess import DEVNULL, PIPE, Process
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import pytest
 
@@ -18,10 +18,12 @@ from robotiq_async import ConnectionLostError, Finger, RobotiqError, State
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.fleet import cuts
+from tests.forked import ROOT, forking
 from tests.grippers import active_gripper
 from tests.patience import patience
 
-ROOT = Path(__file__).parents[2]
+PROGRAMS = "tests.fleet.programs"
+IMPORTED = (PROGRAMS, "zenoh", "anyio._backends._asyncio")
 LIMIT_S = 8.0
 """Seconds for work that takes one or two: the machine does other things too."""
 
@@ -51,8 +53,11 @@ class Site:
 
     async def start(self, name: str, *words: str, says: str = "ready") -> Process:
         """Start a program of tests/fleet/programs.py, and wait for its first word."""
-        words = ("-m", "tests.fleet.programs", name, self.endpoint, *words)
-        process = await asyncio.create_subprocess_exec(sys.executable, *words, cwd=ROOT, stdout=PIPE)
+        words = ("-m", PROGRAMS, name, self.endpoint, *words)
+        with forking(IMPORTED):
+            process = await asyncio.create_subprocess_exec(
+                sys.executable, *words, cwd=ROOT, env=os.environ, stdin=DEVNULL, stdout=PIPE, stderr=2
+            )
         self.programs.append(process)
         assert await said(process) == says
         return process
