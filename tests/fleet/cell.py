@@ -24,10 +24,10 @@ from tests.fleet.world import PROMPT_S, WINDOW_S, Client, World, motions
 Trouble = Callable[[World], Coroutine[Any, Any, None]]
 NAMED = re.compile(r"`(.+?)`")
 GRADUAL = re.compile(r"(`[^`]+`(?: and `[^`]+`)*) end like (`[^`]+`(?:(?:, | or )`[^`]+`)*)")
-TARGET = 130
-RATE_S = 0.03
+TARGET = 100
+RATE_S = 0.045
 """Below the interval between two polls: of some commands only the newest is written."""
-SETTLE_S = 2.5
+SETTLE_S = 2.0
 """Seconds after the trouble in which everything has to come right by itself, and nothing may come late."""
 
 
@@ -75,7 +75,7 @@ async def second_agent(world: World) -> None:
     world.network.part("agent", "second agent")
     await world.start_agent("second agent")
     world.network.join("agent", "second agent")
-    await asyncio.sleep(3)
+    await asyncio.sleep(1.5)
     await world.agents.pop().end()
 
 
@@ -110,7 +110,7 @@ def bad(*, requests_only: bool = False, **what: float) -> Trouble:
         usual = [{name: getattr(stream, name) for name in what} for stream in streams]
         for stream in streams:
             vars(stream).update(what)
-        await asyncio.sleep(4)
+        await asyncio.sleep(2.5)
         for stream, values in zip(streams, usual, strict=True):
             vars(stream).update(values)
             stream.free_at = min(stream.free_at, world.now())
@@ -223,7 +223,7 @@ class Doing:
         hand, world = self.world.holder.hand, self.world
         number = 0
         while self.goes_on:
-            value = (TARGET + number % 100, number // 100)
+            value = (TARGET + number % 20, number // 20)
             self.asked[value] = world.now()
             hand.command(Finger.A, position=value[0], speed=value[1])
             number += 1
@@ -256,8 +256,9 @@ PHASES: dict[str, Callable[[Doing], Coroutine[Any, Any, None]]] = {
     "a control loop": looping,
     "holding a grip": gripping,
 }
-QUIET = ("idle", "holding a grip")
-"""The phases in which nothing is commanded."""
+LOOP = "a control loop"
+"""The phase in which commands are sent during the trouble."""
+OTHERS = tuple(phase for phase in PHASES if phase != LOOP)
 
 
 async def outcome(world: World, phase: str, trouble: Trouble) -> tuple[str, float | None]:
@@ -398,7 +399,7 @@ async def works(world: World) -> None:
     commander = other if holder.host.is_dead else holder
     if commander is holder:
         # A client that lost the lease to a halt does not come back by itself.
-        await asyncio.sleep(1.5)
+        await asyncio.sleep(0.7)
         assert not holder.hand.is_in_control, "the old holder came back after a halt"
     await commander.do(commander.hand.acquire())
     await world.settle()
@@ -446,16 +447,17 @@ def cells() -> Iterator[Cell]:
 
 
 def tried() -> Iterator[Cell]:
-    """The cells that are tried: every trouble with commands, and by turns in one phase without.
+    """The cells that are tried: every trouble during a control loop, and by turns in the other phases.
 
-    Without commands the troubles of a row differ in nothing but the renewals of the lease. Each cell of the
-    table is tried by one trouble at least.
+    In those the troubles of a row differ in nothing but the renewals of the lease, and the answer to a move.
+    Each cell of the table is tried by one trouble at least.
     """
     for _, row in groupby(cells(), attrgetter("row")):
         troubles = [list(each) for _, each in groupby(row, attrgetter("trouble"))]
+        turns = min(len(troubles), len(OTHERS))
         for number, each in enumerate(troubles):
-            left_out = QUIET[number % 2] if len(troubles) > 1 else None
-            yield from (cell for cell in each if cell.phase != left_out)
+            its_turn = {phase for turn, phase in enumerate(OTHERS) if (turn - number) % turns == 0}
+            yield from (cell for cell in each if cell.phase in its_turn | {LOOP})
 
 
 # -- a motion that lasts, and requests by hand -------------------------------------------------------------

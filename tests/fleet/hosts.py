@@ -99,6 +99,10 @@ class Host(_Loop):
         self.outer.add(entry)
         return entry
 
+    def call_now(self, callback: Callable[..., object], *args: Any) -> None:
+        """Call from outside: at once, or when the gate opens."""
+        _Entry(callback, args, self)._run()
+
     call_soon_threadsafe = call_soon  # type: ignore[assignment]
 
     def call_at(  # type: ignore[override]
@@ -201,7 +205,7 @@ class _Gate:
         pass  # the host's own part has the error
 
     def data_received(self, data: bytes) -> None:
-        self._host.call_soon(self._protocol.data_received, data)
+        self._host.call_now(self._protocol.data_received, data)
 
     def eof_received(self) -> None:
         self._host.call_soon(self._protocol.eof_received)

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from robotiq_async.fleet.network.bus import PendingQuery, Query, Reply, Undo, Urgency, is_any, is_anything
+from tests.fleet.hosts import Host
 
 T = TypeVar("T")
 LATENCY_S = 0.0002
@@ -144,10 +145,9 @@ class Network:
         if not self.is_up(source, target.name):
             return
 
-        # On the host it is for: that one may stand still.
-        def arrive() -> None:
-            target.loop.call_soon(deliver)
-
+        # The host it is for may stand still.
+        here = target.loop
+        arrive = functools.partial(here.call_now, deliver) if isinstance(here, Host) else deliver
         if stream.is_cut:
             if stream.keeps and urgency is not Urgency.TELEMETRY:
                 stream.kept.append(arrive)

@@ -26,7 +26,7 @@ T = TypeVar("T")
 WINDOW_S = 1.0
 PROMPT_S = 0.2
 """Allowed beside the window."""
-LOOK_S = 0.04
+LOOK_S = 0.05
 POLL_S = 0.05
 """As seldom as the stories allow: the polls are most of what they cost."""
 IDLE_POLL_S = 0.1
@@ -53,7 +53,7 @@ class World:
         self.records = MemoryRecords()
         self.agents: list[ServingAgent] = []
         self.holder = Client(self, "holder", "left")
-        self.other = Client(self, "other", "left")
+        self.other = Client(self, "other", "left", IDLE_POLL_S)
         self.neighbour = Client(self, "neighbour", "right", IDLE_POLL_S)
 
     @property
