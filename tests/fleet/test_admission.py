@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.fleet.agent.agent import Questions
@@ -163,8 +163,7 @@ class Model:
     holder: str | None = None
 
 
-@settings(max_examples=500)
-@given(st.lists(STEP, max_size=40))
+@given(st.lists(STEP, min_size=20, max_size=40))
 def test_never_two_holders_and_never_an_old_lease(steps: list[tuple[str, str, int, int, float]]) -> None:
     one, model, now, number = Admission(BASE, EPOCH, Lease(1.0)), Model(), NOW, 10
     granted: set[int] = set()
@@ -302,19 +301,19 @@ async def test_a_flood_of_questions_leaves_other_clients_and_the_log_alone(
     here: Lab, hand: RemoteHand, caplog: pytest.LogCaptureFixture
 ) -> None:
     flooding = asyncio.create_task(flood(here))
-    await asyncio.sleep(0.5)
+    await asyncio.sleep(0.25)
     async with here.client("reader", control=False) as reader:
         await hand.move(30)
         await reader.halt()
     answered = await flooding
-    assert answered <= 4 * EACH < FLOOD
+    assert answered <= 2 * EACH < FLOOD / 2
     assert caplog.text.count("requests for information were dropped") == 1
 
 
 async def flood(here: Lab) -> int:
-    """Send questions for a second; return the number of answers."""
+    """Send questions for half a second; return the number of answers."""
     bus, answers = here.network.bus("flooding"), []
-    for number in range(FLOOD // 8):
+    for number in range(FLOOD // 16):
         call = Call(LEFT.base, "curious", number=number)
         answers += [
             bus.ask(LEFT.key("info"), call.pack(), timeout=1.0, urgency=Urgency.COMMAND) for _ in range(8)

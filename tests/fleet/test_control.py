@@ -330,14 +330,14 @@ async def test_a_client_that_was_cut_off_does_not_come_back_after_an_interventio
         await asyncio.sleep(1.5)
     here.mend(here.holder)
     stood = here.gripper.travel(Finger.A)
-    await asyncio.sleep(4)
+    await asyncio.sleep(2)
     assert not hand.is_in_control
     assert here.gripper.travel(Finger.A) == stood
     word = "halted" if what == "halt" else "taken"
     assert await here.holder.do(ending(hand.set_speed(9))) == f"ControlLost {word}"
     looping.cancel()
     await here.holder.do(hand.acquire())
-    await here.holder.do(hand.move(60, Finger.A))
+    await here.holder.do(hand.move(60, Finger.A, speed=255))
 
 
 @pytest.mark.parametrize("record", [None, {"runs": "?", "number": 3, "barred": [1, "x"]}])

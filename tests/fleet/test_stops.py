@@ -6,6 +6,7 @@ import asyncio
 import logging
 from collections.abc import Iterator
 from contextlib import suppress
+from itertools import product
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -26,6 +27,13 @@ from tests.virtual import inside, until, virtual
 A = Finger.A
 STOPS: dict[str, dict[str, bool]] = {"leave": {"halt": False}, "keep": {"keep_grip": True}, "halt": {}}
 DELAY_S = 0.02
+BETWEEN_S = (0.0005, 0.003, 0.02, 0.2)
+TWICE = [
+    (first, second, between)
+    for number, (first, second) in enumerate(product(STOPS, STOPS))
+    for between in (0.0, BETWEEN_S[number % 4], BETWEEN_S[(number + 2) % 4])
+]
+"""Two stops, and the seconds between them: at once, and for each pair two of the moments after that."""
 
 
 # -- final stop --------------------------------------------------------------------------------------------
@@ -80,9 +88,7 @@ async def test_a_caller_hears_at_once_that_the_hand_was_stopped(here: Lab, hand:
     await stopping
 
 
-@pytest.mark.parametrize("between", [0.0, 0.0005, 0.003, 0.02, 0.2])
-@pytest.mark.parametrize("second", STOPS)
-@pytest.mark.parametrize("first", STOPS)
+@pytest.mark.parametrize(("first", "second", "between"), TWICE)
 @inside(lab)
 async def test_the_strongest_stop_counts_in_any_order(
     here: Lab, hand: RemoteHand, first: str, second: str, between: float

@@ -10,6 +10,7 @@ from robotiq_async import Finger
 from tests.fleet.cell import (
     LOOP,
     PHASES,
+    SETTLE_S,
     TARGET,
     TROUBLES,
     Cell,
@@ -66,7 +67,7 @@ async def test_a_halt_in_the_midst(here: World, trouble: str) -> None:
     else:
         assert heard == "ConnectionLost"
     await going_on
-    await asyncio.sleep(2.5)
+    await asyncio.sleep(SETTLE_S)
     assert not here.gripper.is_moving or heard != "done"
     if heard == "done":
         assert here.gripper.position(Finger.A) < TARGET / 2
