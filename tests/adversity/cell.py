@@ -26,8 +26,8 @@ PATIENCE_S = 2.0
 """Seconds that a trouble lasts when the call does not end because of it; then it ends, and the call may."""
 IDLE_S = 1.0
 """Seconds that a trouble lasts when there is no call, and that one for ever goes on after the call."""
-REST_S = 0.6 if HABITS else 0.3
-"""Seconds for which a hand at rest stays in its state: five polls, and longer than any status lags."""
+REST_S = 0.6 if HABITS else 0.4
+"""Seconds for which a hand at rest stays in its state: four polls, and longer than any status lags."""
 ESCALATION_S = 5.0
 """Interference is a major fault after this time (20 s of the gripper, which is five times as fast)."""
 STOP_S = 2.0
@@ -148,12 +148,13 @@ def _noticed(world: World) -> str:
 
 
 async def _rest(world: World, settled: Collection[State]) -> None:
-    """Wait until the hand stays in one state, and whatever it moves has come to rest."""
+    """Wait until the hand stays in one state, long after whatever it moves has come to rest."""
     async with asyncio.timeout(40):
         while True:
-            state = world.hand.state
+            state, moved = world.hand.state, world.gripper.is_moving
             await asyncio.sleep(REST_S)
-            if world.hand.state is state and state in settled and not world.gripper.is_moving:
+            moved = moved or world.gripper.is_moving
+            if world.hand.state is state and state in settled and not moved:
                 return
 
 
