@@ -17,7 +17,7 @@ from robotiq_async.tools.verify.stages import first_motions, loss, soft_part
 from robotiq_async.values.enums import Finger
 from tests.grippers import activate_beforehand
 
-SHORT = Lengths(reads=50, idle=(0.5, 1.0, 1.5, 5.0), alone=(10.0,), soak=1.0, commands=0.5, interval=0.06)
+SHORT = Lengths(reads=20, idle=(0.5, 1.0, 1.5, 5.0), alone=(10.0,), soak=1.0, commands=0.5, interval=0.1)
 FOAM = 120
 """The position at which the fingers meet it."""
 WHICH = {Finger.A: "a", Finger.B: "l", Finger.C: "r", Finger.SCISSOR: "s"}

@@ -70,7 +70,7 @@ async def activate(watch: Watch) -> float:
     watch.envelope = ANYWHERE
     await reset(watch)
     began = await watch.write(Request(activate=True, model=watch.model))
-    if await watch.until(lambda status: status.is_activated, ACTIVATION_S, 0.02) is None:
+    if await watch.until(lambda status: status.is_activated, ACTIVATION_S) is None:
         shown = f": the gripper is {describe(watch.last)}" if watch.last else ""
         raise EndError("time", f"the activation did not finish within {ACTIVATION_S:g} s{shown}")
     watch.needs_active = True
