@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-
-import pytest
 
 from robotiq_async import Finger
 from robotiq_async.tools.measure.campaigns import force_values
@@ -15,8 +14,10 @@ from robotiq_async.tools.measure.plots import (
     LONGEST,
     ROW,
     ROWS,
+    _curves,
     _placed,
     _right,
+    _shown,
     plot_current_over_time,
     plot_peak_currents,
     plot_recording,
@@ -30,28 +31,29 @@ def words(picture: Path) -> list[str]:
     return re.findall(r"<!-- (.+?) -->", picture.read_text(encoding="utf-8"))
 
 
-def peaks(tmp_path: Path, *samples: tuple[int, int, int]) -> list[str]:
-    currents = {force: [[(0, *each)]] for force, each in enumerate(samples)}
-    _, picture = plot_peak_currents(tmp_path / "peaks", currents, "foam", "simulated")
-    return [each for each in words(picture) if each.startswith("finger")]
-
-
 def test_fingers_that_are_alike_are_one_curve_that_says_so(tmp_path: Path) -> None:
-    assert peaks(tmp_path, (10, 10, 10), (20, 20, 20)) == ["fingers A, B, C: the same"]
-    assert peaks(tmp_path, (10, 10, 10), (20, 30, 20)) == ["fingers A, C: the same", "finger B"]
-    assert peaks(tmp_path, (10, 20, 30), (20, 30, 40)) == ["finger A", "finger B", "finger C"]
+    assert _curves([(10, 10, 10), (20, 20, 20)]) == [("fingers A, B, C: the same", (10, 20))]
+    assert _curves([(10, 20, 30), (20, 30, 40)]) == [
+        ("finger A", (10, 20)),
+        ("finger B", (20, 30)),
+        ("finger C", (30, 40)),
+    ]
+    currents = {force: [[(0, *each)]] for force, each in enumerate([(10, 10, 10), (20, 30, 20)])}
+    _, picture = plot_peak_currents(tmp_path / "peaks", currents, "foam", "simulated")
+    names = [each for each in words(picture) if each.startswith("finger")]
+    assert names == ["fingers A, C: the same", "finger B"]
 
 
-@pytest.mark.parametrize(
-    ("step", "drawn"),
-    [(25, [0, 125, 250]), (85, [0, 85, 255]), (128, [0, 128])],
-)
-def test_currents_over_time_are_drawn_near_the_usual_force_values(
-    step: int, drawn: list[int], tmp_path: Path
-) -> None:
-    currents = {force: [[(0, 1, 1, 1), (9, 2, 2, 2)]] for force in force_values(step)}
-    _, picture = plot_current_over_time(tmp_path / "it", {"foam": currents}, "simulated")
-    assert [int(each.split()[1]) for each in words(picture) if each.startswith("force ")] == drawn
+def test_currents_over_time_are_drawn_near_the_usual_force_values(tmp_path: Path) -> None:
+    by_step = {
+        step: {force: [[(0, 1, 1, 1), (9, 2, 2, 2)]] for force in force_values(step)}
+        for step in (25, 85, 128)
+    }
+    drawn = [_shown(currents) for currents in by_step.values()]
+    assert drawn == [[0, 125, 250], [0, 85, 255], [0, 128]]
+    _, picture = plot_current_over_time(tmp_path / "it", {"foam": by_step[85]}, "simulated")
+    names = [each for each in words(picture) if each.startswith("force ")]
+    assert names == ["force 0", "force 85", "force 255"]
 
 
 LONG = "X" * 2 * LONGEST
@@ -85,12 +87,18 @@ def test_events_are_written_above_the_curves(tmp_path: Path) -> None:
     assert "opening, mm" not in words(picture), "three fingers have none"
 
 
-def test_a_part_is_drawn_with_the_times_of_the_whole(tmp_path: Path) -> None:
-    _, picture = plot_recording(tmp_path / "it", recorded(), begin=1.5, end=4)
-    text = picture.read_text(encoding="utf-8")
-    assert "<!-- FIRST -->" not in text
-    assert "<!-- SECOND -->" in text
-    assert plot_recording(tmp_path / "none", recorded(), begin=1.5, end=3) == []
+def test_a_part_of_a_jaw_is_drawn_with_the_times_of_the_whole_and_its_opening(tmp_path: Path) -> None:
+    jaw = {"A": {"position": 6, "requested_position": 0, "current_ma": 0, "opening_mm": 84.2}}
+    entries = [
+        replace(each, data=json.dumps(jaw).encode()) if each.topic == "/gripper/status" else each
+        for each in recorded()
+    ]
+    _, picture = plot_recording(tmp_path / "it", entries, begin=1.5, end=4)
+    text = words(picture)
+    assert "FIRST" not in text
+    assert {"SECOND", "jaw", "opening, mm"} <= set(text)
+    assert "A" not in text
+    assert plot_recording(tmp_path / "none", entries, begin=1.5, end=3) == []
 
 
 def test_labels_take_as_many_rows_as_they_need_and_no_third_of_the_picture() -> None:
@@ -105,14 +113,3 @@ def test_labels_take_as_many_rows_as_they_need_and_no_third_of_the_picture() -> 
     for row in range(ROWS):
         inside = [each for each in close if each.row == row]
         assert all(_right(one) <= other.left + 0.03 for one, other in pairwise(inside))
-
-
-def test_a_jaw_has_its_opening_beside_its_counts(tmp_path: Path) -> None:
-    axis = {"position": 6, "requested_position": 0, "current_ma": 0, "opening_mm": 84.2}
-    entries = [
-        Entry("/gripper/status", second * 10**9, 0, json.dumps({"A": axis}).encode(), is_json=True)
-        for second in range(3)
-    ]
-    _, picture = plot_recording(tmp_path / "it", entries)
-    assert {"jaw", "opening, mm"} <= set(words(picture))
-    assert "A" not in words(picture)

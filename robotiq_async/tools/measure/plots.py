@@ -100,18 +100,24 @@ def plot_peak_currents(path: Path, currents: Currents, surface: str, label: str)
     with _figure(path, f"Highest current of a grasp, {surface} ({label})") as ((axes,), files):
         values = sorted(currents)
         peaks = [peak_currents(currents[value]) for value in values]
-        # Identical fingers, such as the simulator's, would overlap: they share one curve.
-        alike: dict[tuple[int, ...], str] = {}
-        for finger, of_finger in zip("ABC", zip(*peaks, strict=True), strict=True):
-            alike[of_finger] = alike.get(of_finger, "") + finger
-        for (of_fingers, names), colour, marker in zip(alike.items(), COLOURS, "o^s", strict=False):
-            name = f"finger {names}" if len(names) == 1 else f"fingers {', '.join(names)}: the same"
+        for (name, of_fingers), colour, marker in zip(_curves(peaks), COLOURS, "o^s", strict=False):
             axes.plot(values, of_fingers, color=colour, marker=marker, ms=5, mfc="none", label=name)
         axes.set_xlabel("force value")
         axes.set_ylabel("highest current, mA")
         axes.set_ylim(bottom=0)
         axes.legend()
     return files
+
+
+def _curves(peaks: Iterable[tuple[int, ...]]) -> list[tuple[str, tuple[int, ...]]]:
+    """Names and values. Identical fingers, such as the simulator's, would overlap: they share one curve."""
+    alike: dict[tuple[int, ...], str] = {}
+    for finger, of_finger in zip("ABC", zip(*peaks, strict=True), strict=True):
+        alike[of_finger] = alike.get(of_finger, "") + finger
+    return [
+        (f"finger {names}" if len(names) == 1 else f"fingers {', '.join(names)}: the same", of_fingers)
+        for of_fingers, names in alike.items()
+    ]
 
 
 def plot_current_over_time(path: Path, by_surface: Mapping[str, Currents], label: str) -> list[Path]:
