@@ -30,6 +30,7 @@ from robotiq_async.values.calibration import SpeedCalibration
 from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, TableError, read_table, thesis_table
 from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.errors import MeasuringError
+from tests.grippers import activate_beforehand
 from tests.virtual import VirtualLoop, virtual
 
 POLL_S = 0.005
@@ -40,6 +41,7 @@ async def active(
     speedup: float = 1.0, poll: float = POLL_S
 ) -> AsyncIterator[tuple[SimulatedGripper, RobotiqHand]]:
     gripper = SimulatedGripper(asyncio.get_running_loop().time, speedup=speedup)
+    await activate_beforehand(gripper)
     async with SimulatorServer(gripper) as server, RobotiqHand(server.address, poll_interval=poll) as hand:
         yield gripper, hand
 
