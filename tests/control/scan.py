@@ -21,8 +21,13 @@ from robotiq_async.values.request import Request
 from tests.register_words import with_object_status
 
 POLL_S = 0.005
+LIVELY_S = 0.1
+"""So long after anything has happened every poll is made. Then nothing happens until an axis arrives."""
+DULL_POLLS = 4
+"""The polls of which one is made then: an axis is on its way, or all of them rest."""
 ACTIVATING_S = 0.2
 """Between two polls of an activation that is only a beginning: it takes many seconds."""
+ROUNDING_S = 1e-6
 
 
 class Outcome:
@@ -71,10 +76,11 @@ class Scan:
     ) -> None:
         """``after`` is the program before this one: the gripper is its, and so is the time.
 
-        ``lag`` is by how many reads gDT and gSTA come late, ``spacing`` the hand's ``write_spacing``; the
+        ``lag`` is by how many polls gDT and gSTA come late, ``spacing`` the hand's ``write_spacing``; the
         options are the gripper's.
         """
-        self._late: deque[Registers] = deque(maxlen=lag + 1)
+        self._lag_s = lag * POLL_S
+        self._late: deque[tuple[float, Registers]] = deque()
         self._time: list[float] = [100.0] if after is None else after._time
         self.gripper: SimulatedGripper
         if after is not None:
@@ -92,6 +98,7 @@ class Scan:
         self.forgets = 0
         """Number of the next writes that the gripper acknowledges and forgets."""
         self.polls = 0
+        self._lively_until = 0.0
 
     @property
     def now(self) -> float:
@@ -109,10 +116,13 @@ class Scan:
 
     def status(self) -> RobotiqStatus:
         self.polls += 1
-        self._late.append(self.gripper.status_registers())
-        return RobotiqStatus(
-            with_object_status(self._late[-1], self._late[0]), self.now, self.polls, self.gripper.model
-        )
+        now, registers = self.now, self.gripper.status_registers()
+        if self._lag_s:
+            self._late.append((now, registers))
+            while len(self._late) > 1 and self._late[1][0] <= now - self._lag_s + ROUNDING_S:
+                self._late.popleft()
+            registers = with_object_status(registers, self._late[0][1])
+        return RobotiqStatus(registers, now, self.polls, self.gripper.model)
 
     def connect(self, *, activate: bool = True) -> None:
         self.controller.activates = activate
@@ -139,8 +149,11 @@ class Scan:
         if due is not None and due.is_urgent and not due.wait:
             self._write(answer=True)
 
+    def decide(self) -> Request | None:
+        return self.controller.decide(self.now)
+
     def _write(self, *, answer: bool, arrives: float = 0.0, lost: float = 0.0) -> None:
-        request = self.controller.decide(self.now)
+        request = self.decide()
         if request is not None:
             self.written.append(request.registers)
             self.now += arrives
@@ -155,16 +168,35 @@ class Scan:
                 self.controller.lost(None, self.now)
 
     def run(self, seconds: float) -> None:
-        for _ in range(round(seconds / POLL_S)):
-            self.step()
+        self._lively_until = self.now + LIVELY_S
+        left = round(seconds / POLL_S)
+        while left > 0:
+            left -= self._pass(left)
 
-    def until(self, condition: Callable[[], bool], seconds: float = 30.0, poll: float = POLL_S) -> float:
+    def until(self, condition: Callable[[], bool], seconds: float = 30.0, poll: float | None = None) -> float:
         """Step until something is true; returns how long it took."""
         began = self.now
+        self._lively_until = began + LIVELY_S
         while not condition():
             assert self.now - began < seconds, f"not within {seconds} s: {self.controller.status!r}"
-            self.step(poll=poll)
+            if poll is None:
+                self._pass(DULL_POLLS)
+            else:
+                self.step(poll=poll)
         return self.now - began
+
+    def _pass(self, most: int) -> int:
+        """Make the next poll, or the last of some if nothing happens; returns how many have passed."""
+        polls = 1 if self.now < self._lively_until else min(most, DULL_POLLS)
+        before, writes = self._shown(), len(self.written)
+        self.step(poll=polls * POLL_S)
+        if self._shown() != before or len(self.written) != writes:
+            self._lively_until = self.now + LIVELY_S
+        return polls
+
+    def _shown(self) -> tuple[object, ...]:
+        """All that a status shows but for positions and currents."""
+        return (*self.latest.registers[:2], self.latest.echo)
 
     def blink(self, away: float = 0.05) -> None:
         """The link is lost and comes back."""

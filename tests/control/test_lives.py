@@ -65,21 +65,17 @@ steps = st.lists(
 
 
 class Watched(Scan):
-    """Checks each image as it is written."""
+    """Checks each image before it is written."""
 
     motions: Counter[tuple[Finger, int]]
     """Number of images that set an axis in motion to a position."""
 
-    def _write(self, *, answer: bool, arrives: float = 0.0, lost: float = 0.0) -> None:
-        written, state, shown = len(self.written), self.state, self.latest
+    def decide(self) -> Request | None:
+        state, shown, now = self.state, self.latest, super().decide()
+        if now is None:
+            return None
         before = Request.from_registers(self.written[-1]) if self.written else Request()
-        at = {axis: self.gripper.position(axis) for axis in AXES}
-        in_force = Request.from_registers(self.gripper.request_registers)
-        holds = self.gripper.holds
-        super()._write(answer=answer, arrives=arrives, lost=lost)
-        if len(self.written) == written:
-            return
-        now = self.last_image
+        in_force, holds = Request.from_registers(self.gripper.request_registers), self.gripper.holds
         assert not now.activate or shown.activation_echo or state is State.DO_ACTIVATION, "rACT has risen"
         assert not now.release or state is State.DO_ATR, "rATR was set"
         for axis in AXES:
@@ -89,8 +85,9 @@ class Watched(Scan):
             # does rGTO, set again, move a finger that holds something under the same request.
             is_same = in_force.position(axis) == asked and (in_force.go or axis in holds)
             is_new = is_new and not is_same
-            if is_new and abs(asked - at[axis]) > TOLERANCE:
+            if is_new and abs(asked - self.gripper.position(axis)) > TOLERANCE:
                 self.motions[axis, asked] += 1
+        return now
 
 
 class Life:

@@ -16,7 +16,7 @@ from tests.register_words import only_holds
 
 masks = st.integers(1, 15).map(Finger)
 values = st.integers(0, 255)
-WAITS_S = 0.02
+WAITS_S = 0.05
 """Seconds between polls while nothing is asked and everything comes to rest."""
 PAUSES = st.sampled_from([0.0, 0.005, 0.01, 0.05])
 
