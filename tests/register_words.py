@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
+from hypothesis import strategies as st
+
 from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.values.enums import Mode
 from robotiq_async.values.registers import Registers
-from robotiq_async.values.request import Request
+from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 
 REQUEST_RESERVED = (0xE0, 0xF3, 0xFF, *(0,) * 12, 0xFF)
@@ -18,6 +21,27 @@ def registers_of(content: Sequence[int]) -> tuple[int, ...]:
     """Eight registers of sixteen bytes: byte 2n is the high half of register n."""
     assert len(content) == 16
     return tuple(content[n] << 8 | content[n + 1] for n in range(0, 16, 2))
+
+
+def request_of(content: Sequence[int]) -> Request:
+    """The request in fourteen bytes; what none of its bits says is lost."""
+    hand, individual, *axes = content
+    return Request(
+        activate=bool(hand & 0x01),
+        mode=Mode(hand >> 1 & 0x03),
+        go=bool(hand & 0x08),
+        release=bool(hand & 0x10),
+        individual_fingers=bool(individual & 0x04),
+        individual_scissor=bool(individual & 0x08),
+        axes=tuple(AxisRequest(*axes[n : n + 3]) for n in range(0, 12, 3)),
+    )
+
+
+# One draw of bytes is cheaper than one for each field, and shrinks as well.
+BLOCKS = st.binary(min_size=16, max_size=16).map(registers_of)
+"""Any eight registers."""
+REQUESTS = st.binary(min_size=14, max_size=14).map(request_of)
+"""Any request."""
 
 
 def bytes_of(registers: Sequence[int]) -> list[int]:

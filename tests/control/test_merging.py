@@ -14,7 +14,7 @@ from robotiq_async.values.enums import NO_AXES, Finger, Mode, ObjectStatus
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
-from tests.register_words import status_of
+from tests.register_words import REQUESTS, status_of
 
 A, B, C, S = THREE_FINGER.axes
 IN_MOTION, OPENING, CLOSING, THERE = ObjectStatus
@@ -119,19 +119,12 @@ def test_an_axis_may_be_held_while_another_is_sent_somewhere() -> None:
 # -- anything ----------------------------------------------------------------------------------------------
 
 BYTES = st.integers(0, 255)
-IMAGES = st.builds(
-    Request,
-    activate=st.booleans(),
-    go=st.booleans(),
-    release=st.booleans(),
-    mode=st.sampled_from(Mode),
-    axes=st.tuples(*[st.builds(AxisRequest, BYTES, BYTES, BYTES)] * 4),
-)
+IMAGES = REQUESTS.map(lambda base: replace(base, individual_fingers=True, individual_scissor=True))
 STATUSES = st.builds(
     status_of,
     st.sampled_from([0x31, 0x39, 0x30, 0x00, 0x11]),
     BYTES,
-    position=st.tuples(*[BYTES] * 4),
+    position=st.binary(min_size=4, max_size=4),
 )
 MASKS = st.integers(0, 15).map(Finger)
 COMMANDS = st.lists(

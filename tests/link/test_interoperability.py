@@ -116,7 +116,7 @@ async def test_a_reply_that_waits_while_the_loop_is_held_up_is_an_answer() -> No
 
 
 async def test_the_simulator_with_a_client_that_is_not_pymodbus() -> None:
-    async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
+    async with SimulatorServer(SimulatedGripper(speedup=100)) as server:
         client = ModbusClient(host="127.0.0.1", port=server.port, unit_id=2, auto_open=True)
 
         def status() -> RobotiqStatus:

@@ -86,7 +86,7 @@ async def test_pyrobotiqgripper_on_a_jaw_like_hardware() -> None:
 
 async def test_a_loop_that_writes_and_reads_with_function_23_sees_its_own_request() -> None:
     """The vendor's example: write, and read until gOBJ reports the end of the motion."""
-    jaw = SimulatedGripper(speedup=2, spread=False, model=TWO_FINGER_85)
+    jaw = SimulatedGripper(speedup=10, spread=False, model=TWO_FINGER_85)
     async with RtuOverTcpSimulatorServer(jaw) as server:
         for habit in like_hardware(TWO_FINGER_85):
             await server.fault_injector.begin(habit)

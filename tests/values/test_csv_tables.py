@@ -48,7 +48,7 @@ def refusal(file: Path, text: str, layout: Layout = SPEED) -> str:
 def test_a_table_is_read_as_it_was_written(
     tmp_path_factory: pytest.TempPathFactory, table: dict[int, tuple[int, ...]]
 ) -> None:
-    file = tmp_path_factory.mktemp("runs") / "table.csv"
+    file = tmp_path_factory.getbasetemp() / "table.csv"
     write_table(file, SPEED, table)
     assert read_table(file, SPEED) == table
 

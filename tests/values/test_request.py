@@ -12,20 +12,9 @@ from hypothesis import strategies as st
 from robotiq_async.values.enums import Finger, Mode
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
-from tests.register_words import REQUEST_RESERVED, bytes_of, registers_of, status_of
+from tests.register_words import BLOCKS, REQUEST_RESERVED, REQUESTS, bytes_of, registers_of, status_of
 
 BYTES = st.integers(0, 255)
-REQUESTS = st.builds(
-    Request,
-    activate=st.booleans(),
-    go=st.booleans(),
-    release=st.booleans(),
-    mode=st.sampled_from(Mode),
-    individual_fingers=st.booleans(),
-    individual_scissor=st.booleans(),
-    axes=st.tuples(*[st.builds(AxisRequest, BYTES, BYTES, BYTES)] * 4),
-)
-BLOCKS = st.tuples(*[st.integers(0, 0xFFFF)] * 8)
 
 
 def test_the_words_of_the_manual() -> None:

@@ -7,15 +7,13 @@ from collections.abc import Callable
 
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
 
 from robotiq_async import Fault, Finger, Initialization, Mode, ObjectStatus, RobotiqStatus
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.status import NO_REQUEST
-from tests.register_words import bytes_of, registers_of, status_of
+from tests.register_words import BLOCKS, bytes_of, registers_of, status_of
 
 AXES = A, B, C, S = THREE_FINGER.axes
-BLOCKS = st.tuples(*[st.integers(0, 0xFFFF)] * 8)
 
 PER_AXIS: list[Callable[[RobotiqStatus, Finger], object]] = [
     RobotiqStatus.finger_status,
