@@ -11,11 +11,14 @@ status reports a lost part. A finger of the 3-Finger locks where it met the part
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 from robotiq_async.values.enums import Finger, ObjectStatus
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from robotiq_async.values.model import Model
 
     from .alone import Levers
@@ -63,15 +66,18 @@ class MotorDrive:
         self, model: Model, axis: Finger, index: int, levers: Levers, gains: tuple[float, float]
     ) -> None:
         self.index = index
-        values, self._levers = levers
-        self._gain, self._damping = gains
+        (self._low, self._high), places = levers
+        self._levers = _slopes(places)
+        gain, damping = gains
         self._forces = model.forces_n
         self._locks = model.has_modes
-        first, last = _counts_at_ends(model, axis, values)
+        first, last = _counts_at_ends(model, axis, levers[0])
         self._ends = min(first, last), max(first, last)
-        self._low, self._high = values
         self._scale = (self._high - self._low) / (last - first)
         self._zero = self._low - first * self._scale
+        self._stiffness = gain * abs(self._scale)
+        """Force of the servo for each count."""
+        self._gain, self._damping = gain, damping
         self.position = float(model.stroke.open_reading)
         if axis is Finger.SCISSOR:
             self.position = (first + last) / 2
@@ -81,7 +87,7 @@ class MotorDrive:
         self._target = self._aim = self._reference = self._farthest = self.position
         self._sign = 1.0
         self._rate = 0.0
-        self._force = 0
+        self._newtons = 0.0
         self._has_goal = False
         self._is_locked = True
         self._is_blocked = False
@@ -120,7 +126,8 @@ class MotorDrive:
         low, high = self._ends
         self._target = min(max(target, low), high)
         self._aim = min(max(target, low - 1), high + 1)  # pressed against a stop, it reads the stop
-        self._rate, self._force = rate, force
+        least, most = self._forces
+        self._rate, self._newtons = rate, least + (most - least) * force / 255
         before, self._sign = self._sign, 1.0 if self._target > self.position else -1.0
         turns = before != self._sign
         if turns or not (self._is_going or self._presses):
@@ -143,14 +150,14 @@ class MotorDrive:
     def command(self, step_s: float) -> tuple[float, float]:
         """The servo's reference and the limit of its force for a step, in the units of the actuator."""
         if self._is_locked:
-            return self._value(self._reference), _LOCK * self._full_force()
-        limit = self._limit()
-        back = self._pushed_back()
+            return self._value(self._reference), _LOCK * (self._forces[1] * self._lever())
+        position, sign, most = self.position, self._sign, self._rate * step_s
+        limit, back = self._limit(), self._pushed_back()
         # However near the target is: what is in the way is pressed with the force of the request.
-        way = self._aim + self._sign * _BEYOND * self._is_blocked - self._reference
-        moved = min(max(way, -self._rate * step_s), self._rate * step_s)
-        lead = _LEAD * limit / self._stiffness + back + 2 * self._rate * step_s
-        self._reference = min(max(self._reference + moved, self.position - lead), self.position + lead)
+        way = self._aim + sign * _BEYOND * self._is_blocked - self._reference
+        moved = min(max(way, -most), most)
+        lead = _LEAD * limit / self._stiffness + back + 2 * most
+        self._reference = min(max(self._reference + moved, position - lead), position + lead)
         # Makes up for the speed that damping costs.
         ahead = self._damping * self._scale * moved / step_s / self._gain
         return self._value(self._reference) + ahead, limit + self._stiffness * back
@@ -170,32 +177,26 @@ class MotorDrive:
         That turns no gear: it meets the servo besides the force of the request. The pads of a jaw have one
         motor, and push each other nowhere.
         """
-        self._farthest = self._sign * max(self._sign * self._farthest, self._sign * self.position)
-        return abs(self._farthest - self.position) if self._locks else 0.0
+        if not self._locks:
+            return 0.0
+        if self._sign * (self.position - self._farthest) > 0:
+            self._farthest = self.position
+        return abs(self._farthest - self.position)
 
     def _value(self, counts: float) -> float:
         return self._zero + self._scale * counts
 
     def _lever(self) -> float:
-        """Straight between the places that were looked at, which are evenly apart."""
-        steps = len(self._levers) - 1
-        at = min(max(self.share, 0.0), 1.0) * steps
-        place = min(int(at), steps - 1)
-        before, after = self._levers[place : place + 2]
-        return before + (after - before) * (at - place)
+        """The motor's force for a newton at the pads: straight between places that are evenly apart."""
+        share = (self._value(self.position) - self._low) / (self._high - self._low)
+        at = min(max(share, 0.0), 1.0) * (len(self._levers) - 1)
+        place = int(at)
+        lever, slope = self._levers[place]
+        return lever + slope * (at - place)
 
     def _limit(self) -> float:
         """The force of the request, in the units of the actuator."""
-        low, high = self._forces
-        return (low + (high - low) * self._force / 255) * self._lever()
-
-    def _full_force(self) -> float:
-        return self._forces[1] * self._lever()
-
-    @property
-    def _stiffness(self) -> float:
-        """Force of the servo for each count."""
-        return self._gain * abs(self._scale)
+        return self._newtons * self._lever()
 
     def _lock(self, *, presses: bool) -> None:
         """Stay here, with the force of the request if it presses against something."""
@@ -206,12 +207,13 @@ class MotorDrive:
 
     def see(self, value: float, step_s: float) -> None:
         """Take the position of the axis after a step, and judge it."""
-        position = (value - self._zero) / self._scale
-        if abs(position - self._counted_at) >= _TREMBLING:
-            self.travel += abs(position - self._counted_at)
+        self.position = position = (value - self._zero) / self._scale
+        way = abs(position - self._counted_at)
+        if way >= _TREMBLING:
+            self.travel += way
             self._counted_at = position
-        self.position = position
-        self._see_blocked()
+        if self._is_blocked or self._rested >= _BLOCKED_S:
+            self._see_blocked()
         if abs(position - self._rests_at) <= _RESTING:
             self._rested += step_s
         else:
@@ -219,7 +221,8 @@ class MotorDrive:
         if not self._has_goal:
             return
         if self.outcome is ObjectStatus.IN_MOTION:
-            self._judge()
+            if self._rested >= _ARRIVED_S:
+                self._judge()
             # Parts come back to open fingers; between closed ones there is no room for them.
             self.clears = self.clears and (self._is_going or self._sign > 0)
         elif not self._locks and self._has_moved_on:
@@ -232,7 +235,7 @@ class MotorDrive:
             if self._sign * on > _GONE or self._sign * beyond > _NEAR:  # what was in the way has gone
                 self._is_blocked = False
                 self._reference = self._sign * min(self._sign * self._reference, self._sign * self._aim)
-        elif self._rested >= _BLOCKED_S and not (self._is_near or self._is_locked):
+        elif not (self._is_near or self._is_locked):
             self._is_blocked, self._blocked_at = True, self.position
 
     @property
@@ -242,7 +245,7 @@ class MotorDrive:
 
     def _judge(self) -> None:
         is_all = self._is_blocked or self._reference == self._aim
-        if self._is_near and is_all and self._rested >= _ARRIVED_S:
+        if self._is_near and is_all:
             self.outcome = ObjectStatus.AT_POSITION
             self._ended_at = self.position
         elif self._rested >= _CONTACT_S and not self._is_near and self._has_its_force:
@@ -259,3 +262,9 @@ def _counts_at_ends(model: Model, axis: Finger, values: tuple[float, float]) -> 
     open_first = model.stroke.open_reading, model.stroke.closed_reading
     # A Hand-E's joint grows as it opens.
     return open_first if values[0] == 0 and values[1] > 0.1 else open_first[::-1]
+
+
+def _slopes(levers: Sequence[float]) -> list[tuple[float, float]]:
+    """Each lever, and what it gains to the next."""
+    gains = [after - before for before, after in pairwise(levers)]
+    return [*zip(levers, gains, strict=False), (levers[-2] + gains[-1], 0.0)]

@@ -63,9 +63,9 @@ class World:
         self._model: Any = compiled(spec, scene)
         self.failure: Exception | None = None
         self._data: Any = mujoco.MjData(self._model)
-        # Views of MuJoCo's own numbers: each look at an attribute makes one.
-        self._controls, self._lengths = self._data.ctrl, self._data.actuator_length
-        self._limits = self._model.actuator_forcerange
+        # Views of MuJoCo's own numbers, as plain floats: each look at an attribute makes an array.
+        self._controls, self._lengths = _floats(self._data.ctrl), _floats(self._data.actuator_length)
+        self._limits = _floats(self._model.actuator_forcerange)
         is_ours = scene.file is None
         self._mount: int | None = self._model.actuator("mount").id if is_ours else None
         self._lifted = self._height = 0.0
@@ -73,11 +73,13 @@ class World:
         if self._model.nkey:
             mujoco.mj_resetDataKeyframe(self._model, self._data, 0)
         self.drives = {axis: self._drive(model, axis) for axis in model.axes}
-        for drive in self.drives.values():
+        self._motors = tuple(self.drives.values())
+        for drive in self._motors:
             put_at(self._model, self._data, [drive.index], drive.share)
         mujoco.mj_forward(self._model, self._data)
         if not (np.isfinite(self._data.qpos).all() and np.isfinite(self._data.qacc).all()):
             raise ValueError(f"physics: {scene.file!r:.100} has a place or a mass that is not finite")
+        self.time = float(self._data.time)
         self._start = self._data.qpos.copy()
         root = root_of(self._model)
         self.root: str = self._model.body(root).name.removeprefix(OURS)
@@ -107,39 +109,38 @@ class World:
         """Supports that hold a part: constraints that end when the gripper holds it."""
         self.step_s: float = self._model.opt.timestep
 
-    @property
-    def time(self) -> float:
-        return float(self._data.time)
-
     def step(self, until: float) -> None:
         """Let one step pass, or all that are due until a time while nothing moves."""
-        data, drives = self._data, self.drives.values()
-        if self._sleeps and self._lifted == self._height and all(drive.is_still for drive in drives):
-            data.time += int((until - data.time) / self.step_s + _SLACK) * self.step_s
+        motors, step_s = self._motors, self.step_s
+        if self._sleeps and self._lifted == self._height and all(motor.is_still for motor in motors):
+            self.time += int((until - self.time) / step_s + _SLACK) * step_s
+            self._data.time = self.time
             return
-        self._set_aside(self._is_taken or any(drive.clears for drive in drives))
-        for drive in drives:
-            index = drive.index
-            self._controls[index], limit = drive.command(self.step_s)
-            self._limits[index] = (-limit, limit)
-        if self._mount is not None:
+        if self._parts:
+            self._set_aside(self._is_taken or any(motor.clears for motor in motors))
+        for motor in motors:
+            index = motor.index
+            self._controls[index], limit = motor.command(step_s)
+            self._limits[2 * index], self._limits[2 * index + 1] = -limit, limit
+        if self._mount is not None and self._lifted != self._height:
             way = self._height - self._lifted
-            self._lifted += min(max(way, -_LIFTING * self.step_s), _LIFTING * self.step_s)
+            self._lifted += min(max(way, -_LIFTING * step_s), _LIFTING * step_s)
             self._controls[self._mount] = self._lifted
-        before = data.time
-        mujoco.mj_step(self._model, data)
-        values = [float(self._lengths[drive.index]) for drive in drives]
+        mujoco.mj_step(self._model, self._data)
+        before, self.time = self.time, self._data.time
+        lengths = [self._lengths[motor.index] for motor in motors]
         # MuJoCo begins again at 0 with bodies that have become unstable, unless a file forbids it.
-        if not data.time > before or any(map(isnan, values)):
+        if not self.time > before or any(map(isnan, lengths)):
             raise RuntimeError(
-                f"they became unstable after {before:.3f} s (timestep {self.step_s:g} s): smaller steps,"
+                f"they became unstable after {before:.3f} s (timestep {step_s:g} s): smaller steps,"
                 " softer contacts or parts of a sensible size and mass help"
             )
-        for drive, value in zip(drives, values, strict=True):
-            drive.see(value, self.step_s)
-        fingers = [drive for axis, drive in self.drives.items() if axis is not Finger.SCISSOR]
-        if self._hands and all(drive.outcome.is_contact for drive in fingers):
-            self._let_go()
+        for motor, length in zip(motors, lengths, strict=True):
+            motor.see(length, step_s)
+        if self._hands:
+            fingers = [motor for axis, motor in self.drives.items() if axis is not Finger.SCISSOR]
+            if all(motor.outcome.is_contact for motor in fingers):
+                self._let_go()
 
     def lift(self, millimetres: float) -> None:
         """Begin to raise the gripper to so many millimetres above its first place."""
@@ -258,3 +259,8 @@ class World:
         levers = levers_of(packaged(model), axis)
         gain, damping = self._model.actuator_gainprm[index][0], -self._model.actuator_biasprm[index][2]
         return MotorDrive(model, axis, index, levers, (float(gain), float(damping)))
+
+
+def _floats(array: Any) -> memoryview[float]:
+    """All numbers of an array, one after the other."""
+    return memoryview(array).cast("B").cast("d")

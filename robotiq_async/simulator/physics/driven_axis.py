@@ -150,10 +150,14 @@ class DrivenAxis(Axis):
         self._origin = self._drive.position
         self.status = self._drive.outcome
 
-    def observe(self, time: float) -> None:
-        """Take the outcome of the goal: the end of a motion is due at once, and so is a slipping part."""
+    def observe(self, time: float) -> bool:
+        """Take the outcome of the goal: the end of a motion is due at once, and so is a slipping part.
+
+        Returns whether something is due by then.
+        """
         if self._goal is not None and self._drive.outcome is not self.status:
             self.ends_at = time
+        return self.ends_at <= time
 
     def _plan(self, time: float) -> None:
         assert self._goal is not None, "only a motion with a goal is planned"

@@ -329,10 +329,9 @@ class SimulatedGripper(Surroundings):
         """Let the bodies move until a time, or until an axis has something to report."""
         axes = self._controller.driven
         while physics.step(until):
-            self._time = max(self._time, physics.time)
-            for axis in axes:
-                axis.observe(self._time)
-            if any(axis.ends_at <= self._time for axis in axes):
+            time = self._time = max(self._time, physics.time)
+            reports = [axis.observe(time) for axis in axes]
+            if any(reports):
                 return
 
 
