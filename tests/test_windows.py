@@ -50,8 +50,7 @@ async def on_windows(program: str, *arguments: str, coarse: bool = False) -> str
     return out
 
 
-async def test_the_process_lacks_what_windows_lacks() -> None:
-    await on_windows("""
+LACKS = """
 import asyncio, importlib, os, select, signal, socket, time
 from tests.windows import LOOP, MODULES, NAMES
 
@@ -73,11 +72,8 @@ async def main():
 
 asyncio.run(main())
 fails(EncodingWarning, exec, "open('README.md')", {"__name__": "robotiq_async"})
-""")
-
-
-async def test_all_of_the_core_and_the_command_line_can_be_imported() -> None:
-    program = """
+"""
+ALL_OF_IT = """
 import importlib, pkgutil, robotiq_async
 from robotiq_async.cli.tui.screen import DRIVER
 
@@ -91,12 +87,14 @@ for found in pkgutil.walk_packages(robotiq_async.__path__, "robotiq_async."):
         count += 1
 assert count > 140, count
 """
-    await on_windows(program)
 
 
-@pytest.mark.parametrize("coarse", [False, True], ids=["fine clock", "coarse clock"])
-async def test_a_hand_moves_and_its_loop_waits_finely_while_it_polls(*, coarse: bool) -> None:
-    program = """
+async def test_the_process_lacks_what_windows_lacks_and_all_can_be_imported_there() -> None:
+    """All of the core and the command line."""
+    await on_windows(LACKS + ALL_OF_IT)
+
+
+A_HAND = """
 import asyncio
 from robotiq_async import Finger, RobotiqHand, State
 
@@ -117,17 +115,10 @@ async def main(address):
 
 asyncio.run(main(sys.argv[1]))
 """
-    async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
-        server.gripper.place_object(Finger.ABC, 150)
-        await on_windows(program, server.address, coarse=coarse)
+A_BLOCKING_HAND = """
+from robotiq_async.sync import RobotiqHand as BlockingHand
 
-
-async def test_the_blocking_hand_moves() -> None:
-    program = """
-from robotiq_async import Finger
-from robotiq_async.sync import RobotiqHand
-
-with RobotiqHand(sys.argv[1]) as hand:
+with BlockingHand(sys.argv[1]) as hand:
     assert abs(hand.move(50).positions[Finger.A] - 50) <= 2
     assert hand.close().contacts == Finger.ABC
     for status in hand.statuses():
@@ -136,19 +127,11 @@ with RobotiqHand(sys.argv[1]) as hand:
     hand.open()
 assert Winmm.periods == 0
 """
-    async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
-        server.gripper.place_object(Finger.ABC, 150)
-        await on_windows(program, server.address, coarse=True)
-
-
-async def test_a_frame_waits_in_the_loop_where_the_clock_cannot_tell_how_long() -> None:
-    """Looking at such a clock until it has moved would hold up the loop for 15 ms."""
-    await on_windows(
-        """
-import asyncio, time
+A_SILENCE = """
+import time
 from robotiq_async.link.silence import Silence
 
-async def main():
+async def keep_silent():
     looks, silence, clock = 0, Silence(0.0001), time.monotonic
 
     def counted():
@@ -160,12 +143,20 @@ async def main():
     for _ in range(5):
         silence.heard = counted()
         await silence.keep(time.monotonic)
-    assert looks < 200, looks
+    assert looks < 200, f"looking at such a clock until it has moved holds up the loop for 15 ms: {looks}"
 
-asyncio.run(main())
-""",
-        coarse=True,
-    )
+asyncio.run(keep_silent())
+"""
+"""A frame waits in the loop where the clock cannot tell how long."""
+
+
+@pytest.mark.parametrize("coarse", [False, True], ids=["fine clock", "coarse clock"])
+async def test_hands_move_and_their_loop_waits_finely_while_they_poll(*, coarse: bool) -> None:
+    """One process for all that a coarse clock could spoil: what it imports takes longer."""
+    async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
+        server.gripper.place_object(Finger.ABC, 150)
+        program = A_HAND + A_BLOCKING_HAND + A_SILENCE if coarse else A_HAND
+        await on_windows(program, server.address, coarse=coarse)
 
 
 COMMANDS = """

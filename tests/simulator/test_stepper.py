@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import subprocess
 import sys
 import threading
@@ -20,6 +21,7 @@ from robotiq_async.simulator import Physics, PhysicsError, SimulatedGripper, Sim
 from robotiq_async.values.enums import JAW
 from robotiq_async.values.errors import RobotiqConnectionError
 from robotiq_async.values.model import TWO_FINGER_85
+from tests.forked import forking
 from tests.patience import patience
 
 BOX = "box:30x40x60,0.3"
@@ -168,9 +170,17 @@ async def test_a_hand_says_why_its_simulated_gripper_answers_no_more(unstable: s
 
 def test_the_command_ends_with_the_error(unstable: str) -> None:
     command = [sys.executable, "-m", "robotiq_async", "simulate", "--model", "2f85", "--port", "0"]
-    with subprocess.Popen(
-        [*command, "--physics", unstable], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as run:
+    with (
+        forking(),
+        subprocess.Popen(
+            [*command, "--physics", unstable],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=os.environ,
+            text=True,
+        ) as run,
+    ):
         try:
             assert run.stdout is not None
             address = run.stdout.readline().strip()
