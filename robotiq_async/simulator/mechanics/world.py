@@ -80,7 +80,6 @@ class World:
         if not (np.isfinite(self._data.qpos).all() and np.isfinite(self._data.qacc).all()):
             raise ValueError(f"physics: {scene.file!r:.100} has a place or a mass that is not finite")
         self.time = float(self._data.time)
-        self._start = self._data.qpos.copy()
         root = root_of(self._model)
         self.root: str = self._model.body(root).name.removeprefix(OURS)
         base = self._model.body_rootid[root]  # of a robot that drives about, perhaps
@@ -90,6 +89,7 @@ class World:
             if self._model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
             and self._model.jnt_bodyid[joint] != base
         ]
+        self._places = [self._place_of(joint) for joint in self._parts]
         bodies = {int(self._model.jnt_bodyid[joint]) for joint in self._parts}
         self._part_geoms = [
             geom
@@ -228,12 +228,17 @@ class World:
                 if is_inside and int(geom) in parts:
                     yield int(self._model.geom_bodyid[geom])
 
+    def _place_of(self, joint: int) -> tuple[Any, Any, Any]:
+        """Views of the place and of the speed of a part, and between them a copy of its first place."""
+        at, speed = self._model.jnt_qposadr[joint], self._model.jnt_dofadr[joint]
+        place = self._data.qpos[at : at + 7]
+        return place, place.copy(), self._data.qvel[speed : speed + 6]
+
     def _put(self, z: float = 0.0) -> None:
-        for joint in self._parts:
-            at, speed = self._model.jnt_qposadr[joint], self._model.jnt_dofadr[joint]
-            self._data.qpos[at : at + 7] = self._start[at : at + 7]
-            self._data.qpos[at + 2] += z
-            self._data.qvel[speed : speed + 6] = 0
+        for place, first, speed in self._places:
+            place[:] = first
+            place[2] += z
+            speed[:] = 0
 
     def _set_aside(self, aside: bool) -> None:
         # For an activation, or taken away: parts stay where they are put, and nothing meets them.
