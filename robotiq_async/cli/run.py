@@ -76,7 +76,7 @@ def _mend_streams() -> None:
 def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | None]:
     try:
         _check_units(arguments)
-        command, bound, _ = build().parse_args(arguments, print_error=False, exit_on_error=False)
+        command, bound, _ = build(arguments).parse_args(arguments, print_error=False, exit_on_error=False)
         outcome = command(*bound.args, **bound.kwargs)
         if inspect.iscoroutine(outcome):
             with closing(outcome):  # a signal may come before it has begun
