@@ -43,6 +43,11 @@ COMMAND_LINE = (
     *("textual.app", "textual.drivers.linux_driver", "textual.widgets"),
 )
 """Modules of the command line, imported before."""
+PAGE = (
+    *(*CORE, "aiohttp", "fastapi", "socketio", "jinja2", "h11", "httpx"),
+    *("uvicorn.lifespan.on", "uvicorn.protocols.http.h11_impl", "uvicorn.protocols.websockets.auto"),
+)
+"""What NiceGUI imports. It itself is not imported before: it reads the environment."""
 MOST = 1 << 20
 """Bytes of a request."""
 
@@ -89,7 +94,7 @@ def fork(
 
 
 class Forked(Popen[Any]):
-    """A process that is forked in place of started; all of its streams must be given."""
+    """A process that is forked in place of started. Streams that are not given are those of this one."""
 
     imported: ClassVar[tuple[str, ...]] = COMMAND_LINE
     variables: ClassVar[tuple[tuple[str, str], ...]] = ()
@@ -100,6 +105,7 @@ class Forked(Popen[Any]):
         pipes = ("p2cread", "p2cwrite", "c2pread", "c2pwrite", "errread", "errwrite")
         try:
             streams = [of[each] for each in (pipes[0], *pipes[3::2])]
+            streams = [number if each == -1 else each for number, each in enumerate(streams)]
             self.pid = fork(
                 of["args"][1:],
                 of["env"],
@@ -169,6 +175,8 @@ def _take(streams: list[int], *, terminal: bool) -> None:
 
 def _run(arguments: list[str]) -> None:
     match arguments:
+        case ["-P", *arguments]:
+            _run(arguments)
         case ["-m", module, *_]:
             sys.argv = arguments[1:]
             runpy.run_module(module, run_name="__main__", alter_sys=True)

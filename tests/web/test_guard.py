@@ -7,7 +7,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import http.client
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -27,6 +27,7 @@ from robotiq_async.tools.web.settings import PageSettings
 from robotiq_async.values.errors import ViewerError
 from tests.conftest import watched
 from tests.fake_hand import FakeHand
+from tests.forked import PAGE, forking
 from tests.patience import patience
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
@@ -37,6 +38,12 @@ HANDS = 13
 
 def settings(**options: object) -> PageSettings:
     return PageSettings(port=0, addresses=("fake://hand",), **options)  # type: ignore[arg-type]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def forked_pages() -> Iterator[None]:
+    with forking(PAGE):
+        yield
 
 
 @pytest_asyncio.fixture(loop_scope="module", scope="module")

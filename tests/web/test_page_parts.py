@@ -32,6 +32,7 @@ from robotiq_async.tools.web.settings import PageSettings
 from robotiq_async.tools.wording import refusal_words
 from robotiq_async.values.enums import Trigger
 from tests.fake_hand import FakeHand
+from tests.forked import PAGE, forking
 from tests.grippers import active_gripper, shows, until
 from tests.patience import patience
 
@@ -322,15 +323,16 @@ async def test_a_process_that_dies_is_noticed_and_its_motions_are_held() -> None
     gripper = active_gripper(spread=False)
     async with SimulatorServer(gripper) as server, RobotiqHand(server.address) as hand:
         settings = PageSettings(port=0, control=True, addresses=(hand.address,))
-        async with PageServer([hand], settings, operators=[Operator(hand)]) as page:
-            asked = {"page": "p", "number": 1, "at": monotonic(), "hand": 0, "name": "close"}
-            page._hear({"do": {**asked, "arguments": {}}})
-            await shows(hand, lambda status: status.is_moving)
-            page._process.kill()
-            async with asyncio.timeout(patience(20)):
-                await page.ended()
-            stood = await shows(hand, lambda status: not status.is_moving)
-            assert stood.position(Finger.A) < 200
+        with forking(PAGE):
+            async with PageServer([hand], settings, operators=[Operator(hand)]) as page:
+                asked = {"page": "p", "number": 1, "at": monotonic(), "hand": 0, "name": "close"}
+                page._hear({"do": {**asked, "arguments": {}}})
+                await shows(hand, lambda status: status.is_moving)
+                page._process.kill()
+                async with asyncio.timeout(patience(20)):
+                    await page.ended()
+                stood = await shows(hand, lambda status: not status.is_moving)
+                assert stood.position(Finger.A) < 200
 
 
 # -- in touch ----------------------------------------------------------------------------------------------
