@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from hypothesis import strategies as st
-
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.enums import Mode
 from robotiq_async.values.registers import Registers
@@ -35,13 +33,6 @@ def request_of(content: Sequence[int]) -> Request:
         individual_scissor=bool(individual & 0x08),
         axes=tuple(AxisRequest(*axes[n : n + 3]) for n in range(0, 12, 3)),
     )
-
-
-# One draw of bytes is cheaper than one for each field, and shrinks as well.
-BLOCKS = st.binary(min_size=16, max_size=16).map(registers_of)
-"""Any eight registers."""
-REQUESTS = st.binary(min_size=14, max_size=14).map(request_of)
-"""Any request."""
 
 
 def bytes_of(registers: Sequence[int]) -> list[int]:

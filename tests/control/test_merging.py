@@ -14,7 +14,8 @@ from robotiq_async.values.enums import NO_AXES, Finger, Mode, ObjectStatus
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
-from tests.register_words import REQUESTS, status_of
+from tests.register_words import status_of
+from tests.strategies import REQUESTS
 
 A, B, C, S = THREE_FINGER.axes
 IN_MOTION, OPENING, CLOSING, THERE = ObjectStatus

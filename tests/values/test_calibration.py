@@ -115,7 +115,7 @@ async def test_the_default_time_out_of_a_move_comes_from_the_calibration(tmp_pat
         gripper = SimulatedGripper(clock, device_cycle=0.0)
         async with (
             SimulatorServer(gripper) as server,
-            RobotiqHand(server.address, calibration=calibration, poll_interval=0.05) as hand,
+            RobotiqHand(server.address, calibration=calibration, poll_interval=0.1) as hand,
         ):
             clock.slow_down()
             way = 255 - hand.status.position(Finger.A)

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.values import registers as reg
-from tests.register_words import BLOCKS, REQUEST_RESERVED, bytes_of, registers_of
+from tests.register_words import REQUEST_RESERVED, bytes_of, registers_of
+from tests.strategies import BLOCKS
 
 REQUEST = {
     "rACT": (0, 0, 1),

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from robotiq_async.values.enums import Finger, Mode
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
-from tests.register_words import BLOCKS, REQUEST_RESERVED, REQUESTS, bytes_of, registers_of, status_of
+from tests.register_words import REQUEST_RESERVED, bytes_of, registers_of, status_of
+from tests.strategies import BLOCKS, REQUESTS
 
 BYTES = st.integers(0, 255)
 

@@ -11,7 +11,8 @@ from hypothesis import given
 from robotiq_async import Fault, Finger, Initialization, Mode, ObjectStatus, RobotiqStatus
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.status import NO_REQUEST
-from tests.register_words import BLOCKS, bytes_of, registers_of, status_of
+from tests.register_words import bytes_of, registers_of, status_of
+from tests.strategies import BLOCKS
 
 AXES = A, B, C, S = THREE_FINGER.axes
 
