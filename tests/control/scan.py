@@ -99,6 +99,8 @@ class Scan:
         """Number of the next writes that the gripper acknowledges and forgets."""
         self.polls = 0
         self._lively_until = 0.0
+        self._news: tuple[object, ...] = ()
+        """What has been written and shown at the last poll that was passed."""
 
     @property
     def now(self) -> float:
@@ -188,15 +190,14 @@ class Scan:
     def _pass(self, most: int) -> int:
         """Make the next poll, or the last of some if nothing happens; returns how many have passed."""
         polls = 1 if self.now < self._lively_until else min(most, DULL_POLLS)
-        before, writes = self._shown(), len(self.written)
+        before = self._news
         self.step(poll=polls * POLL_S)
-        if self._shown() != before or len(self.written) != writes:
+        status = self.latest
+        # All that a status shows but for positions and currents.
+        self._news = (len(self.written), status.registers[:2], status.echo)
+        if self._news != before:
             self._lively_until = self.now + LIVELY_S
         return polls
-
-    def _shown(self) -> tuple[object, ...]:
-        """All that a status shows but for positions and currents."""
-        return (*self.latest.registers[:2], self.latest.echo)
 
     def blink(self, away: float = 0.05) -> None:
         """The link is lost and comes back."""
