@@ -25,9 +25,11 @@ from tests.simulator.test_server import RawClient, raw_client
 from tests.virtual import virtual
 from tests.virtual_line import VirtualLine
 
-REQUESTS = 15_000
+REQUESTS = 8_000
 READ = with_crc(bytes.fromhex("09 03 03e8 0008"))
 ANSWER = with_crc(bytes.fromhex("09 03 10") + bytes(16))
+OURS = 4096
+"""Bytes that the server keeps for a client before it takes no more requests of it."""
 LARGEST_READ = 256 * 1024
 """Bytes that asyncio takes from a socket at a time."""
 
@@ -47,6 +49,9 @@ async def narrow(server: SimulatorServer) -> AsyncIterator[RawClient]:
     line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     reader, writer = await asyncio.open_connection(sock=line, limit=2**12)
     try:
+        while not server.connections:  # noqa: ASYNC110
+            await asyncio.sleep(0)
+        server.connections[-1].transport.set_write_buffer_limits(OURS)  # 64 kB, by asyncio: 5000 answers more
         yield RawClient(reader, writer)
     finally:
         writer.transport.abort()
@@ -67,7 +72,7 @@ async def test_a_client_that_never_reads_has_to_wait() -> None:
         await until_held(server)
         (connection,) = server.connections
         assert len(connection._inbox) <= MOST_UNREAD + LARGEST_READ
-        assert connection.transport.get_write_buffer_size() < 100_000
+        assert connection.transport.get_write_buffer_size() < 2 * OURS
         async with raw_client(server) as other:
             assert (await other.read_status()).is_reset, "others are served meanwhile"
         async with asyncio.timeout(patience(20)):
@@ -110,21 +115,20 @@ def line() -> Iterator[Line]:
 
 
 async def test_replies_that_are_not_read_from_a_serial_line_are_lost(line: Line) -> None:
-    answered = 0
+    answered = asyncio.Event()
 
     def policy(reply: bytes) -> list[tuple[float, bytes]]:
-        nonlocal answered
-        answered += 1
+        answered.set()
         return [(0.0, reply)]
 
     async with SerialSimulatorServer(line.port, paced=False) as server:
         server.policy = policy
         (connection,) = server.connections
         transport: Any = connection.transport
-        for count in range(5000):
+        for _ in range(5000):
+            answered.clear()
             line.send(READ)
-            while answered == count:  # noqa: ASYNC110
-                await asyncio.sleep(0)
+            await answered.wait()
             assert sum(map(len, transport.intern_write_buffer)) <= MOST_UNSENT
         received = b""
         while transport.get_write_buffer_size() or not received.endswith(ANSWER):

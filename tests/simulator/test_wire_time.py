@@ -116,9 +116,9 @@ async def test_a_line_keeps_no_more_than_it_carries_for_a_while(monkeypatch: pyt
     async with SerialSimulatorServer(cable.FAR, SimulatedGripper(loop.time)) as server:
         connection: Any = server.connections[0]
         for _ in range(1000):
-            connection.data_received(100 * READ)
+            connection.data_received(100 * WRITE)
             connection.pass_on(bytes(100))
-        assert connection._wire.unheard(loop.time()) <= MOST_UNREAD + 100 * len(READ)
+        assert connection._wire.unheard(loop.time()) <= MOST_UNREAD + 100 * len(WRITE)
         assert connection._wire.unsent(loop.time()) <= MOST_UNSENT + 100
         await asyncio.sleep(60)
         assert not connection._inbox
@@ -156,14 +156,14 @@ async def test_how_often_a_hand_polls(
         await activate_beforehand(gripper)
         address = f"rtu://{cable.NEAR}?model={model}"
         async with RobotiqHand(address, write_spacing=0.0, **interval) as hand:  # type: ignore[arg-type]
-            await asyncio.sleep(0.1)
-            seconds, before = 5.0 if streaming else 1.0, hand.statistics
+            await asyncio.sleep(0.02)
+            seconds, before = 2.0 if streaming else 1.0, hand.statistics
             until = loop.time() + seconds
             while loop.time() < until:
                 if streaming:
                     hand.command(Finger.A, position=100 + int(20 * (loop.time() % 5)))
                     hand.command(Finger.A, speed=int(1000 * loop.time()) % 256)
-                await asyncio.sleep(0.001)
+                await asyncio.sleep(0.002)
             after = hand.statistics
             assert (after.polls - before.polls) / seconds == pytest.approx(polls, rel=0.02)
             assert (after.writes - before.writes) / seconds == pytest.approx(writes, rel=0.02)
