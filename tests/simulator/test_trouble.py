@@ -8,7 +8,7 @@ import re
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robotiq_async.simulator import Trouble, parse_troubles
@@ -216,6 +216,7 @@ def test_a_trouble_in_words(words: str) -> None:
     assert str(trouble) == words
 
 
+@settings(max_examples=50)
 @given(plan=st.lists(troubles(), max_size=4), separator=st.sampled_from(["\n", ";", "; ", " # again\n"]))
 def test_the_words_of_a_plan_give_an_equal_plan(plan: list[Trouble], separator: str) -> None:
     assert parse_troubles(separator.join(map(str, plan))) == plan
