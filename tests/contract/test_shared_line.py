@@ -4,8 +4,10 @@ The hands take turns, and a failure of one is followed by a silence of the line.
 depends on when an exchange comes: starts and stops, commands that meet each other, are halted or cancelled
 in the midst of a turn, waits with a limit, links that are lost, and who reads meanwhile. What a gripper
 does with its axes, its faults and its parts is in the statuses, however late they come. A scene is tried in
-one of its forms: they differ in what the hand is asked, and not in its turns. A 3-Finger is written with
-function 16, a jaw with 23.
+one of its forms: they differ in what the hand is asked, and not in its turns.
+
+A 3-Finger at a port is written with function 16, a jaw behind a socket with 23. A scene has one of the two,
+by turns: what a hand does with the turns of its line is the same on either.
 """
 
 from __future__ import annotations
@@ -15,13 +17,14 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from contextvars import copy_context
 from functools import partial
+from itertools import cycle
 
 import pytest
 
 from robotiq_async import RobotiqConnectionError, RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.simulator.troubles.fault_injector import FaultInjector
-from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
+from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85
 from tests.contract.bench import HABIT, MODEL, OTHERWISE, SERVER
 from tests.fleet.lab import SPEEDUP
 from tests.grippers import activate_beforehand
@@ -160,19 +163,21 @@ async def beside_another(kind: Kind, gripper: SimulatedGripper) -> AsyncIterator
             assert hand.statistics.reconnects <= bus.pulls
 
 
-LINES = {"rtu, 3-Finger": (serial_bus, THREE_FINGER), "rtu+tcp, 2F-85": (socket_bus, TWO_FINGER_85)}
+LINES = {
+    (THREE := "rtu, 3-Finger"): (serial_bus, THREE_FINGER),
+    (JAW := "rtu+tcp, 2F-85"): (socket_bus, TWO_FINGER_85),
+}
 CASES = [
-    pytest.param(*line, file, name, id=f"{what}-{name}")
-    for what, line in LINES.items()
+    (THREE if name in OTHERWISE else next(line), file, name)
     for file, names in BY_TURNS.items()
+    for line in [cycle([JAW, THREE])]
     for name in names
-    if line[1] is THREE_FINGER or name not in OTHERWISE
 ]
 
 
-@pytest.mark.parametrize(("kind", "model", "file", "name"), CASES)
-def test_beside_another_hand_the_contract_holds(kind: Kind, model: Model, file: str, name: str) -> None:
-    context = copy_context()
+@pytest.mark.parametrize(("line", "file", "name"), CASES)
+def test_beside_another_hand_the_contract_holds(line: str, file: str, name: str) -> None:
+    (kind, model), context = LINES[line], copy_context()
     context.run(MODEL.set, model)
     context.run(SERVER.set, partial(beside_another, kind))  # type: ignore[arg-type]
     context.run(HABIT.set, (None, {"device_id": OURS}))
