@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import re
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Mapping
 from typing import TYPE_CHECKING
 
 import pytest
@@ -32,8 +31,7 @@ from robotiq_async.tools.actions import Operator
 from robotiq_async.tools.wording import refusal_words
 from robotiq_async.values.enums import Trigger
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85
-from tests.grippers import active_gripper, shows
-from tests.patience import patience
+from tests.grippers import active_gripper, shows, until
 
 if TYPE_CHECKING:
     Screen = Pilot[None]
@@ -60,15 +58,8 @@ async def active(operator: Operator) -> Operator:
 
 @contextlib.asynccontextmanager
 async def shown(operator: Operator) -> AsyncIterator[Screen]:
-    async with Monitor(operator).run_test(size=(100, 30)) as pilot:
+    async with Monitor(operator).run_test(size=(100, 20)) as pilot:
         yield pilot
-
-
-async def until(pilot: Screen, condition: Callable[[], bool]) -> None:
-    """Let the screen live until it is so."""
-    async with asyncio.timeout(patience(20)):
-        while not condition():
-            await pilot.pause(0.02)
 
 
 def log(pilot: Screen) -> str:
@@ -81,7 +72,7 @@ def text(pilot: Screen, where: str) -> str:
 
 async def sees(pilot: Screen, where: str, words: str) -> None:
     """Wait until these words are in a part of the screen."""
-    await until(pilot, lambda: words in (log(pilot) if where == "#log" else text(pilot, where)))
+    await until(lambda: words in (log(pilot) if where == "#log" else text(pilot, where)))
 
 
 def asked(pilot: Screen) -> Question | None:
@@ -107,7 +98,7 @@ async def test_it_shows_the_gripper_before_anything_happens(operator: Operator) 
         assert [line.split()[0] for line in axes(pilot)] == ["A", "B", "C", "SCISSOR"]
         assert "6 → 0" in axes(pilot)[0]
         await sees(pilot, "#link", "reconnects 0")
-        await until(pilot, lambda: 15 < float(text(pilot, "#link").split()[0]) < 25)
+        await until(lambda: 15 < float(text(pilot, "#link").split()[0]) < 25)
         assert "speed 128  force 64" in text(pilot, "#link")
     assert not operator.has_moved
 
@@ -121,10 +112,10 @@ async def test_it_follows_the_axes() -> None:
         shown(Operator(hand)) as pilot,
     ):
         await hand.close(Finger.A, speed=0, force=255)
-        await until(pilot, lambda: "120 → 255 CONTACT closing" in axes(pilot)[0])
+        await until(lambda: "120 → 255 CONTACT closing" in axes(pilot)[0])
         assert set(sparkline_of(axes(pilot)[0])) & set("▅▆▇█"), "half an ampere before it grips"
         await hand.close(Finger.B, speed=255)
-        await until(pilot, lambda: "241 → 255 there" in axes(pilot)[1])
+        await until(lambda: "241 → 255 there" in axes(pilot)[1])
         assert "▁" in sparkline_of(axes(pilot)[3])
         assert set(sparkline_of(axes(pilot)[3])) <= {"▁", " "}, "a gap is a poll that came late"
 
@@ -152,7 +143,7 @@ async def test_a_lost_gripper_is_a_state_and_comes_back(active: Operator, server
         server.cut()
         await sees(pilot, "#state", "LOST")
         old = re.compile(r"no gripper answers: what you see is \d+\.\d s old")
-        await until(pilot, lambda: old.search(text(pilot, "#state")) is not None)
+        await until(lambda: old.search(text(pilot, "#state")) is not None)
         assert all(span.style == "dim" for span in pilot.app.query_one(Axes).render().spans[-1:])
         await pilot.press("o")
         await sees(pilot, "#log", "open: the link is down")
@@ -169,9 +160,9 @@ async def test_an_activation_is_shown_as_a_motion() -> None:
         async with shown(Operator(hand)) as pilot:
             await confirmed(pilot, "a")
             await sees(pilot, "#state", "the fingers MOVE")
-            await until(pilot, lambda: " moving " in axes(pilot)[0])
+            await until(lambda: " moving " in axes(pilot)[0])
             await sees(pilot, "#state", "active, not moving")
-            await until(pilot, lambda: " moving " not in axes(pilot)[0])
+            await until(lambda: " moving " not in axes(pilot)[0])
         await hand.stop()
 
 
@@ -238,7 +229,7 @@ async def test_keys_open_close_and_spread(active: Operator) -> None:
             ("2", Finger.SCISSOR, 100),
         ):
             await pilot.press(key)
-            await until(pilot, lambda: hand.status.requested_position(axis) == target)  # noqa: B023
+            await until(lambda: hand.status.requested_position(axis) == target)  # noqa: B023
         await sees(pilot, "#log", "normal: SCISSOR at")
     assert active.has_moved
 
@@ -252,35 +243,33 @@ async def test_speed_and_force_by_keys(active: Operator) -> None:
             await sees(pilot, "#link", f"speed {speed}  force {force}")
 
 
-@pytest.mark.parametrize(
-    ("key", "warning"), [("r", "DROPS"), ("l", "OPEN slowly"), ("a", "MOVE"), ("v", "DROPS")]
-)
-@pytest.mark.parametrize("answer", ["n", "escape"])
-async def test_dangerous_keys_ask_first(
-    key: str, warning: str, answer: str, active: Operator, gripper: SimulatedGripper
-) -> None:
+async def test_dangerous_keys_ask_first(active: Operator, gripper: SimulatedGripper) -> None:
     requests = active.hand.requests()
     async with shown(active) as pilot:
-        await pilot.press(key)
-        await until(pilot, lambda: asked(pilot) is not None)
-        assert warning in text(pilot, "#question")
-        await pilot.press("o", "r")  # nothing else works until then
-        assert asked(pilot) is not None
-        await pilot.press(answer)
-        await until(pilot, lambda: asked(pilot) is None)
+        for key, warning in (("r", "DROPS"), ("l", "OPEN slowly"), ("a", "MOVE"), ("v", "DROPS")):
+            for answer in ("n", "escape"):
+                await pilot.press(key)
+                assert asked(pilot) is not None, key
+                assert warning in text(pilot, "#question")
+                await pilot.press("o", "r")  # nothing else works until then
+                assert asked(pilot) is not None
+                assert warning in text(pilot, "#question")
+                await pilot.press(answer)
+                assert asked(pilot) is None, (key, answer)
+        assert not gripper.is_moving
     assert requests.take_nowait() is None
 
 
 async def confirmed(pilot: Screen, key: str) -> None:
     await pilot.press(key)
-    await until(pilot, lambda: (question := asked(pilot)) is not None and question.is_open)
+    await until(lambda: (question := asked(pilot)) is not None and question.is_open)
     await pilot.press("y")
 
 
 async def test_a_yes_resets_and_activates(active: Operator) -> None:
     async with shown(active) as pilot:
         await confirmed(pilot, "r")
-        await until(pilot, lambda: active.hand.state is State.RESET)
+        await until(lambda: active.hand.state is State.RESET)
         await confirmed(pilot, "a")
         await sees(pilot, "#log", "activate: the gripper is active")
 
@@ -325,13 +314,13 @@ async def test_of_a_jaw_the_one_axis_is_chosen_and_no_other_can_be() -> None:
             await sees(pilot, "#log", "a 2F-85 has no scissor")
 
 
-@pytest.mark.parametrize("key", sorted(NO))
-async def test_a_position_that_is_not_entered_moves_nothing(key: str, active: Operator) -> None:
+async def test_a_position_that_is_not_entered_moves_nothing(active: Operator) -> None:
     requests = active.hand.requests()
     async with shown(active) as pilot:
-        await pilot.press("p", "a", "9", key)
-        assert not pilot.app.query_one("#question").display
-        assert pilot.app.is_running, "it ends the question and not the monitor"
+        for key in sorted(NO):
+            await pilot.press("p", "a", "9", key)
+            assert not pilot.app.query_one("#question").display, key
+            assert pilot.app.is_running, "it ends the question and not the monitor"
     assert requests.take_nowait() is None
 
 
@@ -383,7 +372,7 @@ async def test_the_log_keeps_clear_of_its_scroll_bar(operator: Operator) -> None
         history = pilot.app.query_one("#log", RichLog)
         for number in range(40):
             pilot.app.write_log(f"{number} " + "x" * 150)
-        await until(pilot, lambda: history.max_scroll_y > 0)
+        await until(lambda: history.max_scroll_y > 0)
         assert (
             max(len(line.text.rstrip()) for line in history.lines) <= history.scrollable_content_region.width
         )
@@ -400,21 +389,22 @@ async def closing() -> AsyncIterator[tuple[RobotiqHand, Screen]]:
         hand = RobotiqHand(slow.address, poll_interval=SLOWLY)
         async with hand, shown(Operator(hand)) as pilot:
             await pilot.press("c")
-            await until(pilot, lambda: hand.is_moving)
+            await until(lambda: hand.is_moving)
             yield hand, pilot
 
 
-@pytest.mark.parametrize("key", ["space", "h"])
-@pytest.mark.parametrize("open_question", [[], ["r"], ["p", "a", "1"]], ids=["none", "reset", "position"])
-async def test_halt_is_one_key_also_during_a_question(
-    key: str, open_question: list[str], closing: tuple[RobotiqHand, Screen]
-) -> None:
+async def test_halt_is_one_key_also_during_a_question(closing: tuple[RobotiqHand, Screen]) -> None:
     hand, pilot = closing
-    await pilot.press(*open_question, key)
-    await sees(pilot, "#log", "halt: every axis has stopped")
-    assert not hand.is_moving
     assert isinstance(pilot.app, Monitor)
-    assert (pilot.app.asking is not None) is bool(open_question)
+    for open_question in ([], ["r"], ["p", "a", "1"]):
+        for key, again in (("space", "o"), ("h", "c")):
+            await until(lambda: hand.is_moving)
+            halts = log(pilot).count("halt: every axis has stopped")
+            await pilot.press(*open_question, key)
+            await until(lambda: log(pilot).count("halt: every axis has stopped") > halts)  # noqa: B023
+            assert not hand.is_moving
+            assert (pilot.app.asking is not None) is bool(open_question), key
+            await pilot.press(*["escape"] * bool(open_question), again)
     await sees(pilot, "#log", "close: ")
 
 
@@ -422,7 +412,7 @@ async def test_halt_is_one_key_also_during_a_question(
 async def test_quitting_in_a_motion_holds_it(key: str, closing: tuple[RobotiqHand, Screen]) -> None:
     hand, pilot = closing
     await pilot.press(key)
-    await until(pilot, lambda: not pilot.app.is_running)
+    await until(lambda: not pilot.app.is_running)
     status = await shows(hand, lambda status: not status.is_moving)
     assert status.position(Finger.A) < 200
 
