@@ -20,7 +20,7 @@ from robotiq_async.cli.commands.measure import speed
 from robotiq_async.cli.commands.measure_force import force
 from robotiq_async.cli.commands.measure_stroke import stroke
 from robotiq_async.session.options import LATE_POLLS
-from robotiq_async.simulator import SimulatorServer
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.conftest import WITHOUT
 
 if TYPE_CHECKING:
@@ -277,6 +277,9 @@ def test_a_simulated_gripper_is_called_simulated_before_anything_else(
 ) -> None:
     """A forgotten address must not look like a healthy gripper."""
     monkeypatch.chdir(tmp_path)
+    usual = SimulatedGripper.__init__.__kwdefaults__
+    assert usual is not None
+    monkeypatch.setitem(usual, "speedup", 20.0)  # the demo takes two minutes
     outcome = call(*command.split())
     outcome.assert_succeeded()
     assert outcome.out.splitlines()[0] == SIMULATED
