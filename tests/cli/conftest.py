@@ -48,6 +48,14 @@ from robotiq_async.cli import main
 sys.exit(main({}))
 """
 """A command line that does not find a module."""
+CLOSED = """
+import os, sys
+os.close({0})
+setattr(sys, ("stdin", "stdout", "stderr")[{0}], None)
+from robotiq_async.cli import main
+sys.exit(main({1}))
+"""
+"""A command line with a closed stream: the interpreter has None for one that is closed when it starts."""
 PATIENCE = 30.0
 """Seconds after which a command counts as hanging."""
 
@@ -358,9 +366,19 @@ async def _record(file: Path) -> None:
         await hand.wait_for_state(State.RUNNING_IDLE)
 
 
-def draw_nothing(patch: pytest.MonkeyPatch) -> None:
-    """Let matplotlib write empty pictures: to draw one takes longer than all else that a command does."""
-    patch.setattr("matplotlib.figure.Figure.draw", lambda *_: None)
+def draw_nothing(patch: pytest.MonkeyPatch, words: list[set[str]] | None = None) -> None:
+    """Let matplotlib write empty pictures: to draw one takes longer than all else that a command does.
+
+    The list gets the words of each picture.
+    """
+    from matplotlib.figure import Figure  # noqa: PLC0415  # few tests draw
+    from matplotlib.text import Text  # noqa: PLC0415
+
+    def draw(figure: Figure, *_: object) -> None:
+        if words is not None:
+            words.append({text.get_text() for text in figure.findobj(Text)})
+
+    patch.setattr(Figure, "draw", draw)
 
 
 @pytest.fixture

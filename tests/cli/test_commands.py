@@ -24,7 +24,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values import registers as reg
 from robotiq_async.values.calibration.csv_tables import write_stroke
 from robotiq_async.values.request import Request
-from tests.cli.conftest import Outcome, served
+from tests.cli.conftest import CLOSED, Outcome, served
 from tests.patience import patience
 
 if TYPE_CHECKING:
@@ -299,9 +299,8 @@ def output_is_not_read() -> Iterator[None]:
 async def test_a_closed_standard_stream_does_no_harm(
     shell: Shell, server: SimulatorServer, closed: int
 ) -> None:
-    command = [sys.executable, "-m", "robotiq_async", "status", server.address]
-    code = f"import os; os.close({closed}); os.execv({sys.executable!r}, {command!r})"
-    (await shell.finish(await shell.forked("-c", code))).assert_succeeded()
+    process = await shell.forked("-c", CLOSED.format(closed, ["status", server.address]))
+    (await shell.finish(process)).assert_succeeded()
 
 
 # -- ports -------------------------------------------------------------------------------------------------

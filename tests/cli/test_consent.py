@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +15,7 @@ from robotiq_async.cli.commands.measure_force import force
 from robotiq_async.cli.commands.measure_stroke import stroke
 from robotiq_async.cli.commands.verify import verify
 from robotiq_async.simulator import SimulatorServer
+from tests.cli.conftest import CLOSED
 from tests.cli.terminal import Terminal
 from tests.forked import ROOT
 
@@ -76,10 +76,8 @@ def test_without_a_terminal_nothing_is_sent(call: Call, file: Path, command: str
 async def test_a_stream_that_is_closed_is_no_terminal(
     shell: Shell, server: SimulatorServer, closed: int
 ) -> None:
-    code = f"import os; os.close({closed}); os.execv({{0!r}}, [{{0!r}}, '-m', 'robotiq_async', *{{1!r}}])"
-    outcome = await shell.finish(
-        await shell.forked("-c", code.format(sys.executable, ["move", "30", server.address]))
-    )
+    process = await shell.forked("-c", CLOSED.format(closed, ["move", "30", server.address]))
+    outcome = await shell.finish(process)
     outcome.assert_failed(2, "--yes")
     assert not server.gripper.writes
 
