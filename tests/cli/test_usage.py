@@ -52,19 +52,18 @@ def test_help_lists_every_command_and_the_addresses(
         assert word in out
 
 
-@pytest.mark.parametrize("command", EVERY)
+@pytest.mark.parametrize(("command", "width"), [*((each, 60) for each in EVERY), ("move", 120)])
 def test_the_help_of_a_command(
-    command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    command: str, width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for width in (60, 120):
-        monkeypatch.setenv("COLUMNS", str(width))
-        assert main([*command.split(), "--help"]) == 0
-        out = capsys.readouterr().out
-        words, _, examples = out.partition("\n\n")[2].partition("For example:")
-        assert_wrapped_once(words.splitlines(), width)
-        assert f"\n    robotiq-async {command}" in examples, "an example keeps its line"
-        assert command not in COMMANDS or "address" in out.lower()
-        assert command not in MOVE or "FINGERS MOVE" in " ".join(out.split())
+    monkeypatch.setenv("COLUMNS", str(width))
+    assert main([*command.split(), "--help"]) == 0
+    out = capsys.readouterr().out
+    words, _, examples = out.partition("\n\n")[2].partition("For example:")
+    assert_wrapped_once(words.splitlines(), width)
+    assert f"\n    robotiq-async {command}" in examples, "an example keeps its line"
+    assert command not in COMMANDS or "address" in out.lower()
+    assert command not in MOVE or "FINGERS MOVE" in " ".join(out.split())
 
 
 def assert_wrapped_once(lines: list[str], width: int) -> None:
