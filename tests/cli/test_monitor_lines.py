@@ -17,7 +17,7 @@ from robotiq_async import Fault, Finger, RobotiqHand
 from robotiq_async.cli.output.lines import print_objects
 from robotiq_async.session.options import LATE_POLLS
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.forked import ROOT
+from tests.forked import ROOT, forking
 from tests.grippers import shows, until
 from tests.patience import patience
 
@@ -141,9 +141,10 @@ async def test_a_signal_ends_it_although_its_output_is_not_read(
         reading, writing = os.pipe()
         arguments = ("-m", "robotiq_async", "monitor", "--json", server.address)
         environment = os.environ | {"PYTHONPATH": str(ROOT)}
-        process = await asyncio.create_subprocess_exec(
-            sys.executable, *arguments, stdout=writing, env=environment
-        )
+        with forking():
+            process = await asyncio.create_subprocess_exec(
+                sys.executable, *arguments, stdout=writing, env=environment
+            )
         await until(lambda: not select.select([], [writing], [], 0)[1], within=60)
         os.close(writing)
         full_at = hand.status.sequence

@@ -21,7 +21,7 @@ from robotiq_async.cli.commands.measure_force import force
 from robotiq_async.cli.commands.measure_stroke import stroke
 from robotiq_async.session.options import LATE_POLLS
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.cli.conftest import WITHOUT
+from tests.cli.conftest import ANEW, WITHOUT
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Beside, Call, Shell
@@ -205,7 +205,7 @@ def test_wrong_usage_is_one_line_and_opens_nothing(
 
 
 async def test_without_the_extra_one_line_names_it(shell: Shell) -> None:
-    outcome = await shell.finish(await shell.python("-c", WITHOUT.format("cyclopts", [])))
+    outcome = await shell.finish(await shell.forked("-c", ANEW + WITHOUT.format("cyclopts", [])))
     outcome.assert_failed(1, "cyclopts", "pip install 'cyclopts")
 
 
