@@ -208,13 +208,6 @@ def test_pandas_takes_it(grasp: Path, call: Call) -> None:
     assert table["is_moving"].dtype.kind == "b"
 
 
-def test_a_plot_is_drawn(grasp: Path, call: Call) -> None:
-    outcome = call("plot", str(grasp))
-    assert outcome.out.splitlines() == [str(grasp.with_suffix(suffix)) for suffix in (".png", ".svg")]
-    drawn = grasp.with_suffix(".svg").read_bytes()
-    assert b"COMMUNICATION_NOT_READY" in drawn or drawn.count(b"<use ") > 50, "words are drawn as glyphs"
-
-
 @pytest.mark.usefixtures("undrawn")
 def test_the_name_of_a_picture_may_have_its_suffix(grasp: Path, call: Call) -> None:
     call("plot", str(grasp), str(grasp.with_name("there.png"))).assert_succeeded()
@@ -236,7 +229,9 @@ def test_recover_makes_a_broken_one_whole(grasp: Path, call: Call) -> None:
 
 @pytest.mark.usefixtures("undrawn")
 def test_a_part_of_a_recording_is_drawn(grasp: Path, call: Call) -> None:
-    call("plot", str(grasp), "--from", "0", "--to", "1e6").assert_succeeded()
+    outcome = call("plot", str(grasp), "--from", "0", "--to", "1e6")
+    outcome.assert_succeeded()
+    assert outcome.out.splitlines() == [str(grasp.with_suffix(suffix)) for suffix in (".png", ".svg")]
     picture = str(grasp.with_name("part"))
     call("plot", str(grasp), picture, "--from", "1e6").assert_failed(1, "between --from and --to")
     call("plot", str(grasp), picture, "--from", "2", "--to", "1").assert_failed(2, "less than --to")
@@ -380,24 +375,30 @@ def test_nothing_to_show_is_said(foreign: Callable[..., Path], command: str, wor
     assert not file.with_suffix(".csv").exists()
 
 
-def test_words_of_others_and_a_file_name_that_is_not_text_are_drawn_as_they_are(
-    grasp: Path, call: Call
-) -> None:
-    with grasp.open("rb") as stream:
-        first = next(make_reader(stream).iter_messages(topics=["/gripper/status"]))[2]
+def test_a_plot_is_drawn_with_words_of_others_and_a_file_name_as_they_are(grasp: Path, call: Call) -> None:
     file = Path(os.fsdecode(os.fsencode(grasp.parent) + b"/\xff$\\frac{$.mcap"))
-    with file.open("wb") as stream:
+    channels: dict[str, int] = {}
+    at = 0
+    with grasp.open("rb") as own, file.open("wb") as stream:
         writer = Writer(stream)
         writer.start()
-        for topic in ("/gripper/status", "/gripper/event"):
-            writer.register_channel(topic, "json", 0)
-        for second, words in enumerate(("$\\frac{", "x" * 100_000, STEERING)):
-            writer.add_message(1, first.log_time + second * 10**9, first.data, 0)
-            writer.add_message(2, first.log_time + second * 10**9, event(kind="state", target=words), 0)
+        for _, channel, message in make_reader(own).iter_messages():
+            if channel.topic not in channels:
+                channels[channel.topic] = writer.register_channel(channel.topic, "json", 0)
+            at = message.log_time
+            writer.add_message(channels[channel.topic], at, message.data, 0)
+        for second, words in enumerate(("$\\frac{", "x" * 100_000, STEERING), 1):
+            state = event(kind="state", target=words)
+            writer.add_message(channels["/gripper/event"], at + second * 10**9, state, 0)
         writer.finish()  # type: ignore[no-untyped-call]
     outcome = call("plot", str(file))
     outcome.assert_succeeded()
-    assert outcome.out.endswith(".svg\n")
+    pictures = [file.with_suffix(suffix) for suffix in (".png", ".svg")]
+    assert [line.rpartition(".")[2] for line in outcome.out.splitlines()] == ["png", "svg"]
+    assert pictures[0].stat().st_size > 10_000
+    drawn = pictures[1].read_bytes()
+    assert b"COMMUNICATION_NOT_READY" in drawn
+    assert drawn.count(b"<use ") > 50, "words are drawn as glyphs"
     assert "messages in" in call("recover", str(file)).out
 
 
