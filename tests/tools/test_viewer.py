@@ -64,9 +64,9 @@ def listening() -> set[tuple[str, int]]:
 async def test_every_poll_arrives(hand: RobotiqHand) -> None:
     async with viewed(hand) as client:
         await client.subscribe("/gripper/status")
-        await client.until(lambda: len(client.received) >= 200)
+        await client.until(lambda: len(client.received) >= 100)
     sequences = [each["sequence"] for each in client.objects("/gripper/status")]
-    assert sequences == list(range(sequences[0], sequences[0] + 200))
+    assert sequences == list(range(sequences[0], sequences[0] + 100))
 
 
 async def test_the_messages_have_what_their_schema_says(hand: RobotiqHand) -> None:
@@ -199,20 +199,22 @@ async def test_viewers_do_not_delay_the_stop() -> None:
 
 
 @pytest.mark.skipif(not LINUX, reason="asks Linux who listens where")
-@pytest.mark.parametrize("steps", range(12))
-async def test_cancelled_at_any_moment_it_leaves_nothing(hand: RobotiqHand, steps: int) -> None:
+async def test_cancelled_at_any_moment_it_leaves_nothing(hand: RobotiqHand) -> None:
     before = listening()
 
     async def use() -> None:
         async with Viewer(hand, port=0):
             pass
 
-    using = asyncio.create_task(use())
-    for _ in range(steps):
-        await asyncio.sleep(0)
-    using.cancel()
-    await asyncio.gather(using, return_exceptions=True)
-    await until(lambda: listening() == before, within=5)
+    for steps in range(12):
+        tasks = asyncio.all_tasks()
+        using = asyncio.create_task(use())
+        for _ in range(steps):
+            await asyncio.sleep(0)
+        using.cancel()
+        await asyncio.gather(using, return_exceptions=True)
+        assert asyncio.all_tasks() <= tasks, f"cancelled after {steps} turns it leaves a task"
+        await until(lambda: listening() == before, within=5)
 
 
 async def test_a_hand_that_is_started_again_is_shown_again(server: SimulatorServer) -> None:
@@ -244,10 +246,10 @@ async def test_the_state_is_published_when_it_changes(hand: RobotiqHand, gripper
 async def test_a_control_loop_does_not_make_the_state_the_talk_of_the_town(hand: RobotiqHand) -> None:
     async with viewed(hand) as one:
         await one.subscribe("/gripper/state", "/gripper/event")
-        for position in range(100):
+        for position in range(50):
             await hand.set_position(position)
-        await one.until(lambda: len(one.objects("/gripper/event")) >= 200)
-        assert len(one.objects("/gripper/state")) < 20
+        await one.until(lambda: len(one.objects("/gripper/event")) >= 100)
+        assert len(one.objects("/gripper/state")) < 10
 
 
 async def test_a_port_that_is_taken_and_ports_that_cannot_be(hand: RobotiqHand) -> None:
