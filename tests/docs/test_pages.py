@@ -37,6 +37,7 @@ from tests.docs.pages import (
 )
 from tests.docs.test_tutorial import agree
 from tests.forked import CORE, forking
+from tests.grippers import activate_beforehand
 from tests.patience import patience
 
 FRONT = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")]
@@ -144,9 +145,10 @@ async def test_the_first_move_of_a_real_gripper_ends_wherever_its_fingers_are(cl
     page = DOCS / "how-to" / "first-hour.md"
     (block,) = [block for _, block in CODE if "Finger.A" in block.text and _ == page]
     gripper = SimulatedGripper(asyncio.get_running_loop().time)
+    await activate_beforehand(gripper)
     async with SimulatorServer(gripper) as server:
         async with RobotiqHand(server.address) as hand:
-            await (hand.close if closed else hand.open)()
+            await (hand.close if closed else hand.open)(speed=255)
         with redirect_stdout(StringIO()) as printed:
             await run_prompt(compiled(page, block, server.address), {})
     assert printed.getvalue().count("<MoveResult A=") == block.text.count("await hand.") > 0
