@@ -64,7 +64,7 @@ def recording(**options: Any) -> Any:
 
 plain, short = recording(has_pictures=False), recording(first=2, last=3)
 """Recordings to the last stage that is compared, and from the first that writes to the activation."""
-hardware_like = recording(is_like_hardware=True, has_pictures=False)
+hardware_like = recording(is_like_hardware=True, has_pictures=False, last=5)
 jaw = recording(model=TWO_FINGER_85)
 
 
