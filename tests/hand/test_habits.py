@@ -40,9 +40,11 @@ SELDOM_S = 0.1
 """Between two polls, where seconds pass in which nothing depends on the next status."""
 
 
-async def silent() -> Wire:
+async def silent(*, active: bool = True) -> Wire:
     """One with 0x09 in the first status after a second without a message."""
     wire = Wire(habits=Habits(silence_fault=1.0))
+    if active:
+        await wire.activate()
     await asyncio.sleep(2)
     return wire
 
@@ -63,6 +65,7 @@ async def pressed(wire: Wire, resets: int | None = None, *, active: bool = True)
 @pytest.mark.parametrize("lag", [0.005, 0.04])  # a poll, and some
 async def test_a_hand_with_a_late_object_status_is_used_as_any(lag: float) -> None:
     late = Wire(habits=Habits(status_lag=lag))
+    await activate_beforehand(late.gripper)
     async with RobotiqHand(late, speed=255) as hand:
         assert set((await hand.open()).outcomes) == {Finger.A, Finger.B, Finger.C}
         closed = await hand.close()
@@ -91,6 +94,7 @@ async def test_a_move_and_a_grasp_after_a_short_move_end_when_the_fingers_have_a
 ) -> None:
     """At 20 ms of lag, a move to 200 after one of 8 counts ended after 0.03 s, at 117."""
     late = Wire(model=model, habits=Habits(status_lag=lag))
+    await activate_beforehand(late.gripper)
     async with RobotiqHand(late, model=model.name, speed=255) as hand:
         await hand.move(100, Finger.A)
         await asyncio.sleep(0.5)
@@ -110,7 +114,7 @@ async def test_a_move_and_a_grasp_after_a_short_move_end_when_the_fingers_have_a
 
 
 async def test_a_start_is_entered_active_although_the_silence_before_shows_as_a_fault() -> None:
-    wire = await silent()
+    wire = await silent(active=False)
     for _ in range(2):
         async with RobotiqHand(wire) as hand:
             assert hand.state is State.RUNNING_IDLE

@@ -44,7 +44,8 @@ async def serial_server(line: SerialLine, clock: Clock) -> AsyncIterator[SerialS
 async def serial_hand(
     line: SerialLine, serial_server: SerialSimulatorServer, timeout: float
 ) -> AsyncIterator[RobotiqHand]:
-    async with RobotiqHand(f"rtu://{line.near}", response_timeout=timeout) as hand:
+    # A few polls are in the shortest time for which replies are held back; more reveal no more.
+    async with RobotiqHand(f"rtu://{line.near}", response_timeout=timeout, poll_interval=0.02) as hand:
         yield hand
 
 
