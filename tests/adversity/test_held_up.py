@@ -17,6 +17,8 @@ from tests.virtual import inside
 
 A = Finger.A
 POLL_S = 0.01
+POLL_TURNS = 6
+"""Turns of the loop from one poll to the next; they are the same in each."""
 
 
 @inside(started, poll_interval=POLL_S)
@@ -75,7 +77,7 @@ async def test_a_move_survives(here: World, held_s: float) -> None:
 
 
 @inside(started)
-@pytest.mark.parametrize("turns", range(1, 25))
+@pytest.mark.parametrize("turns", range(1, 2 * POLL_TURNS + 1))
 async def test_the_link_survives_wherever_in_an_exchange_it_happens(here: World, turns: int) -> None:
     await anext(here.hand.statuses())
     here.loop.after_turns(turns, lambda: here.loop.hold_up(0.6))
@@ -113,7 +115,7 @@ async def test_changes_during_a_stall_are_seen_before_the_next_write(here: World
 
 
 @inside(started)
-@pytest.mark.parametrize("turns", range(1, 31))
+@pytest.mark.parametrize("turns", range(1, 2 * POLL_TURNS + 1))
 async def test_a_stall_anywhere_in_a_poll_delays_the_write_until_a_new_status(
     here: World, turns: int
 ) -> None:
