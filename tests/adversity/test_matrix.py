@@ -75,6 +75,8 @@ def named(cell: Cell) -> str:
 
 POLL_S = 0.03 if HABITS else 0.1
 """Seconds between polls. A trouble lasts for some twenty of them: more reveal no more, but for a habit."""
+POLL_WHILE_KEEPING_S = min(POLL_S, 0.05)
+"""A stop that keeps a grip has half a second to see that the rest has stopped, or it lets go."""
 TROUBLES_OF_A_JAW = (*LEFT_TO_A_JAW, "drop once", "silence for 60", "line pulled", "status-lag 0.2 for 60")
 """The troubles for a sibling here. ``MODEL=2f85`` in the environment tries the whole table."""
 CELLS = in_turn(EVERY)
@@ -145,8 +147,10 @@ def usual(cell: Cell) -> str:
 
 
 def tried(cell: Cell, model: Model, patch: pytest.MonkeyPatch) -> str:
+    poll_s = POLL_WHILE_KEEPING_S if cell.phase.name == "keeping a grip" else POLL_S
+
     async def main() -> str:
-        async with world(cell.link, monkeypatch=patch, model=model, poll_interval=POLL_S) as here:
+        async with world(cell.link, monkeypatch=patch, model=model, poll_interval=poll_s) as here:
             return await outcome(here, cell.phase, cell.trouble)
 
     # Virtual time takes the same course again: what the code does to the loop it does each time. The machine,
