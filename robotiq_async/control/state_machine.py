@@ -2,13 +2,12 @@
 
 Every state has an entry for every trigger: the next state, IGNORED where there is nothing to do, or the
 error that the caller gets. A refusal changes nothing. What a status shows is never refused. The table comes
-from three rules and 18 entries: :func:`_row` has what holds wherever the link is up, what a status shows
-leads to its state wherever no procedure runs, and the entries are what differs.
+from three rules and 18 entries, which are what differs.
 
 The state follows from what the hand does and what the gripper shows; the controller works it out, and the
 table has what it may be. DO_ states and RUNNING_CC last from the decision to write until the
-acknowledgement, so the last state before DISCONNECTED names the write that may be lost. This module knows no
-register, clock or task. The diagram and the tables in docs/ are made from the table below.
+acknowledgement, so the last state before DISCONNECTED names the write that may be lost. The diagram and the
+tables in docs/ are made from the table below.
 """
 
 from __future__ import annotations
@@ -42,8 +41,7 @@ class Verdict(Enum):
     NOT_NOW = "InvalidStateError"
 
 
-Row = dict[Trigger, State | Verdict]
-"""The entries of one state."""
+Row = dict[Trigger, State | Verdict]  # the entries of one state
 
 
 def _all(triggers: tuple[Trigger, ...], entry: State | Verdict) -> Row:
@@ -51,17 +49,18 @@ def _all(triggers: tuple[Trigger, ...], entry: State | Verdict) -> Row:
 
 
 # First rule: what a call finds wherever the link is up, in _row(). Second: what a status shows leads to its
-# state, wherever no procedure runs, in _SEEN. Third: a hand that is off refuses, in _OFF.
+# state, wherever no procedure runs, in SEEN. Third: a hand that is off refuses, in _OFF.
 _STOPS: Final = (Trigger.ASK_HOLD, Trigger.ASK_HALT)
 _MOTIONS: Final = (Trigger.ASK_ACTIVATE, Trigger.ASK_COMMAND)
 _USER: Final = (*_MOTIONS, *_STOPS, Trigger.ASK_RELEASE, Trigger.ASK_RESET)
-_SEEN: Final[Row] = {
+SEEN: Final = {
     Trigger.SEEN_READY: State.RUNNING_IDLE,
     Trigger.SEEN_BUSY: State.WF_ACTIVATION,
     Trigger.SEEN_RESET: State.RESET,
     Trigger.SEEN_FAULT: State.FAULT,
     Trigger.SEEN_RELEASED: State.ATR_DONE,
 }
+_SEEN: Final[Row] = {**SEEN}
 _RUNNING: Final[Row] = _SEEN | {
     Trigger.ASK_ACTIVATE: Verdict.IGNORED,
     **_all((Trigger.ASK_COMMAND, *_STOPS), State.RUNNING_CC),
@@ -133,9 +132,6 @@ SEQUENCES: Final = frozenset(
 )
 """The states of an activation, a release and a reset. Clearing rGTO ends none of these."""
 
-_ADVICE: Final = "activate() waits for it, and recover() also resets a gripper that is stuck"
-"""For a motion that an activation refuses."""
-
 
 def states_allowing(trigger: Trigger) -> frozenset[State]:
     return frozenset(
@@ -146,44 +142,28 @@ def states_allowing(trigger: Trigger) -> frozenset[State]:
 
 
 class StateMachine:
-    """The state of one hand. It is a view: the controller works out which state holds, and shows it here.
-
-    Attributes:
-        changed: called with source, target and trigger after each change of state.
-        why_down: why the link is down, for the error of what is refused then.
-    """
+    """The state of one hand. It is a view: the controller works out which state holds, and shows it here."""
 
     def __init__(
         self, changed: Callable[[State, State, Trigger], None] = lambda *_: None, *, log: Log = log
     ) -> None:
         self.log = log
-        self.changed = changed
-        self.why_down: object = None
-        self._state = State.DISCONNECTED
-
-    @property
-    def state(self) -> State:
-        return self._state
+        self.changed = changed  # called after each change
+        self.why_down: object = None  # why the link is down, for the error of what is refused then
+        self.state = State.DISCONNECTED
 
     def ask(self, trigger: Trigger, status: RobotiqStatus | None = None) -> bool:
-        """Whether there is anything to do for what is asked: False where the table has IGNORED.
-
-        ``status`` is the newest one, for the error of what a fault refuses.
-
-        Raises:
-            RobotiqError: the table refuses it.
-        """
-        answer = TABLE[self._state][trigger]
+        """Whether there is anything to do for what is asked. Raises the error if the table refuses it."""
+        answer = TABLE[self.state][trigger]
         if isinstance(answer, Verdict) and answer is not Verdict.IGNORED:
-            raise refusal(trigger, self._state, status, self.why_down)
+            raise refusal(trigger, self.state, status, self.why_down)
         return answer is not Verdict.IGNORED
 
     def show(self, target: State, trigger: Trigger) -> None:
-        """Show another state, and what has led to it."""
-        source = self._state
+        source = self.state
         if target is source:
             return
-        self._state = target
+        self.state = target
         # A control loop goes to RUNNING_CC and back with every command.
         level = logging.DEBUG if {source, target} <= RUNNING else logging.INFO
         self.log.log(level, "%s -> %s (%s)", source.name, target.name, trigger.value)
@@ -206,10 +186,11 @@ def refusal(
             return GripperFaultError(Fault.NONE if status is None else status.fault)
     allowed = states_allowing(trigger)
     names = ", ".join(sorted(each.name for each in allowed))
+    waits = "activate() waits for it, and recover() also resets a gripper that is stuck"
     is_activating = state in (State.DO_ACTIVATION, State.WF_ACTIVATION)
     return InvalidStateError(
         f"{trigger.value} is not possible in state {state.name}; possible in: {names or 'none'}",
         state,
         allowed,
-        advice=_ADVICE if is_activating and trigger is Trigger.ASK_COMMAND else "",
+        advice=waits if is_activating and trigger is Trigger.ASK_COMMAND else "",
     )
