@@ -33,12 +33,9 @@ _CODE: Final = int(Fault.COMMUNICATION_NOT_READY)
 
 
 def classify(status: RobotiqStatus) -> Trigger:
-    """The condition that a status shows, one of five.
-
-    A serious fault comes first: gIMC = 0 with a fault is an automatic release and not a reset
-    [manual 2014, p. 50; 2018, p. 39].
-    """
-    # Only gACT, gIMC and gFLT decide. They rarely change and this runs at every poll, so it is cached.
+    """The condition that a status shows, one of five."""
+    # A serious fault comes first: gIMC = 0 with a fault is an automatic release and not a reset [manual 2014,
+    # p. 50; 2018, p. 39]. Only gACT, gIMC and gFLT decide: they rarely change, so what they show is cached.
     registers = status.registers
     return _classify(registers[0] >> 8, registers[1] >> 8 & 0x0F, status.model)
 
@@ -50,7 +47,7 @@ def is_activating(status: RobotiqStatus) -> bool:
 
 @cache
 def _classify(activation: int, fault: int, model: Model) -> Trigger:
-    """``activation`` is the byte with gACT and gIMC, ``fault`` is gFLT."""
+    # The byte with gACT and gIMC, and gFLT.
     status = RobotiqStatus((activation << 8, fault << 8, 0, 0, 0, 0, 0, 0), model=model)
     if status.fault is Fault.AUTOMATIC_RELEASE_DONE:
         return Trigger.SEEN_RELEASED
@@ -64,17 +61,11 @@ def _classify(activation: int, fault: int, model: Model) -> Trigger:
 
 
 class Evidence:
-    """The newest status as decisions see it: without a 0x09 that may pass.
-
-    Attributes:
-        status: that status; None before the first.
-        condition: what it shows; None while the link is down.
-        passing: 0x09, as far as it was seen.
-    """
+    """The newest status as decisions see it: without a 0x09 that may pass."""
 
     def __init__(self, log: Log) -> None:
         self.status: RobotiqStatus | None = None
-        self.condition: Trigger | None = None
+        self.condition: Trigger | None = None  # what it shows; None while the link is down
         self.passing: Final = PassingFault()
         self._log: Final = log
 
@@ -84,47 +75,33 @@ class Evidence:
         return self.passing.may_pass and self.condition is None
 
     def update(self, status: RobotiqStatus, asked: float) -> Trigger | None:
-        """Take in a status that was asked for at ``asked``.
-
-        Returns:
-            Its condition, which counts from now on; None while the first one on a new link is undecided.
-        """
+        """Take in a status; return its condition, or None while the first one on a new link is undecided."""
         condition = classify(status)
         if self.passing.is_counting or condition is Trigger.SEEN_FAULT:
-            judged = self._without_passing(status, asked)
+            before = self.passing.passed
+            judged = self.passing.filtered(status, asked)
+            if self.passing.passed > before == 0:
+                self._log.info(
+                    "the gripper showed fault 0x09 for a moment, as some do after a second without a poll: "
+                    "ignored, and from here on only counted"
+                )
             # In a fault 0x09 is no news, and counts at once: hiding it would show the fault as cleared.
             status = status if self.condition is Trigger.SEEN_FAULT else judged
             condition = classify(status)
         self.status = status
-        if self.condition is None and self.is_undecided:
-            return None
-        self.condition = condition
-        return condition
-
-    def _without_passing(self, status: RobotiqStatus, asked: float) -> RobotiqStatus:
-        before = self.passing.passed
-        judged = self.passing.filtered(status, asked)
-        if self.passing.passed > before == 0:
-            self._log.info(
-                "the gripper showed fault 0x09 for a moment, as some do after a second without a poll: "
-                "ignored, and from here on only counted"
-            )
-        return judged
+        if self.condition is not None or not self.is_undecided:
+            self.condition = condition
+        return self.condition
 
     def lost(self) -> None:
-        """The link is down: the next condition is the first."""
-        self.condition = None
+        self.condition = None  # the next one is the first
 
 
 class PassingFault:
-    """Distinguishes 0x09 that lasts from 0x09 that follows a silence.
-
-    Attributes:
-        passed: how often it has gone without having lasted.
-    """
+    """Distinguishes 0x09 that lasts from 0x09 that follows a silence."""
 
     def __init__(self) -> None:
-        self.passed = 0
+        self.passed = 0  # how often it has gone without having lasted
         # When the reads in a row that have shown it were asked for: all, and those since the last silence.
         self._row: list[float] = []
         self._since_silence: list[float] = []
@@ -164,7 +141,6 @@ def _lasts(reads: list[float]) -> bool:
 
 
 def without_fault(status: RobotiqStatus) -> RobotiqStatus:
-    """The same status, with gFLT = 0."""
     words = list(status.registers)
     reg.gFLT.write(words, 0)
     return RobotiqStatus(
