@@ -13,34 +13,20 @@ from .rest import Moment, Target
 
 @dataclass(slots=True, eq=False)
 class Entry:
-    """One image. Callers keep the entry and not its number, which may change.
+    """One image. Callers keep the entry and not its number, which may change."""
 
-    Attributes:
-        number: its place in the order in which the entries act.
-        image: what is asked.
-        before: the image that it replaces.
-        echo: what a status repeats of it.
-        is_ours: whether this hand has written it.
-        sent: when, in monotonic seconds; of a write that was lost with the link, the latest time at which it
-            may have arrived.
-        acknowledged: when; None before that.
-        acts_since: the first status that showed that it acts, as far as that was needed.
-        is_doubtful: whether it may or may not act.
-        changes: the axes whose request it changes.
-        again: those of them that it lets try again: it sets rGTO or raises the force.
-        rested: those of them that were proven to rest before it.
-        started: those of these that have shown motion since, so that no status from before can follow.
-    """
-
-    number: int
+    number: int  # its place in the order in which the entries act
     image: Request
-    before: Request
+    before: Request  # the image that it replaces
     echo: Echo
     is_ours: bool
-    sent: float
+    sent: float  # of a write that was lost with the link: the latest time at which it may have arrived
     acknowledged: float | None = None
-    acts_since: Moment | None = None
-    is_doubtful: bool = False
+    acts_since: Moment | None = None  # the first status that showed that it acts, as far as that was needed
+    is_doubtful: bool = False  # it may act or not
+    # The axes whose request it changes, and of these: those that it lets try again (it sets rGTO or raises
+    # the force); those that were proven to rest before it; and of the latter those that have shown motion
+    # since, so that no status from before can follow.
     changes: Finger = NO_AXES
     again: Finger = NO_AXES
     rested: Finger = NO_AXES
@@ -53,7 +39,6 @@ class Entry:
 
     @property
     def time(self) -> float:
-        """From when on it may act."""
         return self.sent if self.acknowledged is None else self.acknowledged
 
     @property

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from itertools import chain
+from itertools import chain, takewhile
 from typing import Final
 
 from ..runtime.log import Log, log
@@ -47,51 +47,31 @@ NEVER: Final = float("-inf")
 
 
 class Ledger:
-    """The entries, the oldest first.
-
-    Args:
-        speed: what every axis gets until set otherwise, 0..255.
-        force: what every axis gets until set otherwise, 0..255.
-        model: of the gripper.
-        log: gets its software limits.
-
-    Attributes:
-        shown: the newest entry that has shown.
-        match: the entry that the newest status shows; None if it shows none.
-        now: when the newest status was asked for. It may show the state of that time, however late a busy
-            loop reads the reply; so the age of a write is measured by this.
-        ours: the axes that may move because of us: we gave them their position.
-        unrested: the axes that are not known to have come to rest under their last request.
-        grips: the contacts when rGTO was last set.
-        limits: the software limits that the gripper shows.
-    """
+    """The entries, the oldest first. Every axis has ``speed`` and ``force`` until they are set otherwise."""
 
     def __init__(self, speed: int, force: int, model: Model = THREE_FINGER, log: Log = log) -> None:
         first = Request(axes=(AxisRequest(0, speed, force),) * len(model.axes), model=model)
-        self.shown = Entry(0, first, first, first.echo, False, NEVER, NEVER, LONG_AGO)
-        self.match: Entry | None = None
+        self.shown = Entry(0, first, first, first.echo, False, NEVER, NEVER, LONG_AGO)  # newest that showed
+        self.match: Entry | None = None  # the one that the newest status shows
+        # When that was asked for. It may show the state of that time, however late a busy loop reads the
+        # reply; so the age of a write is measured by this.
         self.now = Moment(0.0, 0)
-        self.ours = NO_AXES
-        self.unrested = NO_AXES
+        self.ours = NO_AXES  # the axes that may move because of us: we gave them their position
+        self.unrested = NO_AXES  # those not known to have come to rest under their last request
         self.grips: Final = Grips()
         self.limits: Final = Limits(log)
         self._model: Final = model
-        # Those that a status may show.
-        self._entries = deque([self.shown])
-        # Those before them. No status shows them, but a late gDT may be from their time.
-        self._past: deque[Entry] = deque()
+        self._entries = deque([self.shown])  # those that a status may show
+        self._past: deque[Entry] = deque()  # those before them: a late gDT may be from their time
         # The entry that showed as a status was adopted. If it is ours, it may activate: after a reset our own
         # image is taken for another client's.
         self._mistaken: Entry | None = None
-        # Follows the entry of another client as long as that is the last.
-        self._adoption: Adoption | None = None
+        self._adoption: Adoption | None = None  # of another client's entry as long as that is the last
         # The masks and the flag spare a poll the questions whose answers are known. A write that changes the
         # request of an axis puts it into unrested and _unproven; a status at rest takes it out of the one,
         # and a status that cannot be from before the write out of the other.
-        # The axes that may still show a status from before their last request; all those unrested.
-        self._unproven = NO_AXES
-        # The axes that rested before an entry, as noted there, and that have not moved since.
-        self._may_start = NO_AXES
+        self._unproven = NO_AXES  # may still show a status from before their last request; all those unrested
+        self._rested: dict[Finger, Entry] = {}  # the last entry before which an axis rested, until it moves
         self._has_doubtful = False
 
     # -- questions -------------------------------------------------------------------------------------
@@ -105,7 +85,6 @@ class Ledger:
 
     @property
     def base(self) -> Request:
-        """The image that the next one is made from."""
         last = self.last
         return last.image if self._adoption is None else self._adoption.request(last.before.axes)
 
@@ -118,7 +97,6 @@ class Ledger:
 
     @property
     def is_certain(self) -> bool:
-        """Whether the base can be relied on."""
         is_known = self._adoption is None or self._adoption.is_certain
         return is_known and not self.has_lost_write
 
@@ -128,10 +106,8 @@ class Ledger:
         return Finger.ALL & ~self.unrested
 
     def acts(self, entry: Entry | None = None) -> bool:
-        """Whether the image of an entry, or of a later one, acts by now; None for the last one.
-
-        It does when its echo has shown, or a long enough time after its acknowledgement.
-        """
+        """Whether the image of an entry, or of a later one, acts by now; None for the last one."""
+        # It does when its echo has shown, or a long enough time after its acknowledgement.
         entry = self._entries[-1] if entry is None else entry
         if entry.number <= self.shown.number:
             return True
@@ -151,8 +127,8 @@ class Ledger:
     def may_activate(self, status: RobotiqStatus) -> bool:
         """Whether a write of ours with rACT begins to act only in a status, or a short time before it."""
         ours = (each for each in (*self._entries, self._mistaken) if each is not None and each.is_ours)
-        recent = (each for each in ours if self.now.time - each.time < WINDOW_S)
-        return any(each.image.activate and each.echo == status.echo for each in recent)
+        activating = (each for each in ours if each.image.activate and each.echo == status.echo)
+        return any(self.now.time - each.time < WINDOW_S for each in activating)
 
     @property
     def may_set_go(self) -> bool:
@@ -161,10 +137,8 @@ class Ledger:
 
     @property
     def may_begin_to_move(self) -> bool:
-        """Whether an image that does not act yet, or does not show in gDT yet, may start an axis.
-
-        While rGTO is clear a speed or a force does not: then all entries that wait have the same echo.
-        """
+        """Whether an image that does not act yet, or does not show in gDT yet, may start an axis."""
+        # While rGTO is clear a speed or a force does not: then all entries that wait have the same echo.
         if not self.acts():
             return self.base.go or len({each.echo for each in self._entries}) > 1
         return bool(self.unrested) and self.base.go and self._adoption is None
@@ -201,8 +175,7 @@ class Ledger:
 
     def write(self, image: Request, moved: Finger, now: float) -> Entry:
         """Add an image that is about to be sent, with new positions for ``moved``."""
-        before = self.base
-        self._freeze(before)
+        before = self._settled_base()
         entry = Entry(self._entries[-1].number + 1, image, before, image.echo, is_ours=True, sent=now)
         self.limits.written(entry, moved)
         self.grips.forget(moved)  # a new position may let go
@@ -219,58 +192,52 @@ class Ledger:
             entry.changes |= pressed & ~self.unrested
         entry.again = entry.changes & pressed if before.go or not image.go else entry.changes
         # With rGTO clear gDT has no meaning, so no axis was proven to rest under what was asked before.
-        if before.go:
-            entry.rested = entry.changes & ~self._unproven
-            self._may_start |= entry.rested
+        entry.rested = entry.changes & ~self._unproven if before.go else NO_AXES
+        if entry.rested:
+            self._rested |= dict.fromkeys(entry.rested, entry)
         self._unproven |= entry.changes
         if image.go:
             self.unrested |= entry.changes
 
     def acknowledge(self, now: float) -> None:
-        """The last image was acknowledged."""
         self._entries[-1].acknowledged = now
 
     def lost(self, now: float = NEVER) -> None:
         """The link is down: a write without acknowledgement may have arrived at any time until now."""
-        self._freeze(self.base)
+        self._settled_base()
         last = self._entries[-1]
         if last.is_in_flight:
             last.is_doubtful = self._has_doubtful = True
             last.sent = max(last.sent, now)
 
-    def _freeze(self, base: Request) -> None:
-        """End the adoption: the base is settled."""
+    def _settled_base(self) -> Request:
+        """The base, which no later status of an adopted gripper changes any more."""
+        base = self.base
         if self._adoption is not None:
             self.last.image, self._adoption = base, None
+        return base
 
     # -- what is read ----------------------------------------------------------------------------------
 
     def update(self, status: RobotiqStatus, asked: float) -> None:
-        """Take in a status. From then on the questions are about it."""
+        """Take in a status: from then on the questions are about it."""
         self.now = Moment(asked, self.now.reads + 1)
         entries, echo, shown = self._entries, status.echo, self.shown
         if len(entries) > 1:
             self._raise_floor()
-        # The common case first: nothing has changed since the last poll, and nothing waits to show.
-        if shown.echo == echo and (shown is entries[-1] or self._shows_still(shown)):
-            self.match = shown
-        else:
-            self.match = self._find(status)
+        # The common case first: nothing has changed since the last poll, and nothing waits to show. If others
+        # wait, an echo of the entry shown before is its own unless a limit makes it ambiguous.
+        may_show = shown is entries[-1] or (shown.number >= entries[0].number and not self.limits.has_alias)
+        self.match = shown if shown.echo == echo and may_show else self._find(status)
         if self._has_doubtful:
             self._forget_doubtful()
         # A moving axis of another client shows its direction with time, an axis at rest its true gDT.
         if self._adoption is not None and self.match is self.last:
             self._adoption.update(status, self.now)
 
-    def _shows_still(self, shown: Entry) -> bool:
-        """Whether an echo of the entry shown before is its own, although others wait."""
-        return shown.number >= self._entries[0].number and not self.limits.has_alias
-
     def _raise_floor(self) -> None:
-        """Take the entries that were replaced longer than WINDOW_S ago out of those that a status may show.
-
-        This comes before the status is looked at: after a silence it must not show an echo of long ago.
-        """
+        """Set apart the entries that were replaced longer than WINDOW_S ago."""
+        # This comes before the status is looked at: after a silence it must not show an echo of long ago.
         entries, floor = self._entries, 0
         for index in range(1, len(entries)):
             if not self._is_old(entries[index]):
@@ -299,19 +266,21 @@ class Ledger:
         """The entry that a status shows, perhaps with software limits in place of its requests."""
         found = self._entry_of(status.echo)
         # A write in doubt may not have arrived: then another client explains the echo better.
-        if found is not None or self._has_doubtful:
-            return found
-        if not self.limits.explains(self.shown, self._waiting(), status, self.now.time):
-            return None
-        # Even so it may have to wait: while the echo has not changed, the write may not act yet.
-        return self._entry_of(status.echo)
+        may_be_limit = found is None and not self._has_doubtful
+        if may_be_limit and self.limits.explains(self.shown, self._waiting(), status, self.now.time):
+            # Even so it may have to wait: while the echo has not changed, the write may not act yet.
+            return self._entry_of(status.echo)
+        return found
 
     def _entry_of(self, echo: Echo) -> Entry | None:
         """Of the entries that fit an echo the first after the one shown before."""
         # A control loop leaves a hundred entries in the window. Those that wait are few, and looked at first.
         for each in self._waiting():
             if each.echo == echo or self._shows_limit(each, echo):
-                self._show(each, echo)
+                if each.is_doubtful:
+                    self._revive(each)
+                self.shown = each
+                self.limits.settle(each, self._entries[-1], echo)
                 return each
         return next((each for each in self._entries if each.echo == echo), None)
 
@@ -325,26 +294,13 @@ class Ledger:
 
     def _waiting(self) -> list[Entry]:
         """The entries after the one that shows, the oldest first."""
-        waiting: list[Entry] = []
-        for each in reversed(self._entries):
-            if each.number <= self.shown.number:
-                break
-            waiting.append(each)
-        return waiting[::-1]
-
-    def _show(self, entry: Entry, echo: Echo) -> None:
-        """An entry shows for the first time."""
-        if entry.is_doubtful:
-            self._revive(entry)
-        self.shown = entry
-        self.limits.settle(entry, self._entries[-1], echo)
+        shown = self.shown.number
+        return [*takewhile(lambda each: each.number > shown, reversed(self._entries))][::-1]
 
     def _revive(self, entry: Entry) -> None:
-        """An entry in doubt acts after all, and so will those that were acknowledged after it.
-
-        Images act in their order [follows]. What these ask is compared with the image that showed until now.
-        """
-        self._freeze(self.base)
+        """An entry in doubt acts after all, and so will those that were acknowledged after it."""
+        # Images act in their order [follows]. They are compared with the image that showed until now.
+        self._settled_base()
         before = self.shown.image
         for each in self._entries:
             if each.number < entry.number or not each.is_doubtful:
@@ -360,24 +316,18 @@ class Ledger:
 
     def _forget_doubtful(self) -> None:
         """Forget the writes in doubt that did not show in time, but not before this status was compared."""
-        shown = self.shown.number
-        self._entries = deque(
-            each
-            for each in self._entries
-            if not each.is_doubtful or (each.number > shown and not self._is_old(each))
-        )
-        self._has_doubtful = any(each.is_doubtful for each in self._entries)
+        doubtful = [each for each in self._entries if each.is_doubtful]
+        kept = [each for each in doubtful if each.number > self.shown.number and not self._is_old(each)]
+        self._entries = deque(each for each in self._entries if not each.is_doubtful or each in kept)
+        self._has_doubtful = bool(kept)
 
     def adopt(self, status: RobotiqStatus, *, is_found: bool = False) -> None:
-        """Add an entry for the image that a status shows, as no other explains it; the next is made from it.
-
-        The entries that wait may still act after it. Nothing is written. With ``is_found`` the gripper was
-        found like this, and no axis moves because of us.
-        """
-        before = self.base
+        """Add an entry for the image that a status shows, as no other explains it."""
+        # Those that wait may still act after it. If the gripper was found like this, no axis moves because of
+        # us.
         # A client that keeps writing must not make us wait again each time.
         since = self.now if self._adoption is None else self._adoption.since
-        self._freeze(before)
+        before = self._settled_base()
         self._adoption = Adoption(status, self.now, since)
         image, time = self._adoption.request(before.axes), self.now.time
         other = Entry(self._entries[-1].number + 1, image, before, status.echo, False, time, time, self.now)
@@ -395,21 +345,17 @@ class Ledger:
         self._forget_past()
 
     def restart(self, status: RobotiqStatus) -> bool:
-        """A procedure has ended: the gripper has its last image, and no other write is on its way.
-
-        Returns:
-            Whether the status shows that image. If not, another client has written since. rATR has no
-            echo [manual 2014, p. 50], so an image with rATR counts as not shown by a gripper that follows
-            requests.
-        """
-        image, time = self.base, self._entries[-1].time
-        self._adoption = None
-        number = self._entries[-1].number + 1
+        """A procedure has ended: the gripper has its last image, and no other write is on its way."""
+        # Return whether the status shows that image; if not, another client has written since. rATR has no
+        # echo [manual 2014, p. 50]: of a gripper that follows requests an image with rATR counts as not
+        # shown.
+        image, number, time = self.base, self._entries[-1].number + 1, self._entries[-1].time
         self.shown = self.match = Entry(number, image, image, status.echo, True, time, time, LONG_AGO)
-        self._entries, self._has_doubtful = deque([self.shown]), False
+        self._entries, self._has_doubtful, self._adoption = deque([self.shown]), False, None
         self._past.clear()
         self._mistaken = None
-        self.unrested = self._unproven = self._may_start = NO_AXES
+        self._rested.clear()
+        self.unrested = self._unproven = NO_AXES
         self.ours = Finger.ALL
         return status.echo == image.echo and not image.release
 
@@ -428,7 +374,6 @@ class Ledger:
             self.grips.remember(status, contacts)
 
     def _note_acting(self) -> None:
-        """Note since when the newest entries act."""
         for each in chain(reversed(self._entries), reversed(self._past)):
             if each.acts_since is not None:
                 return
@@ -443,8 +388,10 @@ class Ledger:
                 continue
             what, position = status.finger_status(axis), status.position(axis)
             if what is ObjectStatus.IN_MOTION:
-                if axis & self._may_start:
-                    self._note_start(axis)
+                # An axis at rest moves only for a new request: every later status is from after it [follows].
+                if axis in self._rested:
+                    entry = self._rested.pop(axis)
+                    entry.started |= axis
                 continue
             rest = rest_of(self._targets(axis), self._model, what, position)
             if rest is not Rest.UNKNOWN and axis & self.unrested:
@@ -452,14 +399,6 @@ class Ledger:
                 self.limits.note_rest(axis, status)
             if rest is Rest.PROVEN:
                 self._unproven &= ~axis
-
-    def _note_start(self, axis: Finger) -> None:
-        """An axis at rest moves only for a new request: every later status is from after it [follows]."""
-        self._may_start &= ~axis
-        for each in chain(reversed(self._entries), reversed(self._past)):
-            if each.rested & axis:
-                each.started |= axis
-                return
 
 
 def _changed(before: Request, image: Request) -> Finger:

@@ -32,28 +32,21 @@ ALONE_S: Final = 10.0
 """If another client was seen within this time, it explains the echo better than a limit."""
 NEAR_PINCH: Final = 160
 """From this scissor position on the fingers may be limited: 137 is basic mode, 219 is pinch mode."""
-FIRST_POSITION: Final = 2
-"""Index of the first position in an echo."""
+_FIRST: Final = 2  # index of the first position in an echo
 
 
 class Limits:
-    """The limits that have been echoed in place of requests.
-
-    Attributes:
-        limited: the limit that the gripper shows in place of the last request, by axis.
-    """
+    """The limits that have been echoed in place of requests."""
 
     def __init__(self, log: Log = log) -> None:
-        self.limited: dict[Finger, int] = {}
+        self.limited: dict[Finger, int] = {}  # by axis the one that shows in place of the last request
         self._log: Final = log
-        # The limit by axis and whether it limits closing.
+        # By axis, and whether it limits closing.
         self._known: dict[tuple[Finger, bool], int] = {}
         self._proven: set[tuple[Finger, bool]] = set()
         # The echo of an entry under the known limits, until it shows.
         self._aliases: dict[Entry, Echo] = {}
         self._others_at = -math.inf
-
-    # -- what the ledger asks --------------------------------------------------------------------------
 
     @property
     def has_alias(self) -> bool:
@@ -61,7 +54,6 @@ class Limits:
         return bool(self._aliases)
 
     def written(self, entry: Entry, moved: Finger) -> None:
-        """An entry is about to be sent, with new positions for some axes."""
         if self.limited:
             self.limited = {axis: at for axis, at in self.limited.items() if axis not in moved}
         self._note_alias(entry)
@@ -111,8 +103,6 @@ class Limits:
         self._others_at = now
         self._known = {key: limit for key, limit in self._known.items() if key in self._proven}
 
-    # -- the limits ------------------------------------------------------------------------------------
-
     def _note_alias(self, entry: Entry) -> None:
         limits = self.apply(entry.image)
         if limits:
@@ -127,15 +117,13 @@ class Limits:
         }
 
     def learn(self, before: Request, image: Request, status: RobotiqStatus) -> bool:
-        """Learn the differences between a write and a status as limits; return whether they can be limits.
-
-        ``before`` is the image in force before the write; the status is the first that shows neither.
-        """
+        """Learn the differences between a write and a status as limits; return whether they can be limits."""
+        # ``before`` is the image in force before the write; the status is the first that shows neither.
         echo = status.echo
-        if echo[:FIRST_POSITION] != image.echo[:FIRST_POSITION] or not image.go:
+        if echo[:_FIRST] != image.echo[:_FIRST] or not image.go:
             return False
         found: dict[tuple[Finger, bool], int] = {}
-        for axis, shown in zip(image.model.axes, echo[FIRST_POSITION:], strict=True):
+        for axis, shown in zip(image.model.axes, echo[_FIRST:], strict=True):
             request = image.position(axis)
             if shown == request:
                 continue
@@ -152,8 +140,7 @@ def _may_be_limit(axis: Finger, request: int, shown: int, status: RobotiqStatus)
     position = status.position(axis)
     closing = request > shown
     is_on_the_way = shown >= position - TOLERANCE if closing else shown <= position + TOLERANCE
-    if axis is Finger.SCISSOR:
+    if axis is Finger.SCISSOR or not is_on_the_way:
         return is_on_the_way
-    if Finger.SCISSOR not in status.model.all_axes:
-        return False
-    return is_on_the_way and closing and status.position(Finger.SCISSOR) >= NEAR_PINCH
+    has_scissor = Finger.SCISSOR in status.model.all_axes
+    return has_scissor and closing and status.position(Finger.SCISSOR) >= NEAR_PINCH
