@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import reduce
-from operator import or_
 from typing import Final
 
 from ..runtime.log import Log, log
@@ -21,22 +19,13 @@ MARGIN_S: Final = 2.0
 
 
 class Move:
-    """One awaited move.
-
-    Args:
-        position: target in counts.
-        axes: which axes move.
-        now: monotonic seconds of the call.
-        waiter: gets the result, or the error.
-    """
+    """One awaited move to a position in counts."""
 
     def __init__(self, position: int, axes: Finger, now: float, waiter: Waiter[MoveResult]) -> None:
         self.position = position
         self.axes = axes
-        self.left = axes
-        """Those of its axes that may still follow it, although it may have failed."""
+        self.left = axes  # those that may still follow it, although it may have failed
         self.entry: Entry | None = None
-        """Its write; None before that."""
         self._started = now
         self._waiter = waiter
         self._peak = dict.fromkeys(axes, 0)
@@ -44,22 +33,18 @@ class Move:
     def default_timeout(
         self, status: RobotiqStatus, speeds: Mapping[Finger, int], closing_time: Callable[[int], float]
     ) -> float:
-        """Seconds it may take: twice the expected time of its slowest axis plus 2 s.
-
-        ``closing_time`` gives the seconds of a full stroke at a speed. No time is published for the scissor:
-        it counts as a finger.
-        """
+        """Seconds it may take: twice the expected time of its slowest axis plus 2 s."""
+        # ``closing_time`` gives the seconds of a full stroke at a speed. No time is published for the
+        # scissor: it counts as a finger.
         full = status.model.stroke.counts
         strokes = {axis: abs(self.position - status.position(axis)) / full for axis in self._peak}
         # The times are those of one gripper without load [thesis, table A1.1]: twice leaves room.
         return 2 * max(stroke * closing_time(speeds[axis]) for axis, stroke in strokes.items()) + MARGIN_S
 
     def written(self, entry: Entry) -> None:
-        """It is about to be sent."""
         self.entry = entry
 
     def note_currents(self, status: RobotiqStatus) -> None:
-        """Take in the currents of a status read after the write."""
         for axis, peak in self._peak.items():
             self._peak[axis] = max(peak, status.current_ma(axis) or 0)
 
@@ -71,15 +56,22 @@ class Move:
         )
 
     def has_arrived(self, status: RobotiqStatus, resting: Finger, limited: Mapping[Finger, int]) -> bool:
-        """Whether a status shows the move ended, and its object status is not from before the write.
-
-        ``resting`` has the axes that are known to rest under their last request.
-        """
+        """Whether a status shows the move ended; ``resting`` are the axes known to rest."""
         # An axis may be known to rest by its position, and move by its gDT, which is then from before.
         return self.axes in resting and not status.moving & self.axes and self.is_under(status, limited)
 
     def end(self, status: RobotiqStatus) -> MoveResult:
-        result, self.left = self._result(status), NO_AXES
+        reached = (axis for axis in self._peak if status.has_reached(axis, self.position))
+        result = MoveResult(
+            outcomes={axis: status.finger_status(axis) for axis in self._peak},
+            positions={axis: status.position(axis) for axis in self._peak},
+            contacts=status.contacts & self.axes,
+            reached=Finger(sum(reached)),
+            duration=status.timestamp - self._started,
+            peak_current_ma={axis: peak if status.has_current else None for axis, peak in self._peak.items()},
+            status=status,
+        )
+        self.left = NO_AXES
         if not self._waiter.done():
             self._waiter.set_result(result)
         return result
@@ -88,18 +80,6 @@ class Move:
         """It has failed; only its axes in ``left`` still follow it. The first error counts."""
         self.left &= left
         fail([self._waiter], error)
-
-    def _result(self, status: RobotiqStatus) -> MoveResult:
-        reached = (axis for axis in self._peak if status.has_reached(axis, self.position))
-        return MoveResult(
-            outcomes={axis: status.finger_status(axis) for axis in self._peak},
-            positions={axis: status.position(axis) for axis in self._peak},
-            contacts=status.contacts & self.axes,
-            reached=reduce(or_, reached, NO_AXES),
-            duration=status.timestamp - self._started,
-            peak_current_ma={axis: peak if status.has_current else None for axis, peak in self._peak.items()},
-            status=status,
-        )
 
 
 class LiveMoves:
@@ -119,7 +99,6 @@ class LiveMoves:
         return bool(self._moves or self._failed)
 
     def add(self, move: Move) -> None:
-        """Add a move that goes out with the next write."""
         self._moves.append(move)
 
     def remove(self, move: Move) -> bool:
@@ -131,13 +110,11 @@ class LiveMoves:
         return is_live
 
     def written(self, entry: Entry) -> None:
-        """The moves added since the last write go out with this one."""
         for move in self._moves:
             if move.entry is None:
                 move.written(entry)
 
     def end_arrived(self, status: RobotiqStatus, ledger: Ledger) -> None:
-        """End the moves that a status shows to have arrived."""
         for move in self._moves[:]:
             if move.entry is None:
                 continue
@@ -147,10 +124,8 @@ class LiveMoves:
                 self._warn_of_unreached(move, move.end(status), ledger.limits.limited)
 
     def _warn_of_unreached(self, move: Move, result: MoveResult, limited: Mapping[Finger, int]) -> None:
-        """Warn once if a gripper shows "at position" and stands far from where it was asked to go.
-
-        Not of the scissor: its range ends within 15..232 (drivers), and programs ask it for 0 and 255.
-        """
+        """Warn once if a gripper shows "at position" and stands far from where it was asked to go."""
+        # Not of the scissor: its range ends within 15..232 (drivers), and programs ask it for 0 and 255.
         for axis, how in result.outcomes.items():
             is_there = axis in result.reached or axis in limited or axis is Finger.SCISSOR
             if self._has_warned or is_there or how is not ObjectStatus.AT_POSITION:
@@ -170,11 +145,7 @@ class LiveMoves:
         self.fail(error, lambda move: bool(move.axes & axes), left=~axes)
 
     def fail(
-        self,
-        error: RobotiqError,
-        which: Callable[[Move], bool] = lambda _: True,
-        *,
-        left: Finger = NO_AXES,
+        self, error: RobotiqError, which: Callable[[Move], bool] = lambda _: True, *, left: Finger = NO_AXES
     ) -> None:
         """Fail the moves for which ``which`` is true. Only axes in ``left`` still follow a failed move."""
         failed = [*self._failed, *(move for move in self._moves if which(move))]
