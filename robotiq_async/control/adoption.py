@@ -14,8 +14,7 @@ from typing import Final
 from ..values.enums import CLOSED, OPEN, Finger, ObjectStatus
 from ..values.request import AxisRequest, Request
 from ..values.status import RobotiqStatus
-from .contact import agrees
-from .rest import Moment
+from .rest import Moment, agrees
 
 DIRECTION_WAIT_S: Final = 0.1
 """Time in which a moving axis shows its direction: at the slowest speed a count takes 43 ms
@@ -23,44 +22,33 @@ DIRECTION_WAIT_S: Final = 0.1
 
 
 class Adoption:
-    """Follows an adopted gripper until the hand writes its own first image.
-
-    Args:
-        first: the first status after the adoption, asked for at ``now``.
-        since: when the time begins that a moving axis has to show its direction, and a late object status to
-            come.
-    """
+    """Follows an adopted gripper until the hand writes its own first image."""
 
     def __init__(self, first: RobotiqStatus, now: Moment, since: Moment) -> None:
+        # From then on a moving axis has time to show its direction, and a late object status to come.
         self.since: Final = since
         self._first: Final = first
         self._latest, self._now = first, now
 
     def update(self, status: RobotiqStatus, now: Moment) -> None:
-        """Take in the next status, and when it was asked for."""
         self._latest, self._now = status, now
 
     @property
     def is_certain(self) -> bool:
-        """Whether the request made from the status can be relied on.
-
-        A moving axis must have shown its direction, or have had the time to. An axis at rest must agree with
-        its echo; if it does not, its gDT may be from before that request, and gets time to come.
-        """
+        """Whether the request made from the status can be relied on."""
+        status, moving = self._latest, self._latest.moving
+        # A moving axis must have shown its direction, or have had the time to.
         has_time = self._now.time - self.since.time < DIRECTION_WAIT_S
-        if has_time and not all(self._direction(axis) for axis in self._latest.moving):
+        if has_time and not all(self._direction(axis) for axis in moving):
             return False
-        return self.since.is_lag_over(self._now) or not self._is_late
-
-    @property
-    def _is_late(self) -> bool:
-        """Whether an axis at rest contradicts its echo. Under simple control some always do."""
-        status = self._latest
-        # Speed has no echo, so a slow start cannot be told from a contradiction but by its time [vendor].
-        return status.go_echo and not all(
-            self._agrees(axis, status.requested_position(axis))
-            for axis in status.model.axes
-            if axis not in status.moving
+        # An axis at rest must agree with its echo; if it does not, its gDT may be from before that request,
+        # and gets time to come. Under simple control some never agree. Speed has no echo, so a slow start
+        # cannot be told from a contradiction but by its time [vendor].
+        at_rest = (axis for axis in status.model.axes if axis not in moving)
+        return (
+            self.since.is_lag_over(self._now)
+            or not status.go_echo
+            or all(self._agrees(axis, status.requested_position(axis)) for axis in at_rest)
         )
 
     def request(self, settings: Sequence[AxisRequest]) -> Request:
@@ -78,13 +66,15 @@ class Adoption:
         )
 
     def _position(self, axis: Finger) -> int:
-        status = self._latest
-        position = status.position(axis)
+        """The echo that agrees with what an axis shows, if one does."""
+        status, position = self._latest, self._latest.position(axis)
         if not status.go_echo:
             return position  # it stands [manual 2014, p. 50], and the next rGTO = 1 must not move it
-        requested = self._requested(axis)
-        if requested is not None:
-            return requested
+        # Under simple control the fingers B and C follow the registers of A [manual 2014, pp. 45, 47].
+        for register in (axis, Finger.A) if axis in Finger.B | Finger.C else (axis,):
+            requested = status.requested_position(register)
+            if self._agrees(axis, requested):
+                return requested
         # No echo explains the contact: press on in its direction, so that the grip is not given up.
         match status.finger_status(axis):
             case ObjectStatus.CONTACT_CLOSING:
@@ -92,15 +82,6 @@ class Adoption:
             case ObjectStatus.CONTACT_OPENING:
                 return OPEN
         return position
-
-    def _requested(self, axis: Finger) -> int | None:
-        """The echo that agrees with what an axis shows, if one does."""
-        status = self._latest
-        candidates = [status.requested_position(axis)]
-        # Under simple control the fingers B and C follow the registers of A [manual 2014, pp. 45, 47].
-        if axis in Finger.B | Finger.C:
-            candidates.append(status.requested_position(Finger.A))
-        return next((each for each in candidates if self._agrees(axis, each)), None)
 
     def _agrees(self, axis: Finger, request: int) -> bool:
         status = self._latest

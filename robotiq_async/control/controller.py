@@ -1,11 +1,8 @@
 """Decides what to write: takes in statuses and requests, and gives the image that is due.
 
-No I/O, no clock and no event loop. The task that owns the link calls:
-
-* :meth:`Controller.see` with each status that it has read;
-* :meth:`Controller.due` to learn whether there is something to write; :meth:`Controller.decide` for the
-  image, in the turn in which the link writes; and :meth:`Controller.acknowledged`;
-* :meth:`Controller.lost` if the link goes down at any point.
+No I/O, no clock and no event loop. The task that owns the link calls see() with each status that it has read;
+due() to learn whether there is something to write; decide() for the image, in the turn in which the link
+writes, and acknowledged(); and lost() if the link goes down at any point.
 """
 
 from __future__ import annotations
@@ -27,59 +24,31 @@ from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .entry import Entry
 from .evidence import FOLLOWS, Evidence, classify, is_activating
-from .gate import gate
+from .gate import gate, merged
 from .ledger import NEVER, Ledger
 from .motion import Move
-from .open_requests import OpenRequests
-from .pending import Command, Pending, merged
+from .pending import Command, OpenRequests, Pending
 from .procedures import Begun, Procedure
-from .state_machine import RUNNING, StateMachine
+from .state_machine import RUNNING, SEEN, StateMachine
 from .stops import Keeping, Stop
-from .waiters import Waiter, resolve
+from .waiters import Waiter, fail, resolve
 
 WARNING_S: Final = 1.0
 """Seconds between two warnings about another client."""
 _OFF: Final = frozenset({State.DO_SHUTDOWN, State.SHUTDOWN})
 _CALLS: Final = frozenset({Trigger.ASK_COMMAND, Trigger.ASK_HOLD, Trigger.ASK_HALT})
-_STATES: Final = {
-    Trigger.SEEN_BUSY: State.WF_ACTIVATION,
-    Trigger.SEEN_RESET: State.RESET,
-    Trigger.SEEN_FAULT: State.FAULT,
-    Trigger.SEEN_RELEASED: State.ATR_DONE,
-}
 
 
 class Due(NamedTuple):
-    """The next write: when it may leave, and whether it is urgent.
+    """The next write."""
 
-    Attributes:
-        wait: seconds until it may leave, because of write_spacing.
-        is_urgent: whether it is a stop, which does not wait for a status that may never come.
-        is_command: whether it is a command or a hold, and no step of something longer.
-    """
-
-    wait: float
-    is_urgent: bool
-    is_command: bool
+    wait: float  # seconds until it may leave, because of write_spacing
+    is_urgent: bool  # a stop, which does not wait for a status that may never come
+    is_command: bool  # a command or a hold, and no step of something longer
 
 
 class Controller:
-    """State, requests and moves of one hand.
-
-    Args:
-        machine: the state of the hand, in DISCONNECTED.
-        speed: what every axis gets until set otherwise, 0..255.
-        force: what every axis gets until set otherwise, 0..255.
-        closing_time: gives the seconds of a full closing at a speed; default timeouts of moves come from it.
-        write_spacing: seconds from sending a write to the next one: a gripper may acknowledge one that comes
-            sooner and forget it. A stop does not wait; it is repeated.
-        model: of the gripper.
-
-    Attributes:
-        status: the newest status; None before the first.
-        activates: whether a gripper that is found reset is activated.
-        foreign_commands: how often another client was seen to command the gripper.
-    """
+    """State, requests and moves of one hand. Every axis has ``speed`` and ``force`` until set otherwise."""
 
     def __init__(
         self,
@@ -91,26 +60,26 @@ class Controller:
         model: Model = THREE_FINGER,
     ) -> None:
         self.machine: Final = machine
-        self.status: RobotiqStatus | None = None
-        self.activates = False
-        self.foreign_commands = 0
+        self.status: RobotiqStatus | None = None  # the newest
+        self.activates = False  # a gripper that is found reset
+        self.foreign_commands = 0  # how often another client was seen to command the gripper
         self._ledger: Final = Ledger(speed, force, model, machine.log)
-        self._closing_time: Final = closing_time
+        self._closing_time: Final = closing_time  # seconds of a full closing at a speed
+        # Seconds from sending a write to the next one: a gripper may acknowledge one that comes sooner and
+        # forget it. A stop does not wait; it is repeated.
         self._spacing: Final = write_spacing
         self._evidence: Final = Evidence(machine.log)
         self._requests: Final = OpenRequests(machine.log)
         self._stop: Stop | None = None
         self._procedure: Procedure | None = None
         self._activation: Begun | None = None  # stopping the hand takes it back
-        # Why a hand that is being stopped must not leave rGTO set.
-        self._why_no_grip = ""
+        self._why_no_grip = ""  # why a hand that is being stopped must not leave rGTO set
         self._written_at = self._warned = NEVER  # when the last image was given to be written, and a warning
 
     # -- what is asked ---------------------------------------------------------------------------------
     # Each call raises the error by which the state machine refuses it. A refusal changes nothing.
 
     def command(self, command: Command, waiter: Waiter[None] | None = None) -> None:
-        """Add a command to the next write."""
         self.machine.ask(Trigger.ASK_COMMAND, self.status)
         self._requests.command(command, waiter)
         self._update_state(Trigger.ASK_COMMAND)
@@ -125,10 +94,8 @@ class Controller:
         return move.default_timeout(self.status, speeds, self._closing_time)
 
     def abandon(self, move: Move, *, unseen: bool = False) -> None:
-        """The caller of a move has left: if it has given up, hold those of its axes that still move.
-
-        ``unseen`` if it was cancelled: then it does not see, either, that the move has failed already.
-        """
+        """The caller of a move has left: if it has given up, hold those of its axes that still move."""
+        # ``unseen`` if it was cancelled: then it does not see, either, that the move has failed already.
         is_live, pending = self._requests.moves.remove(move), self._requests.pending
         if is_live or unseen:
             self._requests.hold(move.left, "a move took over and was given up")
@@ -157,7 +124,6 @@ class Controller:
         self._update_state(Trigger.ASK_HALT)
 
     def activate(self) -> None:
-        """Begin an activation, unless the gripper is active or activating."""
         if self.machine.ask(Trigger.ASK_ACTIVATE, self.status):
             self._begin(Trigger.ASK_ACTIVATE)
 
@@ -199,15 +165,12 @@ class Controller:
             self.machine.show(State.SHUTDOWN, Trigger.STOPPED)
 
     def keep_no_grip(self) -> None:
-        """Make the stop that has begun clear rGTO after all."""
         if isinstance(self._stop, Keeping):
             self._stop = Stop(StopLevel.SHUTDOWN)
 
     def stop_fingers(self, level: StopLevel = StopLevel.SHUTDOWN) -> None:
-        """Begin to stop the fingers, if any may move, by KEEP or SHUTDOWN.
-
-        An activation that this hand began is taken back with rACT = 0: clearing rGTO would not stop it.
-        """
+        """Begin to stop the fingers, if any may move, by KEEP or SHUTDOWN."""
+        # An activation that this hand began is taken back with rACT = 0: clearing rGTO would not stop it.
         self._procedure, status = None, self._evidence.status
         if self._activation is not None:
             self._stop = Stop(StopLevel.RESET)
@@ -220,7 +183,6 @@ class Controller:
     # -- what follows from that ------------------------------------------------------------------------
 
     def _begin(self, trigger: Trigger) -> None:
-        """Begin an activation or a release."""
         releases = trigger is Trigger.ASK_RELEASE
         self._procedure, self._stop = Procedure(self._ledger, releases=releases), None
         self._update_state(trigger)
@@ -235,14 +197,13 @@ class Controller:
         """Fail everything asked so far, halts too. A write may be on the line all the same."""
         self._requests.fail(error)
         if self._stop is not None:
-            self._stop.fail(error)
+            fail(self._stop.callers, error)
             self._stop = None
 
     # -- what is known ---------------------------------------------------------------------------------
 
     @property
     def passing_faults(self) -> int:
-        """The number of times that 0x09 has passed."""
         return self._evidence.passing.passed
 
     @property
@@ -265,7 +226,6 @@ class Controller:
 
     @property
     def has_request(self) -> bool:
-        """Whether there may be a request to write."""
         return self._stop is not None or self._procedure is not None or not self._requests.pending.is_empty
 
     @property
@@ -285,7 +245,7 @@ class Controller:
         if self._procedure is not None:
             return self._procedure.state
         if self._evidence.condition is not Trigger.SEEN_READY:
-            return _STATES[self._evidence.condition]
+            return SEEN[self._evidence.condition]
         halts = stop is not None and not stop.is_delivered
         return State.RUNNING_CC if halts or self._requests.has_caller else State.RUNNING_IDLE
 
@@ -298,10 +258,8 @@ class Controller:
     # -- what a status shows ---------------------------------------------------------------------------
 
     def see(self, status: RobotiqStatus, asked: float | None = None) -> None:
-        """Take in a status that was read after every acknowledgement so far.
-
-        ``asked`` is when it was asked for, in monotonic seconds; None for the time of the reply.
-        """
+        """Take in a status that was read after every acknowledgement so far."""
+        # ``asked`` is when it was asked for, in monotonic seconds; None for the time of the reply.
         asked = status.timestamp if asked is None else asked
         ledger, stop, before = self._ledger, self._stop, self._evidence.condition
         self.status = status
@@ -316,9 +274,13 @@ class Controller:
                 return  # what shows during a stop is its business, and so is what shows in a procedure
         if condition is None or self.is_busy:
             return
-        is_news = condition is not before or ledger.match is None
-        if is_news and not self._note_news(before, condition, status):
-            return
+        if condition is not before or ledger.match is None:
+            if self.machine.state in _OFF:
+                return
+            self._note_news(before, condition, status)
+            if before is None and condition is Trigger.SEEN_RESET and self.activates:
+                self._begin(Trigger.ACTIVATES)
+                return
         if condition is Trigger.SEEN_READY:
             ledger.update_rest(status)
             if self._requests.moves:
@@ -328,20 +290,35 @@ class Controller:
         if condition is Trigger.SEEN_BUSY:
             self._follow_activation(status)
 
-    def _note_news(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> bool:
-        """Take in a new condition, or an image that no entry explains; return whether it is to be shown."""
-        if self.machine.state in _OFF:
-            return False
-        if condition is not before:
-            self._follow_change(before, condition, status)
-        elif condition in FOLLOWS:
-            self._adopt_other_client(status)
-        if self._ledger.match is None and condition not in FOLLOWS:
-            self._ledger.adopt(status)  # after a reset or a power cycle no image from before acts [follows]
-        if before is None and condition is Trigger.SEEN_RESET and self.activates:
-            self._begin(Trigger.ACTIVATES)
-            return False
-        return True
+    def _note_news(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
+        """A new condition, or an image that no entry explains: whose image acts, what ends, what is held."""
+        ledger = self._ledger
+        if before is None:
+            self._resume_or_adopt(condition, status)
+        elif before not in FOLLOWS and condition in FOLLOWS:
+            # Others have reset and activated it, even if its image is equal to one of ours [follows].
+            ledger.adopt(status, is_found=True)
+        elif ledger.match is None and condition in FOLLOWS:
+            self._adopt_other_client(status)  # before a fault's hold, which would undo what it wrote
+        if before in FOLLOWS and condition not in (before, Trigger.SEEN_READY):
+            self._end_requests(condition, status)
+        if condition is not before and condition not in FOLLOWS:
+            self._requests.pending.hold_only(NO_AXES)
+        if ledger.match is None:
+            ledger.adopt(status)  # after a reset or a power cycle no image from before acts [follows]
+
+    def _end_requests(self, condition: Trigger, status: RobotiqStatus) -> None:
+        """The gripper has a fault, or does not follow requests any more."""
+        if condition is Trigger.SEEN_RELEASED:
+            self._fail_all(GripperFaultError(status.fault))
+        elif condition is not Trigger.SEEN_FAULT:
+            self._fail_all(NotActivatedError("the gripper lost its activation"))
+        else:
+            self._requests.fail_motions(GripperFaultError(status.fault))
+            if status.activation_echo:
+                # A command sent just before may not act yet, and its motion would begin when the fault clears
+                # [manual 2012, 4.7: if it is minor]. Which axes need it is decided when it is written.
+                self._requests.hold(self._ledger.ours, "the fingers are held")
 
     def _advance_stop(self, stop: Stop, status: RobotiqStatus) -> None:
         stop.fail_overdue(self._ledger, status, self.machine.log)
@@ -377,35 +354,8 @@ class Controller:
             self._take_back("the gripper was reset as it was commanded: its activation is taken back")
 
     def _take_back(self, why: str) -> None:
-        """End an activation that nobody has asked for."""
         self.machine.log.warning("%s", why)
         self._begin_reset(Trigger.ASK_RESET, NotActivatedError(why))
-
-    def _follow_change(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
-        """The condition is another than before: what ends with that, whose image acts, what is held."""
-        ledger, requests = self._ledger, self._requests
-        if before is None:
-            self._resume_or_adopt(condition, status)
-        elif before in FOLLOWS and condition is Trigger.SEEN_FAULT:
-            if ledger.match is None:
-                self._adopt_other_client(status)  # first, or the hold would undo what it wrote
-            requests.fail_motions(GripperFaultError(status.fault))
-            if status.activation_echo:
-                # A command sent just before may not act yet, and its motion would begin when the fault
-                # clears [manual 2012, 4.7: if it is minor]. Which axes need the hold is decided when it
-                # is written.
-                requests.hold(ledger.ours, "the fingers are held")
-        elif before in FOLLOWS and condition is Trigger.SEEN_RELEASED:
-            self._fail_all(GripperFaultError(status.fault))
-        elif before in FOLLOWS and condition is not Trigger.SEEN_READY:
-            self._fail_all(NotActivatedError("the gripper lost its activation"))
-        elif condition in FOLLOWS and before not in FOLLOWS:
-            # Others have reset and activated it, even if its image is equal to one of ours [follows].
-            ledger.adopt(status, is_found=True)
-        elif ledger.match is None and condition in FOLLOWS:
-            self._adopt_other_client(status)
-        if condition not in FOLLOWS:
-            requests.pending.hold_only(NO_AXES)
 
     def _resume_or_adopt(self, condition: Trigger, status: RobotiqStatus) -> None:
         """The link is back: continue from our image if the gripper shows one, or adopt it."""
@@ -443,7 +393,6 @@ class Controller:
     # -- what is written -------------------------------------------------------------------------------
 
     def due(self, now: float) -> Due | None:
-        """The next write, if there is one to make."""
         if not self.has_request:
             return None
         stop, status = self._stop, self._evidence.status
@@ -459,10 +408,8 @@ class Controller:
     def decide(self, now: float) -> Request | None:
         """Return the image to write now, or None. It counts as sent from here on."""
         status, stop = self._evidence.status, self._stop
-        if status is None or not self.has_request:
+        if status is None or not self.has_request or self._wait(now):
             return None  # most cycles end here
-        if self._wait(now):
-            return None
         if stop is not None:
             return self._next_stop(stop, status, now)
         if self._procedure is not None:
@@ -473,8 +420,6 @@ class Controller:
         ledger = self._ledger
         if stop.entry is not None:
             image = stop.again(ledger, status)
-        elif stop.level is StopLevel.HALT and self._evidence.condition not in FOLLOWS:
-            image = None
         else:
             is_ready = self._evidence.condition is Trigger.SEEN_READY
             if stop.level is StopLevel.SHUTDOWN and ledger.match is None and is_ready:
@@ -493,11 +438,11 @@ class Controller:
         return entry.image
 
     def _next_step(self, procedure: Procedure, status: RobotiqStatus, now: float) -> Request | None:
-        """Advance the procedure; return the image that it wants written."""
         has_written = procedure.entry is not None
-        if procedure.entry is not None and not self._ledger.acts(procedure.entry):
-            return None
-        if not has_written and not procedure.releases and self._evidence.passing.may_pass:
+        if procedure.entry is not None:
+            if not self._ledger.acts(procedure.entry):
+                return None
+        elif not procedure.releases and self._evidence.passing.may_pass:
             return None  # if the fault lasts, no activation is begun
         try:
             image = procedure.steps.send(status)
@@ -528,13 +473,9 @@ class Controller:
         # After a halt a motion waits until the halt acts: only then is it known where the fingers stopped.
         if pending.positions and not base.go and status.go_echo and not ledger.acts():
             return None
-        image = merged(
-            base,
-            pending,
-            status,
-            gripping=ledger.grips.held(status, base) if pending.positions else NO_AXES,
-            may_move=ledger.may_move(status) if pending.hold else NO_AXES,
-        )
+        gripping = ledger.grips.held(status, base) if pending.positions else NO_AXES
+        may_move = ledger.may_move(status) if pending.hold else NO_AXES
+        image = merged(base, pending, status, gripping=gripping, may_move=may_move)
         if not pending.has_changes and gate(image, status) == base:
             # No axis moves. If an earlier write does not act yet, one may begin to: ask again then.
             if ledger.acts():
@@ -554,7 +495,6 @@ class Controller:
         return entry
 
     def acknowledged(self, now: float) -> None:
-        """The image that decide() returned was acknowledged."""
         self._ledger.acknowledge(now)
         self._requests.acknowledged()
         self._update_state(Trigger.DELIVERED)
@@ -565,7 +505,7 @@ class Controller:
         error = ConnectionLostError(f"the link went down before this was done: {why}")
         error.__cause__ = why
         if self._stop is not None:
-            self._stop.fail(error)
+            fail(self._stop.callers, error)
             # A halt and a reset are not sent again: once the link is back, what we move is held instead.
             if self._stop.level in (StopLevel.HALT, StopLevel.RESET):
                 self._requests.pending.merge_hold(Finger.ALL)

@@ -1,4 +1,4 @@
-"""The gate through which every image leaves: the one place that decides about rACT and rATR.
+"""The images that are written, and the gate through which they leave: it alone decides about rACT and rATR.
 
 A rising rACT moves all fingers to their stops, and rATR releases the part [manual 2012, 4.6]. An image is
 made from an older one, so either could be carried along by accident: by a command after another client's
@@ -10,8 +10,57 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..values.request import Request
+from ..values.enums import NO_AXES, Finger
+from ..values.request import AxisRequest, Request
 from ..values.status import RobotiqStatus
+from .pending import Pending
+from .rest import drifts
+
+
+def merged(
+    base: Request,
+    pending: Pending,
+    status: RobotiqStatus,
+    *,
+    gripping: Finger = NO_AXES,
+    may_move: Finger = NO_AXES,
+) -> Request:
+    """Merge pending changes into ``base``. Axes that they do not address keep their requests."""
+    # ``gripping`` has the axes that were in contact when rGTO was last set, ``may_move`` those that show rest
+    # and may move all the same.
+    if pending.positions and not base.go:
+        # rGTO starts every axis [manual 2012, 4.6]: ask each for where it is. An axis that gripped keeps its
+        # request, or it would lose its grip.
+        base = base.with_positions(
+            {axis: status.position(axis) for axis in status.model.axes if axis not in gripping}
+        )
+    # With rGTO set, an axis that is not addressed keeps its position request, and with it its motion or grip:
+    # so speed and force alone start nothing.
+    held = {
+        axis: status.position(axis)
+        for axis in status.model.axes
+        if axis in pending.hold and drifts(axis, base, status, may_move)
+    }
+    positions = held | pending.positions
+    return replace(
+        base,
+        go=base.go or bool(pending.positions),
+        axes=tuple(
+            AxisRequest(
+                positions.get(axis, old.position),
+                pending.speeds.get(axis, old.speed),
+                pending.forces.get(axis, old.force),
+            )
+            for axis, old in base.by_axis
+        ),
+    )
+
+
+def at_rest(base: Request, status: RobotiqStatus) -> Request:
+    """Clear rGTO and ask every axis to be where it is, so that no axis starts."""
+    # The positions count at the next rGTO = 1, of whichever client.
+    here = {axis: status.position(axis) for axis in status.model.axes}
+    return replace(base, go=False).with_positions(here)
 
 
 def gate(

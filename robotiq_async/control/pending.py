@@ -1,4 +1,4 @@
-"""Requests of callers that are not written yet, and the images that they make of the last one.
+"""Requests of callers: those for the next write, the write in flight, and moves.
 
 All requests between two polls are merged into one write; the last value wins. A position, a speed or a force
 is written once and never again: it may move an axis. A hold remains until it is acknowledged, also over a
@@ -7,16 +7,15 @@ lost link, because it can only stop one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from functools import reduce
-from operator import or_
+from dataclasses import dataclass, field
+from typing import Final
 
+from ..runtime.log import Log, log
 from ..values.enums import NO_AXES, Finger
-from ..values.errors import RobotiqError
-from ..values.request import AxisRequest, Request
-from ..values.status import RobotiqStatus
-from .contact import drifts
-from .waiters import Waiter, fail
+from ..values.errors import ConnectionLostError, MoveSupersededError, RobotiqError
+from .entry import Entry
+from .motion import LiveMoves
+from .waiters import Waiter, fail, resolve
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,24 +30,18 @@ class Command:
 
 @dataclass(slots=True)
 class Pending:
-    """The changes for the next write, and the callers that wait for it.
-
-    Attributes:
-        positions: new position request by axis.
-        speeds: new speed by axis.
-        forces: new force by axis.
-        hold: axes to hold if they move. A position of the same axis goes before it, but does not end it: if
-            the link goes down before the write, the hold remains and the position does not.
-        callers: those of commands, which wait for the acknowledgement, each with the axes that it moves.
-        holders: those of hold(), with their axes. These are held whichever client moves them.
-    """
+    """The changes for the next write, by axis, and the callers that wait for its acknowledgement."""
 
     positions: dict[Finger, int] = field(default_factory=dict)
     speeds: dict[Finger, int] = field(default_factory=dict)
     forces: dict[Finger, int] = field(default_factory=dict)
+    # Axes to hold if they move. A position of the same axis goes before it, but does not end it: if the link
+    # goes down before the write, the hold remains and the position does not.
     hold: Finger = NO_AXES
-    callers: list[tuple[Finger, Waiter[None]]] = field(default_factory=list)
-    holders: list[tuple[Finger, Waiter[None]]] = field(default_factory=list)
+    # Those of commands with the axes that each moves, and those of hold() with the axes that each has named:
+    # these are held whichever client moves them.
+    callers: dict[Waiter[None], Finger] = field(default_factory=dict)
+    holders: dict[Waiter[None], Finger] = field(default_factory=dict)
 
     @property
     def is_empty(self) -> bool:
@@ -67,17 +60,11 @@ class Pending:
 
     @property
     def moved(self) -> Finger:
-        """The axes that get a new position."""
-        return reduce(or_, self.positions, NO_AXES)
-
-    @property
-    def named_to_hold(self) -> Finger:
-        """The axes named by callers of hold()."""
-        return reduce(or_, (axes for axes, _ in self.holders), NO_AXES)
+        return Finger(sum(self.positions))
 
     @property
     def waiters(self) -> list[Waiter[None]]:
-        return [waiter for _, waiter in (*self.callers, *self.holders)]
+        return [*self.callers, *self.holders]
 
     def merge(self, new: Command, waiter: Waiter[None] | None = None) -> None:
         # The last value wins, per axis and field; an axis keeps what a command does not name.
@@ -86,89 +73,107 @@ class Pending:
             if value is not None:
                 changes.update(dict.fromkeys(new.axes, value))
         if waiter is not None:
-            self.callers.append((NO_AXES if new.position is None else new.axes, waiter))
+            self.callers[waiter] = NO_AXES if new.position is None else new.axes
 
     def merge_hold(self, axes: Finger, waiter: Waiter[None] | None = None) -> None:
         self.hold |= axes
         if waiter is not None:
-            self.holders.append((axes, waiter))
+            self.holders[waiter] = axes
 
     def hold_only(self, axes: Finger) -> None:
         """Hold none but these axes, and those that callers of hold() have named."""
-        self.hold &= axes | self.named_to_hold
+        for named in self.holders.values():
+            axes |= named
+        self.hold &= axes
 
     def drop_positions(self, axes: Finger, superseded: RobotiqError) -> None:
         """Drop the positions of some axes. Their callers get the error ``superseded``."""
         for axis in axes:
             self.positions.pop(axis, None)
-        fail((waiter for mask, waiter in self.callers if mask & axes), superseded)
-        self.callers = [each for each in self.callers if not each[0] & axes]
+        fail([waiter for waiter, moved in self.callers.items() if moved & axes], superseded)
+        self.callers = {waiter: moved for waiter, moved in self.callers.items() if not moved & axes}
 
     def drop_changes(self, error: RobotiqError) -> None:
         """Drop everything that may move an axis, and holds of our own making."""
-        fail((waiter for _, waiter in self.callers), error)
+        fail(self.callers, error)
         for each in (self.positions, self.speeds, self.forces, self.callers):
             each.clear()
         self.hold_only(NO_AXES)
 
     def drop(self, error: RobotiqError) -> None:
-        """Drop everything."""
         self.drop_changes(error)
-        fail((waiter for _, waiter in self.holders), error)
-        self.hold = NO_AXES
-        self.holders.clear()
+        fail(self.take_holds().holders, error)
 
     def take_holds(self) -> Pending:
         """Take the holds alone: a halt covers them, and goes before the rest."""
-        taken = Pending(hold=self.hold, holders=[*self.holders])
+        taken = Pending(hold=self.hold, holders={**self.holders})
         self.hold = NO_AXES
         self.holders.clear()
         return taken
 
 
-def merged(
-    base: Request,
-    pending: Pending,
-    status: RobotiqStatus,
-    *,
-    gripping: Finger = NO_AXES,
-    may_move: Finger = NO_AXES,
-) -> Request:
-    """Merge pending changes into ``base``. Axes that they do not address keep their requests.
+class OpenRequests:
+    """Commands, holds and moves. Halts belong to their stop."""
 
-    ``gripping`` has the axes that were in contact when rGTO was last set, ``may_move`` those that show rest
-    and may move all the same.
-    """
-    if pending.positions and not base.go:
-        # rGTO starts every axis [manual 2012, 4.6]: ask each for where it is. An axis that gripped keeps its
-        # request, or it would lose its grip.
-        base = base.with_positions(
-            {axis: status.position(axis) for axis in status.model.axes if axis not in gripping}
-        )
-    # With rGTO set, an axis that is not addressed keeps its position request, and with it its motion or grip:
-    # so speed and force alone start nothing.
-    held = {
-        axis: status.position(axis)
-        for axis in status.model.axes
-        if axis in pending.hold and drifts(axis, base, status, may_move)
-    }
-    positions = held | pending.positions
-    return replace(
-        base,
-        go=base.go or bool(pending.positions),
-        axes=tuple(
-            AxisRequest(
-                positions.get(axis, old.position),
-                pending.speeds.get(axis, old.speed),
-                pending.forces.get(axis, old.force),
-            )
-            for axis, old in base.by_axis
-        ),
-    )
+    def __init__(self, log: Log = log) -> None:
+        self.pending = Pending()  # what is to be written
+        self.moves: Final = LiveMoves(log)
+        self._sent = Pending()  # the write in flight
 
+    @property
+    def has_caller(self) -> bool:
+        """Whether a caller waits for an acknowledgement, or for a write."""
+        return self.pending.has_caller or self._sent.has_caller
 
-def at_rest(base: Request, status: RobotiqStatus) -> Request:
-    """Clear rGTO and ask every axis to be where it is, so that no axis starts."""
-    # The positions count at the next rGTO = 1, of whichever client.
-    here = {axis: status.position(axis) for axis in status.model.axes}
-    return replace(base, go=False).with_positions(here)
+    @property
+    def has_undelivered_hold(self) -> bool:
+        return bool(self.pending.hold or self._sent.hold)
+
+    def command(self, command: Command, waiter: Waiter[None] | None = None) -> None:
+        if command.position is not None and self.moves:  # few loops at 200 Hz have a move to end
+            self.moves.take_over(command.axes, MoveSupersededError(f"another command moves {command.axes}"))
+        self.pending.merge(command, waiter)
+
+    def hold(self, axes: Finger, why: str, waiter: Waiter[None] | None = None) -> None:
+        """Hold those axes that move. It supersedes what moves them."""
+        self.supersede(axes, MoveSupersededError(why))
+        self.pending.merge_hold(axes, waiter)
+
+    def supersede(self, axes: Finger, error: MoveSupersededError) -> None:
+        """Fail what moves these axes, and is not sent."""
+        self.moves.take_over(axes, error)
+        self.pending.drop_positions(axes, error)
+
+    # -- what becomes of it ----------------------------------------------------------------------------
+
+    def taken(self) -> Pending:
+        taken, self.pending = self.pending, Pending()
+        return taken
+
+    def sending(self, sent: Pending, entry: Entry) -> None:
+        self._sent = sent
+        if sent.positions:
+            self.moves.written(entry)
+
+    def acknowledged(self) -> None:
+        sent, self._sent = self._sent, Pending()
+        resolve(sent.waiters)
+
+    def fail_motions(self, error: RobotiqError) -> None:
+        """Fail everything that would move an axis, sent or not; holds that callers have named remain."""
+        self.pending.drop_changes(error)
+        fail(self._sent.callers, error)
+        self.moves.fail(error, left=Finger.ALL if isinstance(error, ConnectionLostError) else NO_AXES)
+
+    def fail(self, error: RobotiqError) -> None:
+        """Fail everything asked so far. A write may be on the line all the same."""
+        self.fail_motions(error)
+        self.pending.drop(error)
+        fail(self._sent.holders, error)
+
+    def lost(self, error: RobotiqError) -> None:
+        """The link is down: fail everything. Holds stop motion: their axes remain, for when it is back."""
+        # A hold of our own making has no caller to get the error.
+        hold = self.pending.hold | self._sent.hold
+        self.fail(error)
+        self.pending, self._sent = Pending(hold=hold), Pending()

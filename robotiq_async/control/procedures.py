@@ -19,31 +19,24 @@ from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .entry import Entry
 from .evidence import classify
+from .gate import at_rest
 from .ledger import WINDOW_S, Ledger
-from .pending import at_rest
 
 STRAY_COUNTS: Final = 10
 """An axis that moves further in an activation is driven by it. One that a stop catches at full speed goes on
 for less: 10 counts take 0.09 s [thesis]."""
 
 Steps = Generator[Request | None, RobotiqStatus, None]
-Image = Callable[[RobotiqStatus], Request]
-"""Makes the image to begin from, given the newest status."""
+Image = Callable[[RobotiqStatus], Request]  # makes the image to begin from, given the newest status
 
 
 class Procedure:
-    """An activation or an automatic release, from its request to its end.
-
-    Attributes:
-        releases: whether it is an automatic release.
-        steps: what it does.
-        entry: its write; None before that.
-    """
+    """An activation or an automatic release, from its request to its end."""
 
     def __init__(self, ledger: Ledger, *, releases: bool) -> None:
-        steps = automatic_release if releases else activation
+        begin = automatic_release if releases else activation
         self.releases: Final = releases
-        self.steps: Final = steps(lambda status: at_rest(ledger.base, status))
+        self.steps: Final = begin(lambda status: at_rest(ledger.base, status))
         self.entry: Entry | None = None
         next(self.steps)  # to its first yield: what the gripper shows decides whether it begins
 
@@ -53,7 +46,6 @@ class Procedure:
 
     @property
     def state(self) -> State:
-        """DO_ until the write is acknowledged, then WF_."""
         if self.entry is None or self.entry.acknowledged is None:
             return State.DO_ATR if self.releases else State.DO_ACTIVATION
         return State.WF_ATR if self.releases else State.WF_ACTIVATION
@@ -64,15 +56,11 @@ class Begun:
 
     A write begins one that nobody has asked for if another client resets the gripper just before it: then
     its rACT rises [follows]. An emergency stop shows the same [seen], and moves nothing.
-
-    Args:
-        entry: the write.
-        first: the first status of one that nobody has asked for; None if somebody has.
     """
 
     def __init__(self, entry: Entry, first: RobotiqStatus | None = None) -> None:
         self._entry: Final = entry
-        self._first: Final = first
+        self._first: Final = first  # status of one that nobody has asked for
 
     def is_over(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether a status shows its end. What shows may be from before it."""
@@ -81,21 +69,13 @@ class Begun:
 
     def is_stray(self, status: RobotiqStatus) -> bool:
         """Whether nobody has asked for it, and it moves an axis."""
-        first = self._first
-        return first is not None and any(
-            abs(status.position(axis) - first.position(axis)) > STRAY_COUNTS for axis in status.model.axes
-        )
+        first = self._first or status
+        moved = (abs(status.position(axis) - first.position(axis)) for axis in status.model.axes)
+        return max(moved) > STRAY_COUNTS
 
 
 def activation(image: Image) -> Steps:
-    """Raise rACT and wait for gIMC = 3. The fingers open and close to their stops.
-
-    Does nothing if the gripper is no longer reset.
-
-    Raises:
-        GripperFaultError: the activation ended in a major fault.
-        NotActivatedError: the gripper was reset after the activation had begun, or does not show it.
-    """
+    """Raise rACT and wait for gIMC = 3. The fingers open and close to their stops."""
     status = yield None
     # Only a rising rACT activates [manual 2012, 4.6]: there is none unless the gripper is reset.
     if classify(status) is not Trigger.SEEN_RESET:
@@ -116,15 +96,9 @@ def activation(image: Image) -> Steps:
 
 
 def automatic_release(image: Image) -> Steps:
-    """Raise rATR and wait for fault 0x0F. All axes open slowly; afterwards the gripper needs a reset.
-
-    Does nothing if the gripper was reset: the image has rACT set and would activate it.
-
-    Raises:
-        NotActivatedError: the gripper was reset during it, and may have been activated again since; or
-            it does not show the release.
-    """
+    """Raise rATR and wait for fault 0x0F. All axes open slowly; afterwards the gripper needs a reset."""
     status = yield None
+    # The image has rACT set, and would activate a gripper that was reset.
     if not status.activation_echo:
         return
     asked, begun = status.timestamp, False

@@ -12,15 +12,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from enum import Enum
-from functools import reduce
-from operator import or_
 from typing import Final, NamedTuple
 
 from ..values.enums import NO_AXES, Finger, ObjectStatus
 from ..values.model import TOLERANCE, Model
 from ..values.request import Request
 from ..values.status import RobotiqStatus
-from .contact import agrees
 
 LAG_S: Final = 0.25
 """Time in which gDT may show the state before a request, from the first status that echoes the request. The
@@ -29,6 +26,35 @@ move_gripper.cpp); 0.05 s are added for a poll and a slow host. Nothing was meas
 LAG_READS: Final = 10
 """The reads that the lag lasts at least: the same source counts exchanges, and a slow poll makes few of
 them."""
+
+
+def agrees(model: Model, request: int, what: ObjectStatus, position: int, direction: int) -> bool:
+    """Whether what an axis shows at a position can result from a request; positions are in counts."""
+    # ``direction`` is above 0 closing, below 0 opening, 0 unknown; it is used only while the axis moves.
+    # gDT says that an axis has stopped before its request, and in which direction it was going [manual 2014,
+    # p. 51; 2018, p. 39]. One at its request may be off by the model's tolerance [manual: up to 2 counts].
+    match what:
+        case ObjectStatus.CONTACT_CLOSING:
+            return request > position
+        case ObjectStatus.CONTACT_OPENING:
+            return request < position
+        case ObjectStatus.IN_MOTION:
+            return request != position and (direction == 0 or (request > position) == (direction > 0))
+    return model.has_reached(request, position)
+
+
+def drifts(axis: Finger, base: Request, status: RobotiqStatus, may_move: Finger = NO_AXES) -> bool:
+    """Whether an axis moves or is about to, so that a hold must ask for its present position."""
+    # An axis in contact keeps its request, and with it its grip; so does one at rest where it was asked to
+    # be. An axis may still show what the request before this one made it do: then the two disagree.
+    # ``may_move`` has the axes that show rest, and may move because of an earlier request.
+    if not base.go:
+        return False  # rGTO = 0 stops every axis [manual 2014, p. 50]
+    # A needless hold would cost an axis in contact its grip: it would be asked for where it is.
+    if axis in may_move:
+        return base.position(axis) != status.position(axis)
+    what, position, request = status.finger_status(axis), status.position(axis), base.position(axis)
+    return what is ObjectStatus.IN_MOTION or not agrees(status.model, request, what, position, direction=0)
 
 
 class Moment(NamedTuple):
@@ -46,20 +72,13 @@ LONG_AGO: Final = Moment(-math.inf, -LAG_READS)
 
 
 class Target(NamedTuple):
-    """One request of an axis.
+    """One request of an axis."""
 
-    Attributes:
-        position: in counts; None while rGTO is clear, where gDT has no meaning [manual 2014, p. 51].
-        again: whether it makes an axis in contact try again: it sets rGTO or raises the force.
-        since: the first status that showed that it acts; None before that.
-    """
-
-    position: int | None
-    again: bool = False
-    since: Moment | None = LONG_AGO
+    position: int | None  # None while rGTO is clear, where gDT has no meaning [manual 2014, p. 51]
+    again: bool = False  # it makes an axis in contact try again: it sets rGTO or raises the force
+    since: Moment | None = LONG_AGO  # the first status that showed that it acts; None before that
 
     def fits(self, model: Model, what: ObjectStatus, position: int) -> bool:
-        """Whether an axis can rest like this under it."""
         return self.position is None or agrees(model, self.position, what, position, direction=0)
 
 
@@ -74,10 +93,7 @@ class Rest(Enum):
 
 
 def rest_of(targets: Iterator[Target], model: Model, what: ObjectStatus, position: int) -> Rest:
-    """Whether an axis rests under the last of its requests. Its position is never late.
-
-    ``targets`` has the requests that the status may show, the newest first.
-    """
+    """Whether an axis rests under the last of its requests, given the newest first. No position is late."""
     # Only the newest requests are looked at where they decide: this runs at every poll of a motion, and a
     # control loop leaves fifty requests in the lag.
     last = next(targets, None)
@@ -95,30 +111,24 @@ def rest_of(targets: Iterator[Target], model: Model, what: ObjectStatus, positio
 
 
 def may_move(targets: Iterable[Target], model: Model, what: ObjectStatus, position: int) -> bool:
-    """Whether an axis may move, or be about to, although it shows rest.
-
-    A contact is doubted only if a request within the lag contradicts it: a needless doubt would cost the
-    grip. An axis close to the request before the last may have some counts to go [conceivable].
-    ``targets`` as above.
-    """
+    """Whether an axis may move, or be about to, although it shows rest."""
+    # A contact is doubted only if a request within the lag contradicts it: a needless doubt would cost the
+    # grip. An axis close to the request before the last may have some counts to go [conceivable].
     last, *before = [*targets] or [Target(None)]
     if not before or what is ObjectStatus.IN_MOTION:
         return False
     if what is ObjectStatus.AT_POSITION:
-        others = [each for each in before if each.position != last.position]
-        return not last.fits(model, what, position) or any(
-            each.fits(model, what, position) for each in others
-        )
+        others = (each for each in before if each.position != last.position)
+        fits_other = any(each.fits(model, what, position) for each in others)
+        return fits_other or not last.fits(model, what, position)
     return not _is_true_since((last, *before), model, what, position, unless_again=False)
 
 
 def _is_true_since(
     targets: tuple[Target, ...], model: Model, what: ObjectStatus, position: int, *, unless_again: bool
 ) -> bool:
-    """Whether this fits the last request, and every request since the first that it fits.
-
-    It was true under that one. If no later request contradicts it, it is still true.
-    """
+    """Whether this fits the last request, and every request since the first that it fits."""
+    # It was true under that one. If no later request contradicts it, it is still true.
     fits = False
     for each in reversed(targets):
         was_fitting, fits = fits, each.fits(model, what, position)
@@ -142,7 +152,6 @@ class Grips:
         return bool(self._contacts)
 
     def remember(self, status: RobotiqStatus, contacts: Finger) -> None:
-        """Remember the axes that are in contact in a status that shows rGTO set."""
         self._contacts = {axis: (status.finger_status(axis), status.position(axis)) for axis in contacts}
 
     def forget(self, axes: Finger = Finger.ALL) -> None:
@@ -157,4 +166,4 @@ class Grips:
             if abs(status.position(axis) - at) <= TOLERANCE
             and agrees(status.model, base.position(axis), what, at, direction=0)
         )
-        return reduce(or_, held, NO_AXES)
+        return Finger(sum(held))

@@ -1,9 +1,8 @@
 """Stops: a halt, a reset, and what ends a hand. Each is a level; a new one replaces the one before.
 
-A stop differs from all else that is written. It is written before the read of its cycle: a gripper may obey
-and not answer. It may be written again, because it only ends motion: a gripper may acknowledge a write that
-comes soon after another one and forget it [manual 2014, pp. 58, 75: space them by 10 ms]. It is reached when
-its write acts and a status shows it: what shows may be from before the write.
+It is written before the read of its cycle: a gripper may obey and not answer. It may be written again, as it
+only ends motion: a gripper may acknowledge a write that comes soon after another one and forget it
+[manual 2014, pp. 58, 75: space them by 10 ms].
 """
 
 # Level     First write           Written again                    Over when
@@ -21,18 +20,20 @@ its write acts and a status shows it: what shows may be from before the write.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final, NamedTuple
 
 from ..runtime.log import Log
 from ..values.enums import Fault, Finger, StopLevel, Trigger
-from ..values.errors import RobotiqError, StateTimeoutError
+from ..values.errors import StateTimeoutError
 from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .entry import Entry
-from .evidence import classify, is_activating
+from .evidence import FOLLOWS, classify, is_activating
+from .gate import at_rest, merged
 from .ledger import WINDOW_S, Ledger
-from .pending import Pending, at_rest, merged
+from .pending import Pending
 from .waiters import Waiter, fail, resolve
 
 KEEP_S: Final = 0.5
@@ -46,38 +47,24 @@ MOST_HALTS: Final = 2
 
 
 class Write(NamedTuple):
-    """One write of a stop.
-
-    Attributes:
-        entry: in the ledger.
-        is_early: whether it came within write_spacing of another: the gripper may have forgotten it, and it
-            is due again.
-        was_active: whether the gripper was active before it: an activation that runs already is not ours to
-            take back.
-    """
+    """One write of a stop."""
 
     entry: Entry
-    is_early: bool
-    was_active: bool
+    is_early: bool  # it came within write_spacing of another: the gripper may have forgotten it
+    was_active: bool  # the gripper was, before it: an activation that ran already is not ours to take back
 
 
 class Stop:
-    """One stop, from its request until it is reached.
-
-    Attributes:
-        level: its level. A new level is a new stop.
-        callers: of halt(), each with the stop that was begun for it: this one, or one that it has replaced.
-        writes: those that it has made.
-    """
+    """One stop, from its request until it is reached. A new level is a new stop."""
 
     def __init__(self, level: StopLevel, before: Stop | None = None) -> None:
         self.level: Final = level
-        self.callers: Final[list[tuple[Waiter[None], Stop]]] = [*before.callers] if before else []
+        # Those of halt(), each with the stop that was begun for it: this one, or one that it has replaced.
+        self.callers: Final[dict[Waiter[None], Stop]] = {**before.callers} if before else {}
         self.writes: Final[list[Write]] = []
 
     @property
     def entry(self) -> Entry | None:
-        """Its last write; None before that."""
         return self.writes[-1].entry if self.writes else None
 
     @property
@@ -91,14 +78,11 @@ class Stop:
         return sum(not each.is_early for each in self.writes)
 
     def written(self, entry: Entry, status: RobotiqStatus, *, is_early: bool) -> None:
-        """A write of it is about to be sent, made from this status."""
         self.writes.append(Write(entry, is_early, status.activation_echo and status.is_activated))
 
     def is_urgent(self, ledger: Ledger, status: RobotiqStatus) -> bool:
-        """Whether it is to be written before the next read."""
-        if self.entry is not None:
-            return False
-        return self.level is not StopLevel.SHUTDOWN or status.go_echo or not ledger.acts()
+        goes = self.level is not StopLevel.SHUTDOWN or status.go_echo or not ledger.acts()
+        return goes and not self.writes
 
     def image(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
         """The image to write first; None if there is nothing to stop."""
@@ -107,7 +91,7 @@ class Stop:
             case StopLevel.RESET:  # rACT = 0 clears faults and ends what runs [manual 2012, 4.6]
                 return replace(at_rest(base, status), activate=False)
             case StopLevel.HALT:  # positions and speeds stay as they were asked
-                return replace(base, go=False)
+                return replace(base, go=False) if classify(status) in FOLLOWS else None
         # A write of ours that does not act yet may set rGTO after this status: then it is not settled.
         is_settled = ledger.acts()
         if is_settled and not status.go_echo:
@@ -116,9 +100,7 @@ class Stop:
         return replace(base, activate=base.activate or is_settled, go=False)
 
     def again(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
-        """The image to write once more, if it is due again."""
-        if not self.writes:
-            return None
+        """The image of its last write, if that is due again."""
         entry, is_early, _ = self.writes[-1]
         if entry.acknowledged is None:
             return None
@@ -138,10 +120,8 @@ class Stop:
         return entry.image if is_due else None
 
     def is_reached(self, ledger: Ledger, status: RobotiqStatus) -> bool:
-        if not self.writes:
-            return False
-        entry, is_early, _ = self.writes[-1]
-        if entry.acknowledged is None or is_early:
+        entry = self.entry
+        if entry is None or entry.acknowledged is None or self.writes[-1].is_early:
             return False
         if self.level is StopLevel.HALT and not status.go_echo and not ledger.may_set_go:
             return True  # nothing that may act later sets rGTO, so it need not act
@@ -158,29 +138,24 @@ class Stop:
         return is_reset or status.echo == entry.echo
 
     def add(self, caller: Waiter[None]) -> None:
-        """Add a caller of halt()."""
-        self.callers.append((caller, self))
-
-    def fail(self, error: RobotiqError) -> None:
-        """Fail the callers that have no answer yet."""
-        fail((caller for caller, _ in self.callers), error)
+        self.callers[caller] = self
 
     def fail_overdue(self, ledger: Ledger, status: RobotiqStatus, log: Log) -> None:
         """Fail callers whose halt does not show, however often it has been replaced since."""
         since = ledger.now.time - MOST_HALTS * WINDOW_S
-        older = [(caller, stop) for caller, stop in self.callers if stop is not self and not caller.done()]
-        overdue = [caller for caller, stop in older if stop.writes[0].entry.time <= since]
+        older = ((caller, stop) for caller, stop in self.callers.items() if stop is not self)
+        late = (caller for caller, stop in older if stop.writes[0].entry.time <= since)
+        overdue = [caller for caller in late if not caller.done()]
         if overdue and status.go_echo:
             self._give_up(overdue, log)
 
     def answer(self, status: RobotiqStatus, log: Log) -> None:
         """Answer the callers: it is reached, or was sent as often as it may be."""
-        callers = [caller for caller, _ in self.callers]
         if self.level is StopLevel.HALT and status.go_echo:
-            self._give_up(callers, log)
-        resolve(callers)
+            self._give_up(self.callers, log)
+        resolve(self.callers)
 
-    def _give_up(self, callers: list[Waiter[None]], log: Log) -> None:
+    def _give_up(self, callers: Iterable[Waiter[None]], log: Log) -> None:
         error = StateTimeoutError(
             f"the gripper does not show that it has stopped after {MOST_HALTS} halts: the fingers may "
             "still move (another client commands it, or it forgets writes)"
@@ -189,15 +164,11 @@ class Stop:
         fail(callers, error)
 
     def has_activated(self, ledger: Ledger, status: RobotiqStatus) -> bool:
-        """Whether its rACT activates a gripper that another client has reset just before.
-
-        Two clients within one device cycle can do that [follows from Modbus].
-        """
-        if not self.is_delivered:
+        """Whether its rACT activates a gripper that another client has reset just before."""
+        # Two clients within one device cycle can do that [follows from Modbus].
+        if not self.is_delivered or not self.writes[-1].entry.image.activate:
             return False
         entry, _, was_active = self.writes[-1]
-        if not entry.image.activate:
-            return False
         if self.level is StopLevel.HALT:
             return classify(status) is Trigger.SEEN_RESET or is_activating(status)
         return was_active and ledger.acts(entry) and is_activating(status)
@@ -210,15 +181,11 @@ class Keeping(Stop):
     source. So rGTO stays set if every axis is seen at rest under a known request. Axes that move are held
     first, once, as after a cancelled move. In any doubt rGTO is cleared. docs/decisions/keeping-a-grip.md has
     the reasons.
-
-    Attributes:
-        why_no_grip: why rGTO must be cleared, from the beginning or as a status has shown since; empty for no
-            reason.
     """
 
     def __init__(self, status: RobotiqStatus, why_no_grip: str) -> None:
         super().__init__(StopLevel.KEEP)
-        self.why_no_grip = why_no_grip
+        self.why_no_grip = why_no_grip  # why rGTO must be cleared, as asked for or as a status has shown
         # Rest is timed by when a status was asked for, because a busy loop may read the reply late.
         self._until = status.timestamp + KEEP_S
         self._since = math.inf
@@ -251,7 +218,6 @@ class Keeping(Stop):
         return None if held == base else held
 
     def _trouble(self, ledger: Ledger, status: RobotiqStatus) -> str:
-        """The reason that the condition of the gripper gives against it; empty for none."""
         # Any fault, also a minor one: no hand would be there to see it clear.
         condition = classify(status)
         if condition is not Trigger.SEEN_READY or status.fault is not Fault.NONE:
@@ -259,7 +225,6 @@ class Keeping(Stop):
         return "another client commands the gripper" if ledger.match is None else ""
 
     def _unrest(self, ledger: Ledger, status: RobotiqStatus) -> str:
-        """The reason that the axes give against it; empty for none."""
         if status.timestamp - ledger.now.time > KEEP_S:
             return "the newest status is old: something holds up the event loop"
         # A late object status is worth a wait. A write that was lost with the link is not.

@@ -23,8 +23,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from ..control.contact import agrees
 from ..control.evidence import PassingFault
+from ..control.rest import agrees
 from ..values.checks import check_int, check_mask, repr_of
 from ..values.enums import Finger, ObjectStatus
 from ..values.grip import GripChange, GripEvent

@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.control.contact import agrees, drifts
-from robotiq_async.control.pending import Command, Pending, merged
+from robotiq_async.control.gate import merged
+from robotiq_async.control.pending import Command, Pending
+from robotiq_async.control.rest import agrees, drifts
 from robotiq_async.values.enums import NO_AXES, Finger, Mode, ObjectStatus
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
