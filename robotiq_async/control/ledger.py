@@ -175,7 +175,7 @@ class Ledger:
 
     def write(self, image: Request, moved: Finger, now: float) -> Entry:
         """Add an image that is about to be sent, with new positions for ``moved``."""
-        before = self._settled_base()
+        before = self._settle_base()
         entry = Entry(self._entries[-1].number + 1, image, before, image.echo, is_ours=True, sent=now)
         self.limits.written(entry, moved)
         self.grips.forget(moved)  # a new position may let go
@@ -192,9 +192,10 @@ class Ledger:
             entry.changes |= pressed & ~self.unrested
         entry.again = entry.changes & pressed if before.go or not image.go else entry.changes
         # With rGTO clear gDT has no meaning, so no axis was proven to rest under what was asked before.
-        entry.rested = entry.changes & ~self._unproven if before.go else NO_AXES
-        if entry.rested:
-            self._rested |= dict.fromkeys(entry.rested, entry)
+        if before.go:
+            entry.rested = entry.changes & ~self._unproven
+            if entry.rested:
+                self._rested |= dict.fromkeys(entry.rested, entry)
         self._unproven |= entry.changes
         if image.go:
             self.unrested |= entry.changes
@@ -204,14 +205,14 @@ class Ledger:
 
     def lost(self, now: float = NEVER) -> None:
         """The link is down: a write without acknowledgement may have arrived at any time until now."""
-        self._settled_base()
+        self._settle_base()
         last = self._entries[-1]
         if last.is_in_flight:
             last.is_doubtful = self._has_doubtful = True
             last.sent = max(last.sent, now)
 
-    def _settled_base(self) -> Request:
-        """The base, which no later status of an adopted gripper changes any more."""
+    def _settle_base(self) -> Request:
+        """End the adoption, so that no later status changes the base; return that."""
         base = self.base
         if self._adoption is not None:
             self.last.image, self._adoption = base, None
@@ -300,7 +301,7 @@ class Ledger:
     def _revive(self, entry: Entry) -> None:
         """An entry in doubt acts after all, and so will those that were acknowledged after it."""
         # Images act in their order [follows]. They are compared with the image that showed until now.
-        self._settled_base()
+        self._settle_base()
         before = self.shown.image
         for each in self._entries:
             if each.number < entry.number or not each.is_doubtful:
@@ -323,11 +324,10 @@ class Ledger:
 
     def adopt(self, status: RobotiqStatus, *, is_found: bool = False) -> None:
         """Add an entry for the image that a status shows, as no other explains it."""
-        # Those that wait may still act after it. If the gripper was found like this, no axis moves because of
-        # us.
+        # Those that wait may still act after it. If it was found like this, no axis moves because of us.
         # A client that keeps writing must not make us wait again each time.
         since = self.now if self._adoption is None else self._adoption.since
-        before = self._settled_base()
+        before = self._settle_base()
         self._adoption = Adoption(status, self.now, since)
         image, time = self._adoption.request(before.axes), self.now.time
         other = Entry(self._entries[-1].number + 1, image, before, status.echo, False, time, time, self.now)
@@ -347,8 +347,7 @@ class Ledger:
     def restart(self, status: RobotiqStatus) -> bool:
         """A procedure has ended: the gripper has its last image, and no other write is on its way."""
         # Return whether the status shows that image; if not, another client has written since. rATR has no
-        # echo [manual 2014, p. 50]: of a gripper that follows requests an image with rATR counts as not
-        # shown.
+        # echo [manual 2014, p. 50]: a gripper that follows requests counts as not showing it.
         image, number, time = self.base, self._entries[-1].number + 1, self._entries[-1].time
         self.shown = self.match = Entry(number, image, image, status.echo, True, time, time, LONG_AGO)
         self._entries, self._has_doubtful, self._adoption = deque([self.shown]), False, None
