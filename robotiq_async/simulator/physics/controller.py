@@ -58,10 +58,6 @@ if TYPE_CHECKING:
 ZEROS: Final = (0,) * reg.REGISTER_COUNT
 """The image of a gripper that was just switched on."""
 _AS_REGISTERS: Final = struct.Struct(">8H")
-_AXIS_BYTES: Final = tuple(
-    (echo.byte, position.byte, current.byte)
-    for echo, position, current in zip(reg.gPR, reg.gPO, reg.gCU, strict=True)
-)
 _MOVING, _SOME_STOPPED, _ALL_STOPPED, _ALL_ARRIVED = range(4)
 
 Statuses = tuple[ObjectStatus, ...]
@@ -133,6 +129,13 @@ class Controller:
             self.axes = self.driven = tuple(
                 self._driven(mechanism, axis, motor, scissor_limit) for axis, motor in named
             )
+        self._places = tuple(
+            (shown.byte, shown.shift, echo.byte, position.byte, current.byte)
+            for shown, echo, position, current in zip(
+                model.object_status, reg.gPR, reg.gPO, reg.gCU, strict=False
+            )
+        )
+        """Of each axis in a status: byte and shift of its gDT, bytes of its gPR, gPO and gCU."""
         self._nothing = (ObjectStatus.IN_MOTION,) * len(model.axes)
         """gDT without a meaning: zeros."""
         self._nowhere: control.Goals = (None,) * len(model.axes)
@@ -251,10 +254,10 @@ class Controller:
         if model.has_modes:
             content[0] |= request.mode << reg.gMOD.shift | _summary(statuses[:3]) << reg.gSTA.shift
         content[reg.gFLT.byte] = fault
-        for axis, status, shown, echo, (echo_byte, position_byte, current_byte) in zip(
-            self.axes, statuses, model.object_status, self.echoes, _AXIS_BYTES, strict=False
+        for axis, status, echo, (shown, shift, echo_byte, position_byte, current_byte) in zip(
+            self.axes, statuses, self.echoes, self._places, strict=True
         ):
-            content[shown.byte] |= status << shown.shift
+            content[shown] |= status << shift
             content[echo_byte] = echo
             content[position_byte] = round(axis.position(time))
             content[current_byte] = axis.current(time)
@@ -419,7 +422,7 @@ def _summary(fingers: Sequence[ObjectStatus]) -> int:
     """Return gSTA of the three fingers."""
     if ObjectStatus.IN_MOTION in fingers:
         return _MOVING
-    contacts = sum(status.is_contact for status in fingers)
-    if contacts == len(fingers):
-        return _ALL_STOPPED
-    return _SOME_STOPPED if contacts else _ALL_ARRIVED
+    arrived = fingers.count(ObjectStatus.AT_POSITION)
+    if arrived == len(fingers):
+        return _ALL_ARRIVED
+    return _SOME_STOPPED if arrived else _ALL_STOPPED
