@@ -175,8 +175,7 @@ class SimulatorEndpoint(ABC):
 
     def answer(self, frame: Frame) -> bytes:
         """Carry out a request; return the frame of the reply."""
-        served = set(self.functions) - self.fault_injector.refused_functions
-        return self._reply(frame, self._bank.answer(frame.pdu, served))
+        return self._reply(frame, self._bank.answer(frame.pdu, self.functions))
 
     def fail(self, error: PhysicsError) -> None:
         """Drop all clients for good: the gripper has no state any more that could be told."""

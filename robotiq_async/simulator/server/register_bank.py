@@ -55,7 +55,7 @@ class RegisterBank:
     def answer(self, pdu: bytes, functions: Collection[int]) -> bytes:
         """Carry out a request, all of it or nothing; return the reply, or the exception that refuses it."""
         try:
-            if pdu[0] not in functions:
+            if pdu[0] not in functions or pdu[0] in self._troubles.refused_functions:
                 raise _RefusedError(_ILLEGAL_FUNCTION)
             return pdu[:1] + self._carry_out(pdu[0], pdu[1:])
         except _RefusedError as refused:

@@ -5,9 +5,9 @@
 # A trouble is over as soon as it has begun (an event), or lasts in _ongoing until end(), or until its first
 # hit if it is for once. It acts in one of three ways:
 #
-#   on demand   the simulator calls hears(), lets_in(), deliver() and the properties; of several troubles
-#               about one request or reply the oldest decides. What needs no more than the reply is a function
-#               of corruption.py; what needs earlier ones keeps them here, in deliver()
+#   on demand   the simulator calls hears(), lets_in() and deliver(), and reads the attributes; of several
+#               troubles about one request or reply the oldest decides. What needs no more than the reply is
+#               a function of corruption.py; what needs earlier ones keeps them here, in deliver()
 #   on state    _do() changes the gripper or the server, and _undo() restores it. Troubles of one kind overlap
 #               in any order, so those that last are applied again
 #   on habits   the gripper's own habits are kept from the first such trouble on, and restored at its end
@@ -81,6 +81,14 @@ class FaultInjector:
     """Applies troubles to one simulator. Troubles may overlap.
 
     Of those that are about the same reply the oldest acts; with none of them, the simulator's policy.
+
+    Attributes:
+        is_multiplexed: whether clients share a connection to the gripper that outlives theirs.
+        refused_functions: Modbus functions that are refused although the link serves them.
+        reads_only_with_function_3: whether function 4 is refused and 3 reads the status.
+        echoes: whether the line echoes the bytes that are sent.
+        strict_silence: seconds after a reply in which no request is heard.
+        served_registers: the number of registers of each block that are served.
     """
 
     def __init__(self, target: Target) -> None:
@@ -92,6 +100,9 @@ class FaultInjector:
         """The gripper's own habits, without a trouble."""
         self._idle: asyncio.TimerHandle | None = None
         """The timer after which the gripper loses its activation, unless a request comes first."""
+        self._idle_after: float | None
+        """Its seconds, by the least patient trouble."""
+        self._decide()
 
     @property
     def ongoing(self) -> tuple[Ongoing, ...]:
@@ -123,6 +134,7 @@ class FaultInjector:
         self._do(trouble)
         if kind.corruption is not None or kind.lasts == math.inf:
             self._ongoing.append(ongoing)
+            self._decide()
             if trouble.kind == "idle-reset":
                 self._await_request()
         else:
@@ -187,38 +199,21 @@ class FaultInjector:
                 return
             await asyncio.sleep(began + trouble.every - loop.time())
 
-    # Called by the simulator.
-
-    @property
-    def is_multiplexed(self) -> bool:
-        """Whether clients share a connection to the gripper that outlives theirs."""
-        return bool(self._lasting("multiplexer"))
-
-    @property
-    def refused_functions(self) -> frozenset[int]:
-        """Modbus functions that are refused although the link serves them."""
+    def _decide(self) -> None:
+        """Work out what lasts; the simulator asks for it at each request."""
         refusing = {"function-3-only": READ_INPUT, "no-function-23": READ_WRITE}
-        return frozenset(refusing[trouble.kind] for trouble in self._lasting(*refusing))
+        silences = [trouble.amount for trouble in self._lasting("strict-silence")]
+        served = [int(trouble.amount) for trouble in self._lasting("registers")]
+        waits = [trouble.amount for trouble in self._lasting("idle-reset")]
+        self.is_multiplexed = bool(self._lasting("multiplexer"))
+        self.refused_functions = frozenset(refusing[trouble.kind] for trouble in self._lasting(*refusing))
+        self.reads_only_with_function_3 = bool(self._lasting("function-3-only"))
+        self.echoes = bool(self._lasting("echo"))
+        self.strict_silence = max(silences, default=0.0)
+        self.served_registers = min(served, default=REGISTER_COUNT)
+        self._idle_after = min(waits, default=None)
 
-    @property
-    def reads_only_with_function_3(self) -> bool:
-        """Whether function 4 is refused and 3 reads the status."""
-        return bool(self._lasting("function-3-only"))
-
-    @property
-    def echoes(self) -> bool:
-        """Whether the line echoes the bytes that are sent."""
-        return bool(self._lasting("echo"))
-
-    @property
-    def strict_silence(self) -> float:
-        """Seconds after a reply in which no request is heard."""
-        return max((trouble.amount for trouble in self._lasting("strict-silence")), default=0.0)
-
-    @property
-    def served_registers(self) -> int:
-        """The number of registers of each block that are served."""
-        return min((int(trouble.amount) for trouble in self._lasting("registers")), default=REGISTER_COUNT)
+    # Called by the simulator.
 
     def lets_in(self, present: int) -> bool:
         """Whether a new connection is let in, beside those that there are."""
@@ -239,9 +234,8 @@ class FaultInjector:
 
     def deliver(self, frame: bytes) -> Iterable[tuple[float, bytes]] | None:
         """The parts to send for a reply; None to hang up."""
-        reply = self._target.as_reply(frame)
         for ongoing in self._ongoing:
-            parts = ongoing.trouble.corrupt(reply)
+            parts = ongoing.trouble.corrupt(self._target.as_reply(frame))
             if parts is not None:
                 self._hit(ongoing)
                 return parts
@@ -255,6 +249,7 @@ class FaultInjector:
 
     def _forget(self, ongoing: Ongoing) -> None:
         self._ongoing.remove(ongoing)
+        self._decide()
         ongoing.over.set()
 
     # Effects that begin and end.
@@ -336,8 +331,9 @@ class FaultInjector:
         """Begin to wait for the next request, for as long as the least patient trouble allows."""
         if self._idle is not None:
             self._idle.cancel()
-        waits = [each.amount for each in self._lasting("idle-reset")]
-        self._idle = asyncio.get_running_loop().call_later(min(waits), self._reset) if waits else None
+            self._idle = None
+        if self._idle_after is not None:
+            self._idle = asyncio.get_running_loop().call_later(self._idle_after, self._reset)
 
     def _reset(self) -> None:
         """Take the activation from the gripper, which keeps its power."""
