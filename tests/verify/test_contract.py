@@ -39,7 +39,7 @@ EXCEPT: dict[str, dict[str, str]] = {
         "test_superseded_by_another_client_of_the_gripper": FORGOTTEN,
         "test_a_foreign_reset": FORGOTTEN,
     },
-    "slow-activation 35": {"test_a_cancelled_activation_goes_on": IMPATIENT},
+    "slow-activation 35": {"test_a_cancelled_activation_goes_on": IMPATIENT, "test_statistics": SLOWER},
     "delay": AT_200_HZ,
 }
 """Tests of the contract that a habit keeps from passing, whatever the hand does, and why."""
@@ -60,7 +60,8 @@ SHOWING: dict[str, set[str]] = {
         "test_the_newest_status",
         "test_while_the_link_is_down",
     },
-    # Those that fail with an activation_timeout of 25 s, and the one that waits for less itself.
+    # Those that fail with an activation_timeout of 25 s, the one that waits for less itself, and one that
+    # shows that the hand polls as slowly as it was told.
     "slow-activation 35": {
         "test_a_cancelled_activation_goes_on",
         "test_a_command_during_an_activation",
@@ -75,6 +76,7 @@ SHOWING: dict[str, set[str]] = {
         "test_an_emergency_release",
         "test_opening_releases_the_part_and_a_reset_loses_it",
         "test_release_reset_activate",
+        "test_statistics",
         "test_transitions_lose_nothing",
         "test_while_reset_nothing_moves",
     },
