@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -13,6 +14,7 @@ from robotiq_async.link.address import parse_address
 from robotiq_async.simulator import SimulatorServer, Trouble
 from robotiq_async.simulator.troubles.like_hardware import like_hardware, own_habits
 from robotiq_async.tools.verify import Plan, Report, Runner, Verdict
+from robotiq_async.tools.verify.bench import Lengths
 from robotiq_async.tools.verify.catalogue import HARMLESS, checks_of
 from robotiq_async.tools.verify.motions import REACHED, UNREACHED
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
@@ -102,7 +104,7 @@ class Cue(Roll):
 
 
 async def with_trouble(
-    server: SimulatorServer, helper: Helper, trouble: str, stage: int
+    server: SimulatorServer, helper: Helper, trouble: str, stage: int, lengths: Lengths = SHORT
 ) -> tuple[Report, Cue]:
     """A run of one stage in the middle of which something happens."""
     begun: list[asyncio.Future[object]] = []
@@ -118,7 +120,7 @@ async def with_trouble(
             begun.append(asyncio.ensure_future(server.fault_injector.begin(what)))
 
     cue = Cue(22, act)
-    plan = Plan(parse_address(server.address), first=stage, last=stage, lengths=SHORT)
+    plan = Plan(parse_address(server.address), first=stage, last=stage, lengths=lengths)
     runner = Runner(plan, helper, cue, lambda _: None)
     running = asyncio.ensure_future(runner.run())
     with contextlib.suppress(asyncio.CancelledError):
@@ -126,6 +128,18 @@ async def with_trouble(
     assert trouble in ("a key", "Ctrl-C") or begun, "the stage was over before it began"
     await asyncio.gather(*begun)
     return runner.report, cue
+
+
+async def test_a_read_that_fails_in_a_soak_is_counted_even_if_it_is_the_last() -> None:
+    found = 0
+    for milliseconds in range(80, 125, 5):
+        async with served(active=True) as server:
+            lengths = replace(SHORT, soak=milliseconds / 1000)
+            report, _ = await with_trouble(server, Helper(server), "drop", 9, lengths)
+        if report.checks["soak.reads"].figures["failed"]:
+            found += 1
+            assert report.why == "done", (milliseconds, report.words)
+    assert 0 < found < 9, "in some of them it is the last"
 
 
 @pytest.mark.parametrize(("trouble", "stage", "cell"), EVENTS)

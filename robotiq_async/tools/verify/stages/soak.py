@@ -71,6 +71,8 @@ def _repeats(bench: Bench) -> int:
 
 async def _command(bench: Bench) -> None:
     """Move finger A back and forth a little; at each rate the last command must be followed."""
+    if not bench.link.is_open:  # the last read failed
+        await bench.link.open()
     watch = bench.watch(len(RATES) * (bench.lengths.commands + 20))
     start = await watch.look()
     image = in_place(start, speed=SPEED)
