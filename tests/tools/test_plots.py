@@ -19,6 +19,7 @@ from robotiq_async.tools.measure.plots import (
     _right,
     _shown,
     plot_current_over_time,
+    plot_force,
     plot_peak_currents,
     plot_recording,
 )
@@ -42,6 +43,14 @@ def test_fingers_that_are_alike_are_one_curve_that_says_so(tmp_path: Path) -> No
     _, picture = plot_peak_currents(tmp_path / "peaks", currents, "foam", "simulated")
     names = [each for each in words(picture) if each.startswith("finger")]
     assert names == ["fingers A, C: the same", "finger B"]
+
+
+def test_the_forces_of_each_run_stand_beside_their_mean_and_the_figures_of_others(tmp_path: Path) -> None:
+    _, picture = plot_force(tmp_path / "it", {0: (900, 1100), 255: (5000, 6000)}, "foam", "mine")
+    names = [each for each in words(picture) if each.endswith((": runs", ": mean"))]
+    assert names[-2:] == ["mine: runs", "mine: mean"], "two runs have one name"
+    assert len(names) == 3, "and the mean of the thesis"
+    assert "Force of a grasp, foam" in words(picture)
 
 
 def test_currents_over_time_are_drawn_near_the_usual_force_values(tmp_path: Path) -> None:
