@@ -44,7 +44,7 @@ smoke: $(STAMP)  ## Try a bit of everything; the first thing to run after a chan
 test-core: $(STAMP)  ## Run the tests of the core: values, control, link, session, hand, simulator, sync (1 minute)
 	@$(BIN)/python -m pytest -rs --numprocesses auto --dist worksteal @tests/core.txt
 
-test: $(STAMP)  ## Run the tests (3 minutes); those that need a browser, ROS or other environments are test-web, test-ros2, test-lerobot, test-urcap, test-urdf and pages
+test: $(STAMP)  ## Run the tests (2.5 minutes); those that need a browser, ROS or other environments are test-web, test-ros2, test-lerobot, test-urcap, test-urdf and pages
 	@$(BIN)/python -m pytest -rs --numprocesses auto --dist worksteal
 
 test-web: $(STAMP)  ## Test the page in a real browser (Debian: chromium, chromium-driver); skipped where there is none
