@@ -48,7 +48,10 @@ class Due(NamedTuple):
 
 
 class Controller:
-    """State, requests and moves of one hand. Every axis has ``speed`` and ``force`` until set otherwise."""
+    """State, requests and moves of one hand.
+
+    Every axis has ``speed`` and ``force``, 0..255, until set otherwise; ``machine`` is in DISCONNECTED.
+    """
 
     def __init__(
         self,
@@ -60,8 +63,8 @@ class Controller:
         model: Model = THREE_FINGER,
     ) -> None:
         self.machine: Final = machine
-        self.status: RobotiqStatus | None = None  # the newest
-        self.activates = False  # a gripper that is found reset
+        self.status: RobotiqStatus | None = None  # the newest; None before the first
+        self.activates = False  # whether a gripper that is found reset is activated
         self.foreign_commands = 0  # how often another client was seen to command the gripper
         self._ledger: Final = Ledger(speed, force, model, machine.log)
         self._closing_time: Final = closing_time  # seconds of a full closing at a speed
@@ -124,6 +127,7 @@ class Controller:
         self._update_state(Trigger.ASK_HALT)
 
     def activate(self) -> None:
+        """Begin an activation, unless the gripper is active or activates already."""
         if self.machine.ask(Trigger.ASK_ACTIVATE, self.status):
             self._begin(Trigger.ASK_ACTIVATE)
 
@@ -165,6 +169,7 @@ class Controller:
             self.machine.show(State.SHUTDOWN, Trigger.STOPPED)
 
     def keep_no_grip(self) -> None:
+        """Make a stop that has begun to keep a grip clear rGTO after all."""
         if isinstance(self._stop, Keeping):
             self._stop = Stop(StopLevel.SHUTDOWN)
 
@@ -354,6 +359,7 @@ class Controller:
             self._take_back("the gripper was reset as it was commanded: its activation is taken back")
 
     def _take_back(self, why: str) -> None:
+        """End an activation that nobody has asked for."""
         self.machine.log.warning("%s", why)
         self._begin_reset(Trigger.ASK_RESET, NotActivatedError(why))
 

@@ -20,10 +20,10 @@ class Entry:
     before: Request  # the image that it replaces
     echo: Echo
     is_ours: bool
-    sent: float  # of a write that was lost with the link: the latest time at which it may have arrived
-    acknowledged: float | None = None
+    sent: float  # monotonic seconds; of a write lost with the link the latest at which it may have arrived
+    acknowledged: float | None = None  # when; None before that
     acts_since: Moment | None = None  # the first status that showed that it acts, as far as that was needed
-    is_doubtful: bool = False  # it may act or not
+    is_doubtful: bool = False  # whether it acts is not known
     # The axes whose request it changes, and of these: those that it lets try again (it sets rGTO or raises
     # the force); those that were proven to rest before it; and of the latter those that have shown motion
     # since, so that no status from before can follow.

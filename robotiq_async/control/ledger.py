@@ -70,8 +70,8 @@ class Ledger:
         # The masks and the flag spare a poll the questions whose answers are known. A write that changes the
         # request of an axis puts it into unrested and _unproven; a status at rest takes it out of the one,
         # and a status that cannot be from before the write out of the other.
-        self._unproven = NO_AXES  # may still show a status from before their last request; all those unrested
-        self._rested: dict[Finger, Entry] = {}  # the last entry before which an axis rested, until it moves
+        self._unproven = NO_AXES  # may still show a status from before their last request; with all unrested
+        self._may_start = NO_AXES  # rested before an entry, as noted there, and have not moved since
         self._has_doubtful = False
 
     # -- questions -------------------------------------------------------------------------------------
@@ -194,8 +194,7 @@ class Ledger:
         # With rGTO clear gDT has no meaning, so no axis was proven to rest under what was asked before.
         if before.go:
             entry.rested = entry.changes & ~self._unproven
-            if entry.rested:
-                self._rested |= dict.fromkeys(entry.rested, entry)
+            self._may_start |= entry.rested
         self._unproven |= entry.changes
         if image.go:
             self.unrested |= entry.changes
@@ -353,8 +352,7 @@ class Ledger:
         self._entries, self._has_doubtful, self._adoption = deque([self.shown]), False, None
         self._past.clear()
         self._mistaken = None
-        self._rested.clear()
-        self.unrested = self._unproven = NO_AXES
+        self.unrested = self._unproven = self._may_start = NO_AXES
         self.ours = Finger.ALL
         return status.echo == image.echo and not image.release
 
@@ -387,10 +385,8 @@ class Ledger:
                 continue
             what, position = status.finger_status(axis), status.position(axis)
             if what is ObjectStatus.IN_MOTION:
-                # An axis at rest moves only for a new request: every later status is from after it [follows].
-                if axis in self._rested:
-                    entry = self._rested.pop(axis)
-                    entry.started |= axis
+                if axis & self._may_start:
+                    self._note_start(axis)
                 continue
             rest = rest_of(self._targets(axis), self._model, what, position)
             if rest is not Rest.UNKNOWN and axis & self.unrested:
@@ -398,6 +394,15 @@ class Ledger:
                 self.limits.note_rest(axis, status)
             if rest is Rest.PROVEN:
                 self._unproven &= ~axis
+
+    def _note_start(self, axis: Finger) -> None:
+        """An axis at rest moves only for a new request: every later status is from after it [follows]."""
+        self._may_start &= ~axis
+        # What an entry notes as rested may change as it is revived, so the entry is looked for now.
+        for each in chain(reversed(self._entries), reversed(self._past)):
+            if each.rested & axis:
+                each.started |= axis
+                return
 
 
 def _changed(before: Request, image: Request) -> Finger:

@@ -39,7 +39,7 @@ class Limits:
     """The limits that have been echoed in place of requests."""
 
     def __init__(self, log: Log = log) -> None:
-        self.limited: dict[Finger, int] = {}  # by axis the one that shows in place of the last request
+        self.limited: dict[Finger, int] = {}  # by axis, the limit that shows in place of the last request
         self._log: Final = log
         # By axis, and whether it limits closing.
         self._known: dict[tuple[Finger, bool], int] = {}

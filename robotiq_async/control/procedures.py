@@ -60,7 +60,7 @@ class Begun:
 
     def __init__(self, entry: Entry, first: RobotiqStatus | None = None) -> None:
         self._entry: Final = entry
-        self._first: Final = first  # status of one that nobody has asked for
+        self._first: Final = first  # the first status of one that nobody has asked for; None if somebody has
 
     def is_over(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether a status shows its end. What shows may be from before it."""

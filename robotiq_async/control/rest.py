@@ -93,7 +93,7 @@ class Rest(Enum):
 
 
 def rest_of(targets: Iterator[Target], model: Model, what: ObjectStatus, position: int) -> Rest:
-    """Whether an axis rests under the last of its requests, given the newest first. No position is late."""
+    """Whether an axis rests under the last of its targets, the newest first. Its position is never late."""
     # Only the newest requests are looked at where they decide: this runs at every poll of a motion, and a
     # control loop leaves fifty requests in the lag.
     last = next(targets, None)
@@ -111,7 +111,7 @@ def rest_of(targets: Iterator[Target], model: Model, what: ObjectStatus, positio
 
 
 def may_move(targets: Iterable[Target], model: Model, what: ObjectStatus, position: int) -> bool:
-    """Whether an axis may move, or be about to, although it shows rest."""
+    """Whether an axis may move, or be about to, although it shows rest; its newest target comes first."""
     # A contact is doubted only if a request within the lag contradicts it: a needless doubt would cost the
     # grip. An axis close to the request before the last may have some counts to go [conceivable].
     last, *before = [*targets] or [Target(None)]

@@ -60,7 +60,7 @@ SEEN: Final = {
     Trigger.SEEN_FAULT: State.FAULT,
     Trigger.SEEN_RELEASED: State.ATR_DONE,
 }
-_SEEN: Final[Row] = {**SEEN}
+_SEEN: Final[Row] = {**SEEN}  # the same as a Row: the types of a dictionary are its own
 _RUNNING: Final[Row] = _SEEN | {
     Trigger.ASK_ACTIVATE: Verdict.IGNORED,
     **_all((Trigger.ASK_COMMAND, *_STOPS), State.RUNNING_CC),
@@ -148,9 +148,9 @@ class StateMachine:
         self, changed: Callable[[State, State, Trigger], None] = lambda *_: None, *, log: Log = log
     ) -> None:
         self.log = log
-        self.changed = changed  # called after each change
+        self.changed = changed  # called with source, target and trigger after each change
         self.why_down: object = None  # why the link is down, for the error of what is refused then
-        self.state = State.DISCONNECTED
+        self.state = State.DISCONNECTED  # only show() sets it
 
     def ask(self, trigger: Trigger, status: RobotiqStatus | None = None) -> bool:
         """Whether there is anything to do for what is asked. Raises the error if the table refuses it."""

@@ -1,7 +1,7 @@
 """Stops: a halt, a reset, and what ends a hand. Each is a level; a new one replaces the one before.
 
-It is written before the read of its cycle: a gripper may obey and not answer. It may be written again, as it
-only ends motion: a gripper may acknowledge a write that comes soon after another one and forget it
+A stop is written before the read of its cycle: a gripper may obey and not answer. It may be written again,
+as it only ends motion: a gripper may acknowledge a write that comes soon after another one and forget it
 [manual 2014, pp. 58, 75: space them by 10 ms].
 """
 
@@ -51,7 +51,7 @@ class Write(NamedTuple):
 
     entry: Entry
     is_early: bool  # it came within write_spacing of another: the gripper may have forgotten it
-    was_active: bool  # the gripper was, before it: an activation that ran already is not ours to take back
+    was_active: bool  # whether the gripper was, before it: what activates already is not ours to take back
 
 
 class Stop:
@@ -81,8 +81,8 @@ class Stop:
         self.writes.append(Write(entry, is_early, status.activation_echo and status.is_activated))
 
     def is_urgent(self, ledger: Ledger, status: RobotiqStatus) -> bool:
-        goes = self.level is not StopLevel.SHUTDOWN or status.go_echo or not ledger.acts()
-        return goes and not self.writes
+        is_needed = self.level is not StopLevel.SHUTDOWN or status.go_echo or not ledger.acts()
+        return is_needed and not self.writes
 
     def image(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
         """The image to write first; None if there is nothing to stop."""

@@ -12,7 +12,7 @@ T_contra = TypeVar("T_contra", contravariant=True)
 
 
 class Waiter(Protocol[T_contra]):
-    """The answer to one caller. It is done, too, once the caller has given up."""
+    """The answer to one caller. It is done, too, once the caller has given up, and waits for one request."""
 
     def done(self) -> bool: ...
 

@@ -16,7 +16,7 @@ from robotiq_async.control.adoption import DIRECTION_WAIT_S
 from robotiq_async.control.entry import Entry
 from robotiq_async.control.ledger import SILENT_S, WINDOW_S, Ledger
 from robotiq_async.control.rest import LAG_READS, LAG_S
-from robotiq_async.values.enums import NO_AXES, Finger
+from robotiq_async.values.enums import NO_AXES, Finger, ObjectStatus
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
@@ -415,6 +415,30 @@ def test_the_first_image_shown_is_not_ours_but_settled(status: RobotiqStatus) ->
     assert not ledger.may_begin_to_move
     assert ledger.acts()
     assert ledger.is_certain
+
+
+def test_a_late_contact_of_another_clients_request_is_no_rest_under_ours() -> None:
+    """Ours was in doubt, and shows after all: what moved the axis in between is not known."""
+    ledger = found(shows(100, 0.0))
+
+    def shown(echo: int, position: int, what: ObjectStatus, at: float) -> RobotiqStatus:
+        at_rest = (100, 100, 100)
+        echoes, positions = (echo, *at_rest), (position, *at_rest)
+        status = status_of(0x39, 0xFC | what, echo=echoes, position=positions, at=at)
+        ledger.update(status, at)
+        return status
+
+    for n in range(100):
+        ledger.update_rest(shown(100, 100, ObjectStatus.AT_POSITION, n / 200))
+    ledger.write(ledger.base.with_positions({A: 200}), A, 0.5)
+    ledger.acknowledge(0.5)
+    ledger.adopt(shown(60, 100, ObjectStatus.AT_POSITION, 0.505))
+    shown(200, 98, ObjectStatus.AT_POSITION, 0.51)
+    assert ledger.base.position(A) == 200
+    ledger.update_rest(shown(200, 92, ObjectStatus.IN_MOTION, 0.515))
+    ledger.update_rest(shown(200, 90, ObjectStatus.CONTACT_OPENING, 0.52))
+    assert A not in ledger.resting
+    assert ledger.may_begin_to_move
 
 
 def test_a_moving_gripper_that_is_found_is_not_certain_before_it_has_shown_its_direction() -> None:
