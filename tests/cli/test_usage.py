@@ -21,7 +21,7 @@ from robotiq_async.cli.commands.measure_force import force
 from robotiq_async.cli.commands.measure_stroke import stroke
 from robotiq_async.session.options import LATE_POLLS
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from tests.cli.conftest import ANEW, WITHOUT
+from tests.cli.conftest import FORGETTING, WITHOUT
 
 if TYPE_CHECKING:
     from tests.cli.conftest import Beside, Call, Shell
@@ -205,7 +205,7 @@ def test_wrong_usage_is_one_line_and_opens_nothing(
 
 
 async def test_without_the_extra_one_line_names_it(shell: Shell) -> None:
-    outcome = await shell.finish(await shell.forked("-c", ANEW + WITHOUT.format("cyclopts", [])))
+    outcome = await shell.finish(await shell.forked("-c", FORGETTING + WITHOUT.format("cyclopts", [])))
     outcome.assert_failed(1, "cyclopts", "pip install 'cyclopts")
 
 
@@ -278,10 +278,17 @@ def test_a_simulated_gripper_is_called_simulated_before_anything_else(
     monkeypatch.chdir(tmp_path)
     usual = SimulatedGripper.__init__.__kwdefaults__
     assert usual is not None
+    assert "speedup" in usual
     monkeypatch.setitem(usual, "speedup", 20.0)  # the demo takes two minutes
     outcome = call(*command.split())
     outcome.assert_succeeded()
     assert outcome.out.splitlines()[0] == SIMULATED
+
+
+def test_an_option_before_the_command_is_refused_with_the_names_of_all_commands(call: Call) -> None:
+    outcome = call("--yes", "move", "30")
+    assert outcome.code == 2
+    assert "Available commands: demo, simulate, status, move" in outcome.err
 
 
 @pytest.mark.parametrize("command", [["status"], ["move", "30", "--yes"], ["doctor"]])
