@@ -79,6 +79,12 @@ def pytest_runtest_call(item: pytest.Item) -> None:
     item.config.stash[HANG_WATCH].go_on()
 
 
+@pytest.hookimpl(trylast=True)
+def pytest_exception_interact(node: pytest.Item | pytest.Collector) -> None:
+    """After a failure pytest calls off every alarm, and the end of the test may hang, too."""
+    node.config.stash[HANG_WATCH].begin()
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
     """More than there are cores: half of the time a worker waits for a process, a motion or a network."""
@@ -150,7 +156,8 @@ def watched(caplog: pytest.LogCaptureFixture, *, tasks: bool = True) -> Iterator
     for task in left if tasks else ():
         task.cancel()
     assert not (tasks and left), f"tasks left running: {left}"
-    complaints = [record.getMessage() for record in caplog.get_records("call") if record.name == "asyncio"]
+    records = [*caplog.get_records("call"), *caplog.get_records("teardown")]
+    complaints = [record.getMessage() for record in records if record.name == "asyncio"]
     if isinstance(loop, VirtualLoop):
         complaints += loop.complaints
     assert not complaints, f"the event loop complained: {complaints}"

@@ -25,8 +25,8 @@ def patience(seconds: float) -> float:
 class HangWatch:
     """Ends the run when a test hangs, and shows where: its set-up has the limit, then the test with its end.
 
-    On a busy machine they have more. To look how busy it is costs as much as a short test, and so does to set
-    the alarm: the one is done once in a second, the other again only after a set-up of more than a second.
+    On a busy machine they have more. Reading the load and setting the alarm each cost as much as a short
+    test: the load is read once a second, and the alarm set again only after a set-up of more than a second.
     """
 
     def __init__(self, limit: float) -> None:

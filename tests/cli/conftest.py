@@ -48,12 +48,12 @@ from robotiq_async.cli import main
 sys.exit(main({}))
 """
 """A command line that does not find a module."""
-ANEW = """
+FORGETTING = """
 import sys
 for name in [each for each in sys.modules if each.startswith("robotiq_async.cli")]:
     del sys.modules[name]
 """
-"""What a forked process runs before it: the command line is imported in it."""
+"""Makes a forked process forget the command line, so that it imports it itself."""
 CLOSED = """
 import os, sys
 os.close({0})

@@ -15,7 +15,7 @@ from robotiq_async.cli.commands.measure_force import force
 from robotiq_async.cli.commands.measure_stroke import stroke
 from robotiq_async.cli.commands.verify import verify
 from robotiq_async.simulator import SimulatorServer
-from tests.cli.conftest import ANEW, CLOSED
+from tests.cli.conftest import CLOSED, FORGETTING
 from tests.cli.terminal import Terminal
 from tests.forked import ROOT
 
@@ -188,7 +188,7 @@ def test_commands_that_do_not_move_write_nothing(call: Call, there: SimulatorSer
 
 async def test_the_demo_asks_without_the_extra_too(shell: Shell, server: SimulatorServer) -> None:
     code = f"import runpy, sys; sys.modules['cyclopts'] = None; sys.argv[1:] = [{server.address!r}]"
-    program = f"{ANEW}{code}\nrunpy.run_path({PROGRAM[0]!r}, run_name='__main__')"
+    program = f"{FORGETTING}{code}\nrunpy.run_path({PROGRAM[0]!r}, run_name='__main__')"
     outcome = await shell.finish(await shell.forked("-c", program))
     assert outcome.code == 2
     assert outcome.err.startswith("demo: ")

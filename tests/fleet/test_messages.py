@@ -303,7 +303,7 @@ def test_an_error_with_something_else_in_a_field(kind: type[Exception]) -> None:
     for name in fields:
         for value in ODD:
             error = values.read_error(carried(fields | {name: value}), five_later)
-            assert type(error) in (kind, AgentError, ProtocolError)
+            assert type(error) in (kind, AgentError, ProtocolError), (name, value)
             assert isinstance(str(error), str)
 
 

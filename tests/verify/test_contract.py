@@ -51,6 +51,7 @@ OF_OTHERS = ("test_differences", "test_physics", "test_shared_line", "test_units
 """Hands on other hosts, and what has no scene of its own."""
 ASKING = [file for file in FILES if file not in ("test_arguments", *OF_OTHERS)]
 """All but what is refused before the gripper is asked anything."""
+# For a new scene or habit: a set is what fails when every scene is tried without the option of its row.
 SHOWING: dict[str, set[str]] = {
     # Without the option no scene finds its gripper. With it they differ in the function code of a read alone:
     # the first connection, the next ones, each kind of answer, and another start.
