@@ -47,7 +47,7 @@ PAGE = (
     *(*CORE, "aiohttp", "fastapi", "socketio", "jinja2", "h11", "httpx"),
     *("uvicorn.lifespan.on", "uvicorn.protocols.http.h11_impl", "uvicorn.protocols.websockets.auto"),
 )
-"""What NiceGUI imports. It itself is not imported before: it reads the environment."""
+"""Modules that NiceGUI imports. It itself is not imported before: it reads the environment."""
 MOST = 1 << 20
 """Bytes of a request."""
 

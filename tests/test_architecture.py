@@ -56,7 +56,7 @@ def test_no_function_is_longer_than_sixty_lines() -> None:
 
 
 def statements(node: ast.AST) -> Iterator[ast.AST]:
-    """What a module consists of, down to the innermost block, without what stands in expressions."""
+    """Statements of a module, down to the innermost block, without those in expressions."""
     for block in ("body", "handlers", "orelse", "finalbody", "cases"):
         for each in getattr(node, block, ()):
             yield each

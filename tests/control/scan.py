@@ -100,7 +100,7 @@ class Scan:
         self.polls = 0
         self._lively_until = 0.0
         self._news: tuple[object, ...] = ()
-        """What has been written and shown at the last poll that was passed."""
+        """Images written and statuses shown up to the last poll that was passed."""
 
     @property
     def now(self) -> float:

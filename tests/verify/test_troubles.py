@@ -31,7 +31,7 @@ OUTSIDE_MOTIONS = {
 }
 """Habits that show in a connection, after a silence or in an activation: no motion is like or unlike them."""
 SHORTER = {"slow-device": "slow-device 0.05"}
-"""What lasts in a test: its echo is looked for a thousand times a second."""
+"""Troubles made shorter for a test: an echo is looked for a thousand times a second."""
 
 
 @pytest.mark.parametrize(("trouble", "check", "option"), [row for row in HABITS if row[0] != "none"])

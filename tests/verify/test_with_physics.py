@@ -38,7 +38,7 @@ async def test_every_stage_ends_well_but_the_one_with_foam(model: Model, last: i
 
 
 def test_a_stroke_of_three_fingers_and_of_the_scissor_is_as_assumed() -> None:
-    """What the stage of full strokes looks at, at one speed and without its waits."""
+    """The stage of full strokes, at one speed and without its waits."""
     now = 0.0
     habits = Habits(activation_time=0)
     gripper = SimulatedGripper(lambda: now, habits=habits, physics=Physics("table"))
