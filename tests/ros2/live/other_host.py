@@ -33,6 +33,7 @@ def test_goals_a_halt_and_an_agent_that_is_killed(simulator: Simulator) -> None:
         goal = begun(client.move(2.8))
         goal.cancel()
         assert goal.ends()[0] == CANCELED
+        assert client.move(0.5).ends()[0] == SUCCEEDED  # the whole way again, however late it was canceled
         goal = begun(client.move(2.8))
         assert client.call("halt").success
         there = position(simulator)
