@@ -323,7 +323,7 @@ class Ledger:
 
     def adopt(self, status: RobotiqStatus, *, is_found: bool = False) -> None:
         """Add an entry for the image that a status shows, as no other explains it."""
-        # Those that wait may still act after it. If it was found like this, no axis moves because of us.
+        # Those that wait may still act after it. If the gripper was found so, no axis moves because of us.
         # A client that keeps writing must not make us wait again each time.
         since = self.now if self._adoption is None else self._adoption.since
         before = self._settle_base()
@@ -346,7 +346,7 @@ class Ledger:
     def restart(self, status: RobotiqStatus) -> bool:
         """A procedure has ended: the gripper has its last image, and no other write is on its way."""
         # Return whether the status shows that image; if not, another client has written since. rATR has no
-        # echo [manual 2014, p. 50]: a gripper that follows requests counts as not showing it.
+        # echo [manual 2014, p. 50]: while a gripper follows requests, an image with rATR counts as not shown.
         image, number, time = self.base, self._entries[-1].number + 1, self._entries[-1].time
         self.shown = self.match = Entry(number, image, image, status.echo, True, time, time, LONG_AGO)
         self._entries, self._has_doubtful, self._adoption = deque([self.shown]), False, None
