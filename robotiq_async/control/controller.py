@@ -31,7 +31,7 @@ from .pending import Command, OpenRequests, Pending
 from .procedures import Begun, Procedure
 from .state_machine import RUNNING, SEEN, StateMachine
 from .stops import Keeping, Stop
-from .waiters import Waiter, fail, resolve
+from .waiters import Waiter, fail
 
 WARNING_S: Final = 1.0
 """Seconds between two warnings about another client."""
@@ -90,7 +90,7 @@ class Controller:
     def move(self, move: Move, speed: int | None, force: int | None) -> float:
         """Add a move as a command; return its default timeout in seconds."""
         self.command(Command(move.axes, move.position, speed, force))
-        self._requests.moves.add(move)
+        self._requests.add(move)
         assert self.status is not None, "the hand takes commands, so a status has been read"
         written = {axis: asked.speed for axis, asked in self._ledger.base.by_axis}
         speeds = written | self._requests.pending.speeds
@@ -99,13 +99,14 @@ class Controller:
     def abandon(self, move: Move, *, unseen: bool = False) -> None:
         """The caller of a move has left: if it has given up, hold those of its axes that still move."""
         # ``unseen`` if it was cancelled: then it does not see, either, that the move has failed already.
-        is_live, pending = self._requests.moves.remove(move), self._requests.pending
+        requests = self._requests
+        is_live, left = requests.leave(move)
         if is_live or unseen:
-            self._requests.hold(move.left, "a move took over and was given up")
+            requests.hold(left, "a move took over and was given up")
             # Its other axes follow it until what has taken them over is written, and that may be lost.
-            pending.merge_hold(move.axes & pending.moved)
+            requests.merge_hold(move.axes & requests.pending.moved)
         if unseen and not is_live and self._evidence.condition is not None:
-            pending.hold_only(self._ledger.ours)
+            requests.hold_only(self._ledger.ours)
 
     def hold(self, axes: Finger, waiter: Waiter[None]) -> None:
         """Hold those axes that move, whichever client moves them. In a procedure there is nothing to do."""
@@ -146,7 +147,7 @@ class Controller:
 
     def drop_requests(self, error: RobotiqError) -> None:
         """Fail every command and every move, sent or not. Holds and halts remain."""
-        self._requests.fail_motions(error)
+        self._requests.drop(error, holds=False)
         self._update_state(Trigger.DELIVERED)
 
     def refuse_requests(self) -> None:
@@ -200,7 +201,7 @@ class Controller:
 
     def _fail_all(self, error: RobotiqError) -> None:
         """Fail everything asked so far, halts too. A write may be on the line all the same."""
-        self._requests.fail(error)
+        self._requests.drop(error, holds=True)
         if self._stop is not None:
             fail(self._stop.callers, error)
             self._stop = None
@@ -288,8 +289,8 @@ class Controller:
                 return
         if condition is Trigger.SEEN_READY:
             ledger.update_rest(status)
-            if self._requests.moves:
-                self._requests.moves.end_arrived(status, ledger)
+            if self._requests.calls:
+                self._requests.end_arrived(status, ledger)
         if condition is not before:
             self._update_state(condition)
         if condition is Trigger.SEEN_BUSY:
@@ -308,7 +309,7 @@ class Controller:
         if before in FOLLOWS and condition not in (before, Trigger.SEEN_READY):
             self._end_requests(condition, status)
         if condition is not before and condition not in FOLLOWS:
-            self._requests.pending.hold_only(NO_AXES)
+            self._requests.hold_only(NO_AXES)
         if ledger.match is None:
             ledger.adopt(status)  # after a reset or a power cycle no image from before acts [follows]
 
@@ -319,7 +320,7 @@ class Controller:
         elif condition is not Trigger.SEEN_FAULT:
             self._fail_all(NotActivatedError("the gripper lost its activation"))
         else:
-            self._requests.fail_motions(GripperFaultError(status.fault))
+            self._requests.drop(GripperFaultError(status.fault), holds=False)
             if status.activation_echo:
                 # A command sent just before may not act yet, and its motion would begin when the fault clears
                 # [manual 2012, 4.7: if it is minor]. Which axes need it is decided when it is written.
@@ -365,12 +366,12 @@ class Controller:
 
     def _resume_or_adopt(self, condition: Trigger, status: RobotiqStatus) -> None:
         """The link is back: continue from our image if the gripper shows one, or adopt it."""
-        ledger, pending = self._ledger, self._requests.pending
+        ledger, requests = self._ledger, self._requests
         if ledger.match is None or not ledger.match.is_ours:
             ledger.adopt(status, is_found=True)
         if condition is Trigger.SEEN_FAULT and status.activation_echo:
-            pending.merge_hold(Finger.ALL)  # as when a fault begins: no motion may resume when it clears
-        pending.hold_only(ledger.ours)
+            requests.merge_hold(Finger.ALL)  # as when a fault begins: no motion may resume when it clears
+        requests.hold_only(ledger.ours)
 
     def _adopt_other_client(self, status: RobotiqStatus) -> None:
         """Another client commands the gripper: adopt its requests, or our next write would undo them."""
@@ -381,12 +382,8 @@ class Controller:
             self.machine.log.warning("another client commands the gripper: %r", status)
         ledger.limits.note_other_client(ledger.now.time)
         ledger.adopt(status)
-        self._requests.pending.hold_only(ledger.ours)
-        self._requests.moves.fail(
-            MoveSupersededError("another client commands the gripper"),
-            lambda move: move.entry is not None and not move.is_under(status, ledger.limits.limited),
-            left=Finger.ALL,
-        )
+        self._requests.hold_only(ledger.ours)
+        self._requests.fail_replaced(status, ledger.limits.limited)
 
     def _finish(self, status: RobotiqStatus, *, has_written: bool) -> None:
         """A procedure, a reset or a shutdown is over: the condition counts again."""
@@ -438,7 +435,7 @@ class Controller:
             return None
         is_early = now < self._written_at + self._spacing
         # A halt also stops the axes to be held, so the callers of hold() have their answer with it.
-        covered = self._requests.pending.take_holds() if stop.level is StopLevel.HALT else Pending()
+        covered = Pending(hold=self._requests.pending.hold) if stop.level is StopLevel.HALT else Pending()
         entry = self._send(image, covered, status, now)
         stop.written(entry, status, is_early=is_early)
         return entry.image
@@ -485,10 +482,11 @@ class Controller:
         if not pending.has_changes and gate(image, status) == base:
             # No axis moves. If an earlier write does not act yet, one may begin to: ask again then.
             if ledger.acts():
-                resolve(self._requests.taken().waiters)
+                self._requests.sending(pending, ledger.last)
+                self._requests.acknowledged()
                 self._update_state(Trigger.DELIVERED)
             return None
-        return self._send(image, self._requests.taken(), status, now).image
+        return self._send(image, pending, status, now).image
 
     def _send(
         self, image: Request, sent: Pending, status: RobotiqStatus, now: float, of: Procedure | None = None
@@ -514,7 +512,7 @@ class Controller:
             fail(self._stop.callers, error)
             # A halt and a reset are not sent again: once the link is back, what we move is held instead.
             if self._stop.level in (StopLevel.HALT, StopLevel.RESET):
-                self._requests.pending.merge_hold(Finger.ALL)
+                self._requests.merge_hold(Finger.ALL)
         self._requests.lost(error)
         self._procedure, self._stop = None, None
         self._evidence.lost()

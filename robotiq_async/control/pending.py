@@ -1,4 +1,4 @@
-"""Requests of callers: those for the next write, the write in flight, and moves.
+"""Requests of callers: changes for the next write, those in flight, and the calls that wait for an answer.
 
 All requests between two polls are merged into one write; the last value wins. A position, a speed or a force
 is written once and never again: it may move an axis. A hold remains until it is acknowledged, also over a
@@ -7,15 +7,19 @@ lost link, because it can only stop one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from ..runtime.log import Log, log
-from ..values.enums import NO_AXES, Finger
-from ..values.errors import ConnectionLostError, MoveSupersededError, RobotiqError
+from ..values.enums import NO_AXES, Finger, ObjectStatus
+from ..values.errors import MoveSupersededError, RobotiqError
+from ..values.move_result import MoveResult
+from ..values.status import RobotiqStatus
 from .entry import Entry
-from .motion import LiveMoves
-from .waiters import Waiter, fail, resolve
+from .ledger import Ledger
+from .motion import Move
+from .waiters import Call, Waiter, fail, resolve
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +34,7 @@ class Command:
 
 @dataclass(slots=True)
 class Pending:
-    """The changes for the next write, by axis, and the callers that wait for its acknowledgement."""
+    """What one write changes, by axis."""
 
     positions: dict[Finger, int] = field(default_factory=dict)
     speeds: dict[Finger, int] = field(default_factory=dict)
@@ -38,10 +42,6 @@ class Pending:
     # Axes to hold if they move. A position of the same axis goes before it, but does not end it: if the link
     # goes down before the write, the hold remains and the position does not.
     hold: Finger = NO_AXES
-    # Those of commands with the axes that each moves, and those of hold() with the axes that each has named:
-    # these are held whichever client moves them.
-    callers: dict[Waiter[None], Finger] = field(default_factory=dict)
-    holders: dict[Waiter[None], Finger] = field(default_factory=dict)
 
     @property
     def is_empty(self) -> bool:
@@ -54,126 +54,158 @@ class Pending:
         return bool(self.positions or self.speeds or self.forces)
 
     @property
-    def has_caller(self) -> bool:
-        """Whether there is more than holds of our own making, for which no caller waits."""
-        return self.has_changes or bool(self.holders)
-
-    @property
     def moved(self) -> Finger:
         return Finger(sum(self.positions))
 
-    @property
-    def waiters(self) -> list[Waiter[None]]:
-        return [*self.callers, *self.holders]
-
-    def merge(self, new: Command, waiter: Waiter[None] | None = None) -> None:
+    def merge(self, new: Command) -> None:
         # The last value wins, per axis and field; an axis keeps what a command does not name.
         values = (new.position, new.speed, new.force)
         for changes, value in zip((self.positions, self.speeds, self.forces), values, strict=True):
             if value is not None:
                 changes.update(dict.fromkeys(new.axes, value))
-        if waiter is not None:
-            self.callers[waiter] = NO_AXES if new.position is None else new.axes
-
-    def merge_hold(self, axes: Finger, waiter: Waiter[None] | None = None) -> None:
-        self.hold |= axes
-        if waiter is not None:
-            self.holders[waiter] = axes
-
-    def hold_only(self, axes: Finger) -> None:
-        """Hold none but these axes, and those that callers of hold() have named."""
-        for named in self.holders.values():
-            axes |= named
-        self.hold &= axes
-
-    def drop_positions(self, axes: Finger, superseded: RobotiqError) -> None:
-        """Drop the positions of some axes. Their callers get the error ``superseded``."""
-        for axis in axes:
-            self.positions.pop(axis, None)
-        fail([waiter for waiter, moved in self.callers.items() if moved & axes], superseded)
-        self.callers = {waiter: moved for waiter, moved in self.callers.items() if not moved & axes}
-
-    def drop_changes(self, error: RobotiqError) -> None:
-        """Drop everything that may move an axis, and holds of our own making."""
-        fail(self.callers, error)
-        for each in (self.positions, self.speeds, self.forces, self.callers):
-            each.clear()
-        self.hold_only(NO_AXES)
-
-    def drop(self, error: RobotiqError) -> None:
-        self.drop_changes(error)
-        fail(self.take_holds().holders, error)
-
-    def take_holds(self) -> Pending:
-        """Take the holds alone: a halt covers them, and goes before the rest."""
-        taken = Pending(hold=self.hold, holders={**self.holders})
-        self.hold = NO_AXES
-        self.holders.clear()
-        return taken
 
 
 class OpenRequests:
     """Commands, holds and moves. Halts belong to their stop."""
 
     def __init__(self, log: Log = log) -> None:
-        self.pending = Pending()  # what is to be written
-        self.moves: Final = LiveMoves(log)
-        self._sent = Pending()  # the write in flight
+        self.pending = Pending()  # for the next write
+        self.calls: list[Call] = []  # those that wait for their answer
+        self._sent = Pending()  # in the write in flight
+        # The move that an axis follows, until something else takes the axis over. A failed move counts as
+        # well: a caller that gives up as its move fails does not see the error, and counts on a hold.
+        self._followed: Final[dict[Finger, Move]] = {}
+        self._log: Final = log
+        self._has_warned = False
 
     @property
     def has_caller(self) -> bool:
-        """Whether a caller waits for an acknowledgement, or for a write."""
-        return self.pending.has_caller or self._sent.has_caller
+        """Whether there is more to write, or to acknowledge, than holds of our own making."""
+        return self.pending.has_changes or self._sent.has_changes or any(call.held for call in self.calls)
 
     @property
     def has_undelivered_hold(self) -> bool:
         return bool(self.pending.hold or self._sent.hold)
 
+    # -- what is asked ---------------------------------------------------------------------------------
+
     def command(self, command: Command, waiter: Waiter[None] | None = None) -> None:
-        if command.position is not None and self.moves:  # few loops at 200 Hz have a move to end
-            self.moves.take_over(command.axes, MoveSupersededError(f"another command moves {command.axes}"))
-        self.pending.merge(command, waiter)
+        if command.position is not None and self._followed:  # few loops at 200 Hz have a move to end
+            self._take_over(command.axes, MoveSupersededError(f"another command moves {command.axes}"))
+        self.pending.merge(command)
+        if waiter is not None:
+            self.calls.append(Call(waiter, NO_AXES if command.position is None else command.axes))
+
+    def add(self, move: Move) -> None:
+        """Add a move whose command is pending."""
+        self.calls.append(move)
+        self._followed.update(dict.fromkeys(move.axes, move))
 
     def hold(self, axes: Finger, why: str, waiter: Waiter[None] | None = None) -> None:
         """Hold those axes that move. It supersedes what moves them."""
         self.supersede(axes, MoveSupersededError(why))
-        self.pending.merge_hold(axes, waiter)
+        self.merge_hold(axes)
+        if waiter is not None:
+            self.calls.append(Call(waiter, held=axes))
+
+    def merge_hold(self, axes: Finger) -> None:
+        self.pending = replace(self.pending, hold=self.pending.hold | axes)
+
+    def hold_only(self, axes: Finger) -> None:
+        """Hold none but these axes, and those that callers of hold() have named."""
+        for call in self.calls:
+            axes |= call.held if call.entry is None else NO_AXES
+        self.pending = replace(self.pending, hold=self.pending.hold & axes)
 
     def supersede(self, axes: Finger, error: MoveSupersededError) -> None:
-        """Fail what moves these axes, and is not sent."""
-        self.moves.take_over(axes, error)
-        self.pending.drop_positions(axes, error)
+        """Fail the moves of these axes, and what would move them and is not sent."""
+        self._take_over(axes, error)
+        for axis in axes:
+            self.pending.positions.pop(axis, None)
+        self._fail([call for call in self.calls if call.entry is None and call.axes & axes], error)
+
+    def _take_over(self, axes: Finger, error: MoveSupersededError) -> None:
+        # The other axes of these moves still follow them.
+        self._fail([self._followed.pop(axis) for axis in axes if axis in self._followed], error)
 
     # -- what becomes of it ----------------------------------------------------------------------------
 
-    def taken(self) -> Pending:
-        taken, self.pending = self.pending, Pending()
-        return taken
-
     def sending(self, sent: Pending, entry: Entry) -> None:
+        """All that is pending is written, or the hold alone: a halt covers it, and goes before the rest."""
+        is_all = sent is self.pending
+        self.pending = Pending() if is_all else replace(self.pending, hold=self.pending.hold & ~sent.hold)
         self._sent = sent
-        if sent.positions:
-            self.moves.written(entry)
+        for call in self.calls:
+            if call.entry is None and (is_all or sent.hold & call.held):
+                call.written(entry)
 
     def acknowledged(self) -> None:
-        sent, self._sent = self._sent, Pending()
-        resolve(sent.waiters)
+        self._sent = Pending()
+        done = [call for call in self.calls if call.entry is not None and not isinstance(call, Move)]
+        self._remove(done)
+        resolve(call.waiter for call in done)
 
-    def fail_motions(self, error: RobotiqError) -> None:
-        """Fail everything that would move an axis, sent or not; holds that callers have named remain."""
-        self.pending.drop_changes(error)
-        fail(self._sent.callers, error)
-        self.moves.fail(error, left=Finger.ALL if isinstance(error, ConnectionLostError) else NO_AXES)
+    def end_arrived(self, status: RobotiqStatus, ledger: Ledger) -> None:
+        """End the moves that a status shows to have arrived."""
+        limited = ledger.limits.limited
+        for move in self._written_moves:
+            move.note_currents(status)
+            if ledger.acts(move.entry) and move.has_arrived(status, ledger.resting, limited):
+                self.leave(move)
+                self._warn_of_unreached(move, move.end(status), limited)
 
-    def fail(self, error: RobotiqError) -> None:
-        """Fail everything asked so far. A write may be on the line all the same."""
-        self.fail_motions(error)
-        self.pending.drop(error)
-        fail(self._sent.holders, error)
+    def _warn_of_unreached(self, move: Move, result: MoveResult, limited: Mapping[Finger, int]) -> None:
+        """Warn once if a gripper shows "at position" and stands far from where it was asked to go."""
+        # Not of the scissor: its range ends within 15..232 (drivers), and programs ask it for 0 and 255.
+        for axis, how in result.outcomes.items():
+            is_there = axis in result.reached or axis in limited or axis is Finger.SCISSOR
+            if self._has_warned or is_there or how is not ObjectStatus.AT_POSITION:
+                continue
+            self._has_warned = True
+            self._log.warning(
+                "%s was asked for %d, and the gripper says that it is at position, at %d: it ends there (a "
+                "software limit, fingertips of your own), or it did not follow. See MoveResult.reached; "
+                "logged once",
+                axis,
+                move.position,
+                result.positions[axis],
+            )
+
+    def leave(self, move: Move) -> tuple[bool, Finger]:
+        """A move has ended, or its caller has left: whether it was open, and the axes that followed it."""
+        axes = [axis for axis, followed in self._followed.items() if followed is move]
+        for axis in axes:
+            del self._followed[axis]
+        is_open = move in self.calls
+        self._remove([move])
+        return is_open, Finger(sum(axes))
+
+    def drop(self, error: RobotiqError, *, holds: bool) -> None:
+        """Fail all that would move an axis, sent or not, and with ``holds`` those that callers have named."""
+        # A write may be on the line all the same. Holds of our own making go in any case.
+        self._fail([call for call in self.calls if holds or not call.held], error)
+        self._followed.clear()
+        self.pending = Pending(hold=self.pending.hold)
+        self.hold_only(NO_AXES)
+
+    def fail_replaced(self, status: RobotiqStatus, limited: Mapping[Finger, int]) -> None:
+        """Fail the moves whose request another client has replaced. Their axes still follow them."""
+        replaced = [move for move in self._written_moves if not move.is_under(status, limited)]
+        self._fail(replaced, MoveSupersededError("another client commands the gripper"))
 
     def lost(self, error: RobotiqError) -> None:
         """The link is down: fail everything. Holds stop motion: their axes remain, for when it is back."""
-        # A hold of our own making has no caller to get the error.
         hold = self.pending.hold | self._sent.hold
-        self.fail(error)
+        self._fail(self.calls, error)
         self.pending, self._sent = Pending(hold=hold), Pending()
+
+    @property
+    def _written_moves(self) -> list[Move]:
+        return [call for call in self.calls if isinstance(call, Move) and call.entry is not None]
+
+    def _fail(self, calls: Sequence[Call], error: RobotiqError) -> None:
+        self._remove(calls)
+        fail((call.waiter for call in calls), error)
+
+    def _remove(self, calls: Sequence[Call]) -> None:
+        self.calls = [call for call in self.calls if call not in calls]

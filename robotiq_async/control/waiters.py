@@ -1,12 +1,15 @@
-"""Answers to callers: a protocol that ``asyncio.Future`` satisfies."""
+"""Answers to callers: a protocol that ``asyncio.Future`` satisfies, and what each caller waits for."""
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
+from ..values.enums import NO_AXES, Finger
 from ..values.errors import RobotiqError
+from .entry import Entry
 
 T_contra = TypeVar("T_contra", contravariant=True)
 
@@ -19,6 +22,19 @@ class Waiter(Protocol[T_contra]):
     def set_result(self, result: T_contra, /) -> None: ...
 
     def set_exception(self, exception: RobotiqError, /) -> None: ...
+
+
+@dataclass(slots=True, eq=False)
+class Call:
+    """A caller of a command or a hold. It waits until the entry that it was written as is acknowledged."""
+
+    waiter: Waiter[Any]
+    axes: Finger = NO_AXES  # those that it moves
+    held: Finger = NO_AXES  # those that it has named to be held: they are, whichever client moves them
+    entry: Entry | None = None
+
+    def written(self, entry: Entry) -> None:
+        self.entry = entry
 
 
 def resolve(waiters: Iterable[Waiter[None]]) -> None:

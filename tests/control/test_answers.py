@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from robotiq_async import ConnectionLostError, Fault, Finger, GripperFaultError, MoveSupersededError
+from robotiq_async import ConnectionLostError, Fault, Finger, GripperFaultError, MoveSupersededError, State
+from robotiq_async.control.pending import Command
 from robotiq_async.values.model import THREE_FINGER
 from tests.control.scan import POLL_S, Scan, started
 
@@ -107,3 +108,57 @@ def test_a_fault_ends_what_moves_and_not_what_stops() -> None:
     assert isinstance(setter.error, GripperFaultError)
     scan.run(0.1)
     assert holder.answers == halter.answers == [None]
+
+
+# -- while a write is on the line ----------------------------------------------------------------------------
+
+
+def test_a_command_on_the_line_is_delivered_although_a_hold_follows_it() -> None:
+    scan = started()
+    asking = scan.command(A, position=100)
+    assert scan.decide() is not None
+    scan.hold(A)
+    scan.controller.acknowledged(scan.now)
+    assert asking.answers == [None]
+
+
+def test_the_state_tells_of_a_command_until_it_is_delivered_whether_a_caller_waits_or_not() -> None:
+    scan = started()
+    scan.controller.command(Command(A, 100))
+    assert scan.decide() is not None
+    scan.controller.drop_requests(MoveSupersededError("its client is gone"))
+    assert scan.state is State.RUNNING_CC
+    scan.controller.acknowledged(scan.now)
+    assert scan.state is State.RUNNING_IDLE
+
+
+def test_a_command_that_is_dropped_while_a_hold_is_on_the_line_leaves_no_trace() -> None:
+    scan = started()
+    move, _ = scan.move(255, A)
+    scan.run(0.5)
+    scan.controller.abandon(move)
+    assert scan.decide() is not None
+    scan.controller.command(Command(A, 100))
+    assert scan.state is State.RUNNING_CC
+    scan.controller.drop_requests(MoveSupersededError("its client is gone"))
+    assert scan.state is State.RUNNING_IDLE, "the hold is of our own making"
+
+
+def test_a_hold_on_the_line_is_an_open_stop() -> None:
+    scan = moving()
+    scan.hold(A)
+    assert scan.decide() is not None
+    assert scan.controller.has_open_stop
+    scan.controller.acknowledged(scan.now)
+    assert not scan.controller.has_open_stop
+
+
+def test_a_hold_on_the_line_keeps_no_second_one_of_its_axes_that_is_dropped() -> None:
+    scan = moving()
+    scan.hold(A)
+    assert scan.decide() is not None
+    move, _ = scan.move(100, A)
+    scan.controller.abandon(move)
+    assert scan.controller.has_request
+    scan.controller.drop_requests(MoveSupersededError("its client is gone"))
+    assert not scan.controller.has_request

@@ -52,9 +52,7 @@ def command(
 
 
 def hold(axes: Finger) -> Pending:
-    pending = Pending()
-    pending.merge_hold(axes)
-    return pending
+    return Pending(hold=axes)
 
 
 def positions(image: Request) -> tuple[int, ...]:
@@ -144,8 +142,7 @@ def test_an_axis_not_addressed_keeps_its_request_or_stays(
     gripping: Finger,
     may_move: Finger,
 ) -> None:
-    pending = Pending()
-    pending.merge_hold(held)
+    pending = Pending(hold=held)
     for each in commands:
         pending.merge(Command(*each))
     image = merged(base, pending, status, gripping=gripping, may_move=may_move)

@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robotiq_async.control.entry import Entry
 from robotiq_async.control.ledger import Ledger
-from robotiq_async.control.motion import LiveMoves, Move
+from robotiq_async.control.motion import Move
+from robotiq_async.control.pending import Command, OpenRequests
 from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.enums import Finger, ObjectStatus
 from robotiq_async.values.errors import MoveSupersededError
@@ -72,26 +74,32 @@ def test_a_move_has_arrived_when_every_addressed_axis_rests_under_its_request(
 
 def test_a_move_ends_once_with_the_first_outcome() -> None:
     each, outcome = move()
-    each.fail(MoveSupersededError("first"))
-    each.fail(MoveSupersededError("second"))
+    moves = live(each)
+    moves.supersede(A, MoveSupersededError("first"))
+    moves.drop(MoveSupersededError("second"), holds=True)
     each.end(status_of(0xF9, 0xFF))
     assert [str(error) for error in outcome.answers] == ["first"]
 
 
 def test_a_move_that_ended_well_does_not_fail_afterwards() -> None:
     each, outcome = move()
+    moves = live(each)
     each.end(status_of(0xF9, 0xFF))
-    each.fail(MoveSupersededError("late"))
+    moves.drop(MoveSupersededError("late"), holds=True)
     assert outcome.result.status == status_of(0xF9, 0xFF)
 
 
-def test_a_move_knows_which_of_its_axes_may_still_follow_it() -> None:
-    (each, _), (ended, _) = move(), move()
-    assert each.left == each.axes
-    each.fail(MoveSupersededError("A"), ~A)
-    assert each.left == each.axes & ~A
-    ended.end(status_of(0xF9, 0xFF))
-    assert not ended.left
+def test_it_is_known_which_axes_still_follow_a_move() -> None:
+    (each, _), (failed, _), (arrived, _) = move(), move(), move()
+    assert live(each).leave(each) == (True, ABC)
+    moves = live(failed)
+    moves.supersede(A, MoveSupersededError("A"))
+    moves.command(Command(B, 0))
+    assert moves.leave(failed) == (False, C)
+    moves = live(arrived)
+    write(moves)
+    moves.end_arrived(ARRIVED, LEDGER)
+    assert moves.leave(arrived) == (False, Finger(0))
 
 
 # -- the result --------------------------------------------------------------------------------------------
@@ -197,11 +205,20 @@ ARRIVED = status_of(0xF9, 0xFF, echo=255, current=7)
 MOVING = status_of(0x39, 0x00, echo=255, current=9)
 
 
-def live(*each: Move) -> LiveMoves:
-    moves = LiveMoves()
+def live(*each: Move) -> OpenRequests:
+    moves = OpenRequests()
     for move in each:
-        moves.add(move)
+        ask(moves, move)
     return moves
+
+
+def ask(moves: OpenRequests, move: Move) -> None:
+    moves.command(Command(move.axes, move.position))
+    moves.add(move)
+
+
+def write(moves: OpenRequests, entry: Entry = ENTRY) -> None:
+    moves.sending(moves.pending, entry)
 
 
 def test_a_move_that_was_not_written_yet_does_not_end() -> None:
@@ -210,17 +227,17 @@ def test_a_move_that_was_not_written_yet_does_not_end() -> None:
     moves = live(each)
     moves.end_arrived(ARRIVED, LEDGER)
     assert not outcome.answers
-    moves.written(ENTRY)
+    write(moves)
     moves.end_arrived(ARRIVED, LEDGER)
     assert outcome.result.positions == {A: 0, B: 0, C: 0}
-    assert not moves
+    assert not moves.calls
 
 
 def test_a_move_whose_write_does_not_act_yet_does_not_end() -> None:
     each, outcome = move()
     moves = live(each)
     ledger = Ledger(128, 64)
-    moves.written(ledger.write(ledger.base, A, 1.0))
+    write(moves, ledger.write(ledger.base, A, 1.0))
     moves.end_arrived(ARRIVED, ledger)
     assert not outcome.answers
     ledger.acknowledge(1.0)
@@ -232,7 +249,7 @@ def test_a_move_takes_in_currents_from_its_write_on() -> None:
     each, outcome = move()
     moves = live(each)
     moves.end_arrived(status_of(0x39, 0x00, echo=255, current=99), LEDGER)
-    moves.written(ENTRY)
+    write(moves)
     moves.end_arrived(MOVING, LEDGER)
     moves.end_arrived(ARRIVED, LEDGER)
     assert set(outcome.result.peak_current_ma.values()) == {90}
@@ -241,41 +258,41 @@ def test_a_move_takes_in_currents_from_its_write_on() -> None:
 def test_a_later_write_does_not_carry_an_earlier_move() -> None:
     (first, _), (second, _), later = move(axes=A), move(axes=B), Ledger(128, 64).last
     moves = live(first)
-    moves.written(ENTRY)
-    moves.add(second)
-    moves.written(later)
+    write(moves)
+    ask(moves, second)
+    write(moves, later)
     assert (first.entry, second.entry) == (ENTRY, later)
 
 
 def test_every_move_that_has_arrived_ends_and_the_others_go_on() -> None:
     (first, one), (second, other), (third, goes_on) = move(axes=A), move(axes=B), move(100, C)
     moves = live(first, second, third)
-    moves.written(ENTRY)
+    write(moves)
     moves.end_arrived(ARRIVED, LEDGER)
     assert one.is_answered
     assert other.is_answered
     assert not goes_on.answers
-    assert moves
+    assert moves.calls == [third]
 
 
 def test_an_error_fails_its_moves_and_the_others_go_on() -> None:
     (first, one), (second, other) = move(axes=A), move(axes=B)
     moves = live(first, second)
-    moves.fail(MoveSupersededError("A"), lambda move: move.axes is A)
+    moves.supersede(A, MoveSupersededError("A"))
     assert isinstance(one.error, MoveSupersededError)
     assert not other.answers
-    moves.fail(error := MoveSupersededError("all"))
+    moves.drop(error := MoveSupersededError("all"), holds=False)
     assert isinstance(other.error, MoveSupersededError)
     assert other.error is not error, "each caller has one of its own"
-    assert not moves
+    assert not moves.calls
 
 
 def test_a_move_leaves_once() -> None:
     each, outcome = move()
     moves = live(each)
-    assert moves.remove(each)
-    assert not moves.remove(each)
-    moves.fail(MoveSupersededError("too late"))
+    assert moves.leave(each) == (True, ABC)
+    assert moves.leave(each) == (False, Finger(0))
+    moves.drop(MoveSupersededError("too late"), holds=True)
     assert not outcome.answers
 
 
@@ -285,16 +302,16 @@ def test_a_move_has_left_when_its_outcome_is_handed_over(how: str) -> None:
 
     class Caller(Outcome):
         def set_result(self, result: object) -> None:
-            was_under_way.append(moves.remove(each))
+            was_under_way.append(moves.leave(each)[0])
             super().set_result(result)
 
         set_exception = set_result
 
     each = Move(255, ABC, 0.0, Caller())
     moves = live(each)
-    moves.written(ENTRY)
+    write(moves)
     if how == "end":
         moves.end_arrived(ARRIVED, LEDGER)
     else:
-        moves.fail(MoveSupersededError("now"))
+        moves.drop(MoveSupersededError("now"), holds=True)
     assert was_under_way == [False]

@@ -7,6 +7,7 @@ import pytest
 from robotiq_async import Finger, MoveSupersededError, ObjectStatus, State
 from robotiq_async.control.motion import Move
 from robotiq_async.values.calibration.scales import closing_time
+from robotiq_async.values.request import Request
 from tests.control.scan import POLL_S, Outcome, Scan, started
 
 A, B, C, S = Finger.A, Finger.B, Finger.C, Finger.SCISSOR
@@ -104,7 +105,7 @@ def test_an_abandoned_move_is_held_where_it_is(scan: Scan) -> None:
     scan.run(1.0)
     scan.controller.abandon(move)
     at = scan.gripper.position(A)
-    assert not scan.controller._requests.moves, "no caller waits for it"
+    assert not scan.controller._requests.calls, "no caller waits for it"
     scan.run(2.0)
     assert not scan.gripper.is_moving
     assert scan.gripper.position(A) == pytest.approx(at, abs=3)
@@ -222,3 +223,42 @@ def test_the_default_timeout_knows_the_speeds_at_the_call(scan: Scan, slower: bo
     limit = scan.controller.move(Move(255, A, scan.now, Outcome()), None, None)
     scan.command(A, speed=0)
     assert limit == pytest.approx(2 * (slow if slower else fast) + 2, rel=0.15)
+
+
+# -- cancelled in the moment in which they fail: the caller does not see the error ------------------------
+
+
+def test_of_a_move_that_another_client_ended_the_axes_that_still_follow_it_are_held(scan: Scan) -> None:
+    move, outcome = scan.move(255, A | B, speed=0)
+    scan.run(0.5)
+    ours = Request.from_registers(scan.gripper.request_registers)
+    scan.gripper.write(0, ours.with_positions({A: 200}).registers)
+    scan.until(lambda: outcome.is_answered)
+    scan.controller.abandon(move, unseen=True)
+    at = scan.positions()
+    scan.run(15)
+    assert (scan.positions()[A], abs(scan.positions()[B] - at[B]) <= 4) == (200, True)
+
+
+def test_of_a_move_that_another_client_ended_an_axis_that_was_commanded_since_is_not_held(
+    scan: Scan,
+) -> None:
+    move, outcome = scan.move(255, A | B, speed=0)
+    scan.run(0.5)
+    ours = Request.from_registers(scan.gripper.request_registers)
+    scan.gripper.write(0, ours.with_positions({A: 200}).registers)
+    scan.until(lambda: outcome.is_answered)
+    asking = scan.command(B, position=100)
+    scan.controller.abandon(move, unseen=True)
+    scan.run(15)
+    assert (asking.answers, scan.positions()[B]) == ([None], 100)
+
+
+def test_a_move_that_was_dropped_goes_on(scan: Scan) -> None:
+    move, outcome = scan.move(255, A)
+    scan.run(0.5)
+    scan.controller.drop_requests(MoveSupersededError("its client is gone"))
+    assert isinstance(outcome.error, MoveSupersededError)
+    scan.controller.abandon(move, unseen=True)
+    scan.run(5)
+    assert scan.positions()[A] >= 240

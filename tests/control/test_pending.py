@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.control.pending import Command, Pending
+from robotiq_async.control.ledger import Ledger
+from robotiq_async.control.pending import Command, OpenRequests, Pending
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.errors import ConnectionLostError, MoveSupersededError
 from robotiq_async.values.model import THREE_FINGER
@@ -49,24 +50,20 @@ def test_any_commands_leave_the_last_value_of_each_axis_and_field(
 
 # -- holding and halting -----------------------------------------------------------------------------------
 
-Step = Callable[[Pending], None]
+Step = Callable[[OpenRequests], None]
 
 
 def command(axes: Finger, position: int | None = None, setting: int | None = None) -> Step:
     """A command with the same setting for speed and force."""
-    return lambda pending: pending.merge(Command(axes, position, setting, setting))
+    return lambda requests: requests.command(Command(axes, position, setting, setting))
 
 
 def hold(axes: Finger) -> Step:
-    def step(pending: Pending) -> None:
-        pending.drop_positions(axes, SUPERSEDED)
-        pending.merge_hold(axes)
-
-    return step
+    return lambda requests: requests.hold(axes, "hold")
 
 
-def halt(pending: Pending) -> None:
-    pending.drop_positions(Finger.ALL, SUPERSEDED)
+def halt(requests: OpenRequests) -> None:
+    requests.supersede(Finger.ALL, SUPERSEDED)
 
 
 @pytest.mark.parametrize(
@@ -86,19 +83,20 @@ def halt(pending: Pending) -> None:
 def test_holds_and_halts_drop_positions_and_nothing_else(
     steps: list[Step], positions: dict[Finger, int], settings: dict[Finger, int], held: Finger, moved: Finger
 ) -> None:
-    pending = Pending()
+    requests = OpenRequests()
     for step in steps:
-        step(pending)
+        step(requests)
+    pending = requests.pending
     assert (pending.positions, pending.hold, pending.moved) == (positions, held, moved)
     assert pending.speeds == pending.forces == settings
 
 
 def test_a_hold_fails_only_the_callers_that_move_its_axes() -> None:
-    pending, held, other, setting = Pending(), Outcome(), Outcome(), Outcome()
-    pending.merge(Command(A, 100), held)
-    pending.merge(Command(B, 100), other)
-    pending.merge(Command(A, None, 50), setting)
-    hold(A)(pending)
+    requests, held, other, setting = OpenRequests(), Outcome(), Outcome(), Outcome()
+    requests.command(Command(A, 100), held)
+    requests.command(Command(B, 100), other)
+    requests.command(Command(A, None, 50), setting)
+    hold(A)(requests)
     assert isinstance(held.error, MoveSupersededError)
     assert not other.answers
     assert not setting.answers
@@ -110,81 +108,96 @@ def test_a_hold_fails_only_the_callers_that_move_its_axes() -> None:
         (lambda _: None, True, False),
         (hold(A), False, False),
         (command(A, 1), False, True),
-        (lambda pending: pending.merge(Command(A, None, 1)), False, True),
-        (lambda pending: pending.merge(Command(A, None, None, 1)), False, True),
+        (lambda requests: requests.command(Command(A, None, 1)), False, True),
+        (lambda requests: requests.command(Command(A, None, None, 1)), False, True),
     ],
     ids=["nothing", "hold", "position", "speed", "force"],
 )
 def test_a_pending_command_knows_whether_there_is_something_to_write(
     fill: Step, empty: bool, has_changes: bool
 ) -> None:
-    pending = Pending()
-    fill(pending)
-    assert pending.is_empty == empty
-    assert pending.has_changes == has_changes
+    requests = OpenRequests()
+    fill(requests)
+    assert requests.pending.is_empty == empty
+    assert requests.pending.has_changes == has_changes
 
 
 # -- who waits ---------------------------------------------------------------------------------------------
 
 
+def waiting(requests: OpenRequests) -> list[object]:
+    return [call.waiter for call in requests.calls]
+
+
 def test_a_halt_drops_positions_and_leaves_pending_speeds() -> None:
     """The speed stays pending and is delivered: its caller must not hear MoveSupersededError."""
-    pending, for_speed, for_position = Pending(), Outcome(), Outcome()
-    pending.merge(Command(A, None, 50), for_speed)
-    pending.merge(Command(B, 100), for_position)
-    halt(pending)
-    assert pending.speeds == {A: 50}
+    requests, for_speed, for_position = OpenRequests(), Outcome(), Outcome()
+    requests.command(Command(A, None, 50), for_speed)
+    requests.command(Command(B, 100), for_position)
+    halt(requests)
+    assert requests.pending.speeds == {A: 50}
     assert isinstance(for_position.error, MoveSupersededError)
     assert not for_speed.answers
-    assert pending.waiters == [for_speed]
+    assert waiting(requests) == [for_speed]
 
 
 def test_a_position_goes_before_a_hold_whose_caller_still_waits() -> None:
-    pending, holder = Pending(), Outcome()
-    pending.merge_hold(A, holder)
-    pending.merge(Command(A, 100))
-    assert pending.waiters == [holder]
+    requests, holder = OpenRequests(), Outcome()
+    requests.hold(A, "hold", holder)
+    requests.command(Command(A, 100))
+    assert waiting(requests) == [holder]
     assert not holder.is_answered
 
 
 def test_a_hold_that_nobody_asked_for_is_no_request() -> None:
-    pending = Pending()
-    pending.merge_hold(A)
-    assert not pending.has_caller
-    pending.merge_hold(B, Outcome())
-    assert pending.has_caller
-    pending.hold_only(C)
-    assert pending.hold == B, "another client moves A now; B was named by a caller"
+    requests = OpenRequests()
+    requests.hold(A, "hold")
+    assert not requests.has_caller
+    requests.hold(B, "hold", Outcome())
+    assert requests.has_caller
+    requests.hold_only(C)
+    assert requests.pending.hold == B, "another client moves A now; B was named by a caller"
 
 
 def test_what_moves_is_dropped_alone_or_with_the_holds() -> None:
-    pending, mover, holder = Pending(), Outcome(), Outcome()
-    pending.merge(Command(A, 100, 50), mover)
-    pending.merge_hold(B, holder)
-    pending.merge_hold(C)
-    pending.drop_changes(LOST)
+    requests, mover, holder = OpenRequests(), Outcome(), Outcome()
+    requests.command(Command(A, 100, 50), mover)
+    requests.hold(B, "hold", holder)
+    requests.hold(C, "hold")
+    requests.drop(LOST, holds=False)
     assert isinstance(mover.error, ConnectionLostError)
-    assert (pending.hold, pending.has_changes, holder.is_answered) == (B, False, False)
-    pending.drop(LOST)
+    assert (requests.pending, holder.is_answered) == (Pending(hold=B), False)
+    requests.drop(LOST, holds=True)
     assert isinstance(holder.error, ConnectionLostError)
-    assert pending.is_empty
+    assert requests.pending.is_empty
 
 
 def test_a_halt_takes_the_holds_with_it() -> None:
     """The hold alone would leave nothing to write, and its caller would wait for ever."""
-    pending, holder = Pending(), Outcome()
-    pending.merge(Command(B, None, 50))
-    pending.merge_hold(A, holder)
-    taken = pending.take_holds()
-    assert (taken.hold, taken.waiters, taken.has_changes) == (A, [holder], False)
-    assert (pending.hold, pending.waiters, pending.speeds) == (NONE, [], {B: 50})
+    requests, setter, holder = OpenRequests(), Outcome(), Outcome()
+    requests.command(Command(B, None, 50), setter)
+    requests.hold(A, "hold", holder)
+    requests.sending(Pending(hold=requests.pending.hold), Ledger(128, 64).last)
+    assert requests.pending == Pending(speeds={B: 50})
+    requests.acknowledged()
+    assert (holder.answers, waiting(requests)) == ([None], [setter])
+
+
+def test_a_write_of_a_stop_or_a_procedure_takes_nothing_with_it() -> None:
+    requests, setter, holder = OpenRequests(), Outcome(), Outcome()
+    requests.command(Command(B, None, 50), setter)
+    requests.hold(A, "hold", holder)
+    requests.sending(Pending(), Ledger(128, 64).last)
+    requests.acknowledged()
+    assert requests.pending == Pending(speeds={B: 50}, hold=A)
+    assert waiting(requests) == [setter, holder]
 
 
 def test_a_failure_gives_every_caller_an_error_of_its_own() -> None:
-    pending, callers = Pending(), [Outcome(), Outcome()]
-    pending.merge(Command(A, 100), callers[0])
-    pending.merge(Command(A, None, 50), callers[1])
-    pending.drop(LOST)
+    requests, callers = OpenRequests(), [Outcome(), Outcome()]
+    requests.command(Command(A, 100), callers[0])
+    requests.command(Command(A, None, 50), callers[1])
+    requests.drop(LOST, holds=True)
     errors = [each.answers[0] for each in callers]
     assert all(isinstance(error, ConnectionLostError) for error in errors)
     assert len({id(error) for error in errors}) == 2
