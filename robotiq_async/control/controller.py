@@ -210,7 +210,7 @@ class Controller:
 
     @property
     def passing_faults(self) -> int:
-        return self._evidence.passing.passed
+        return self._evidence.passed
 
     @property
     def is_moving(self) -> bool:
@@ -445,7 +445,7 @@ class Controller:
         if procedure.entry is not None:
             if not self._ledger.acts(procedure.entry):
                 return None
-        elif not procedure.releases and self._evidence.passing.may_pass:
+        elif not procedure.releases and self._evidence.may_pass:
             return None  # if the fault lasts, no activation is begun
         try:
             image = procedure.steps.send(status)
@@ -470,7 +470,7 @@ class Controller:
         ledger, pending = self._ledger, self._requests.pending
         if self._evidence.condition not in FOLLOWS or not ledger.is_certain:
             return None
-        if self._evidence.passing.may_pass and pending.has_changes:
+        if self._evidence.may_pass and pending.has_changes:
             return None  # if the fault lasts, no motion is sent at all
         base = ledger.base
         # After a halt a motion waits until the halt acts: only then is it known where the fingers stopped.

@@ -63,69 +63,47 @@ def _classify(activation: int, fault: int, model: Model) -> Trigger:
 class Evidence:
     """The newest status as decisions see it: without a 0x09 that may pass."""
 
-    def __init__(self, log: Log) -> None:
+    def __init__(self, log: Log | None = None) -> None:
         self.status: RobotiqStatus | None = None
         self.condition: Trigger | None = None  # what it shows; None while the link is down
-        self.passing: Final = PassingFault()
+        self.passed = 0  # how often 0x09 has gone without having lasted
         self._log: Final = log
+        # When the reads in a row that have shown it were asked for: all, and those since the last silence.
+        self._row: Final[list[float]] = []
+        self._since_silence: Final[list[float]] = []
+
+    @property
+    def may_pass(self) -> bool:
+        """Whether the next reads decide about 0x09. Never on a link so slow that each read ends a silence."""
+        return _may_pass(self._row)
 
     @property
     def is_undecided(self) -> bool:
         """Whether the first status on a new link shows 0x09, perhaps because of the silence before it."""
-        return self.passing.may_pass and self.condition is None
+        return self.condition is None and self.may_pass
 
     def update(self, status: RobotiqStatus, asked: float) -> Trigger | None:
         """Take in a status; return its condition, or None while the first one on a new link is undecided."""
         condition = classify(status)
-        if self.passing.is_counting or condition is Trigger.SEEN_FAULT:
-            before = self.passing.passed
-            judged = self.passing.filtered(status, asked)
-            if self.passing.passed > before == 0:
-                self._log.info(
-                    "the gripper showed fault 0x09 for a moment, as some do after a second without a poll: "
-                    "ignored, and from here on only counted"
-                )
+        if self._row or condition is Trigger.SEEN_FAULT:  # if not, 0x09 need not be looked for
+            judged = self.judged(status, asked)
             # In a fault 0x09 is no news, and counts at once: hiding it would show the fault as cleared.
             status = status if self.condition is Trigger.SEEN_FAULT else judged
             condition = classify(status)
         self.status = status
-        if self.condition is not None or not self.is_undecided:
+        if self.condition is not None or not self.may_pass:
             self.condition = condition
         return self.condition
 
     def lost(self) -> None:
         self.condition = None  # the next one is the first
 
-
-class PassingFault:
-    """Distinguishes 0x09 that lasts from 0x09 that follows a silence."""
-
-    def __init__(self) -> None:
-        self.passed = 0  # how often it has gone without having lasted
-        # When the reads in a row that have shown it were asked for: all, and those since the last silence.
-        self._row: list[float] = []
-        self._since_silence: list[float] = []
-
-    @property
-    def is_counting(self) -> bool:
-        """Whether it has shown; if not, a status without a fault need not be seen."""
-        return bool(self._row)
-
-    @property
-    def is_shown(self) -> bool:
-        """Whether the newest status shows it, and it has not lasted."""
-        return bool(self._since_silence) and not _lasts(self._since_silence)
-
-    @property
-    def may_pass(self) -> bool:
-        """Whether the next reads decide about it. Never on a link so slow that each read ends a silence."""
-        return bool(self._row) and not _lasts(self._row)
-
-    def filtered(self, status: RobotiqStatus, asked: float) -> RobotiqStatus:
-        """Return the status to judge by: without the fault until that has lasted."""
+    def judged(self, status: RobotiqStatus, asked: float) -> RobotiqStatus:
+        """Return a status without 0x09 until that has lasted; it was asked for at ``asked``."""
         shows = reg.gFLT.read(status.registers) == _CODE
         if not shows or (self._row and asked - self._row[-1] > SILENCE_S):
-            self.passed += self.is_shown
+            if _may_pass(self._since_silence):
+                self._note_passed()
             self._since_silence.clear()
         if not shows:
             self._row.clear()
@@ -133,11 +111,20 @@ class PassingFault:
         for reads in (self._row, self._since_silence):
             del reads[LASTS_READS - 1 :]  # the first ones and the last say enough
             reads.append(asked)
-        return without_fault(status) if self.is_shown else status
+        return without_fault(status) if _may_pass(self._since_silence) else status
+
+    def _note_passed(self) -> None:
+        self.passed += 1
+        if self.passed == 1 and self._log is not None:
+            self._log.info(
+                "the gripper showed fault 0x09 for a moment, as some do after a second without a poll: "
+                "ignored, and from here on only counted"
+            )
 
 
-def _lasts(reads: list[float]) -> bool:
-    return len(reads) >= LASTS_READS and reads[-1] - reads[0] >= LASTS_S
+def _may_pass(reads: list[float]) -> bool:
+    """Whether it shows, and has not lasted in these reads."""
+    return bool(reads) and (len(reads) < LASTS_READS or reads[-1] - reads[0] < LASTS_S)
 
 
 def without_fault(status: RobotiqStatus) -> RobotiqStatus:

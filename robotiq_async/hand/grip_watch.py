@@ -16,14 +16,14 @@
 #
 # Three things in a status mislead. gDT may trail the echo: a released axis moves before its contact ends,
 # and that is no slip. A contact latches: a part that is taken out is noticed once its finger moves. Fault
-# 0x09 may pass in a second (PassingFault); until then the status is judged without it.
+# 0x09 may pass in a second (Evidence); until then the status is judged without it.
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Final
 
-from ..control.evidence import PassingFault
+from ..control.evidence import Evidence
 from ..control.rest import agrees
 from ..values.checks import check_int, check_mask, repr_of
 from ..values.enums import Finger, ObjectStatus
@@ -95,7 +95,7 @@ class GripWatch:
             raise TypeError(f"since must be None or a RobotiqStatus, got {repr_of(since)}")
         self._grips: dict[Finger, _Grip] = {}
         self._last: RobotiqStatus | None = None
-        self._passing_fault = PassingFault()
+        self._evidence = Evidence()
         if since is not None:
             self.see(since)
 
@@ -114,9 +114,7 @@ class GripWatch:
         if last is not None and 0 < last.timestamp - status.timestamp < LATE_S:
             return []
         self._last = status
-        judged = status
-        if self._passing_fault.is_counting or status.fault.is_serious:
-            judged = self._passing_fault.filtered(status, status.timestamp)
+        judged = self._evidence.judged(status, status.timestamp)
         axes = self._axes & status.model.all_axes
         changes = [(axis, *change) for axis in axes for change in self._changes(axis, judged)]
         if last is None:

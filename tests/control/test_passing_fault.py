@@ -7,7 +7,7 @@ import logging
 import pytest
 
 from robotiq_async import Fault, Finger, GripperFaultError, State
-from robotiq_async.control.evidence import LASTS_READS, LASTS_S, PassingFault
+from robotiq_async.control.evidence import LASTS_READS, LASTS_S, Evidence
 from robotiq_async.simulator import Habits
 from tests.control.other_client import going_to
 from tests.control.scan import POLL_S, Scan
@@ -219,16 +219,12 @@ def test_it_does_not_clear_another_fault(silent: Scan) -> None:
     ],
 )
 def test_it_takes_some_reads_and_some_time_without_a_silence(at: list[float], shown: list[bool]) -> None:
-    passing = PassingFault()
-    seen = []
-    for time in at:
-        judged = passing.filtered(status_of(0x31, 0xFF, 0x09, at=time), time)
-        seen.append(passing.is_shown)
-        assert (judged.fault is Fault.NONE) == passing.is_shown
-    assert seen == shown
+    evidence = Evidence()
+    judged = [evidence.judged(status_of(0x31, 0xFF, 0x09, at=time), time) for time in at]
+    assert [each.fault is Fault.NONE for each in judged] == shown
 
 
 @pytest.mark.parametrize("code", [0x00, 0x05, 0x0A, 0x0C, 0x0E])
 def test_every_other_status_is_what_it_is(code: int) -> None:
     status = status_of(0x31, 0xFF, code)
-    assert PassingFault().filtered(status, 0.0) is status
+    assert Evidence().judged(status, 0.0) is status
