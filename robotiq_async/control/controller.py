@@ -181,8 +181,7 @@ class Controller:
         if self._activation is not None:
             self._stop = Stop(StopLevel.RESET)
         elif status is not None and level is StopLevel.KEEP:
-            self._stop = keeping = Keeping(status, self._why_no_grip)
-            self._advance_keeping(keeping)
+            self._stop = Keeping(status, self._why_no_grip).after(self._ledger, status, self.machine.log)
         elif status is not None:
             self._stop = Stop(StopLevel.SHUTDOWN)
 
@@ -327,31 +326,18 @@ class Controller:
                 self._requests.hold(self._ledger.ours, "the fingers are held")
 
     def _advance_stop(self, stop: Stop, status: RobotiqStatus) -> None:
-        stop.fail_overdue(self._ledger, status, self.machine.log)
+        log, judged = self.machine.log, self._evidence.status
+        assert judged is not None
+        stop.fail_overdue(self._ledger, status, log)
         if stop.has_activated(self._ledger, status):
             self._take_back("the gripper was reset as it was stopped: its activation is taken back")
         elif isinstance(stop, Keeping):
-            self._advance_keeping(stop)
+            self._stop = stop.after(self._ledger, judged, log)
         elif stop.is_reached(self._ledger, status):
             self._stop = None
-            stop.answer(status, self.machine.log)
+            stop.answer(status, log)
             if stop.level is not StopLevel.HALT:
                 self._finish(status, has_written=True)
-
-    def _advance_keeping(self, keeping: Keeping) -> None:
-        ledger, status = self._ledger, self._evidence.status
-        assert status is not None
-        ledger.update_rest(status)
-        keeping.judge(ledger, status)
-        if keeping.why_no_grip:
-            self._stop = stop = Stop(StopLevel.SHUTDOWN)
-            if ledger.match is None and classify(status) is Trigger.SEEN_READY:
-                ledger.adopt(status)
-            if stop.image(ledger, status) is not None:
-                self.machine.log.warning("rGTO is cleared, and no grip is kept: %s", keeping.why_no_grip)
-        elif keeping.is_reached(ledger, status):
-            self._stop = None
-            self.machine.log.info("stopped with rGTO set; in contact: %s", status.contacts or "nothing")
 
     def _follow_activation(self, status: RobotiqStatus) -> None:
         if self._activation is None and is_activating(status) and self._ledger.may_activate(status):
@@ -430,7 +416,6 @@ class Controller:
             image = stop.image(ledger, status)
             if image is None and stop.level is StopLevel.SHUTDOWN:
                 self._stop = None
-                self._finish(status, has_written=False)
         if image is None:
             return None
         is_early = now < self._written_at + self._spacing

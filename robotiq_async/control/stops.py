@@ -30,7 +30,7 @@ from ..values.errors import StateTimeoutError
 from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .entry import Entry
-from .evidence import FOLLOWS, classify, is_activating
+from .evidence import classify, is_activating
 from .gate import at_rest, merged
 from .ledger import WINDOW_S, Ledger
 from .pending import Pending
@@ -72,17 +72,11 @@ class Stop:
         """Whether a write of it was acknowledged: it is sent again only after that."""
         return bool(self.writes) and self.writes[0].entry.acknowledged is not None
 
-    @property
-    def _times(self) -> int:
-        """The number of its writes that the gripper cannot have forgotten."""
-        return sum(not each.is_early for each in self.writes)
-
     def written(self, entry: Entry, status: RobotiqStatus, *, is_early: bool) -> None:
         self.writes.append(Write(entry, is_early, status.activation_echo and status.is_activated))
 
     def is_urgent(self, ledger: Ledger, status: RobotiqStatus) -> bool:
-        is_needed = self.level is not StopLevel.SHUTDOWN or status.go_echo or not ledger.acts()
-        return is_needed and not self.writes
+        return not self.writes and self.image(ledger, status) is not None
 
     def image(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
         """The image to write first; None if there is nothing to stop."""
@@ -91,7 +85,7 @@ class Stop:
             case StopLevel.RESET:  # rACT = 0 clears faults and ends what runs [manual 2012, 4.6]
                 return replace(at_rest(base, status), activate=False)
             case StopLevel.HALT:  # positions and speeds stay as they were asked
-                return replace(base, go=False) if classify(status) in FOLLOWS else None
+                return replace(base, go=False)
         # A write of ours that does not act yet may set rGTO after this status: then it is not settled.
         is_settled = ledger.acts()
         if is_settled and not status.go_echo:
@@ -100,24 +94,21 @@ class Stop:
         return replace(base, activate=base.activate or is_settled, go=False)
 
     def again(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
-        """The image of its last write, if that is due again."""
+        """The image of its last write, if that is due again because the stop is not reached."""
         entry, is_early, _ = self.writes[-1]
-        if entry.acknowledged is None:
-            return None
-        if is_early:
-            return entry.image  # whatever shows: the gripper may yet forget it [manual 2014, p. 75]
-        if not ledger.acts(entry):
+        if entry.acknowledged is None or not (is_early or ledger.acts(entry)):
             return None
         match self.level:
             case StopLevel.RESET:
                 is_due = status.activation_echo
-            case StopLevel.HALT:
-                is_due = status.go_echo and self._times < MOST_HALTS
             case StopLevel.KEEP:  # what moves is held once
                 is_due = False
-            case _:  # while another client resets the gripper it comes to rest, and rACT might cross that
+            case StopLevel.SHUTDOWN:  # one that another client resets comes to rest: rACT might cross that
                 is_due = not entry.image.activate or status.activation_echo
-        return entry.image if is_due else None
+            case _:
+                is_due = True
+        # An early one is, whatever shows: the gripper may yet forget it [manual 2014, p. 75].
+        return entry.image if is_early or is_due else None
 
     def is_reached(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         entry = self.entry
@@ -132,7 +123,7 @@ class Stop:
             case StopLevel.RESET:
                 return is_reset
             case StopLevel.HALT:
-                return not status.go_echo or self._times >= MOST_HALTS
+                return not status.go_echo or sum(not each.is_early for each in self.writes) >= MOST_HALTS
         # gGTO = 0 alone may be from before the write before, and the next client would adopt an echo that is
         # about to change.
         return is_reset or status.echo == entry.echo
@@ -143,9 +134,11 @@ class Stop:
     def fail_overdue(self, ledger: Ledger, status: RobotiqStatus, log: Log) -> None:
         """Fail callers whose halt does not show, however often it has been replaced since."""
         since = ledger.now.time - MOST_HALTS * WINDOW_S
-        older = ((caller, stop) for caller, stop in self.callers.items() if stop is not self)
-        late = (caller for caller, stop in older if stop.writes[0].entry.time <= since)
-        overdue = [caller for caller in late if not caller.done()]
+        overdue = [
+            caller
+            for caller, stop in self.callers.items()
+            if stop is not self and stop.writes[0].entry.time <= since and not caller.done()
+        ]
         if overdue and status.go_echo:
             self._give_up(overdue, log)
 
@@ -185,17 +178,29 @@ class Keeping(Stop):
 
     def __init__(self, status: RobotiqStatus, why_no_grip: str) -> None:
         super().__init__(StopLevel.KEEP)
-        self.why_no_grip = why_no_grip  # why rGTO must be cleared, as asked for or as a status has shown
+        self._why_no_grip: Final = why_no_grip  # if it is known from the beginning
         # Rest is timed by when a status was asked for, because a busy loop may read the reply late.
-        self._until = status.timestamp + KEEP_S
+        self._until: Final = status.timestamp + KEEP_S
         self._since = math.inf
 
-    def judge(self, ledger: Ledger, status: RobotiqStatus) -> None:
-        """Take in a status. While a hold is on its way nothing is doubted: it overwrites what came before."""
-        if self.entry is not None and not ledger.acts(self.entry):
-            return
-        self.why_no_grip = self.why_no_grip or self._trouble(ledger, status) or self._unrest(ledger, status)
-        self._since = min(self._since, ledger.now.time) if self.rests(ledger, status) else math.inf
+    def after(self, ledger: Ledger, status: RobotiqStatus, log: Log) -> Stop | None:
+        """What it becomes with a status: a shutdown in any doubt, and None once every axis rests."""
+        ledger.update_rest(status)
+        why = self._why_no_grip
+        if self.entry is None or ledger.acts(self.entry):  # if not, a hold will overwrite what shows
+            why = why or self._trouble(ledger, status) or self._unrest(ledger, status)
+            self._since = min(self._since, ledger.now.time) if self.rests(ledger, status) else math.inf
+        if why:
+            stop = Stop(StopLevel.SHUTDOWN)
+            if ledger.match is None and classify(status) is Trigger.SEEN_READY:
+                ledger.adopt(status)
+            if stop.image(ledger, status) is not None:
+                log.warning("rGTO is cleared, and no grip is kept: %s", why)
+            return stop
+        if ledger.now.time - self._since < REST_S:
+            return self
+        log.info("stopped with rGTO set; in contact: %s", status.contacts or "nothing")
+        return None
 
     def is_urgent(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         # If all rests, the next status decides whether rGTO stays set.
@@ -204,10 +209,7 @@ class Keeping(Stop):
     def rests(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether every axis is known to rest under its last request, with rGTO set."""
         rests = not status.moving and not ledger.unrested and ledger.is_certain
-        return rests and status.go_echo and ledger.acts() and not self.why_no_grip
-
-    def is_reached(self, ledger: Ledger, status: RobotiqStatus) -> bool:  # noqa: ARG002
-        return ledger.now.time - self._since >= REST_S
+        return rests and status.go_echo and ledger.acts()
 
     def image(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
         """The image that holds every axis that moves or is about to; None if no axis does."""
