@@ -297,33 +297,37 @@ class Controller:
 
     def _note_news(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
         """A new condition, or an image that no entry explains: whose image acts, what ends, what is held."""
-        ledger = self._ledger
-        if before is None:
-            self._resume_or_adopt(condition, status)
+        ledger, requests = self._ledger, self._requests
+        if before is None:  # the link is back: continue from our image if the gripper shows one
+            if ledger.match is None or not ledger.match.is_ours:
+                ledger.adopt(status, is_found=True)
+            requests.hold_only(ledger.ours)
         elif before not in FOLLOWS and condition in FOLLOWS:
             # Others have reset and activated it, even if its image is equal to one of ours [follows].
             ledger.adopt(status, is_found=True)
         elif ledger.match is None and condition in FOLLOWS:
             self._adopt_other_client(status)  # before a fault's hold, which would undo what it wrote
-        if before in FOLLOWS and condition not in (before, Trigger.SEEN_READY):
-            self._end_requests(condition, status)
-        if condition is not before and condition not in FOLLOWS:
-            self._requests.hold_only(NO_AXES)
+        if condition is not before:
+            if before in FOLLOWS:
+                self._end_requests(condition, status)
+            if condition is Trigger.SEEN_FAULT and status.activation_echo:
+                # A command sent just before may not act yet, and its motion would begin when the fault clears
+                # [manual 2012, 4.7: if it is minor]. Which axes need it is decided when it is written.
+                requests.merge_hold(ledger.ours)
+            elif condition not in FOLLOWS:
+                requests.hold_only(NO_AXES)
         if ledger.match is None:
             ledger.adopt(status)  # after a reset or a power cycle no image from before acts [follows]
 
     def _end_requests(self, condition: Trigger, status: RobotiqStatus) -> None:
         """The gripper has a fault, or does not follow requests any more."""
-        if condition is Trigger.SEEN_RELEASED:
-            self._fail_all(GripperFaultError(status.fault))
-        elif condition is not Trigger.SEEN_FAULT:
-            self._fail_all(NotActivatedError("the gripper lost its activation"))
-        else:
-            self._requests.drop(GripperFaultError(status.fault), holds=False)
-            if status.activation_echo:
-                # A command sent just before may not act yet, and its motion would begin when the fault clears
-                # [manual 2012, 4.7: if it is minor]. Which axes need it is decided when it is written.
-                self._requests.hold(self._ledger.ours, "the fingers are held")
+        match condition:
+            case Trigger.SEEN_FAULT:
+                self._requests.drop(GripperFaultError(status.fault), holds=False)
+            case Trigger.SEEN_RELEASED:
+                self._fail_all(GripperFaultError(status.fault))
+            case Trigger.SEEN_BUSY | Trigger.SEEN_RESET:
+                self._fail_all(NotActivatedError("the gripper lost its activation"))
 
     def _advance_stop(self, stop: Stop, status: RobotiqStatus) -> None:
         log, judged = self.machine.log, self._evidence.status
@@ -337,7 +341,7 @@ class Controller:
             self._stop = None
             stop.answer(status, log)
             if stop.level is not StopLevel.HALT:
-                self._finish(status, has_written=True)
+                self._finish(status, is_known=self._ledger.restart(status))
 
     def _follow_activation(self, status: RobotiqStatus) -> None:
         if self._activation is None and is_activating(status) and self._ledger.may_activate(status):
@@ -349,15 +353,6 @@ class Controller:
         """End an activation that nobody has asked for."""
         self.machine.log.warning("%s", why)
         self._begin_reset(Trigger.ASK_RESET, NotActivatedError(why))
-
-    def _resume_or_adopt(self, condition: Trigger, status: RobotiqStatus) -> None:
-        """The link is back: continue from our image if the gripper shows one, or adopt it."""
-        ledger, requests = self._ledger, self._requests
-        if ledger.match is None or not ledger.match.is_ours:
-            ledger.adopt(status, is_found=True)
-        if condition is Trigger.SEEN_FAULT and status.activation_echo:
-            requests.merge_hold(Finger.ALL)  # as when a fault begins: no motion may resume when it clears
-        requests.hold_only(ledger.ours)
 
     def _adopt_other_client(self, status: RobotiqStatus) -> None:
         """Another client commands the gripper: adopt its requests, or our next write would undo them."""
@@ -371,10 +366,9 @@ class Controller:
         self._requests.hold_only(ledger.ours)
         self._requests.fail_replaced(status, ledger.limits.limited)
 
-    def _finish(self, status: RobotiqStatus, *, has_written: bool) -> None:
+    def _finish(self, status: RobotiqStatus, *, is_known: bool) -> None:
         """A procedure, a reset or a shutdown is over: the condition counts again."""
-        ledger, condition = self._ledger, self._evidence.condition or classify(status)
-        is_known = ledger.restart(status) if has_written else ledger.match is not None
+        condition = self._evidence.condition or classify(status)
         self._update_state(condition)
         if condition in FOLLOWS and not is_known and self.machine.state not in _OFF:
             self._adopt_other_client(status)
@@ -426,22 +420,24 @@ class Controller:
         return entry.image
 
     def _next_step(self, procedure: Procedure, status: RobotiqStatus, now: float) -> Request | None:
-        has_written = procedure.entry is not None
-        if procedure.entry is not None:
-            if not self._ledger.acts(procedure.entry):
-                return None
-        elif not procedure.releases and self._evidence.may_pass:
+        ledger, entry = self._ledger, procedure.entry
+        if entry is not None and not ledger.acts(entry):
+            return None
+        if entry is None and not procedure.releases and self._evidence.may_pass:
             return None  # if the fault lasts, no activation is begun
         try:
             image = procedure.steps.send(status)
         except (StopIteration, RobotiqError) as end:
             if isinstance(end, RobotiqError):
                 self.machine.log.warning("%s", end)
-            if not has_written:  # it had nothing to do, so there is no write to wait for
-                procedure.written(self._ledger.shown)
+            if entry is not None:
+                is_known = ledger.restart(status)
+            else:  # it had nothing to do, so there is no write to wait for
+                is_known = ledger.match is not None
+                procedure.written(ledger.shown)
                 self._update_state(Trigger.DELIVERED)
             self._procedure = None
-            self._finish(status, has_written=has_written)
+            self._finish(status, is_known=is_known)
             return None
         if image is None:
             return None

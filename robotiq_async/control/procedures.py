@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 from ..values.enums import Fault, Severity, State, Trigger
 from ..values.errors import GripperFaultError, NotActivatedError
@@ -51,25 +51,24 @@ class Procedure:
         return State.WF_ATR if self.releases else State.WF_ACTIVATION
 
 
-class Begun:
+class Begun(NamedTuple):
     """An activation that a write of ours has begun, or may have: stopping the hand takes it back.
 
     A write begins one that nobody has asked for if another client resets the gripper just before it: then
     its rACT rises [follows]. An emergency stop shows the same [seen], and moves nothing.
     """
 
-    def __init__(self, entry: Entry, first: RobotiqStatus | None = None) -> None:
-        self._entry: Final = entry
-        self._first: Final = first  # the first status of one that nobody has asked for; None if somebody has
+    entry: Entry
+    first: RobotiqStatus | None = None  # the first status of one that nobody has asked for
 
     def is_over(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether a status shows its end. What shows may be from before it."""
         has_ended = classify(status) in (Trigger.SEEN_READY, Trigger.SEEN_RESET)
-        return (has_ended or status.fault.severity is Severity.MAJOR) and ledger.acts(self._entry)
+        return (has_ended or status.fault.severity is Severity.MAJOR) and ledger.acts(self.entry)
 
     def is_stray(self, status: RobotiqStatus) -> bool:
         """Whether nobody has asked for it, and it moves an axis."""
-        first = self._first or status
+        first = self.first or status
         moved = (abs(status.position(axis) - first.position(axis)) for axis in status.model.axes)
         return max(moved) > STRAY_COUNTS
 
@@ -105,12 +104,13 @@ def automatic_release(image: Image) -> Steps:
     status = yield replace(image(status), activate=True, release=True)
     while status.fault is not Fault.AUTOMATIC_RELEASE_DONE:
         begun = begun or status.fault is Fault.AUTOMATIC_RELEASE
-        # gIMC is 0 during a release [manual 2014, p. 50]. Until the release shows, a status may be from
-        # before the write, and its fault from before the release [follows].
-        still_releases = status.is_reset or status.fault is Fault.AUTOMATIC_RELEASE
-        is_sure = begun or (status.timestamp - asked > WINDOW_S and not status.fault.is_serious)
-        if classify(status) is Trigger.SEEN_RESET or (is_sure and not still_releases):
-            if begun or classify(status) is Trigger.SEEN_RESET:
-                raise NotActivatedError("the gripper was reset during the automatic release")
+        # gIMC is 0 during a release [manual 2014, p. 50].
+        releases = status.is_reset or status.fault is Fault.AUTOMATIC_RELEASE
+        if classify(status) is Trigger.SEEN_RESET or (begun and not releases):
+            raise NotActivatedError("the gripper was reset during the automatic release")
+        # Until the release shows, a status may be from before the write, and its fault from before the
+        # release [follows].
+        is_sure = status.timestamp - asked > WINDOW_S and not status.fault.is_serious
+        if is_sure and not releases:
             raise NotActivatedError("the gripper does not show the automatic release (its write was lost)")
         status = yield None
