@@ -73,7 +73,7 @@ class Stop:
         return bool(self.writes) and self.writes[0].entry.acknowledged is not None
 
     def written(self, entry: Entry, status: RobotiqStatus, *, is_early: bool) -> None:
-        self.writes.append(Write(entry, is_early, status.activation_echo and status.is_activated))
+        self.writes.append(Write(entry, is_early, status.is_activated))
 
     def is_urgent(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         return not self.writes and self.image(ledger, status) is not None
@@ -96,7 +96,7 @@ class Stop:
     def again(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
         """The image of its last write, if that is due again because the stop is not reached."""
         entry, is_early, _ = self.writes[-1]
-        if entry.acknowledged is None or not (is_early or ledger.acts(entry)):
+        if not (is_early or ledger.acts(entry)):
             return None
         match self.level:
             case StopLevel.RESET:
@@ -112,7 +112,7 @@ class Stop:
 
     def is_reached(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         entry = self.entry
-        if entry is None or entry.acknowledged is None or self.writes[-1].is_early:
+        if entry is None or self.writes[-1].is_early:
             return False
         if self.level is StopLevel.HALT and not status.go_echo and not ledger.may_set_go:
             return True  # nothing that may act later sets rGTO, so it need not act
@@ -207,9 +207,8 @@ class Keeping(Stop):
         return self.entry is None and not self.rests(ledger, status)
 
     def rests(self, ledger: Ledger, status: RobotiqStatus) -> bool:
-        """Whether every axis is known to rest under its last request, with rGTO set."""
-        rests = not status.moving and not ledger.unrested and ledger.is_certain
-        return rests and status.go_echo and ledger.acts()
+        """Whether every axis is known to rest under its last request. If rGTO is clear, that is a doubt."""
+        return not status.moving and not ledger.unrested and ledger.is_certain and ledger.acts()
 
     def image(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
         """The image that holds every axis that moves or is about to; None if no axis does."""
