@@ -41,6 +41,7 @@ class Verdict(Enum):
     NOT_NOW = "InvalidStateError"
 
 
+_REFUSALS: Final = frozenset(Verdict) - {Verdict.IGNORED}
 Row = dict[Trigger, State | Verdict]  # the entries of one state
 
 
@@ -134,11 +135,7 @@ SEQUENCES: Final = frozenset(
 
 
 def states_allowing(trigger: Trigger) -> frozenset[State]:
-    return frozenset(
-        state
-        for state, row in TABLE.items()
-        if isinstance(row[trigger], State) or row[trigger] is Verdict.IGNORED
-    )
+    return frozenset(state for state, row in TABLE.items() if row[trigger] not in _REFUSALS)
 
 
 class StateMachine:
@@ -155,7 +152,7 @@ class StateMachine:
     def ask(self, trigger: Trigger, status: RobotiqStatus | None = None) -> bool:
         """Whether there is anything to do for what is asked. Raises the error if the table refuses it."""
         answer = TABLE[self.state][trigger]
-        if isinstance(answer, Verdict) and answer is not Verdict.IGNORED:
+        if answer in _REFUSALS:
             raise refusal(trigger, self.state, status, self.why_down)
         return answer is not Verdict.IGNORED
 

@@ -96,19 +96,16 @@ class Stop:
     def again(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
         """The image of its last write, if that is due again because the stop is not reached."""
         entry, is_early, _ = self.writes[-1]
-        if not (is_early or ledger.acts(entry)):
-            return None
-        match self.level:
-            case StopLevel.RESET:
-                is_due = status.activation_echo
-            case StopLevel.KEEP:  # what moves is held once
-                is_due = False
-            case StopLevel.SHUTDOWN:  # one that another client resets comes to rest: rACT might cross that
-                is_due = not entry.image.activate or status.activation_echo
-            case _:
-                is_due = True
-        # An early one is, whatever shows: the gripper may yet forget it [manual 2014, p. 75].
-        return entry.image if is_early or is_due else None
+        if is_early:
+            return entry.image  # whatever shows: the gripper may yet forget it [manual 2014, p. 75]
+        is_due = {
+            StopLevel.RESET: status.activation_echo,
+            StopLevel.HALT: True,
+            # While another client resets the gripper it comes to rest, and rACT might cross that.
+            StopLevel.SHUTDOWN: not entry.image.activate or status.activation_echo,
+            StopLevel.KEEP: False,  # what moves is held once
+        }
+        return entry.image if is_due[self.level] and ledger.acts(entry) else None
 
     def is_reached(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         entry = self.entry
@@ -116,17 +113,16 @@ class Stop:
             return False
         if self.level is StopLevel.HALT and not status.go_echo and not ledger.may_set_go:
             return True  # nothing that may act later sets rGTO, so it need not act
-        if not ledger.acts(entry):
-            return False
         is_reset = classify(status) is Trigger.SEEN_RESET
-        match self.level:
-            case StopLevel.RESET:
-                return is_reset
-            case StopLevel.HALT:
-                return not status.go_echo or sum(not each.is_early for each in self.writes) >= MOST_HALTS
-        # gGTO = 0 alone may be from before the write before, and the next client would adopt an echo that is
-        # about to change.
-        return is_reset or status.echo == entry.echo
+        times = sum(not each.is_early for each in self.writes)
+        shows = {
+            StopLevel.RESET: is_reset,
+            StopLevel.HALT: not status.go_echo or times >= MOST_HALTS,
+            # gGTO = 0 alone may be from before the write before, and the next client would adopt an echo that
+            # is about to change.
+            StopLevel.SHUTDOWN: is_reset or status.echo == entry.echo,
+        }
+        return shows[self.level] and ledger.acts(entry)
 
     def add(self, caller: Waiter[None]) -> None:
         self.callers[caller] = self
