@@ -153,7 +153,7 @@ class Controller:
     def refuse_requests(self) -> None:
         """The hand is to stop: refuse requests from here on, and fail those that are not sent."""
         state, stop = self.machine.state, self._stop
-        halts = stop is not None and stop.level is StopLevel.HALT and stop.entry is None
+        halts = stop is not None and stop.level is StopLevel.HALT and not stop.writes
         was_elsewhere = "" if state in RUNNING else f"the hand was in {state.name}"
         self._why_no_grip = "halt() was asked for" if halts else was_elsewhere
         if not self._requests.pending.is_empty or halts:
@@ -384,7 +384,7 @@ class Controller:
 
     def _wait(self, now: float) -> float:
         stop = self._stop
-        if stop is not None and stop.level is not StopLevel.KEEP and stop.entry is None:
+        if stop is not None and stop.level is not StopLevel.KEEP and not stop.writes:
             return 0.0
         return max(0.0, self._written_at + self._spacing - now)
 
@@ -401,7 +401,7 @@ class Controller:
 
     def _next_stop(self, stop: Stop, status: RobotiqStatus, now: float) -> Request | None:
         ledger = self._ledger
-        if stop.entry is not None:
+        if stop.writes:
             image = stop.again(ledger, status)
         else:
             is_ready = self._evidence.condition is Trigger.SEEN_READY

@@ -61,11 +61,8 @@ class Stop:
         self.level: Final = level
         # Those of halt(), each with the stop that was begun for it: this one, or one that it has replaced.
         self.callers: Final[dict[Waiter[None], Stop]] = {**before.callers} if before else {}
+        # Acknowledged, whenever a status is taken in or an image made; only a caller may come before that.
         self.writes: Final[list[Write]] = []
-
-    @property
-    def entry(self) -> Entry | None:
-        return self.writes[-1].entry if self.writes else None
 
     @property
     def is_delivered(self) -> bool:
@@ -108,13 +105,12 @@ class Stop:
         return entry.image if is_due[self.level] and ledger.acts(entry) else None
 
     def is_reached(self, ledger: Ledger, status: RobotiqStatus) -> bool:
-        entry = self.entry
-        if entry is None or self.writes[-1].is_early:
+        if not self.writes or self.writes[-1].is_early:
             return False
         if self.level is StopLevel.HALT and not status.go_echo and not ledger.may_set_go:
             return True  # nothing that may act later sets rGTO, so it need not act
         is_reset = classify(status) is Trigger.SEEN_RESET
-        times = sum(not each.is_early for each in self.writes)
+        entry, times = self.writes[-1].entry, sum(not each.is_early for each in self.writes)
         shows = {
             StopLevel.RESET: is_reset,
             StopLevel.HALT: not status.go_echo or times >= MOST_HALTS,
@@ -155,7 +151,7 @@ class Stop:
     def has_activated(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether its rACT activates a gripper that another client has reset just before."""
         # Two clients within one device cycle can do that [follows from Modbus].
-        if not self.is_delivered or not self.writes[-1].entry.image.activate:
+        if not self.writes or not self.writes[-1].entry.image.activate:
             return False
         entry, _, was_active = self.writes[-1]
         if self.level is StopLevel.HALT:
@@ -183,7 +179,7 @@ class Keeping(Stop):
         """What it becomes with a status: a shutdown in any doubt, and None once every axis rests."""
         ledger.update_rest(status)
         why = self._why_no_grip
-        if self.entry is None or ledger.acts(self.entry):  # if not, a hold will overwrite what shows
+        if not self.writes or ledger.acts(self.writes[-1].entry):  # if not, a hold will overwrite what shows
             why = why or self._trouble(ledger, status) or self._unrest(ledger, status)
             self._since = min(self._since, ledger.now.time) if self.rests(ledger, status) else math.inf
         if why:
@@ -200,7 +196,7 @@ class Keeping(Stop):
 
     def is_urgent(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         # If all rests, the next status decides whether rGTO stays set.
-        return self.entry is None and not self.rests(ledger, status)
+        return not self.writes and not self.rests(ledger, status)
 
     def rests(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether every axis is known to rest under its last request. If rGTO is clear, that is a doubt."""
