@@ -270,6 +270,18 @@ def test_a_lost_hold_is_dropped_when_the_gripper_comes_back_reset(scan: Scan) ->
     assert not scan.controller.has_open_stop
 
 
+def test_a_reset_that_was_lost_and_has_come_to_act_leaves_nothing_to_hold(scan: Scan) -> None:
+    """The image that shows is our own, and what we moved is held in place of a reset that did not arrive."""
+    scan.command(A, 200, speed=0)
+    scan.run(0.5)
+    scan.controller.reset()
+    scan.step(answer=False)
+    assert scan.controller.has_open_stop
+    scan.come_back(1.0)
+    assert scan.state is State.RESET
+    assert not scan.controller.has_open_stop
+
+
 def test_a_hold_is_dropped_when_another_client_commands_after_the_link_loss(scan: Scan) -> None:
     move, _ = scan.move(200, A, speed=0)
     scan.run(0.5)
