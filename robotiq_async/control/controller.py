@@ -77,7 +77,8 @@ class Controller:
         self._procedure: Procedure | None = None
         self._activation: Begun | None = None  # stopping the hand takes it back
         self._why_no_grip = ""  # why a hand that is being stopped must not leave rGTO set
-        self._written_at = self._warned = NEVER  # when the last image was given to be written, and a warning
+        self._warned = NEVER  # when another client was warned of
+        self._free_at = NEVER  # when the spacing after the last write is over
 
     # -- what is asked ---------------------------------------------------------------------------------
     # Each call raises the error by which the state machine refuses it. A refusal changes nothing.
@@ -226,8 +227,8 @@ class Controller:
 
     @property
     def is_undecided(self) -> bool:
-        """Whether the first status on a new link does not decide anything yet: see evidence.py."""
-        return self._evidence.is_undecided
+        """Whether the first status on a new link shows 0x09, perhaps because of the silence before it."""
+        return self._evidence.condition is None and self._evidence.may_pass
 
     @property
     def has_request(self) -> bool:
@@ -386,7 +387,7 @@ class Controller:
         stop = self._stop
         if stop is not None and stop.level is not StopLevel.KEEP and not stop.writes:
             return 0.0
-        return max(0.0, self._written_at + self._spacing - now)
+        return max(0.0, self._free_at - now)
 
     def decide(self, now: float) -> Request | None:
         """Return the image to write now, or None. It counts as sent from here on."""
@@ -412,7 +413,7 @@ class Controller:
                 self._stop = None
         if image is None:
             return None
-        is_early = now < self._written_at + self._spacing
+        is_early = now < self._free_at
         # A halt also stops the axes to be held, so the callers of hold() have their answer with it.
         covered = Pending(hold=self._requests.pending.hold) if stop.level is StopLevel.HALT else Pending()
         entry = self._send(image, covered, status, now)
@@ -476,7 +477,7 @@ class Controller:
         image = gate(image, status, activates=of is not None and not releases, releases=releases)
         entry = self._ledger.write(image, sent.moved, now)
         self._requests.sending(sent, entry)
-        self._written_at = now
+        self._free_at = now + self._spacing
         return entry
 
     def acknowledged(self, now: float) -> None:

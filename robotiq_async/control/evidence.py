@@ -77,11 +77,6 @@ class Evidence:
         """Whether the next reads decide about 0x09. Never on a link so slow that each read ends a silence."""
         return _may_pass(self._row)
 
-    @property
-    def is_undecided(self) -> bool:
-        """Whether the first status on a new link shows 0x09, perhaps because of the silence before it."""
-        return self.condition is None and self.may_pass
-
     def update(self, status: RobotiqStatus, asked: float) -> Trigger | None:
         """Take in a status; return its condition, or None while the first one on a new link is undecided."""
         condition = classify(status)
