@@ -369,7 +369,7 @@ class Controller:
 
     def _finish(self, status: RobotiqStatus, *, is_known: bool) -> None:
         """A procedure, a reset or a shutdown is over: the condition counts again."""
-        condition = self._evidence.condition or classify(status)
+        condition = classify(status)
         self._update_state(condition)
         if condition in FOLLOWS and not is_known and self.machine.state not in _OFF:
             self._adopt_other_client(status)
