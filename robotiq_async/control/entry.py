@@ -23,7 +23,6 @@ class Entry:
     sent: float  # monotonic seconds; of a write lost with the link the latest at which it may have arrived
     acknowledged: float | None = None  # when; None before that
     acts_since: Moment | None = None  # the first status that showed that it acts, as far as that was needed
-    is_doubtful: bool = False  # whether it acts is not known
     # The axes whose request it changes, and of these: those that it lets try again (it sets rGTO or raises
     # the force); those that were proven to rest before it; and of the latter those that have shown motion
     # since, so that no status from before can follow.
@@ -41,9 +40,8 @@ class Entry:
     def time(self) -> float:
         return self.sent if self.acknowledged is None else self.acknowledged
 
-    @property
-    def is_in_flight(self) -> bool:
-        return self.acknowledged is None and not self.is_doubtful
+    def is_lag_over(self, now: Moment) -> bool:
+        return self.acts_since is not None and self.acts_since.is_lag_over(now)
 
     def target(self, axis: Finger, since: Moment | None) -> Target:
         position = self.image.position(axis) if self.image.go else None

@@ -12,18 +12,19 @@ No I/O and no clock: time is that of the newest status.
 #   have: the base of the next image.
 # * shown: a status has repeated its echo. A slow gripper may show an older one again, or skip one [follows].
 # * doubtful: the link went down before the acknowledgement, or another client's image showed first
-#   [follows]. It may act, and is not the base. If it shows, it is certain again, and so is what was
-#   acknowledged after it.
+#   [follows]. It may act, and is not the base: it is kept apart. If it shows, it is certain again, and so is
+#   what was acknowledged after it.
 #
 # A status that shows no entry of the last half second shows another client's image, or a power cycle: that
 # gets an entry of its own, before those that may still act. An entry that was replaced longer ago cannot show
-# in an echo, but gDT may trail the echo [vendor]: it is kept for that, apart from the others.
+# in an echo: it is below the floor. gDT may trail the echo [vendor], so it is kept for that.
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from itertools import chain, takewhile
+from itertools import chain, islice, takewhile
+from operator import attrgetter
 from typing import Final
 
 from ..runtime.log import Log, log
@@ -44,6 +45,7 @@ SILENT_S: Final = 0.25
 """Time in which a write acts where no echo shows it (speed, force; one that was lost with the link): the
 slowest device cycle and 0.05 s."""
 NEVER: Final = float("-inf")
+_number: Final = attrgetter("number")
 
 
 class Ledger:
@@ -61,27 +63,30 @@ class Ledger:
         self.grips: Final = Grips()
         self.limits: Final = Limits(log)
         self._model: Final = model
-        self._entries = deque([self.shown])  # those that a status may show
-        self._past: deque[Entry] = deque()  # those before them: a late gDT may be from their time
+        self._entries = deque([self.shown])  # those that are certain
+        self._floor = 0  # the index of the first that a status may show: gDT may be from before that
+        self._doubtful: list[Entry] = []  # by number; each may act after those with a lower one
         # The entry that showed as a status was adopted. If it is ours, it may activate: after a reset our own
         # image is taken for another client's.
         self._mistaken: Entry | None = None
         self._adoption: Adoption | None = None  # of another client's entry as long as that is the last
-        # The masks and the flag spare a poll the questions whose answers are known. A write that changes the
+        # The masks spare a poll the questions whose answers are known. A write that changes the
         # request of an axis puts it into unrested and _unproven; a status at rest takes it out of the one,
         # and a status that cannot be from before the write out of the other.
         self._unproven = NO_AXES  # may still show a status from before their last request; with all unrested
         self._may_start = NO_AXES  # rested before an entry, as noted there, and have not moved since
-        self._has_doubtful = False
 
     # -- questions -------------------------------------------------------------------------------------
 
     @property
     def last(self) -> Entry:
         """The entry that the gripper has, or is about to have."""
-        if not self._has_doubtful:
-            return self._entries[-1]
-        return next(each for each in reversed(self._entries) if not each.is_doubtful)
+        return self._entries[-1]
+
+    @property
+    def _newest(self) -> Entry:
+        """The one with the highest number: the last, or one in doubt."""
+        return max(self.last, *self._doubtful[-1:], key=_number) if self._doubtful else self.last
 
     @property
     def base(self) -> Request:
@@ -91,9 +96,7 @@ class Ledger:
     @property
     def has_lost_write(self) -> bool:
         """Whether a write may act of which nothing is known: an image from before it would undo it."""
-        return self._has_doubtful and any(
-            each.is_doubtful and self.now.time - each.time < SILENT_S for each in self._entries
-        )
+        return any(self.now.time - each.time < SILENT_S for each in self._doubtful)
 
     @property
     def is_certain(self) -> bool:
@@ -108,10 +111,10 @@ class Ledger:
     def acts(self, entry: Entry | None = None) -> bool:
         """Whether the image of an entry, or of a later one, acts by now; None for the last one."""
         # It does when its echo has shown, or a long enough time after its acknowledgement.
-        entry = self._entries[-1] if entry is None else entry
+        entry = entry or self._newest
         if entry.number <= self.shown.number:
             return True
-        if entry.is_in_flight:
+        if self._is_in_flight(entry):
             return False
         age = self.now.time - entry.time
         if age >= WINDOW_S:
@@ -126,7 +129,7 @@ class Ledger:
 
     def may_activate(self, status: RobotiqStatus) -> bool:
         """Whether a write of ours with rACT begins to act only in a status, or a short time before it."""
-        ours = (each for each in (*self._entries, self._mistaken) if each is not None and each.is_ours)
+        ours = (each for each in (*self._showable(), self._mistaken) if each is not None and each.is_ours)
         activating = (each for each in ours if each.image.activate and each.echo == status.echo)
         return any(self.now.time - each.time < WINDOW_S for each in activating)
 
@@ -140,15 +143,15 @@ class Ledger:
         """Whether an image that does not act yet, or does not show in gDT yet, may start an axis."""
         # While rGTO is clear a speed or a force does not: then all entries that wait have the same echo.
         if not self.acts():
-            return self.base.go or len({each.echo for each in self._entries}) > 1
+            return self.base.go or len({each.echo for each in self._showable()}) > 1
         return bool(self.unrested) and self.base.go and self._adoption is None
 
     def may_move(self, status: RobotiqStatus) -> Finger:
         """The axes that may move, or be about to, although the status shows them at rest."""
         moving = NO_AXES
-        for axis in self._model.axes if self._unproven else ():
+        for axis in self._model.axes:
             what, position = status.finger_status(axis), status.position(axis)
-            if may_move(self._targets(axis), self._model, what, position):
+            if axis & self._unproven and may_move(self._targets(axis), self._model, what, position):
                 moving |= axis
         return moving
 
@@ -156,9 +159,7 @@ class Ledger:
         """The requests that an axis may show, the newest first."""
         since: Moment | None = None
         oldest: Entry | None = None
-        for each in chain(reversed(self._entries), reversed(self._past)):
-            if each.is_doubtful:
-                continue
+        for each in reversed(self._entries):
             since = each.acts_since or since  # an entry acts when it or a later one does
             if not each.changes & axis:
                 continue
@@ -176,7 +177,7 @@ class Ledger:
     def write(self, image: Request, moved: Finger, now: float) -> Entry:
         """Add an image that is about to be sent, with new positions for ``moved``."""
         before = self._settle_base()
-        entry = Entry(self._entries[-1].number + 1, image, before, image.echo, is_ours=True, sent=now)
+        entry = Entry(self._newest.number + 1, image, before, image.echo, is_ours=True, sent=now)
         self.limits.written(entry, moved)
         self.grips.forget(moved)  # a new position may let go
         self._note_changes(entry)
@@ -200,15 +201,14 @@ class Ledger:
             self.unrested |= entry.changes
 
     def acknowledge(self, now: float) -> None:
-        self._entries[-1].acknowledged = now
+        self._newest.acknowledged = now
 
     def lost(self, now: float = NEVER) -> None:
         """The link is down: a write without acknowledgement may have arrived at any time until now."""
         self._settle_base()
-        last = self._entries[-1]
-        if last.is_in_flight:
-            last.is_doubtful = self._has_doubtful = True
-            last.sent = max(last.sent, now)
+        if self._is_in_flight(self.last):
+            self.last.sent = max(self.last.sent, now)
+            self._doubtful.append(self._entries.pop())
 
     def _settle_base(self) -> Request:
         """End the adoption, so that no later status changes the base; return that."""
@@ -222,51 +222,44 @@ class Ledger:
     def update(self, status: RobotiqStatus, asked: float) -> None:
         """Take in a status: from then on the questions are about it."""
         self.now = Moment(asked, self.now.reads + 1)
-        entries, echo, shown = self._entries, status.echo, self.shown
-        if len(entries) > 1:
+        if len(self._entries) > 1:
             self._raise_floor()
         # The common case first: nothing has changed since the last poll, and nothing waits to show. If others
         # wait, an echo of the entry shown before is its own unless a limit makes it ambiguous.
-        may_show = shown is entries[-1] or (shown.number >= entries[0].number and not self.limits.has_alias)
-        self.match = shown if shown.echo == echo and may_show else self._find(status)
-        if self._has_doubtful:
-            self._forget_doubtful()
+        shown, floor = self.shown, self._entries[self._floor].number
+        may_show = shown is self._newest or (shown.number >= floor and not self.limits.has_alias)
+        self.match = shown if shown.echo == status.echo and may_show else self._find(status)
+        if self._doubtful:  # those that did not show in time, but not before this status was compared
+            later = (each for each in self._doubtful if each.number > self.shown.number)
+            self._doubtful = [each for each in later if not self._is_old(each)]
         # A moving axis of another client shows its direction with time, an axis at rest its true gDT.
         if self._adoption is not None and self.match is self.last:
             self._adoption.update(status, self.now)
 
     def _raise_floor(self) -> None:
-        """Set apart the entries that were replaced longer than WINDOW_S ago."""
+        """Let the entries that were replaced longer than WINDOW_S ago show no more."""
         # This comes before the status is looked at: after a silence it must not show an echo of long ago.
-        entries, floor = self._entries, 0
-        for index in range(1, len(entries)):
-            if not self._is_old(entries[index]):
-                break
-            floor = floor if entries[index].is_doubtful else index
-        for _ in range(floor):
-            first = entries.popleft()
-            if not first.is_doubtful:
-                self._past.append(first)
-        self._forget_past()
+        entries = self._entries
+        while self._floor + 1 < len(entries) and self._is_old(entries[self._floor + 1]):
+            self._floor += 1
+        if self._doubtful:
+            self._doubtful = [each for each in self._doubtful if each.number > entries[self._floor].number]
+        while self._floor and (not self._unproven or entries[1].is_lag_over(self.now)):
+            entries.popleft()
+            self._floor -= 1
+
+    def _is_in_flight(self, entry: Entry) -> bool:
+        # One is written at a time: only the last can be on the line.
+        return entry.acknowledged is None and entry is self.last
 
     def _is_old(self, entry: Entry) -> bool:
-        return not entry.is_in_flight and self.now.time - entry.time > WINDOW_S
-
-    def _forget_past(self) -> None:
-        past = self._past
-        if not self._unproven:
-            past.clear()
-        while past:
-            following = past[1] if len(past) > 1 else self._entries[0]
-            if following.acts_since is None or not following.acts_since.is_lag_over(self.now):
-                return
-            past.popleft()
+        return not self._is_in_flight(entry) and self.now.time - entry.time > WINDOW_S
 
     def _find(self, status: RobotiqStatus) -> Entry | None:
         """The entry that a status shows, perhaps with software limits in place of its requests."""
         found = self._entry_of(status.echo)
         # A write in doubt may not have arrived: then another client explains the echo better.
-        may_be_limit = found is None and not self._has_doubtful
+        may_be_limit = found is None and not self._doubtful
         if may_be_limit and self.limits.explains(self.shown, self._waiting(), status, self.now.time):
             # Even so it may have to wait: while the echo has not changed, the write may not act yet.
             return self._entry_of(status.echo)
@@ -277,12 +270,12 @@ class Ledger:
         # A control loop leaves a hundred entries in the window. Those that wait are few, and looked at first.
         for each in self._waiting():
             if each.echo == echo or self._shows_limit(each, echo):
-                if each.is_doubtful:
+                if each in self._doubtful:
                     self._revive(each)
                 self.shown = each
-                self.limits.settle(each, self._entries[-1], echo)
+                self.limits.settle(each, self._newest, echo)
                 return each
-        return next((each for each in self._entries if each.echo == echo), None)
+        return next((each for each in self._showable() if each.echo == echo), None)
 
     def _shows_limit(self, entry: Entry, echo: Echo) -> bool:
         # If the gripper showed the same echo before, the write may not act yet: then wait for SILENT_S.
@@ -292,34 +285,33 @@ class Ledger:
             return False
         return self.limits.shows(entry, echo)
 
+    def _showable(self) -> Iterator[Entry]:
+        """The entries that a status may show."""
+        return chain(islice(self._entries, self._floor, None), self._doubtful)
+
     def _waiting(self) -> list[Entry]:
-        """The entries after the one that shows, the oldest first."""
-        shown = self.shown.number
-        return [*takewhile(lambda each: each.number > shown, reversed(self._entries))][::-1]
+        """Those of them after the one that shows, the oldest first."""
+        first = max(self.shown.number + 1, self._entries[self._floor].number)
+        waiting = takewhile(lambda each: each.number >= first, reversed(self._entries))
+        return sorted((*waiting, *self._doubtful), key=_number)
 
     def _revive(self, entry: Entry) -> None:
         """An entry in doubt acts after all, and so will those that were acknowledged after it."""
         # Images act in their order [follows]. They are compared with the image that showed until now.
         self._settle_base()
         before = self.shown.image
-        for each in self._entries:
-            if each.number < entry.number or not each.is_doubtful:
-                continue
-            if each is entry or each.acknowledged is not None:
-                each.is_doubtful, each.before = False, before
-                if each.acknowledged is None:  # its echo is its acknowledgement: it is not in flight any more
-                    each.acknowledged = self.now.time
-                self._unproven |= _changed(before, each.image)
-                self._note_changes(each)
-                self.ours |= each.changes
-                before = each.image
-
-    def _forget_doubtful(self) -> None:
-        """Forget the writes in doubt that did not show in time, but not before this status was compared."""
-        doubtful = [each for each in self._entries if each.is_doubtful]
-        kept = [each for each in doubtful if each.number > self.shown.number and not self._is_old(each)]
-        self._entries = deque(each for each in self._entries if not each.is_doubtful or each in kept)
-        self._has_doubtful = bool(kept)
+        later = (each for each in self._doubtful if each.number > entry.number)
+        revived = [entry, *(each for each in later if each.acknowledged is not None)]
+        for each in revived:
+            each.before = before
+            if each.acknowledged is None:  # its echo is its acknowledgement: it is not in flight any more
+                each.acknowledged = self.now.time
+            self._unproven |= _changed(before, each.image)
+            self._note_changes(each)
+            self.ours |= each.changes
+            before = each.image
+        self._doubtful = [each for each in self._doubtful if each not in revived]
+        self._entries = deque(sorted((*self._entries, *revived), key=_number))
 
     def adopt(self, status: RobotiqStatus, *, is_found: bool = False) -> None:
         """Add an entry for the image that a status shows, as no other explains it."""
@@ -329,29 +321,29 @@ class Ledger:
         before = self._settle_base()
         self._adoption = Adoption(status, self.now, since)
         image, time = self._adoption.request(before.axes), self.now.time
-        other = Entry(self._entries[-1].number + 1, image, before, status.echo, False, time, time, self.now)
+        other = Entry(self._newest.number + 1, image, before, status.echo, False, time, time, self.now)
         other.changes = _changed(before, image)
         self._unproven |= other.changes
         self.ours = NO_AXES if is_found else self.ours & ~_compared(before, image)[0]
-        waiting = self._waiting()
-        self._past.extend(each for each in self._entries if each.number <= self.shown.number)
+        self._doubtful = self._waiting()
+        for number, each in enumerate(self._doubtful, other.number + 1):
+            each.number = number
+        self._entries = deque(each for each in self._entries if each not in self._doubtful)
+        self._entries.append(other)
+        self._floor = len(self._entries) - 1
         self._mistaken = self.match or self._mistaken
-        self._entries, self.shown, self.match = deque([other, *waiting]), other, other
-        for number, each in enumerate(waiting, other.number + 1):
-            each.number, each.is_doubtful = number, True
-        self._has_doubtful = bool(waiting)
+        self.shown = self.match = other
         self.grips.forget()
-        self._forget_past()
 
     def restart(self, status: RobotiqStatus) -> bool:
         """A procedure has ended: the gripper has its last image, and no other write is on its way."""
         # Return whether the status shows that image; if not, another client has written since. rATR has no
         # echo [manual 2014, p. 50]: while a gripper follows requests, an image with rATR counts as not shown.
-        image, number, time = self.base, self._entries[-1].number + 1, self._entries[-1].time
+        image, newest = self.base, self._newest
+        number, time = newest.number + 1, newest.time
         self.shown = self.match = Entry(number, image, image, status.echo, True, time, time, LONG_AGO)
-        self._entries, self._has_doubtful, self._adoption = deque([self.shown]), False, None
-        self._past.clear()
-        self._mistaken = None
+        self._entries, self._floor, self._doubtful = deque([self.shown]), 0, []
+        self._adoption = self._mistaken = None
         self.unrested = self._unproven = self._may_start = NO_AXES
         self.ours = Finger.ALL
         return status.echo == image.echo and not image.release
@@ -371,10 +363,10 @@ class Ledger:
             self.grips.remember(status, contacts)
 
     def _note_acting(self) -> None:
-        for each in chain(reversed(self._entries), reversed(self._past)):
+        for each in reversed(self._entries):
             if each.acts_since is not None:
                 return
-            if not each.is_doubtful and self.acts(each):
+            if self.acts(each):
                 # If the echo does not show when it began to act, the time for that and the lag end together.
                 never_showed = each.number > self.shown.number and self.now.time - each.time >= WINDOW_S
                 each.acts_since = LONG_AGO if never_showed else self.now
@@ -399,7 +391,7 @@ class Ledger:
         """An axis at rest moves only for a new request: every later status is from after it [follows]."""
         self._may_start &= ~axis
         # What an entry notes as rested may change as it is revived, so the entry is looked for now.
-        for each in chain(reversed(self._entries), reversed(self._past)):
+        for each in reversed(self._entries):
             if each.rested & axis:
                 each.started |= axis
                 return
