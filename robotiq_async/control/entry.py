@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..values.enums import NO_AXES, Finger
@@ -31,14 +30,41 @@ class Entry:
     rested: Finger = NO_AXES
     started: Finger = NO_AXES
 
-    def limit(self, positions: Mapping[Finger, int], echo: Echo | None = None) -> None:
-        """Put limits in place of requests; ``echo`` if it is known to be another than that of the image."""
-        self.image = self.image.with_positions(positions)
-        self.echo = self.image.echo if echo is None else echo
-
     @property
     def time(self) -> float:
         return self.sent if self.acknowledged is None else self.acknowledged
+
+    def compare(self, before: Request, unrested: Finger, unproven: Finger) -> None:
+        """Note what it changes, given the axes that are not known to rest, and not proven to."""
+        self.before, image = before, self.image
+        both = zip(before.by_axis, image.axes, strict=True)
+        pressed = Finger(sum(axis for (axis, old), new in both if new.force > old.force))
+        # More force lets an axis in contact try again [conceivable]; one that moves keeps moving.
+        self.changes = changed(before, image) | pressed & ~unrested
+        self.again = self.changes & pressed if before.go or not image.go else self.changes
+        # With rGTO clear gDT has no meaning, so no axis was proven to rest under what was asked before.
+        if before.go:
+            self.rested = self.changes & ~unproven
+
+    def acknowledge(self, now: float) -> None:
+        self.acknowledged = now
+
+    def lose(self, now: float) -> None:
+        """Note that the link went down before its acknowledgement."""
+        self.sent = max(self.sent, now)
+
+    def renumber(self, number: int) -> None:
+        self.number = number
+
+    def correct(self, image: Request, echo: Echo) -> None:
+        """Take in what a status has shown of it: another client's requests, or limits in place of ours."""
+        self.image, self.echo = image, echo
+
+    def note_acting(self, since: Moment) -> None:
+        self.acts_since = since
+
+    def note_start(self, axis: Finger) -> None:
+        self.started |= axis
 
     def is_lag_over(self, now: Moment) -> bool:
         return self.acts_since is not None and self.acts_since.is_lag_over(now)
@@ -51,3 +77,14 @@ class Entry:
         """The request that it replaces: unknown before another client's, if rGTO was clear."""
         known = self.before if self.before.go or self.is_ours else self.image
         return Target(known.position(axis) if known.go else None)
+
+
+def changed(before: Request, image: Request) -> Finger:
+    """The axes whose request is another: all if rGTO is."""
+    return moved(before, image) if image.go is before.go else image.model.all_axes
+
+
+def moved(before: Request, image: Request) -> Finger:
+    """The axes whose position request is another."""
+    both = zip(before.by_axis, image.axes, strict=True)
+    return Finger(sum(axis for (axis, old), new in both if new.position != old.position))

@@ -34,7 +34,7 @@ from ..values.registers import Echo
 from ..values.request import AxisRequest, Request
 from ..values.status import RobotiqStatus
 from .adoption import Adoption
-from .entry import Entry
+from .entry import Entry, changed, moved
 from .limits import Limits
 from .rest import LONG_AGO, Grips, Moment, Rest, Target, may_move, rest_of
 
@@ -174,47 +174,41 @@ class Ledger:
 
     # -- what is written -------------------------------------------------------------------------------
 
-    def write(self, image: Request, moved: Finger, now: float) -> Entry:
-        """Add an image that is about to be sent, with new positions for ``moved``."""
+    def write(self, image: Request, axes: Finger, now: float) -> Entry:
+        """Add an image that is about to be sent, with new positions for ``axes``."""
         before = self._settle_base()
         entry = Entry(self._newest.number + 1, image, before, image.echo, is_ours=True, sent=now)
-        self.limits.written(entry, moved)
-        self.grips.forget(moved)  # a new position may let go
-        self._note_changes(entry)
-        self.ours |= moved
+        self.limits.written(entry, axes)
+        self.grips.forget(axes)  # a new position may let go
+        self._note_changes(entry, before)
+        self.ours |= axes
         self._entries.append(entry)
         return entry
 
-    def _note_changes(self, entry: Entry) -> None:
-        image, before = entry.image, entry.before
-        moved, pressed = _compared(before, image)
-        entry.changes = moved if image.go is before.go else image.model.all_axes
-        if pressed:  # more force lets an axis in contact try again [conceivable]; one that moves keeps moving
-            entry.changes |= pressed & ~self.unrested
-        entry.again = entry.changes & pressed if before.go or not image.go else entry.changes
-        # With rGTO clear gDT has no meaning, so no axis was proven to rest under what was asked before.
+    def _note_changes(self, entry: Entry, before: Request) -> None:
+        entry.compare(before, self.unrested, self._unproven)
         if before.go:
-            entry.rested = entry.changes & ~self._unproven
             self._may_start |= entry.rested
         self._unproven |= entry.changes
-        if image.go:
+        if entry.image.go:
             self.unrested |= entry.changes
 
     def acknowledge(self, now: float) -> None:
-        self._newest.acknowledged = now
+        self._newest.acknowledge(now)
 
     def lost(self, now: float = NEVER) -> None:
         """The link is down: a write without acknowledgement may have arrived at any time until now."""
         self._settle_base()
         if self._is_in_flight(self.last):
-            self.last.sent = max(self.last.sent, now)
+            self.last.lose(now)
             self._doubtful.append(self._entries.pop())
 
     def _settle_base(self) -> Request:
         """End the adoption, so that no later status changes the base; return that."""
         base = self.base
         if self._adoption is not None:
-            self.last.image, self._adoption = base, None
+            self.last.correct(base, self.last.echo)
+            self._adoption = None
         return base
 
     # -- what is read ----------------------------------------------------------------------------------
@@ -303,11 +297,10 @@ class Ledger:
         later = (each for each in self._doubtful if each.number > entry.number)
         revived = [entry, *(each for each in later if each.acknowledged is not None)]
         for each in revived:
-            each.before = before
-            if each.acknowledged is None:  # its echo is its acknowledgement: it is not in flight any more
-                each.acknowledged = self.now.time
-            self._unproven |= _changed(before, each.image)
-            self._note_changes(each)
+            if each.acknowledged is None:  # its echo is its acknowledgement
+                each.acknowledge(self.now.time)
+            self._unproven |= changed(before, each.image)
+            self._note_changes(each, before)
             self.ours |= each.changes
             before = each.image
         self._doubtful = [each for each in self._doubtful if each not in revived]
@@ -321,13 +314,13 @@ class Ledger:
         before = self._settle_base()
         self._adoption = Adoption(status, self.now, since)
         image, time = self._adoption.request(before.axes), self.now.time
-        other = Entry(self._newest.number + 1, image, before, status.echo, False, time, time, self.now)
-        other.changes = _changed(before, image)
-        self._unproven |= other.changes
-        self.ours = NO_AXES if is_found else self.ours & ~_compared(before, image)[0]
+        number, changes = self._newest.number + 1, changed(before, image)
+        other = Entry(number, image, before, status.echo, False, time, time, self.now, changes)
+        self._unproven |= changes
+        self.ours = NO_AXES if is_found else self.ours & ~moved(before, image)
         self._doubtful = self._waiting()
-        for number, each in enumerate(self._doubtful, other.number + 1):
-            each.number = number
+        for at, each in enumerate(self._doubtful, number + 1):
+            each.renumber(at)
         self._entries = deque(each for each in self._entries if each not in self._doubtful)
         self._entries.append(other)
         self._floor = len(self._entries) - 1
@@ -369,7 +362,7 @@ class Ledger:
             if self.acts(each):
                 # If the echo does not show when it began to act, the time for that and the lag end together.
                 never_showed = each.number > self.shown.number and self.now.time - each.time >= WINDOW_S
-                each.acts_since = LONG_AGO if never_showed else self.now
+                each.note_acting(LONG_AGO if never_showed else self.now)
 
     def _find_rest(self, status: RobotiqStatus) -> None:
         for axis in self._model.axes:
@@ -393,21 +386,5 @@ class Ledger:
         # What an entry notes as rested may change as it is revived, so the entry is looked for now.
         for each in reversed(self._entries):
             if each.rested & axis:
-                each.started |= axis
+                each.note_start(axis)
                 return
-
-
-def _changed(before: Request, image: Request) -> Finger:
-    """The axes whose request is another: all if rGTO is."""
-    return _compared(before, image)[0] if image.go is before.go else image.model.all_axes
-
-
-def _compared(before: Request, image: Request) -> tuple[Finger, Finger]:
-    """The axes whose position request is another, and those that are to press harder."""
-    moved = pressed = NO_AXES
-    for (axis, old), new in zip(before.by_axis, image.axes, strict=True):
-        if new.position != old.position:
-            moved |= axis
-        if new.force > old.force:
-            pressed |= axis
-    return moved, pressed

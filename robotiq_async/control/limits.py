@@ -84,8 +84,9 @@ class Limits:
             if last.image.position(axis) == entry.image.position(axis):
                 self.limited[axis] = limit
                 if last is not entry:
-                    last.limit({axis: limit})
-        entry.limit(limits, echo)
+                    image = last.image.with_positions({axis: limit})
+                    last.correct(image, image.echo)
+        entry.correct(entry.image.with_positions(limits), echo)
 
     def note_rest(self, axis: Finger, status: RobotiqStatus) -> None:
         """An axis has come to rest: at its limit it proves that."""
