@@ -1,10 +1,12 @@
-"""One entry of the ledger, and how a gripper may echo it."""
+"""One entry of the ledger, and what the entries ask of an axis."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import takewhile
 
-from ..values.enums import NO_AXES, Finger
+from ..values.enums import Finger
 from ..values.registers import Echo
 from ..values.request import Request
 from .rest import Moment, Target
@@ -16,35 +18,18 @@ class Entry:
 
     number: int  # its place in the order in which the entries act
     image: Request
-    before: Request  # the image that it replaces
     echo: Echo
     is_ours: bool
     sent: float  # monotonic seconds; of a write lost with the link the latest at which it may have arrived
     acknowledged: float | None = None  # when; None before that
     acts_since: Moment | None = None  # the first status that showed that it acts, as far as that was needed
-    # The axes whose request it changes, and of these: those that it lets try again (it sets rGTO or raises
-    # the force); those that were proven to rest before it; and of the latter those that have shown motion
-    # since, so that no status from before can follow.
-    changes: Finger = NO_AXES
-    again: Finger = NO_AXES
-    rested: Finger = NO_AXES
-    started: Finger = NO_AXES
 
     @property
     def time(self) -> float:
         return self.sent if self.acknowledged is None else self.acknowledged
 
-    def compare(self, before: Request, unrested: Finger, unproven: Finger) -> None:
-        """Note what it changes, given the axes that are not known to rest, and not proven to."""
-        self.before, image = before, self.image
-        both = zip(before.by_axis, image.axes, strict=True)
-        pressed = Finger(sum(axis for (axis, old), new in both if new.force > old.force))
-        # More force lets an axis in contact try again [conceivable]; one that moves keeps moving.
-        self.changes = changed(before, image) | pressed & ~unrested
-        self.again = self.changes & pressed if before.go or not image.go else self.changes
-        # With rGTO clear gDT has no meaning, so no axis was proven to rest under what was asked before.
-        if before.go:
-            self.rested = self.changes & ~unproven
+    def is_lag_over(self, now: Moment) -> bool:
+        return self.acts_since is not None and self.acts_since.is_lag_over(now)
 
     def acknowledge(self, now: float) -> None:
         self.acknowledged = now
@@ -63,28 +48,48 @@ class Entry:
     def note_acting(self, since: Moment) -> None:
         self.acts_since = since
 
-    def note_start(self, axis: Finger) -> None:
-        self.started |= axis
 
-    def is_lag_over(self, now: Moment) -> bool:
-        return self.acts_since is not None and self.acts_since.is_lag_over(now)
+class Asked:
+    """What an axis was asked that its object status may be from, until it is proven to rest."""
 
-    def target(self, axis: Finger, since: Moment | None) -> Target:
-        position = self.image.position(axis) if self.image.go else None
-        return Target(position, bool(self.again & axis), since)
+    def __init__(self, axis: Finger, before: Request, *, is_at_rest: bool) -> None:
+        self._axis = axis
+        # The request before all changes; None if no status can be from its time any more.
+        self._before: Target | None = Target(before.position(axis) if before.go else None)
+        self._may_start = is_at_rest  # it was proven to rest under that, so a motion is that of a change
+        self._changes: list[tuple[Entry, bool]] = []  # the oldest first; True if the axis tries again
 
-    def target_before(self, axis: Finger) -> Target:
-        """The request that it replaces: unknown before another client's, if rGTO was clear."""
-        known = self.before if self.before.go or self.is_ours else self.image
-        return Target(known.position(axis) if known.go else None)
+    def add(self, entry: Entry, now: Moment, *, again: bool) -> None:
+        changes = self._changes
+        while len(changes) > 1 and changes[1][0].is_lag_over(now):
+            del changes[0]
+        at = len(changes)
+        while at and changes[at - 1][0].number > entry.number:  # it was in doubt, and is revived
+            at -= 1
+        changes.insert(at, (entry, again))
 
+    def forget(self, doubtful: list[Entry]) -> None:
+        """Forget the requests of entries that may act, or never: what moves the axis is not known."""
+        kept = [each for each in self._changes if each[0] not in doubtful]
+        if len(kept) < len(self._changes):
+            self._changes, self._may_start = kept, False
+            self._before = self._before or Target(None)
 
-def changed(before: Request, image: Request) -> Finger:
-    """The axes whose request is another: all if rGTO is."""
-    return moved(before, image) if image.go is before.go else image.model.all_axes
+    def note_motion(self) -> None:
+        """An axis at rest moves only for a new request: every later status is from after it [follows]."""
+        if self._may_start:
+            self._before = None
 
+    def waiting(self) -> Iterator[Entry]:
+        """The entries that are not known to act."""
+        return takewhile(lambda each: each.acts_since is None, (each for each, _ in reversed(self._changes)))
 
-def moved(before: Request, image: Request) -> Finger:
-    """The axes whose position request is another."""
-    both = zip(before.by_axis, image.axes, strict=True)
-    return Finger(sum(axis for (axis, old), new in both if new.position != old.position))
+    def targets(self, now: Moment) -> Iterator[Target]:
+        """The newest first, as far back as a status can be from."""
+        for each, again in reversed(self._changes):
+            position = each.image.position(self._axis) if each.image.go else None
+            yield Target(position, again, each.acts_since)
+            if each.is_lag_over(now):
+                return
+        if self._before is not None:
+            yield self._before

@@ -17,13 +17,12 @@ No I/O and no clock: time is that of the newest status.
 #
 # A status that shows no entry of the last half second shows another client's image, or a power cycle: that
 # gets an entry of its own, before those that may still act. An entry that was replaced longer ago cannot show
-# in an echo: it is below the floor. gDT may trail the echo [vendor], so it is kept for that.
+# in an echo, and is forgotten. gDT may trail the echo [vendor]: what it may be from is kept by axis.
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
-from itertools import chain, islice, takewhile
+from itertools import takewhile
 from operator import attrgetter
 from typing import Final
 
@@ -34,9 +33,9 @@ from ..values.registers import Echo
 from ..values.request import AxisRequest, Request
 from ..values.status import RobotiqStatus
 from .adoption import Adoption
-from .entry import Entry, changed, moved
+from .entry import Asked, Entry
 from .limits import Limits
-from .rest import LONG_AGO, Grips, Moment, Rest, Target, may_move, rest_of
+from .rest import LONG_AGO, Grips, Moment, Rest, may_move, rest_of
 
 WINDOW_S: Final = 0.5
 """Time after its acknowledgement in which a write shows, if it acts: the slowest device cycle considered is
@@ -53,7 +52,7 @@ class Ledger:
 
     def __init__(self, speed: int, force: int, model: Model = THREE_FINGER, log: Log = log) -> None:
         first = Request(axes=(AxisRequest(0, speed, force),) * len(model.axes), model=model)
-        self.shown = Entry(0, first, first, first.echo, False, NEVER, NEVER, LONG_AGO)  # newest that showed
+        self.shown = Entry(0, first, first.echo, False, NEVER, NEVER, LONG_AGO)  # the newest that showed
         self.match: Entry | None = None  # the one that the newest status shows
         # When that was asked for. It may show the state of that time, however late a busy loop reads the
         # reply; so the age of a write is measured by this.
@@ -63,18 +62,16 @@ class Ledger:
         self.grips: Final = Grips()
         self.limits: Final = Limits(log)
         self._model: Final = model
-        self._entries = deque([self.shown])  # those that are certain
-        self._floor = 0  # the index of the first that a status may show: gDT may be from before that
+        self._entries = deque([self.shown])  # those that are certain, and that a status may show
         self._doubtful: list[Entry] = []  # by number; each may act after those with a lower one
         # The entry that showed as a status was adopted. If it is ours, it may activate: after a reset our own
         # image is taken for another client's.
         self._mistaken: Entry | None = None
         self._adoption: Adoption | None = None  # of another client's entry as long as that is the last
-        # The masks spare a poll the questions whose answers are known. A write that changes the
-        # request of an axis puts it into unrested and _unproven; a status at rest takes it out of the one,
-        # and a status that cannot be from before the write out of the other.
-        self._unproven = NO_AXES  # may still show a status from before their last request; with all unrested
-        self._may_start = NO_AXES  # rested before an entry, as noted there, and have not moved since
+        # The axes that may still show a status from before their last request, with what they were asked: a
+        # write that changes it puts an axis in, and a status that cannot be from before it takes it out. All
+        # unrested ones are among them. Usually there is none, which spares a poll all questions about them.
+        self._unproven: dict[Finger, Asked] = {}
 
     # -- questions -------------------------------------------------------------------------------------
 
@@ -91,7 +88,7 @@ class Ledger:
     @property
     def base(self) -> Request:
         last = self.last
-        return last.image if self._adoption is None else self._adoption.request(last.before.axes)
+        return last.image if self._adoption is None else self._adoption.request(last.image.axes)
 
     @property
     def has_lost_write(self) -> bool:
@@ -129,7 +126,8 @@ class Ledger:
 
     def may_activate(self, status: RobotiqStatus) -> bool:
         """Whether a write of ours with rACT begins to act only in a status, or a short time before it."""
-        ours = (each for each in (*self._showable(), self._mistaken) if each is not None and each.is_ours)
+        known = (*self._entries, *self._doubtful, self._mistaken)
+        ours = (each for each in known if each is not None and each.is_ours)
         activating = (each for each in ours if each.image.activate and each.echo == status.echo)
         return any(self.now.time - each.time < WINDOW_S for each in activating)
 
@@ -143,55 +141,51 @@ class Ledger:
         """Whether an image that does not act yet, or does not show in gDT yet, may start an axis."""
         # While rGTO is clear a speed or a force does not: then all entries that wait have the same echo.
         if not self.acts():
-            return self.base.go or len({each.echo for each in self._showable()}) > 1
+            return self.base.go or len({each.echo for each in (*self._entries, *self._doubtful)}) > 1
         return bool(self.unrested) and self.base.go and self._adoption is None
 
     def may_move(self, status: RobotiqStatus) -> Finger:
         """The axes that may move, or be about to, although the status shows them at rest."""
         moving = NO_AXES
-        for axis in self._model.axes:
+        for axis, asked in self._unproven.items():
             what, position = status.finger_status(axis), status.position(axis)
-            if axis & self._unproven and may_move(self._targets(axis), self._model, what, position):
+            if may_move(asked.targets(self.now), self._model, what, position):
                 moving |= axis
         return moving
-
-    def _targets(self, axis: Finger) -> Iterator[Target]:
-        """The requests that an axis may show, the newest first."""
-        since: Moment | None = None
-        oldest: Entry | None = None
-        for each in reversed(self._entries):
-            since = each.acts_since or since  # an entry acts when it or a later one does
-            if not each.changes & axis:
-                continue
-            oldest = each
-            yield each.target(axis, since)
-            if each.started & axis or (since is not None and since.is_lag_over(self.now)):
-                return
-            if each.rested & axis:
-                break
-        if oldest is not None:
-            yield oldest.target_before(axis)
 
     # -- what is written -------------------------------------------------------------------------------
 
     def write(self, image: Request, axes: Finger, now: float) -> Entry:
         """Add an image that is about to be sent, with new positions for ``axes``."""
         before = self._settle_base()
-        entry = Entry(self._newest.number + 1, image, before, image.echo, is_ours=True, sent=now)
+        entry = Entry(self._newest.number + 1, image, image.echo, is_ours=True, sent=now)
         self.limits.written(entry, axes)
         self.grips.forget(axes)  # a new position may let go
-        self._note_changes(entry, before)
+        # With rGTO clear gDT has no meaning, so no axis was proven to rest under what was asked before.
+        self._note_changes(entry, before, is_at_rest=before.go)
         self.ours |= axes
         self._entries.append(entry)
         return entry
 
-    def _note_changes(self, entry: Entry, before: Request) -> None:
-        entry.compare(before, self.unrested, self._unproven)
-        if before.go:
-            self._may_start |= entry.rested
-        self._unproven |= entry.changes
-        if entry.image.go:
-            self.unrested |= entry.changes
+    def _note_changes(self, entry: Entry, before: Request, *, is_at_rest: bool = False) -> Finger:
+        """Note what an entry asks that differs from the image before it; return the axes."""
+        image, changes = entry.image, NO_AXES
+        is_raised = image.go and not before.go and entry.is_ours
+        for (axis, old), new in zip(before.by_axis, image.axes, strict=True):
+            is_pressed = new.force > old.force
+            is_new = new.position != old.position or image.go is not before.go
+            # More force lets an axis in contact try again [conceivable]; one that moves keeps moving.
+            if is_new or (is_pressed and not axis & self.unrested):
+                asked = self._unproven.get(axis)
+                if asked is None:
+                    # What it replaces is unknown before another client's, if rGTO was clear.
+                    known = before if before.go or entry.is_ours else image
+                    asked = self._unproven[axis] = Asked(axis, known, is_at_rest=is_at_rest)
+                asked.add(entry, self.now, again=is_pressed or is_raised)
+                changes |= axis
+        if image.go and entry.is_ours:
+            self.unrested |= changes
+        return changes
 
     def acknowledge(self, now: float) -> None:
         self._newest.acknowledge(now)
@@ -201,7 +195,12 @@ class Ledger:
         self._settle_base()
         if self._is_in_flight(self.last):
             self.last.lose(now)
-            self._doubtful.append(self._entries.pop())
+            self._doubt([*self._doubtful, self._entries.pop()])
+
+    def _doubt(self, doubtful: list[Entry]) -> None:
+        self._doubtful = doubtful
+        for asked in self._unproven.values():
+            asked.forget(doubtful)
 
     def _settle_base(self) -> Request:
         """End the adoption, so that no later status changes the base; return that."""
@@ -216,12 +215,14 @@ class Ledger:
     def update(self, status: RobotiqStatus, asked: float) -> None:
         """Take in a status: from then on the questions are about it."""
         self.now = Moment(asked, self.now.reads + 1)
-        if len(self._entries) > 1:
-            self._raise_floor()
+        entries = self._entries
+        # This comes before the status is looked at: after a silence it must not show an echo of long ago.
+        while len(entries) > 1 and self._is_old(entries[1]):
+            entries.popleft()
         # The common case first: nothing has changed since the last poll, and nothing waits to show. If others
         # wait, an echo of the entry shown before is its own unless a limit makes it ambiguous.
-        shown, floor = self.shown, self._entries[self._floor].number
-        may_show = shown is self._newest or (shown.number >= floor and not self.limits.has_alias)
+        shown, is_newest = self.shown, self.shown is entries[-1]
+        may_show = is_newest or (shown.number >= entries[0].number and not self.limits.has_alias)
         self.match = shown if shown.echo == status.echo and may_show else self._find(status)
         if self._doubtful:  # those that did not show in time, but not before this status was compared
             later = (each for each in self._doubtful if each.number > self.shown.number)
@@ -229,18 +230,6 @@ class Ledger:
         # A moving axis of another client shows its direction with time, an axis at rest its true gDT.
         if self._adoption is not None and self.match is self.last:
             self._adoption.update(status, self.now)
-
-    def _raise_floor(self) -> None:
-        """Let the entries that were replaced longer than WINDOW_S ago show no more."""
-        # This comes before the status is looked at: after a silence it must not show an echo of long ago.
-        entries = self._entries
-        while self._floor + 1 < len(entries) and self._is_old(entries[self._floor + 1]):
-            self._floor += 1
-        if self._doubtful:
-            self._doubtful = [each for each in self._doubtful if each.number > entries[self._floor].number]
-        while self._floor and (not self._unproven or entries[1].is_lag_over(self.now)):
-            entries.popleft()
-            self._floor -= 1
 
     def _is_in_flight(self, entry: Entry) -> bool:
         # One is written at a time: only the last can be on the line.
@@ -269,7 +258,7 @@ class Ledger:
                 self.shown = each
                 self.limits.settle(each, self._newest, echo)
                 return each
-        return next((each for each in self._showable() if each.echo == echo), None)
+        return next((each for each in self._entries if each.echo == echo), None)
 
     def _shows_limit(self, entry: Entry, echo: Echo) -> bool:
         # If the gripper showed the same echo before, the write may not act yet: then wait for SILENT_S.
@@ -279,15 +268,12 @@ class Ledger:
             return False
         return self.limits.shows(entry, echo)
 
-    def _showable(self) -> Iterator[Entry]:
-        """The entries that a status may show."""
-        return chain(islice(self._entries, self._floor, None), self._doubtful)
-
     def _waiting(self) -> list[Entry]:
-        """Those of them after the one that shows, the oldest first."""
-        first = max(self.shown.number + 1, self._entries[self._floor].number)
-        waiting = takewhile(lambda each: each.number >= first, reversed(self._entries))
-        return sorted((*waiting, *self._doubtful), key=_number)
+        """The entries after the one that shows, the oldest first."""
+        shown = self.shown.number
+        waiting = [*takewhile(lambda each: each.number > shown, reversed(self._entries))]
+        waiting += (each for each in self._doubtful if each.number > self._entries[0].number)
+        return sorted(waiting, key=_number)
 
     def _revive(self, entry: Entry) -> None:
         """An entry in doubt acts after all, and so will those that were acknowledged after it."""
@@ -299,9 +285,7 @@ class Ledger:
         for each in revived:
             if each.acknowledged is None:  # its echo is its acknowledgement
                 each.acknowledge(self.now.time)
-            self._unproven |= changed(before, each.image)
-            self._note_changes(each, before)
-            self.ours |= each.changes
+            self.ours |= self._note_changes(each, before)
             before = each.image
         self._doubtful = [each for each in self._doubtful if each not in revived]
         self._entries = deque(sorted((*self._entries, *revived), key=_number))
@@ -314,18 +298,16 @@ class Ledger:
         before = self._settle_base()
         self._adoption = Adoption(status, self.now, since)
         image, time = self._adoption.request(before.axes), self.now.time
-        number, changes = self._newest.number + 1, changed(before, image)
-        other = Entry(number, image, before, status.echo, False, time, time, self.now, changes)
-        self._unproven |= changes
-        self.ours = NO_AXES if is_found else self.ours & ~moved(before, image)
-        self._doubtful = self._waiting()
-        for at, each in enumerate(self._doubtful, number + 1):
-            each.renumber(at)
-        self._entries = deque(each for each in self._entries if each not in self._doubtful)
-        self._entries.append(other)
-        self._floor = len(self._entries) - 1
+        other = Entry(self._newest.number + 1, image, status.echo, False, time, time, self.now)
+        self._doubt(self._waiting())
+        for number, each in enumerate(self._doubtful, other.number + 1):
+            each.renumber(number)
+        self._note_changes(other, before)
+        pairs = zip(before.by_axis, image.axes, strict=True)
+        moved = Finger(sum(axis for (axis, old), new in pairs if old.position != new.position))
+        self.ours = NO_AXES if is_found else self.ours & ~moved
         self._mistaken = self.match or self._mistaken
-        self.shown = self.match = other
+        self._entries, self.shown, self.match = deque([other]), other, other
         self.grips.forget()
 
     def restart(self, status: RobotiqStatus) -> bool:
@@ -334,18 +316,17 @@ class Ledger:
         # echo [manual 2014, p. 50]: while a gripper follows requests, an image with rATR counts as not shown.
         image, newest = self.base, self._newest
         number, time = newest.number + 1, newest.time
-        self.shown = self.match = Entry(number, image, image, status.echo, True, time, time, LONG_AGO)
-        self._entries, self._floor, self._doubtful = deque([self.shown]), 0, []
+        self.shown = self.match = Entry(number, image, status.echo, True, time, time, LONG_AGO)
+        self._entries, self._doubtful, self._unproven = deque([self.shown]), [], {}
         self._adoption = self._mistaken = None
-        self.unrested = self._unproven = self._may_start = NO_AXES
-        self.ours = Finger.ALL
+        self.unrested, self.ours = NO_AXES, Finger.ALL
         return status.echo == image.echo and not image.release
 
     # -- which axes rest -------------------------------------------------------------------------------
 
     def update_rest(self, status: RobotiqStatus) -> None:
         """Find out which axes have come to rest. Not in a fault: it keeps axes from starting."""
-        if self._unproven:  # usually none is
+        if self._unproven:
             self._note_acting()
             if status.go_echo:  # gDT has no meaning without rGTO [manual]
                 self._find_rest(status)
@@ -356,9 +337,7 @@ class Ledger:
             self.grips.remember(status, contacts)
 
     def _note_acting(self) -> None:
-        for each in reversed(self._entries):
-            if each.acts_since is not None:
-                return
+        for each in {each for asked in self._unproven.values() for each in asked.waiting()}:
             if self.acts(each):
                 # If the echo does not show when it began to act, the time for that and the lag end together.
                 never_showed = each.number > self.shown.number and self.now.time - each.time >= WINDOW_S
@@ -366,25 +345,16 @@ class Ledger:
 
     def _find_rest(self, status: RobotiqStatus) -> None:
         for axis in self._model.axes:
-            if not axis & self._unproven:
+            asked = self._unproven.get(axis)
+            if asked is None:
                 continue
             what, position = status.finger_status(axis), status.position(axis)
             if what is ObjectStatus.IN_MOTION:
-                if axis & self._may_start:
-                    self._note_start(axis)
+                asked.note_motion()
                 continue
-            rest = rest_of(self._targets(axis), self._model, what, position)
+            rest = rest_of(asked.targets(self.now), self._model, what, position)
             if rest is not Rest.UNKNOWN and axis & self.unrested:
                 self.unrested &= ~axis
                 self.limits.note_rest(axis, status)
             if rest is Rest.PROVEN:
-                self._unproven &= ~axis
-
-    def _note_start(self, axis: Finger) -> None:
-        """An axis at rest moves only for a new request: every later status is from after it [follows]."""
-        self._may_start &= ~axis
-        # What an entry notes as rested may change as it is revived, so the entry is looked for now.
-        for each in reversed(self._entries):
-            if each.rested & axis:
-                each.note_start(axis)
-                return
+                del self._unproven[axis]

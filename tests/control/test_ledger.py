@@ -318,6 +318,12 @@ def test_an_echo_that_was_never_written_is_foreign(status: RobotiqStatus) -> Non
     assert history.look(status) is None
 
 
+def remembered(history: History) -> int:
+    """The number of entries that are kept, or of requests of an axis if these are more."""
+    by_axis = (len(asked._changes) for asked in history._unproven.values())
+    return max(len(history._entries), *by_axis, 0)
+
+
 def test_a_long_life_does_not_make_the_history_remember_more() -> None:
     history = History()
     for n in range(2000):
@@ -326,7 +332,7 @@ def test_a_long_life_does_not_make_the_history_remember_more() -> None:
         assert shown is not None
         assert shown.image == entry.image
         history.update_rest(history.latest)
-    assert len(history._entries) <= WINDOW_S * 10 + 2 + LAG_READS
+    assert remembered(history) <= WINDOW_S * 10 + 2 + LAG_READS
 
 
 def test_settings_of_fingers_at_rest_are_not_remembered_for_ever() -> None:
@@ -336,7 +342,7 @@ def test_settings_of_fingers_at_rest_are_not_remembered_for_ever() -> None:
         history.deliver(image(100, speed=n % 256), n / 200)
         history.look(shows(100, n / 200 + EPSILON))
         history.update_rest(history.latest)
-    assert len(history._entries) <= WINDOW_S * 200 + 2
+    assert remembered(history) <= WINDOW_S * 200 + 2
 
 
 def test_an_adopted_image_may_differ_from_its_echo() -> None:
@@ -417,8 +423,10 @@ def test_the_first_image_shown_is_not_ours_but_settled(status: RobotiqStatus) ->
     assert ledger.is_certain
 
 
-def sent_to_200() -> tuple[Ledger, Callable[[int, int, ObjectStatus, float], RobotiqStatus]]:
-    """The ledger of a gripper whose A is sent there from rest, and what makes and takes in its statuses."""
+def sent_from_rest(
+    to: int = 200, *, is_lost: bool = False
+) -> tuple[Ledger, Callable[[int, int, ObjectStatus, float], RobotiqStatus]]:
+    """The ledger of a gripper whose A was at rest at 100, and what makes and takes in its statuses."""
     ledger = found(shows(100, 0.0))
 
     def shown(echo: int, position: int, what: ObjectStatus, at: float) -> RobotiqStatus:
@@ -430,14 +438,17 @@ def sent_to_200() -> tuple[Ledger, Callable[[int, int, ObjectStatus, float], Rob
 
     for n in range(100):
         ledger.update_rest(shown(100, 100, ObjectStatus.AT_POSITION, n / 200))
-    ledger.write(ledger.base.with_positions({A: 200}), A, 0.5)
-    ledger.acknowledge(0.5)
+    ledger.write(ledger.base.with_positions({A: to}), A, 0.5)
+    if is_lost:
+        ledger.lost(0.5)
+    else:
+        ledger.acknowledge(0.5)
     return ledger, shown
 
 
 def test_a_late_contact_of_another_clients_request_is_no_rest_under_ours() -> None:
     """Ours was in doubt, and shows after all: what moved the axis in between is not known."""
-    ledger, shown = sent_to_200()
+    ledger, shown = sent_from_rest()
     ledger.adopt(shown(60, 100, ObjectStatus.AT_POSITION, 0.505))
     shown(200, 98, ObjectStatus.AT_POSITION, 0.51)
     assert ledger.base.position(A) == 200
@@ -449,13 +460,73 @@ def test_a_late_contact_of_another_clients_request_is_no_rest_under_ours() -> No
 
 def test_a_motion_by_another_client_is_no_start_of_our_write_in_doubt() -> None:
     """Ours shows after it. The contact that comes then may be one of the other client's motion."""
-    ledger, shown = sent_to_200()
+    ledger, shown = sent_from_rest()
     ledger.adopt(moving := shown(60, 98, ObjectStatus.IN_MOTION, 0.505))
     ledger.update_rest(moving)
     ledger.update_rest(shown(200, 92, ObjectStatus.IN_MOTION, 0.51))
     ledger.update_rest(shown(200, 90, ObjectStatus.CONTACT_OPENING, 0.515))
     assert A not in ledger.resting
     assert ledger.may_begin_to_move
+
+
+def test_a_motion_before_our_write_shows_proves_nothing_once_another_client_has_overtaken_it() -> None:
+    ledger, shown = sent_from_rest()
+    ledger.update_rest(shown(100, 102, ObjectStatus.IN_MOTION, 0.505))
+    ledger.adopt(shown(60, 104, ObjectStatus.IN_MOTION, 0.51))
+    ledger.update_rest(shown(60, 104, ObjectStatus.CONTACT_CLOSING, 0.515))
+    assert A not in ledger.resting
+
+
+def test_an_axis_rests_although_a_write_was_lost_that_never_arrives() -> None:
+    ledger, shown = sent_from_rest(is_lost=True)
+    ledger.update_rest(shown(100, 100, ObjectStatus.AT_POSITION, 0.505))
+    assert A in ledger.resting
+    assert ledger.may_begin_to_move, "the write may act"
+    shown(100, 100, ObjectStatus.AT_POSITION, 0.51 + WINDOW_S)
+    assert not ledger.may_begin_to_move
+
+
+def test_a_motion_after_a_lost_write_may_be_the_one_of_that() -> None:
+    """So the contact that follows is no rest under what was written since."""
+    ledger, shown = sent_from_rest(60, is_lost=True)
+    shown(100, 100, ObjectStatus.AT_POSITION, 0.8)
+    ledger.write(ledger.base.with_positions({A: 200}), A, 0.8)
+    ledger.acknowledge(0.8)
+    ledger.update_rest(shown(200, 92, ObjectStatus.IN_MOTION, 0.805))
+    ledger.update_rest(shown(200, 90, ObjectStatus.CONTACT_OPENING, 0.81))
+    assert A not in ledger.resting
+
+
+def test_a_lost_write_that_shows_late_acts_before_what_was_written_since() -> None:
+    ledger, shown = sent_from_rest(is_lost=True)
+    shown(100, 100, ObjectStatus.AT_POSITION, 0.8)
+    ledger.write(image := ledger.base.with_positions({A: 150}), A, 0.8)
+    ledger.acknowledge(0.8)
+    ledger.update_rest(shown(200, 110, ObjectStatus.IN_MOTION, 0.805))
+    assert ledger.base == image
+    assert not ledger.acts()
+    ledger.update_rest(shown(150, 150, ObjectStatus.AT_POSITION, 0.9))
+    assert ledger.acts()
+    assert A in ledger.resting
+
+
+def test_a_lost_write_does_not_show_once_a_later_one_acts() -> None:
+    ledger, shown = sent_from_rest(is_lost=True)
+    shown(100, 100, ObjectStatus.AT_POSITION, 0.8)
+    ledger.write(ledger.base.with_positions({A: 150}), A, 0.8)
+    ledger.acknowledge(0.8)
+    shown(200, 110, ObjectStatus.IN_MOTION, 0.81 + WINDOW_S)
+    assert ledger.match is None, "another client's"
+
+
+def test_a_write_that_never_shows_delays_no_axis_longer_than_it_may_show() -> None:
+    """The gripper has forgotten it: the lag is over with the time in which it might have acted."""
+    ledger, shown = sent_from_rest()
+    for n in range(LAG_READS):
+        ledger.update_rest(shown(100, 100, ObjectStatus.AT_POSITION, 0.5 + n / 100))
+    assert A not in ledger.resting
+    ledger.update_rest(shown(100, 100, ObjectStatus.AT_POSITION, 0.5 + WINDOW_S))
+    assert A in ledger.resting
 
 
 def test_a_moving_gripper_that_is_found_is_not_certain_before_it_has_shown_its_direction() -> None:
@@ -547,6 +618,27 @@ def test_of_two_overtaken_writes_the_newest_is_what_the_gripper_has_once_the_fir
     history.adopt(history.latest)
     history.look(shows(30, 1.21))
     assert history.base == image(40)
+
+
+def test_of_two_overtaken_writes_the_first_is_no_more_in_doubt_once_the_second_shows() -> None:
+    history = History(200)
+    for position in (30, 40):
+        history.deliver(image(position), 1.1)
+    history.look(shows(77, 1.2))
+    history.adopt(history.latest)
+    history.look(shows(40, 1.21))
+    assert history.base == image(40)
+    assert history.is_certain
+
+
+def test_an_axis_of_a_gripper_whose_rgto_another_client_has_set_is_not_doubted() -> None:
+    """What it was asked while rGTO was clear is not known, and needs no hold."""
+    history = History(100)
+    history.deliver(image(100, go=False), 1.0)
+    history.look(shows(100, 1.1, go=False))
+    history.restart(history.latest)
+    history.adopt(shows(200, 1.2))
+    assert history.may_move(shows(200, 1.2)) == NO_AXES
 
 
 def test_a_client_that_keeps_writing_does_not_delay_us_anew() -> None:
@@ -663,6 +755,24 @@ def test_a_contact_that_shows_as_rgto_rises_may_be_from_before() -> None:
         status_of(0x39, 0b11_11_11_10, echo=(200, 100, 100, 100), position=(150, 100, 100, 100), at=1.11)
     )
     history.update_rest(history.latest)
+    assert history.unrested & A
+
+
+def test_a_motion_that_shows_as_rgto_rises_may_be_from_before() -> None:
+    """A halt may have caught the axis, so the contact after it proves no rest either."""
+    history = History(100)
+    history.deliver(image(100, go=False), 1.0)
+    history.look(shows(100, 1.01, go=False))
+    history.restart(history.latest)
+    history.deliver(image(100).with_positions({A: 200}), 1.1, A)
+    for number, what in enumerate((ObjectStatus.IN_MOTION, ObjectStatus.CONTACT_CLOSING)):
+        at = (150 + number, 100, 100, 100)
+        history.look(
+            status_of(
+                0x39, 0b11_11_11_00 | what, echo=(200, 100, 100, 100), position=at, at=1.11 + number / 100
+            )
+        )
+        history.update_rest(history.latest)
     assert history.unrested & A
 
 
