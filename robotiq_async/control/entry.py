@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import takewhile
+from typing import Final
 
 from ..values.enums import Finger
 from ..values.registers import Echo
@@ -52,12 +53,13 @@ class Entry:
 class Asked:
     """What an axis was asked that its object status may be from, until it is proven to rest."""
 
-    def __init__(self, axis: Finger, before: Request, *, is_at_rest: bool) -> None:
-        self._axis = axis
-        # The request before all changes; None if no status can be from its time any more.
-        self._before: Target | None = Target(before.position(axis) if before.go else None)
-        self._may_start = is_at_rest  # it was proven to rest under that, so a motion is that of a change
-        self._changes: list[tuple[Entry, bool]] = []  # the oldest first; True if the axis tries again
+    def __init__(
+        self, axis: Finger, before: Target, *, is_at_rest: bool, changes: Iterable[tuple[Entry, bool]] = ()
+    ) -> None:
+        self._axis: Final = axis
+        self._before: Target | None = before  # all changes; None if no status can be from its time any more
+        self._may_start: Final = is_at_rest  # it was proven to rest under that: a motion is that of a change
+        self._changes: Final = [*changes]  # the oldest first; True if the axis tries again
 
     def add(self, entry: Entry, now: Moment, *, again: bool) -> None:
         changes = self._changes
@@ -68,12 +70,12 @@ class Asked:
             at -= 1
         changes.insert(at, (entry, again))
 
-    def forget(self, doubtful: list[Entry]) -> None:
-        """Forget the requests of entries that may act, or never: what moves the axis is not known."""
+    def without(self, doubtful: list[Entry]) -> Asked:
+        """The same without the requests of entries that may act, or never: what moves it is not known."""
         kept = [each for each in self._changes if each[0] not in doubtful]
-        if len(kept) < len(self._changes):
-            self._changes, self._may_start = kept, False
-            self._before = self._before or Target(None)
+        if len(kept) == len(self._changes):
+            return self
+        return Asked(self._axis, self._before or Target(None), is_at_rest=False, changes=kept)
 
     def note_motion(self) -> None:
         """An axis at rest moves only for a new request: every later status is from after it [follows]."""

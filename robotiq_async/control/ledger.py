@@ -35,7 +35,7 @@ from ..values.status import RobotiqStatus
 from .adoption import Adoption
 from .entry import Asked, Entry
 from .limits import Limits
-from .rest import LONG_AGO, Grips, Moment, Rest, may_move, rest_of
+from .rest import LONG_AGO, Grips, Moment, Rest, Target, may_move, rest_of
 
 WINDOW_S: Final = 0.5
 """Time after its acknowledgement in which a write shows, if it acts: the slowest device cycle considered is
@@ -159,7 +159,7 @@ class Ledger:
         """Add an image that is about to be sent, with new positions for ``axes``."""
         before = self._settle_base()
         entry = Entry(self._newest.number + 1, image, image.echo, is_ours=True, sent=now)
-        self.limits.written(entry, axes)
+        self.limits.forget(axes)
         self.grips.forget(axes)  # a new position may let go
         # With rGTO clear gDT has no meaning, so no axis was proven to rest under what was asked before.
         self._note_changes(entry, before, is_at_rest=before.go)
@@ -180,7 +180,8 @@ class Ledger:
                 if asked is None:
                     # What it replaces is unknown before another client's, if rGTO was clear.
                     known = before if before.go or entry.is_ours else image
-                    asked = self._unproven[axis] = Asked(axis, known, is_at_rest=is_at_rest)
+                    replaced = Target(known.position(axis) if known.go else None)
+                    asked = self._unproven[axis] = Asked(axis, replaced, is_at_rest=is_at_rest)
                 asked.add(entry, self.now, again=is_pressed or is_raised)
                 changes |= axis
         if image.go and entry.is_ours:
@@ -199,8 +200,7 @@ class Ledger:
 
     def _doubt(self, doubtful: list[Entry]) -> None:
         self._doubtful = doubtful
-        for asked in self._unproven.values():
-            asked.forget(doubtful)
+        self._unproven = {axis: asked.without(doubtful) for axis, asked in self._unproven.items()}
 
     def _settle_base(self) -> Request:
         """End the adoption, so that no later status changes the base; return that."""
@@ -221,9 +221,12 @@ class Ledger:
             entries.popleft()
         # The common case first: nothing has changed since the last poll, and nothing waits to show. If others
         # wait, an echo of the entry shown before is its own unless a limit makes it ambiguous.
-        shown, is_newest = self.shown, self.shown is entries[-1]
-        may_show = is_newest or (shown.number >= entries[0].number and not self.limits.has_alias)
-        self.match = shown if shown.echo == status.echo and may_show else self._find(status)
+        shown = self.shown
+        is_same = shown.echo == status.echo and shown.number >= entries[0].number
+        if is_same and (shown is entries[-1] or not self.limits.has_alias(self._waiting)):
+            self.match = shown
+        else:
+            self.match = self._find(status)
         if self._doubtful:  # those that did not show in time, but not before this status was compared
             later = (each for each in self._doubtful if each.number > self.shown.number)
             self._doubtful = [each for each in later if not self._is_old(each)]

@@ -17,7 +17,7 @@ position at which the axis came to rest, and not with MoveSupersededError.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from ..runtime.log import Log, log
@@ -41,79 +41,64 @@ class Limits:
     def __init__(self, log: Log = log) -> None:
         self.limited: dict[Finger, int] = {}  # by axis, the limit that shows in place of the last request
         self._log: Final = log
-        # By axis, and whether it limits closing.
-        self._known: dict[tuple[Finger, bool], int] = {}
-        self._proven: set[tuple[Finger, bool]] = set()
-        # The echo of an entry under the known limits, until it shows.
-        self._aliases: dict[Entry, Echo] = {}
+        # By axis, and whether it limits closing: the limit, and whether an axis has come to rest there.
+        self._known: dict[tuple[Finger, bool], tuple[int, bool]] = {}
         self._others_at = -math.inf
 
-    @property
-    def has_alias(self) -> bool:
-        """Whether an entry that has not shown may show as another echo than its own."""
-        return bool(self._aliases)
-
-    def written(self, entry: Entry, moved: Finger) -> None:
+    def forget(self, axes: Finger) -> None:
+        """These axes are asked for another position."""
         if self.limited:
-            self.limited = {axis: at for axis, at in self.limited.items() if axis not in moved}
-        self._note_alias(entry)
+            self.limited = {axis: at for axis, at in self.limited.items() if axis not in axes}
+
+    def has_alias(self, waiting: Callable[[], Sequence[Entry]]) -> bool:
+        """Whether an entry that waits may show as another echo than its own. Usually no limit is known."""
+        return bool(self._known) and any(self.apply(each.image) for each in waiting())
 
     def shows(self, entry: Entry, echo: Echo) -> bool:
         """Whether an echo shows an entry with limits in place of its requests."""
-        return self._aliases.get(entry) == echo
+        limits = self.apply(entry.image)
+        return bool(limits) and entry.image.with_positions(limits).echo == echo
 
     def explains(self, shown: Entry, waiting: Sequence[Entry], status: RobotiqStatus, now: float) -> bool:
         """Whether limits explain a status that shows no entry; they are known from then on."""
         # Any of those that wait may be the one: a slow gripper skips images [follows].
         is_alone = now - self._others_at > ALONE_S
-        if not is_alone or not any(self.learn(shown.image, each.image, status) for each in waiting):
-            return False
-        for each in waiting:
-            self._note_alias(each)
-        return True
+        return is_alone and any(self.learn(shown.image, each.image, status) for each in waiting)
 
     def settle(self, entry: Entry, last: Entry, echo: Echo) -> None:
         """If an entry shows as limits in place of requests, make it an entry of these limits."""
         limits = self.apply(entry.image)
-        self._aliases = {each: alias for each, alias in self._aliases.items() if each.number > entry.number}
         if echo == entry.echo:  # it is refuted by an image that shows as it was written
-            self._known = {key: limit for key, limit in self._known.items() if key[0] not in limits}
+            self._known = {key: known for key, known in self._known.items() if key[0] not in limits}
             return
         # Later entries with the same request would echo the limit as well; the last is the base.
         for axis, limit in limits.items():
             if last.image.position(axis) == entry.image.position(axis):
                 self.limited[axis] = limit
-                if last is not entry:
-                    image = last.image.with_positions({axis: limit})
-                    last.correct(image, image.echo)
+                image = last.image.with_positions({axis: limit})
+                last.correct(image, image.echo)
         entry.correct(entry.image.with_positions(limits), echo)
 
     def note_rest(self, axis: Finger, status: RobotiqStatus) -> None:
         """An axis has come to rest: at its limit it proves that."""
         if axis not in self.limited or status.finger_status(axis) is not ObjectStatus.AT_POSITION:
             return
-        for key, limit in self._known.items():
-            is_news = key[0] is axis and key not in self._proven
-            if is_news and abs(limit - status.position(axis)) <= TOLERANCE:
-                self._proven.add(key)
+        for key, (limit, is_proven) in self._known.items():
+            if key[0] is axis and not is_proven and abs(limit - status.position(axis)) <= TOLERANCE:
+                self._known[key] = limit, True
                 self._log.info("the gripper replaces requests of %s by its limit %d", axis, limit)
                 return
 
     def note_other_client(self, now: float) -> None:
         """Drop the limits that no axis has proven: they may be the other client's requests."""
         self._others_at = now
-        self._known = {key: limit for key, limit in self._known.items() if key in self._proven}
-
-    def _note_alias(self, entry: Entry) -> None:
-        limits = self.apply(entry.image)
-        if limits:
-            self._aliases[entry] = entry.image.with_positions(limits).echo
+        self._known = {key: known for key, known in self._known.items() if known[1]}
 
     def apply(self, image: Request) -> dict[Finger, int]:
         """The limits that replace requests of an image, by axis."""
         return {
             axis: limit
-            for (axis, closing), limit in self._known.items()
+            for (axis, closing), (limit, _) in self._known.items()
             if (image.position(axis) > limit if closing else image.position(axis) < limit)
         }
 
@@ -123,16 +108,15 @@ class Limits:
         echo = status.echo
         if echo[:_FIRST] != image.echo[:_FIRST] or not image.go:
             return False
-        found: dict[tuple[Finger, bool], int] = {}
+        found: dict[tuple[Finger, bool], tuple[int, bool]] = {}
         for axis, shown in zip(image.model.axes, echo[_FIRST:], strict=True):
             request = image.position(axis)
             if shown == request:
                 continue
             if request == before.position(axis) or not _may_be_limit(axis, request, shown, status):
                 return False
-            found[axis, request > shown] = shown
+            found[axis, request > shown] = shown, False
         self._known |= found
-        self._proven -= set(found)
         return bool(found)
 
 
