@@ -51,15 +51,18 @@ class Entry:
 
 
 class Asked:
-    """What an axis was asked that its object status may be from, until it is proven to rest."""
+    """The requests that the object status of an axis may be from, until it is proven to rest."""
 
     def __init__(
         self, axis: Finger, before: Target, *, is_at_rest: bool, changes: Iterable[tuple[Entry, bool]] = ()
     ) -> None:
         self._axis: Final = axis
-        self._before: Target | None = before  # all changes; None if no status can be from its time any more
-        self._may_start: Final = is_at_rest  # it was proven to rest under that: a motion is that of a change
-        self._changes: Final = [*changes]  # the oldest first; True if the axis tries again
+        # The entries that change its request, the oldest first, and whether it tries again; and its request
+        # before them, or None if no status can be from that time any more. If it was proven to rest then, a
+        # motion is due to one of them.
+        self._changes: Final = [*changes]
+        self._before: Target | None = before
+        self._may_start: Final = is_at_rest
 
     def add(self, entry: Entry, now: Moment, *, again: bool) -> None:
         changes = self._changes
@@ -71,7 +74,7 @@ class Asked:
         changes.insert(at, (entry, again))
 
     def without(self, doubtful: list[Entry]) -> Asked:
-        """The same without the requests of entries that may act, or never: what moves it is not known."""
+        """The same without the entries that may act, or never: what moves the axis is not known."""
         kept = [each for each in self._changes if each[0] not in doubtful]
         if len(kept) == len(self._changes):
             return self

@@ -306,9 +306,8 @@ class Ledger:
         for number, each in enumerate(self._doubtful, other.number + 1):
             each.renumber(number)
         self._note_changes(other, before)
-        pairs = zip(before.by_axis, image.axes, strict=True)
-        moved = Finger(sum(axis for (axis, old), new in pairs if old.position != new.position))
-        self.ours = NO_AXES if is_found else self.ours & ~moved
+        moved = (axis for axis, old in before.by_axis if old.position != image.position(axis))
+        self.ours = NO_AXES if is_found else self.ours & ~Finger(sum(moved))
         self._mistaken = self.match or self._mistaken
         self._entries, self.shown, self.match = deque([other]), other, other
         self.grips.forget()
