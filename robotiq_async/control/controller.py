@@ -27,7 +27,7 @@ from .evidence import FOLLOWS, Evidence, classify, is_activating
 from .gate import gate, merged
 from .ledger import NEVER, Ledger
 from .motion import Move
-from .pending import Command, OpenRequests, Pending
+from .pending import Command, OpenRequests
 from .procedures import Begun, Procedure
 from .state_machine import RUNNING, SEEN, StateMachine
 from .stops import Keeping, Stop
@@ -312,8 +312,8 @@ class Controller:
             if before in FOLLOWS:
                 self._end_requests(condition, status)
             if condition is Trigger.SEEN_FAULT and status.activation_echo:
-                # A command sent just before may not act yet, and its motion would begin when the fault clears
-                # [manual 2012, 4.7: if it is minor]. Which axes need it is decided when it is written.
+                # When it clears [manual 2012, 4.7: if it is minor], no motion may resume, and none begin that
+                # was sent just before and does not act yet. Which axes need it is decided when it is written.
                 requests.merge_hold(ledger.ours)
             elif condition not in FOLLOWS:
                 requests.hold_only(NO_AXES)
@@ -415,8 +415,7 @@ class Controller:
             return None
         is_early = now < self._free_at
         # A halt also stops the axes to be held, so the callers of hold() have their answer with it.
-        covered = Pending(hold=self._requests.pending.hold) if stop.level is StopLevel.HALT else Pending()
-        entry = self._send(image, covered, status, now)
+        entry = self._send(image, status, now, holds=stop.level is StopLevel.HALT)
         stop.written(entry, status, is_early=is_early)
         return entry.image
 
@@ -442,7 +441,7 @@ class Controller:
             return None
         if image is None:
             return None
-        entry = self._send(image, Pending(), status, now, of=procedure)
+        entry = self._send(image, status, now, of=procedure)
         procedure.written(entry)
         if not procedure.releases:
             self._activation = Begun(entry)
@@ -462,21 +461,30 @@ class Controller:
         may_move = ledger.may_move(status) if pending.hold else NO_AXES
         image = merged(base, pending, status, gripping=gripping, may_move=may_move)
         if not pending.has_changes and gate(image, status) == base:
-            # No axis moves. If an earlier write does not act yet, one may begin to: ask again then.
+            # No axis moves, so there is nothing to write, and what the gripper has answers the callers. If an
+            # earlier write does not act yet, an axis may begin to move: ask again then.
             if ledger.acts():
-                self._requests.sending(pending, ledger.last)
+                self._requests.sending(ledger.last, changes=True, holds=True)
                 self._requests.acknowledged()
                 self._update_state(Trigger.DELIVERED)
             return None
-        return self._send(image, pending, status, now).image
+        return self._send(image, status, now, changes=True, holds=True).image
 
     def _send(
-        self, image: Request, sent: Pending, status: RobotiqStatus, now: float, of: Procedure | None = None
+        self,
+        image: Request,
+        status: RobotiqStatus,
+        now: float,
+        *,
+        changes: bool = False,
+        holds: bool = False,
+        of: Procedure | None = None,
     ) -> Entry:
+        """Send an image of a procedure, or one with the pending changes or holds in it."""
         releases = of is not None and of.releases
         image = gate(image, status, activates=of is not None and not releases, releases=releases)
-        entry = self._ledger.write(image, sent.moved, now)
-        self._requests.sending(sent, entry)
+        entry = self._ledger.write(image, self._requests.pending.moved if changes else NO_AXES, now)
+        self._requests.sending(entry, changes=changes, holds=holds)
         self._free_at = now + self._spacing
         return entry
 

@@ -126,17 +126,18 @@ class OpenRequests:
 
     def _take_over(self, axes: Finger, error: MoveSupersededError) -> None:
         # The other axes of these moves still follow them.
-        self._fail([self._followed.pop(axis) for axis in axes if axis in self._followed], error)
+        taken = [self._followed.pop(axis) for axis in axes if axis in self._followed]
+        self._fail([call for call in self.calls if call in taken], error)
 
     # -- what becomes of it ----------------------------------------------------------------------------
 
-    def sending(self, sent: Pending, entry: Entry) -> None:
-        """All that is pending is written, or the hold alone: a halt covers it, and goes before the rest."""
-        is_all = sent is self.pending
-        self.pending = Pending() if is_all else replace(self.pending, hold=self.pending.hold & ~sent.hold)
-        self._sent = sent
+    def sending(self, entry: Entry, *, changes: bool, holds: bool) -> None:
+        """An entry is sent with the pending changes, the pending holds, both, or neither of them."""
+        pending, empty = self.pending, Pending()
+        self._sent = replace(pending if changes else empty, hold=pending.hold if holds else NO_AXES)
+        self.pending = replace(empty if changes else pending, hold=NO_AXES if holds else pending.hold)
         for call in self.calls:
-            if call.entry is None and (is_all or sent.hold & call.held):
+            if call.entry is None and (holds if call.held else changes):
                 call.written(entry)
 
     def acknowledged(self) -> None:
@@ -195,6 +196,7 @@ class OpenRequests:
 
     def lost(self, error: RobotiqError) -> None:
         """The link is down: fail everything. Holds stop motion: their axes remain, for when it is back."""
+        # A hold of our own making has no caller to get the error.
         hold = self.pending.hold | self._sent.hold
         self._fail(self.calls, error)
         self.pending, self._sent = Pending(hold=hold), Pending()

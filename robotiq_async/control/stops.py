@@ -30,7 +30,7 @@ from ..values.errors import StateTimeoutError
 from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .entry import Entry
-from .evidence import classify, is_activating
+from .evidence import FOLLOWS, classify, is_activating
 from .gate import at_rest, merged
 from .ledger import WINDOW_S, Ledger
 from .pending import Pending
@@ -61,13 +61,17 @@ class Stop:
         self.level: Final = level
         # Those of halt(), each with the stop that was begun for it: this one, or one that it has replaced.
         self.callers: Final[dict[Waiter[None], Stop]] = {**before.callers} if before else {}
-        # Acknowledged, whenever a status is taken in or an image made; only a caller may come before that.
         self.writes: Final[list[Write]] = []
 
     @property
     def is_delivered(self) -> bool:
         """Whether a write of it was acknowledged: it is sent again only after that."""
         return bool(self.writes) and self.writes[0].entry.acknowledged is not None
+
+    @property
+    def _times(self) -> int:
+        """The number of its writes that the gripper cannot have forgotten."""
+        return sum(not each.is_early for each in self.writes)
 
     def written(self, entry: Entry, status: RobotiqStatus, *, is_early: bool) -> None:
         self.writes.append(Write(entry, is_early, status.is_activated))
@@ -82,7 +86,7 @@ class Stop:
             case StopLevel.RESET:  # rACT = 0 clears faults and ends what runs [manual 2012, 4.6]
                 return replace(at_rest(base, status), activate=False)
             case StopLevel.HALT:  # positions and speeds stay as they were asked
-                return replace(base, go=False)
+                return replace(base, go=False) if classify(status) in FOLLOWS else None
         # A write of ours that does not act yet may set rGTO after this status: then it is not settled.
         is_settled = ledger.acts()
         if is_settled and not status.go_echo:
@@ -91,13 +95,15 @@ class Stop:
         return replace(base, activate=base.activate or is_settled, go=False)
 
     def again(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
-        """The image of its last write, if that is due again because the stop is not reached."""
+        """The image of its last write, if that is due again."""
         entry, is_early, _ = self.writes[-1]
+        if entry.acknowledged is None:
+            return None
         if is_early:
             return entry.image  # whatever shows: the gripper may yet forget it [manual 2014, p. 75]
         is_due = {
             StopLevel.RESET: status.activation_echo,
-            StopLevel.HALT: True,
+            StopLevel.HALT: status.go_echo and self._times < MOST_HALTS,
             # While another client resets the gripper it comes to rest, and rACT might cross that.
             StopLevel.SHUTDOWN: not entry.image.activate or status.activation_echo,
             StopLevel.KEEP: False,  # what moves is held once
@@ -105,15 +111,15 @@ class Stop:
         return entry.image if is_due[self.level] and ledger.acts(entry) else None
 
     def is_reached(self, ledger: Ledger, status: RobotiqStatus) -> bool:
-        if not self.writes or self.writes[-1].is_early:
+        if not self.writes or self.writes[-1].is_early or self.writes[-1].entry.acknowledged is None:
             return False
         if self.level is StopLevel.HALT and not status.go_echo and not ledger.may_set_go:
             return True  # nothing that may act later sets rGTO, so it need not act
         is_reset = classify(status) is Trigger.SEEN_RESET
-        entry, times = self.writes[-1].entry, sum(not each.is_early for each in self.writes)
+        entry = self.writes[-1].entry
         shows = {
             StopLevel.RESET: is_reset,
-            StopLevel.HALT: not status.go_echo or times >= MOST_HALTS,
+            StopLevel.HALT: not status.go_echo or self._times >= MOST_HALTS,
             # gGTO = 0 alone may be from before the write before, and the next client would adopt an echo that
             # is about to change.
             StopLevel.SHUTDOWN: is_reset or status.echo == entry.echo,
@@ -151,7 +157,7 @@ class Stop:
     def has_activated(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether its rACT activates a gripper that another client has reset just before."""
         # Two clients within one device cycle can do that [follows from Modbus].
-        if not self.writes or not self.writes[-1].entry.image.activate:
+        if not self.is_delivered or not self.writes[-1].entry.image.activate:
             return False
         entry, _, was_active = self.writes[-1]
         if self.level is StopLevel.HALT:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from robotiq_async import ConnectionLostError, Finger, State
+from robotiq_async import ConnectionLostError, Finger, RobotiqStatus, State
 from robotiq_async.control.pending import Command
 from robotiq_async.values.request import AxisRequest, Request
 from tests.control.other_client import activated_by_another, going_to, image
@@ -45,6 +45,24 @@ def test_a_write_that_arrived_unacknowledged_is_ours_when_it_shows(scan: Scan) -
     scan.until(lambda: not scan.controller.is_moving)
     assert scan.gripper.position(A) == pytest.approx(200, abs=2), "B's command keeps what A was asked"
     assert len(scan.written) == writes + 1
+
+
+def test_a_move_that_is_given_up_only_once_the_link_is_back_is_held_even_after_a_change_of_mode(
+    scan: Scan,
+) -> None:
+    """Its caller has the error of the link, and has not left as the gripper shows that it is busy."""
+    move, outcome = scan.move(250, A, speed=0)
+    scan.run(0.3)
+    scan.controller.lost(None, scan.now)
+    assert isinstance(outcome.error, ConnectionLostError)
+    status = scan.status()
+    gimc_2 = (status.registers[0] & ~0x3000) | 0x2000
+    scan.controller.see(RobotiqStatus((gimc_2, *status.registers[1:]), scan.now, scan.polls, status.model))
+    assert scan.state is State.WF_ACTIVATION
+    scan.controller.abandon(move, unseen=True)
+    at = scan.gripper.position(A)
+    scan.run(10.0)
+    assert scan.gripper.position(A) == pytest.approx(at, abs=5)
 
 
 @pytest.mark.parametrize("device_cycle", [0.1, 0.2])

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.control.ledger import Ledger
+from robotiq_async.control.motion import Move
 from robotiq_async.control.pending import Command, OpenRequests, Pending
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.errors import ConnectionLostError, MoveSupersededError
@@ -159,6 +160,22 @@ def test_a_hold_that_nobody_asked_for_is_no_request() -> None:
     assert requests.pending.hold == B, "another client moves A now; B was named by a caller"
 
 
+def test_moves_that_end_together_are_answered_in_the_order_of_their_calls() -> None:
+    requests, answered = OpenRequests(), list[Outcome]()
+
+    class Noted(Outcome):
+        def set_exception(self, error: object) -> None:
+            answered.append(self)
+            super().set_result(error)
+
+    callers = [Noted(), Noted(), Noted()]
+    for axes, caller in zip((C, A, B), callers, strict=True):
+        requests.command(Command(axes, 100))
+        requests.add(Move(100, axes, 0.0, caller))
+    hold(Finger.ALL)(requests)
+    assert answered == callers
+
+
 def test_what_moves_is_dropped_alone_or_with_the_holds() -> None:
     requests, mover, holder = OpenRequests(), Outcome(), Outcome()
     requests.command(Command(A, 100, 50), mover)
@@ -177,7 +194,7 @@ def test_a_halt_takes_the_holds_with_it() -> None:
     requests, setter, holder = OpenRequests(), Outcome(), Outcome()
     requests.command(Command(B, None, 50), setter)
     requests.hold(A, "hold", holder)
-    requests.sending(Pending(hold=requests.pending.hold), Ledger(128, 64).last)
+    requests.sending(Ledger(128, 64).last, changes=False, holds=True)
     assert requests.pending == Pending(speeds={B: 50})
     requests.acknowledged()
     assert (holder.answers, waiting(requests)) == ([None], [setter])
@@ -187,7 +204,7 @@ def test_a_write_of_a_stop_or_a_procedure_takes_nothing_with_it() -> None:
     requests, setter, holder = OpenRequests(), Outcome(), Outcome()
     requests.command(Command(B, None, 50), setter)
     requests.hold(A, "hold", holder)
-    requests.sending(Pending(), Ledger(128, 64).last)
+    requests.sending(Ledger(128, 64).last, changes=False, holds=False)
     requests.acknowledged()
     assert requests.pending == Pending(speeds={B: 50}, hold=A)
     assert waiting(requests) == [setter, holder]
