@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import takewhile
 from typing import Final
 
 from ..values.enums import Finger
@@ -68,10 +67,10 @@ class Asked:
         changes = self._changes
         while len(changes) > 1 and changes[1][0].is_lag_over(now):
             del changes[0]
-        at = len(changes)
-        while at and changes[at - 1][0].number > entry.number:  # it was in doubt, and is revived
-            at -= 1
-        changes.insert(at, (entry, again))
+        is_revived = bool(changes) and changes[-1][0].number > entry.number  # it was in doubt
+        changes.append((entry, again))
+        if is_revived:
+            changes.sort(key=lambda change: change[0].number)
 
     def without(self, doubtful: list[Entry]) -> Asked:
         """The same without the entries that may act, or never: what moves the axis is not known."""
@@ -87,7 +86,10 @@ class Asked:
 
     def waiting(self) -> Iterator[Entry]:
         """The entries that are not known to act."""
-        return takewhile(lambda each: each.acts_since is None, (each for each, _ in reversed(self._changes)))
+        for each, _ in reversed(self._changes):
+            if each.acts_since is not None:
+                return
+            yield each
 
     def targets(self, now: Moment) -> Iterator[Target]:
         """The newest first, as far back as a status can be from."""

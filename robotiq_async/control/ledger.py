@@ -83,7 +83,8 @@ class Ledger:
     @property
     def _newest(self) -> Entry:
         """The one with the highest number: the last, or one in doubt."""
-        return max(self.last, *self._doubtful[-1:], key=_number) if self._doubtful else self.last
+        last = self._entries[-1]
+        return max(last, self._doubtful[-1], key=_number) if self._doubtful else last
 
     @property
     def base(self) -> Request:
@@ -93,7 +94,8 @@ class Ledger:
     @property
     def has_lost_write(self) -> bool:
         """Whether a write may act of which nothing is known: an image from before it would undo it."""
-        return any(self.now.time - each.time < SILENT_S for each in self._doubtful)
+        doubtful = self._doubtful  # usually there is none
+        return bool(doubtful) and any(self.now.time - each.time < SILENT_S for each in doubtful)
 
     @property
     def is_certain(self) -> bool:
@@ -170,10 +172,11 @@ class Ledger:
     def _note_changes(self, entry: Entry, before: Request, *, is_at_rest: bool = False) -> Finger:
         """Note what an entry asks that differs from the image before it; return the axes."""
         image, changes = entry.image, NO_AXES
-        is_raised = image.go and not before.go and entry.is_ours
+        is_switched = image.go is not before.go
+        is_raised = is_switched and image.go and entry.is_ours
         for (axis, old), new in zip(before.by_axis, image.axes, strict=True):
             is_pressed = new.force > old.force
-            is_new = new.position != old.position or image.go is not before.go
+            is_new = is_switched or new.position != old.position
             # More force lets an axis in contact try again [conceivable]; one that moves keeps moving.
             if is_new or (is_pressed and not axis & self.unrested):
                 asked = self._unproven.get(axis)
@@ -274,9 +277,11 @@ class Ledger:
     def _waiting(self) -> list[Entry]:
         """The entries after the one that shows, the oldest first."""
         shown = self.shown.number
-        waiting = [*takewhile(lambda each: each.number > shown, reversed(self._entries))]
-        waiting += (each for each in self._doubtful if each.number > self._entries[0].number)
-        return sorted(waiting, key=_number)
+        waiting = [*takewhile(lambda each: each.number > shown, reversed(self._entries))][::-1]
+        if not self._doubtful:
+            return waiting
+        doubtful = (each for each in self._doubtful if each.number > self._entries[0].number)
+        return sorted((*waiting, *doubtful), key=_number)
 
     def _revive(self, entry: Entry) -> None:
         """An entry in doubt acts after all, and so will those that were acknowledged after it."""
