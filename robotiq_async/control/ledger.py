@@ -335,7 +335,9 @@ class Ledger:
         """Find out which axes have come to rest. Not in a fault: it keeps axes from starting."""
         if self._unproven:
             self._note_acting()
-            if status.go_echo:  # gDT has no meaning without rGTO [manual]
+            # gDT has no meaning without rGTO [manual]. While an adopted request is a guess, it may be where an axis
+            # is only because that shows rest: from before the request, perhaps one of ours that is repeated.
+            if status.go_echo and (self._adoption is None or self._adoption.is_certain):
                 self._find_rest(status)
         if status.go_echo and (self.grips or status.contacts):
             contacts = status.contacts
