@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from ..values.enums import Finger
@@ -78,6 +78,14 @@ class Asked:
         if len(kept) == len(self._changes):
             return self
         return Asked(self._axis, self._before or Target(None), is_at_rest=False, changes=kept)
+
+    def note_overtaken(self, doubtful: list[Entry], now: Moment) -> None:
+        """Another client's image shows: these entries may have acted until now, unseen, and may act later."""
+        # If one does, it is added again.
+        self._changes[:] = [
+            (replace(each, acts_since=now) if each in doubtful else each, again)
+            for each, again in self._changes
+        ]
 
     def note_motion(self) -> None:
         """An axis at rest moves only for a new request: every later status is from after it [follows]."""

@@ -199,11 +199,8 @@ class Ledger:
         self._settle_base()
         if self._is_in_flight(self.last):
             self.last.lose(now)
-            self._doubt([*self._doubtful, self._entries.pop()])
-
-    def _doubt(self, doubtful: list[Entry]) -> None:
-        self._doubtful = doubtful
-        self._unproven = {axis: asked.without(doubtful) for axis, asked in self._unproven.items()}
+            self._doubtful = [*self._doubtful, self._entries.pop()]
+            self._unproven = {axis: asked.without(self._doubtful) for axis, asked in self._unproven.items()}
 
     def _settle_base(self) -> Request:
         """End the adoption, so that no later status changes the base; return that."""
@@ -307,7 +304,9 @@ class Ledger:
         self._adoption = Adoption(status, self.now, since)
         image, time = self._adoption.request(before.axes), self.now.time
         other = Entry(self._newest.number + 1, image, status.echo, False, time, time, self.now)
-        self._doubt(self._waiting())
+        self._doubtful = self._waiting()
+        for asked in self._unproven.values():
+            asked.note_overtaken(self._doubtful, self.now)
         for number, each in enumerate(self._doubtful, other.number + 1):
             each.renumber(number)
         self._note_changes(other, before)
@@ -335,8 +334,8 @@ class Ledger:
         """Find out which axes have come to rest. Not in a fault: it keeps axes from starting."""
         if self._unproven:
             self._note_acting()
-            # gDT has no meaning without rGTO [manual]. While an adopted request is a guess, it may be where an axis
-            # is only because that shows rest: from before the request, perhaps one of ours that is repeated.
+            # gDT has no meaning without rGTO [manual]. While an adopted request is a guess, it may be where
+            # an axis is only because a late gDT shows rest there, though one of ours is repeated, and acts.
             if status.go_echo and (self._adoption is None or self._adoption.is_certain):
                 self._find_rest(status)
         if status.go_echo and (self.grips or status.contacts):
