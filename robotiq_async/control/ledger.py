@@ -345,11 +345,12 @@ class Ledger:
             self.grips.remember(status, contacts)
 
     def _note_acting(self) -> None:
-        for each in {each for asked in self._unproven.values() for each in asked.waiting()}:
-            if self.acts(each):
-                # If the echo does not show when it began to act, the time for that and the lag end together.
-                never_showed = each.number > self.shown.number and self.now.time - each.time >= WINDOW_S
-                each.note_acting(LONG_AGO if never_showed else self.now)
+        # Images act in their order, so what comes after one that does not act need not be looked at.
+        waiting = {each for asked in self._unproven.values() for each in asked.waiting()}
+        for each in takewhile(self.acts, sorted(waiting, key=_number)):
+            # If the echo does not show when it began to act, the time for that and the lag end together.
+            never_showed = each.number > self.shown.number and self.now.time - each.time >= WINDOW_S
+            each.note_acting(LONG_AGO if never_showed else self.now)
 
     def _find_rest(self, status: RobotiqStatus) -> None:
         for axis in self._model.axes:
