@@ -49,7 +49,7 @@ class Entry:
         self.acts_since = since
 
 
-class Asked:
+class RecentRequests:
     """The requests that the object status of an axis may be from, until it is proven to rest."""
 
     def __init__(
@@ -72,16 +72,16 @@ class Asked:
         if is_revived:
             changes.sort(key=lambda change: change[0].number)
 
-    def without(self, doubtful: list[Entry]) -> Asked:
+    def without(self, doubtful: list[Entry]) -> RecentRequests:
         """The same without the entries that may act, or never: what moves the axis is not known."""
         kept = [each for each in self._changes if each[0] not in doubtful]
         if len(kept) == len(self._changes):
             return self
-        return Asked(self._axis, self._before or Target(None), is_at_rest=False, changes=kept)
+        return RecentRequests(self._axis, self._before or Target(None), is_at_rest=False, changes=kept)
 
     def note_overtaken(self, doubtful: list[Entry], now: Moment) -> None:
         """Another client's image shows: these entries may have acted until now, unseen, and may act later."""
-        # If one does, it is added again.
+        # A copy stands for the time until now. If the entry acts later, it is added again.
         self._changes[:] = [
             (replace(each, acts_since=now) if each in doubtful else each, again)
             for each, again in self._changes

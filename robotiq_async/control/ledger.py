@@ -33,7 +33,7 @@ from ..values.registers import Echo
 from ..values.request import AxisRequest, Request
 from ..values.status import RobotiqStatus
 from .adoption import Adoption
-from .entry import Asked, Entry
+from .entry import Entry, RecentRequests
 from .limits import Limits
 from .rest import LONG_AGO, Grips, Moment, Rest, Target, may_move, rest_of
 
@@ -71,7 +71,7 @@ class Ledger:
         # The axes that may still show a status from before their last request, with what they were asked: a
         # write that changes it puts an axis in, and a status that cannot be from before it takes it out. All
         # unrested ones are among them. Usually there is none, which spares a poll all questions about them.
-        self._unproven: dict[Finger, Asked] = {}
+        self._unproven: dict[Finger, RecentRequests] = {}
 
     # -- questions -------------------------------------------------------------------------------------
 
@@ -144,14 +144,14 @@ class Ledger:
         # While rGTO is clear a speed or a force does not: then all entries that wait have the same echo.
         if not self.acts():
             return self.base.go or len({each.echo for each in (*self._entries, *self._doubtful)}) > 1
-        return bool(self.unrested) and self.base.go and self._adoption is None
+        return bool(self.unrested) and self.base.go
 
     def may_move(self, status: RobotiqStatus) -> Finger:
         """The axes that may move, or be about to, although the status shows them at rest."""
         moving = NO_AXES
-        for axis, asked in self._unproven.items():
+        for axis, recent in self._unproven.items():
             what, position = status.finger_status(axis), status.position(axis)
-            if may_move(asked.targets(self.now), self._model, what, position):
+            if may_move(recent.targets(self.now), self._model, what, position):
                 moving |= axis
         return moving
 
@@ -179,13 +179,13 @@ class Ledger:
             is_new = is_switched or new.position != old.position
             # More force lets an axis in contact try again [conceivable]; one that moves keeps moving.
             if is_new or (is_pressed and not axis & self.unrested):
-                asked = self._unproven.get(axis)
-                if asked is None:
+                recent = self._unproven.get(axis)
+                if recent is None:
                     # What it replaces is unknown before another client's, if rGTO was clear.
                     known = before if before.go or entry.is_ours else image
                     replaced = Target(known.position(axis) if known.go else None)
-                    asked = self._unproven[axis] = Asked(axis, replaced, is_at_rest=is_at_rest)
-                asked.add(entry, self.now, again=is_pressed or is_raised)
+                    recent = self._unproven[axis] = RecentRequests(axis, replaced, is_at_rest=is_at_rest)
+                recent.add(entry, self.now, again=is_pressed or is_raised)
                 changes |= axis
         if image.go and entry.is_ours:
             self.unrested |= changes
@@ -200,7 +200,7 @@ class Ledger:
         if self._is_in_flight(self.last):
             self.last.lose(now)
             self._doubtful = [*self._doubtful, self._entries.pop()]
-            self._unproven = {axis: asked.without(self._doubtful) for axis, asked in self._unproven.items()}
+            self._unproven = {axis: recent.without(self._doubtful) for axis, recent in self._unproven.items()}
 
     def _settle_base(self) -> Request:
         """End the adoption, so that no later status changes the base; return that."""
@@ -305,8 +305,8 @@ class Ledger:
         image, time = self._adoption.request(before.axes), self.now.time
         other = Entry(self._newest.number + 1, image, status.echo, False, time, time, self.now)
         self._doubtful = self._waiting()
-        for asked in self._unproven.values():
-            asked.note_overtaken(self._doubtful, self.now)
+        for recent in self._unproven.values():
+            recent.note_overtaken(self._doubtful, self.now)
         for number, each in enumerate(self._doubtful, other.number + 1):
             each.renumber(number)
         self._note_changes(other, before)
@@ -346,7 +346,7 @@ class Ledger:
 
     def _note_acting(self) -> None:
         # Images act in their order, so what comes after one that does not act need not be looked at.
-        waiting = {each for asked in self._unproven.values() for each in asked.waiting()}
+        waiting = {each for recent in self._unproven.values() for each in recent.waiting()}
         for each in takewhile(self.acts, sorted(waiting, key=_number)):
             # If the echo does not show when it began to act, the time for that and the lag end together.
             never_showed = each.number > self.shown.number and self.now.time - each.time >= WINDOW_S
@@ -354,14 +354,14 @@ class Ledger:
 
     def _find_rest(self, status: RobotiqStatus) -> None:
         for axis in self._model.axes:
-            asked = self._unproven.get(axis)
-            if asked is None:
+            recent = self._unproven.get(axis)
+            if recent is None:
                 continue
             what, position = status.finger_status(axis), status.position(axis)
             if what is ObjectStatus.IN_MOTION:
-                asked.note_motion()
+                recent.note_motion()
                 continue
-            rest = rest_of(asked.targets(self.now), self._model, what, position)
+            rest = rest_of(recent.targets(self.now), self._model, what, position)
             if rest is not Rest.UNKNOWN and axis & self.unrested:
                 self.unrested &= ~axis
                 self.limits.note_rest(axis, status)

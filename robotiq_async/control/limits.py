@@ -91,6 +91,7 @@ class Limits:
 
     def note_other_client(self, now: float) -> None:
         """Drop the limits that no axis has proven: they may be the other client's requests."""
+        # A write that shows such a limit after that counts as the other client's: it may be [conceivable].
         self._others_at = now
         self._known = {key: known for key, known in self._known.items() if known[1]}
 

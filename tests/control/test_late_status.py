@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import pytest
 
@@ -10,6 +11,8 @@ from robotiq_async import Finger, MoveResult, MoveSupersededError, ObjectStatus
 from robotiq_async.control.rest import LAG_READS, LAG_S, LONG_AGO, Moment, Rest, Target, may_move, rest_of
 from robotiq_async.values.enums import NO_AXES
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
+from robotiq_async.values.registers import Registers
+from robotiq_async.values.request import Request
 from tests.control.other_client import image
 from tests.control.scan import POLL_S, Outcome, Scan, started
 
@@ -484,3 +487,74 @@ def test_a_contact_that_is_tried_again_is_known_when_the_lag_is_over() -> None:
     assert rest(CLOSING, 150, *asked) is Rest.UNKNOWN
     assert not doubted(CLOSING, 150, *asked), "for a hold it is a grip"
     assert rest(CLOSING, 150, *asked[1:]) is Rest.PROVEN
+
+
+# -- another client, while the object status is late ------------------------------------------------------
+
+
+def changed(words: Sequence[int], positions: Mapping[Finger, int]) -> Registers:
+    """An image of a client that reads what the gripper was asked, and changes these axes at full speed."""
+    read = Request.from_registers(words)
+    axes = tuple(replace(each, speed=255) for each in read.axes)
+    return replace(read, axes=axes).with_positions(positions).registers
+
+
+def holds_on_at_60(device_cycle: float = 0.005) -> Scan:
+    """B opens, slowly and seen to move; there is an object at 60."""
+    scan = Scan(device_cycle=device_cycle, lag=50, speed=0)
+    scan.start()
+    scan.moved(57, B, speed=255)
+    scan.run(1.0)
+    scan.gripper.place_object(B, 60)
+    scan.command(B, 30, speed=0)
+    scan.run(0.3)
+    return scan
+
+
+def closes_to_the_object(scan: Scan) -> None:
+    _, outcome = scan.move(255, B, speed=0)
+    result = ended(scan, outcome)
+    assert result.contacts == B
+    assert result.positions[B] == pytest.approx(60, abs=2)
+
+
+@pytest.mark.parametrize("since", [0.1, 0.15, 0.2])
+def test_a_contact_under_our_request_that_another_client_repeated_ends_no_later_move(since: float) -> None:
+    """Ours has not shown as the client copies it: B closes by the client's image, and touches."""
+    scan = holds_on_at_60()
+    scan.command(B, 200)
+    scan.step()
+    scan.gripper.write(0, changed(scan.written[-1], {A: 100}))
+    scan.run(0.15)
+    scan.gripper.write(0, changed(scan.gripper.request_registers, {B: 40}))
+    scan.run(since)
+    closes_to_the_object(scan)
+
+
+@pytest.mark.parametrize("since", [0.1, 0.15, 0.2])
+def test_a_contact_under_our_request_that_no_status_showed_ends_no_later_move(since: float) -> None:
+    """Ours acts, and B touches, between two polls; another client's image shows then."""
+    scan = holds_on_at_60()
+    scan.command(B, 200, speed=255)
+    scan.step()
+    for _ in range(30):
+        scan.now += POLL_S
+        scan.status()  # what the gripper shows comes late, but nobody asks for it
+    scan.gripper.write(0, changed(scan.gripper.request_registers, {B: 40}))
+    scan.now += POLL_S
+    scan.run(since)
+    closes_to_the_object(scan)
+
+
+def test_a_move_that_another_client_repeats_before_gdt_shows_it_goes_on() -> None:
+    """A gDT from before shows A at rest where it stands: that does not make its place its request."""
+    scan = started(lag=8)
+    scan.moved(30)
+    scan.run(1.0)
+    _, outcome = scan.move(200, A)
+    scan.run(2 * POLL_S)
+    scan.gripper.write(0, changed(scan.gripper.request_registers, {B: 50}))
+    while not outcome.is_answered:
+        scan.step()
+        assert scan.controller.is_moving or outcome.is_answered
+    assert outcome.result.positions[A] == pytest.approx(200, abs=2)

@@ -320,7 +320,7 @@ def test_an_echo_that_was_never_written_is_foreign(status: RobotiqStatus) -> Non
 
 def remembered(history: History) -> int:
     """The number of entries that are kept, or of requests of an axis if these are more."""
-    by_axis = (len(asked._changes) for asked in history._unproven.values())
+    by_axis = (len(recent._changes) for recent in history._unproven.values())
     return max(len(history._entries), *by_axis, 0)
 
 
