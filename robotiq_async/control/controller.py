@@ -301,7 +301,7 @@ class Controller:
         ledger, requests = self._ledger, self._requests
         if before is None:  # the link is back: continue from our image if the gripper shows one
             if ledger.match is None or not ledger.match.is_ours:
-                ledger.adopt(status, is_found=True)
+                ledger.adopt(status)
             requests.hold_only(ledger.ours)
         elif before not in FOLLOWS and condition in FOLLOWS:
             # Others have reset and activated it, even if its image is equal to one of ours [follows].

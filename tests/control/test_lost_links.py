@@ -47,6 +47,24 @@ def test_a_write_that_arrived_unacknowledged_is_ours_when_it_shows(scan: Scan) -
     assert len(scan.written) == writes + 1
 
 
+@pytest.mark.parametrize("theirs", [{S: 100}, {A: 200}], ids=["another axis", "the axis"])
+def test_a_hold_survives_a_lost_link_on_the_axes_that_no_other_client_has_moved(
+    scan: Scan, theirs: dict[Finger, int]
+) -> None:
+    scan.move(250, A, speed=0)
+    scan.run(0.3)
+    scan.hold(A)
+    scan.controller.lost(None, scan.now)
+    read = Request.from_registers(scan.gripper.request_registers)
+    scan.gripper.write(0, read.with_positions(theirs).registers)
+    scan.now += 0.1
+    at = scan.gripper.position(A)
+    scan.connect(activate=False)
+    scan.run(10.0)
+    assert scan.gripper.position(A) == pytest.approx(at if A not in theirs else 200, abs=5)
+    assert scan.gripper.position(S) == pytest.approx(theirs.get(S, 137), abs=2)
+
+
 def test_a_move_that_is_given_up_only_once_the_link_is_back_is_held_even_after_a_change_of_mode(
     scan: Scan,
 ) -> None:
