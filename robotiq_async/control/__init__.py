@@ -1,47 +1,52 @@
-"""Decision logic: the state machine, and the next write after each read. Pure."""
+"""Decision logic: the state machine, and the next write after each read. No I/O, no clock, no event loop."""
 
 # Theory of operation
 #
-# Three things are known, and every decision is a question between them:
+# Three things are known, and every decision compares them:
 #
 # * what callers have asked: changes and holds (pending.py), one stop (stops.py), one procedure
 #   (procedures.py), moves that wait for their end (motion.py);
 # * what the gripper may have: the images written, by us or by others (ledger.py);
 # * what it shows: one of five conditions (evidence.py), and which axes rest (rest.py).
 #
-# A cycle is see(), then decide(). An image is made from the base, which is what the gripper has, so that an
-# axis that is not addressed keeps its request. It leaves through one gate (gate.py): only the procedure that
-# was asked for raises rACT or rATR, whatever an image carries along from another client or an older one. One
-# race is left: if another client resets the gripper while a status is a device cycle old, an image with rACT
-# activates it [follows]. That activation is taken back once it moves an axis, and by a stop at once.
+# A cycle is see(), then decide(); the first write of a stop is decided before the read, which may never be
+# answered. An image is made from the base, the last image that the gripper has or is about to have. So an
+# axis that is not addressed keeps its request; where rGTO rises, it is asked for where it is unless it grips.
+# Every image leaves through one gate (gate.py): only the procedure that was asked for raises rACT or rATR,
+# whatever an image carries along from another client or an older one. One race is left: if another client
+# resets the gripper while a status is a device cycle old, an image with rACT activates it [follows]. That
+# activation is taken back once it moves an axis, and by a stop at once.
 #
-# One write. A change is merged with others until the next cycle, then taken out and sent once, because it
-# may move an axis. Its acknowledgement answers its callers. It acts within a device cycle; a status shows it;
-# a later one supersedes it. If the link goes down before the acknowledgement, its callers get an error, the
-# entry is in doubt, and no command or hold is written for the time in which it may act. A speed or a force
-# has no echo: it counts as acting after a time, and is known to be the gripper's if it was acknowledged.
+# One write. A change is merged with others until the next write, then taken out and sent once, because it
+# may move an axis. The acknowledgement answers its callers; a move waits on for its end. The write acts
+# within a device cycle; a status shows it; a later one supersedes it. If the link goes down, every open call
+# gets an error. A write that was not acknowledged is in doubt, and no command or hold is written for the time
+# in which it may act. A speed or a force has no echo: it counts as acting a time after its acknowledgement.
 #
 # Holds only stop an axis, and are decided when they are written: an axis at rest or in contact keeps its
 # request, and with it its grip. So they may be sent again. They survive a lost link, unless another client
 # has moved the axis since. A fault puts a hold on all axes that may move because of us: a minor fault clears
 # without a reset [manual 2012, 4.7], and nothing must resume then.
 #
-# A stop goes before all else: a halt, a reset, the end of the hand. It is written at once, again until it is
-# seen, and is over when its write acts and a status shows it; stops.py has what that is for each level. A
-# halt that does not show after two writes fails. A halt and a reset fail with the link, too: sent
-# later they would stop another client, or drop a part. Once it is back, what we move is held instead. The end
-# of a hand begins its stop again on a new link.
+# A stop goes before commands and holds: a halt, a reset, the end of the hand. It may be written again, as it
+# only ends motion; stops.py has for each level when it is written, and when it is over. A halt that does not
+# show after two writes fails. A halt and a reset fail with the link, too: sent later they would stop another
+# client, or drop a part. Once it is back, what we move is held instead. A hand that was ending asks for its
+# stop again on a new link.
 #
 # Procedures raise rACT or rATR. While one runs, it alone judges what a status shows. When it ends, no write
-# of ours is on its way, and the ledger begins with what shows then. An activation of ours is remembered until
-# its end shows: stopping the hand takes it back.
+# of ours is on its way: the ledger begins again with our last image, and what shows in place of it is another
+# client's. An activation of ours is remembered until its end shows: stopping the hand takes it back.
 #
-# Another client is seen by a status that shows none of our images. It is adopted: its image becomes the base,
-# the moves whose request is gone fail, the others continue, and our writes on their way are in doubt. An
-# adopted axis that moves gets time to show where to. Nothing is written to a gripper for finding it.
+# Another client is seen by a status that shows none of our images, nor one with software limits in place of
+# requests (limits.py), or by an activation that is not ours. What it writes between our last read and our
+# next write is never seen: our image repeats the older request of every axis. What is seen is adopted: its
+# image becomes the base, the moves whose request is gone fail, the others continue, and our writes on their
+# way are in doubt. An adopted axis gets time to show where it goes, or that it rests. A gripper that is found
+# is written to for two reasons only: to hold what we moved, and to activate it if the hand was told to.
 #
-# Each question "is it reached" asks two things: does the write act, and does a status show it. What shows may
-# be from before the write, and what acts may have been undone by another client.
+# "Is it reached" is two questions: does the write act, and does a status show it. What shows may be from
+# before the write, and what acts may have been undone by another client.
 #
 # The state of the hand is a view of all this: _view() works out which of the fourteen holds, and
 # state_machine.py has what each answers to a call.
@@ -50,4 +55,4 @@
 # from the maker's examples, [follows] from Modbus and two clients alone, [conceivable] from nothing but care.
 # A rule without one is a promise of ours, and needs no fact about the gripper. [manual 2014, p. 50] is a page
 # as printed in that edition of the 3-Finger's instruction manual; the edition of 2012, for firmware 3.0, is
-# cited by section. Of [manual] alone the place was not noted.
+# cited by section. Where [manual] stands alone, the place was not noted.

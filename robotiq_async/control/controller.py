@@ -101,12 +101,13 @@ class Controller:
         """The caller of a move has left: if it has given up, hold those of its axes that still move."""
         # ``unseen`` if it was cancelled: then it does not see, either, that the move has failed already.
         requests = self._requests
-        is_live, left = requests.leave(move)
-        if is_live or unseen:
+        is_open, left = requests.leave(move)
+        if is_open or unseen:
             requests.hold(left, "a move took over and was given up")
             # Its other axes follow it until what has taken them over is written, and that may be lost.
             requests.merge_hold(move.axes & requests.pending.moved)
-        if unseen and not is_live and self._evidence.condition is not None:
+        if unseen and not is_open and self._evidence.condition is not None:
+            # Axes that another client moves by now are left to it. On a new link that is found out first.
             requests.hold_only(self._ledger.ours)
 
     def hold(self, axes: Finger, waiter: Waiter[None]) -> None:
@@ -147,12 +148,12 @@ class Controller:
         self._begin(Trigger.ASK_RELEASE)
 
     def drop_requests(self, error: RobotiqError) -> None:
-        """Fail every command and every move, sent or not. Holds and halts remain."""
+        """Fail every command and every move, sent or not. Halts, and holds with a caller, remain."""
         self._requests.drop(error, holds=False)
         self._update_state(Trigger.DELIVERED)
 
     def refuse_requests(self) -> None:
-        """The hand is to stop: refuse requests from here on, and fail those that are not sent."""
+        """The hand is to stop: refuse requests from here on, and fail all that are open, sent or not."""
         state, stop = self.machine.state, self._stop
         halts = stop is not None and stop.level is StopLevel.HALT and not stop.writes
         was_elsewhere = "" if state in RUNNING else f"the hand was in {state.name}"
@@ -176,7 +177,7 @@ class Controller:
             self._stop = Stop(StopLevel.SHUTDOWN)
 
     def stop_fingers(self, level: StopLevel = StopLevel.SHUTDOWN) -> None:
-        """Begin to stop the fingers, if any may move, by KEEP or SHUTDOWN."""
+        """Begin to stop the fingers, if any may move, by KEEP or SHUTDOWN, or an activation of ours."""
         # An activation that this hand began is taken back with rACT = 0: clearing rGTO would not stop it.
         self._procedure, status = None, self._evidence.status
         if self._activation is not None:
@@ -215,8 +216,10 @@ class Controller:
     @property
     def is_moving(self) -> bool:
         """Whether an axis moves, or will because of a command that does not act yet."""
-        if self.status is None or self.status.is_moving or self.machine.state not in RUNNING:
-            return self.status is not None and self.status.is_moving
+        if self.status is None:
+            return False
+        if self.status.is_moving or self.machine.state not in RUNNING:
+            return self.status.is_moving
         return bool(self._requests.pending.positions) or self._ledger.may_begin_to_move
 
     @property
@@ -432,7 +435,7 @@ class Controller:
                 self.machine.log.warning("%s", end)
             if entry is not None:
                 is_known = ledger.restart(status)
-            else:  # it had nothing to do, so there is no write to wait for
+            else:  # it had nothing to do; WF_ shows for a moment, as DO_ leads nowhere else in the table
                 is_known = ledger.match is not None
                 procedure.written(ledger.shown)
                 self._update_state(Trigger.DELIVERED)
@@ -480,7 +483,7 @@ class Controller:
         holds: bool = False,
         of: Procedure | None = None,
     ) -> Entry:
-        """Send an image of a procedure, or one with the pending changes or holds in it."""
+        """Put an image through the gate and into the ledger; decide() returns it to be sent."""
         releases = of is not None and of.releases
         image = gate(image, status, activates=of is not None and not releases, releases=releases)
         entry = self._ledger.write(image, self._requests.pending.moved if changes else NO_AXES, now)
@@ -494,7 +497,7 @@ class Controller:
         self._update_state(Trigger.DELIVERED)
 
     def lost(self, why: RobotiqError | None = None, now: float = NEVER) -> None:
-        """The link is down: drop what was not acknowledged. No motion is sent again; holds are, on return."""
+        """The link is down: fail every open call. No motion is sent again; holds are, on return."""
         self._why_no_grip = "the link went down"
         error = ConnectionLostError(f"the link went down before this was done: {why}")
         error.__cause__ = why

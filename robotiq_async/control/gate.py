@@ -25,7 +25,7 @@ def merged(
     gripping: Finger = NO_AXES,
     may_move: Finger = NO_AXES,
 ) -> Request:
-    """Merge pending changes into ``base``. Axes that they do not address keep their requests."""
+    """Merge pending changes into ``base``. Other axes keep their requests, unless this sets rGTO."""
     # ``gripping`` has the axes that were in contact when rGTO was last set, ``may_move`` those that show rest
     # and may move all the same.
     if pending.positions and not base.go:

@@ -1,6 +1,6 @@
-"""The ledger: the images that the gripper has, had, or may get. Every question about them is asked here.
+"""The ledger: the images that the gripper has, had, or may get.
 
-No I/O and no clock: time is that of the newest status.
+No I/O and no clock: callers give the time of a write, and questions are about that of the newest status.
 """
 
 # The gripper's requests cannot be read back whole: speed and force have no echo [manual 2014, pp. 50-56], a
@@ -10,14 +10,16 @@ No I/O and no clock: time is that of the newest status.
 # * sent: on the line. It may act already, or never.
 # * acknowledged: it acts within a device cycle. The newest such entry is what the gripper has, or is about to
 #   have: the base of the next image.
-# * shown: a status has repeated its echo. A slow gripper may show an older one again, or skip one [follows].
+# * shown: a status has repeated its echo. A slow gripper may show an older one again, or skip one [follows];
+#   one from before another client's image counts as that client's.
 # * doubtful: the link went down before the acknowledgement, or another client's image showed first
 #   [follows]. It may act, and is not the base: it is kept apart. If it shows, it is certain again, and so is
 #   what was acknowledged after it.
 #
 # A status that shows no entry of the last half second shows another client's image, or a power cycle: that
-# gets an entry of its own, before those that may still act. An entry that was replaced longer ago cannot show
-# in an echo, and is forgotten. gDT may trail the echo [vendor]: what it may be from is kept by axis.
+# becomes the one certain entry, numbered before those that may still act. An entry that was replaced longer
+# ago cannot show in an echo, and is forgotten. gDT may trail the echo [vendor]: the requests that it may be
+# from are kept by axis.
 
 from __future__ import annotations
 
@@ -64,8 +66,8 @@ class Ledger:
         self._model: Final = model
         self._entries = deque([self.shown])  # those that are certain, and that a status may show
         self._doubtful: list[Entry] = []  # by number; each may act after those with a lower one
-        # The entry that showed as a status was adopted. If it is ours, it may activate: after a reset our own
-        # image is taken for another client's.
+        # The entry that showed as a status was adopted. It is an entry no more; but if it is ours, it may
+        # activate: after a reset our own image is taken for another client's.
         self._mistaken: Entry | None = None
         self._adoption: Adoption | None = None  # of another client's entry as long as that is the last
         # The axes that may still show a status from before their last request, with what they were asked: a
@@ -92,15 +94,15 @@ class Ledger:
         return last.image if self._adoption is None else self._adoption.request(last.image.axes)
 
     @property
-    def has_lost_write(self) -> bool:
-        """Whether a write may act of which nothing is known: an image from before it would undo it."""
+    def has_recent_doubt(self) -> bool:
+        """Whether an entry in doubt may still act: an image from before it would undo it."""
         doubtful = self._doubtful  # usually there is none
         return bool(doubtful) and any(self.now.time - each.time < SILENT_S for each in doubtful)
 
     @property
     def is_certain(self) -> bool:
         is_known = self._adoption is None or self._adoption.is_certain
-        return is_known and not self.has_lost_write
+        return is_known and not self.has_recent_doubt
 
     @property
     def resting(self) -> Finger:
@@ -108,7 +110,7 @@ class Ledger:
         return Finger.ALL & ~self.unrested
 
     def acts(self, entry: Entry | None = None) -> bool:
-        """Whether the image of an entry, or of a later one, acts by now; None for the last one."""
+        """Whether an entry, or a later one, acts by now; None for the newest, even if it is in doubt."""
         # It does when its echo has shown, or a long enough time after its acknowledgement.
         entry = entry or self._newest
         if entry.number <= self.shown.number:
@@ -227,7 +229,7 @@ class Ledger:
             self.match = shown
         else:
             self.match = self._find(status)
-        if self._doubtful:  # those that did not show in time, but not before this status was compared
+        if self._doubtful:  # drop those that did not show in time, now that this status was compared
             later = (each for each in self._doubtful if each.number > self.shown.number)
             self._doubtful = [each for each in later if not self._is_old(each)]
         # A moving axis of another client shows its direction with time, an axis at rest its true gDT.
@@ -235,7 +237,7 @@ class Ledger:
             self._adoption.update(status, self.now)
 
     def _is_in_flight(self, entry: Entry) -> bool:
-        # One is written at a time: only the last can be on the line.
+        # One is written at a time, and no status is taken in meanwhile: only the last can be on the line.
         return entry.acknowledged is None and entry is self.last
 
     def _is_old(self, entry: Entry) -> bool:
@@ -296,8 +298,7 @@ class Ledger:
         self._entries = deque(sorted((*self._entries, *revived), key=_number))
 
     def adopt(self, status: RobotiqStatus, *, is_found: bool = False) -> None:
-        """Add an entry for the image that a status shows, as no other explains it."""
-        # Those that wait may still act after it. If the gripper was found so, no axis moves because of us.
+        """Make the image that a status shows the only certain entry; those that wait may act after it."""
         # A client that keeps writing must not make us wait again each time.
         since = self.now if self._adoption is None else self._adoption.since
         before = self._settle_base()
@@ -310,6 +311,7 @@ class Ledger:
         for number, each in enumerate(self._doubtful, other.number + 1):
             each.renumber(number)
         self._note_changes(other, before)
+        # If another client has activated the gripper, no axis moves because of us.
         moved = (axis for axis, old in before.by_axis if old.position != image.position(axis))
         self.ours = NO_AXES if is_found else self.ours & ~Finger(sum(moved))
         self._mistaken = self.match or self._mistaken
@@ -334,8 +336,8 @@ class Ledger:
         """Find out which axes have come to rest. Not in a fault: it keeps axes from starting."""
         if self._unproven:
             self._note_acting()
-            # gDT has no meaning without rGTO [manual]. While an adopted request is a guess, it may be where
-            # an axis is only because a late gDT shows rest there, though one of ours is repeated, and acts.
+            # gDT has no meaning without rGTO [manual]. While an adopted request is a guess, no rest follows
+            # from it: a late gDT alone may make an axis look as if it was asked for where it is.
             if status.go_echo and (self._adoption is None or self._adoption.is_certain):
                 self._find_rest(status)
         if status.go_echo and (self.grips or status.contacts):

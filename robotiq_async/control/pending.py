@@ -1,8 +1,8 @@
 """Requests of callers: changes for the next write, those in flight, and the calls that wait for an answer.
 
-All requests between two polls are merged into one write; the last value wins. A position, a speed or a force
-is written once and never again: it may move an axis. A hold remains until it is acknowledged, also over a
-lost link, because it can only stop one.
+All requests between two writes are merged into one; the last value wins. A position, a speed or a force is
+sent as a change once and never again: it may move an axis. A hold remains until it is acknowledged, also over
+a lost link, because it can only stop one. One without a caller goes if another client takes the axis over.
 """
 
 from __future__ import annotations
@@ -112,13 +112,14 @@ class OpenRequests:
         self.pending = replace(self.pending, hold=self.pending.hold | axes)
 
     def hold_only(self, axes: Finger) -> None:
-        """Hold none but these axes, and those that callers of hold() have named."""
+        """Drop all holds but those of these axes, and those that callers of hold() wait for."""
         for call in self.calls:
             axes |= call.held if call.entry is None else NO_AXES
         self.pending = replace(self.pending, hold=self.pending.hold & axes)
 
     def supersede(self, axes: Finger, error: MoveSupersededError) -> None:
-        """Fail the moves of these axes, and what would move them and is not sent."""
+        """Fail the moves of these axes, and the calls that would move one of them and are not sent."""
+        # Of a call for several axes the others are sent all the same.
         self._take_over(axes, error)
         for axis in axes:
             self.pending.positions.pop(axis, None)
@@ -132,7 +133,7 @@ class OpenRequests:
     # -- what becomes of it ----------------------------------------------------------------------------
 
     def sending(self, entry: Entry, *, changes: bool, holds: bool) -> None:
-        """An entry is sent with the pending changes, the pending holds, both, or neither of them."""
+        """An entry leaves with the pending changes, the pending holds, both or none, or has them already."""
         pending, empty = self.pending, Pending()
         self._sent = replace(pending if changes else empty, hold=pending.hold if holds else NO_AXES)
         self.pending = replace(empty if changes else pending, hold=NO_AXES if holds else pending.hold)

@@ -68,9 +68,10 @@ class Begun(NamedTuple):
 
     def is_stray(self, status: RobotiqStatus) -> bool:
         """Whether nobody has asked for it, and it moves an axis."""
-        first = self.first or status
-        moved = (abs(status.position(axis) - first.position(axis)) for axis in status.model.axes)
-        return max(moved) > STRAY_COUNTS
+        if self.first is None:
+            return False
+        pairs = ((status.position(axis), self.first.position(axis)) for axis in status.model.axes)
+        return max(abs(now - then) for now, then in pairs) > STRAY_COUNTS
 
 
 def activation(image: Image) -> Steps:

@@ -2,9 +2,11 @@
 
 gDT and gSTA are valid once the echo shows [manual 2014, pp. 70, 84]. In the vendor's own software for the
 two-finger grippers they trail the echo by some exchanges [vendor]. So a gDT that is read just after a request
-acts may be from before it. It counts at once only if it can result from no other request than the last, or if
-no request contradicts it since it was true; and in any case when the lag is over. docs/decisions/
-late-status.md has the reasons. The functions here are questions about the last requests of one axis.
+acts may be from before it. It counts at once if it can result from no other request than the last; if it
+says "at position" and the axis is where it was last asked to be, as a position is never late; or if it is a
+contact that no request contradicts since it was true. In any case it counts when the lag is over.
+docs/decisions/late-status.md has the reasons. The functions here are questions about the last requests of
+one axis.
 """
 
 from __future__ import annotations
@@ -84,8 +86,6 @@ class Target(NamedTuple):
 
 class Rest(Enum):
     """The certainty with which an axis that shows rest is at rest."""
-
-    __hash__ = object.__hash__  # see State
 
     UNKNOWN = "it may move, or be about to"
     KNOWN = "it is where it was asked to be; a status from before its request may still come"

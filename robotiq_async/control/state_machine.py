@@ -5,9 +5,9 @@ error that the caller gets. A refusal changes nothing. What a status shows is ne
 from three rules and 18 entries, which are what differs.
 
 The state follows from what the hand does and what the gripper shows; the controller works it out, and the
-table has what it may be. DO_ states and RUNNING_CC last from the decision to write until the
-acknowledgement, so the last state before DISCONNECTED names the write that may be lost. The diagram and the
-tables in docs/ are made from the table below.
+table has what it may be. DO_ states and RUNNING_CC last from the call until the acknowledgement, so the last
+state before DISCONNECTED names the write that may be lost; DO_SHUTDOWN lasts until the hand has stopped. The
+diagram and the tables in docs/ are made from the table below.
 """
 
 from __future__ import annotations

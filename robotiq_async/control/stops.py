@@ -1,21 +1,23 @@
 """Stops: a halt, a reset, and what ends a hand. Each is a level; a new one replaces the one before.
 
-A stop is written before the read of its cycle: a gripper may obey and not answer. It may be written again,
-as it only ends motion: a gripper may acknowledge a write that comes soon after another one and forget it
-[manual 2014, pp. 58, 75: space them by 10 ms].
+The first write of a stop leaves before the read of its cycle: a gripper may obey and not answer. A stop may
+be written again, as it only ends motion: a gripper may acknowledge a write that comes soon after another one
+and forget it [manual 2014, pp. 58, 75: space them by 10 ms]. KEEP is the exception to both.
 """
 
-# Level     First write           Written again                    Over when
+# Level     First write           Written again                   Over when
 #
-# RESET     at once               while gACT shows                 the gripper shows reset
-# HALT      at once               once, if gGTO shows              gGTO = 0 and nothing that waits sets it; or
-#                                                                  after two writes: then halt() fails
-# SHUTDOWN  at once               each WINDOW_S, until it shows    the echo is that of the image, or reset; at
-#                                                                  once if there is nothing to stop
-# KEEP      after write_spacing,  never: replaced by SHUTDOWN      every axis rests for REST_S
-#           only what moves
+# RESET     at once               once it acts, while gACT shows  it acts, and the gripper shows reset
+# HALT      at once               once, if it acts and gGTO       gGTO = 0, and it acts or nothing that waits
+#                                 shows                           sets rGTO; or the second write acts (if gGTO
+#                                                                 shows even then, halt() fails)
+# SHUTDOWN  at once               once it acts, unless its rACT   it acts, and its echo or a reset shows; at
+#                                 might rise                      once if there is nothing to stop
+# KEEP      after write_spacing,  never                           every axis rests for REST_S; in any doubt a
+#           only what moves                                       SHUTDOWN replaces it
 #
-# A first write that came within write_spacing of another is written again before it counts.
+# A write acts once it has shown, or WINDOW_S after its acknowledgement. A first write that came within
+# write_spacing of another is written again before it counts.
 
 from __future__ import annotations
 
@@ -155,7 +157,7 @@ class Stop:
         fail(callers, error)
 
     def has_activated(self, ledger: Ledger, status: RobotiqStatus) -> bool:
-        """Whether its rACT activates a gripper that another client has reset just before."""
+        """Whether its rACT activates a gripper that another client has reset just before, or is about to."""
         # Two clients within one device cycle can do that [follows from Modbus].
         if not self.is_delivered or not self.writes[-1].entry.image.activate:
             return False
@@ -186,7 +188,7 @@ class Keeping(Stop):
         ledger.update_rest(status)
         why = self._why_no_grip
         if not self.writes or ledger.acts(self.writes[-1].entry):  # if not, a hold will overwrite what shows
-            why = why or self._trouble(ledger, status) or self._unrest(ledger, status)
+            why = why or self._trouble(ledger, status) or self._why_not_at_rest(ledger, status)
             self._since = min(self._since, ledger.now.time) if self.rests(ledger, status) else math.inf
         if why:
             stop = Stop(StopLevel.SHUTDOWN)
@@ -205,7 +207,7 @@ class Keeping(Stop):
         return not self.writes and not self.rests(ledger, status)
 
     def rests(self, ledger: Ledger, status: RobotiqStatus) -> bool:
-        """Whether every axis is known to rest under its last request. If rGTO is clear, that is a doubt."""
+        """Whether every axis is known to rest under its last request; also true while rGTO is clear."""
         return not status.moving and not ledger.unrested and ledger.is_certain and ledger.acts()
 
     def image(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
@@ -223,12 +225,12 @@ class Keeping(Stop):
             return f"the {condition.value} ({status.fault.description})"
         return "another client commands the gripper" if ledger.match is None else ""
 
-    def _unrest(self, ledger: Ledger, status: RobotiqStatus) -> str:
+    def _why_not_at_rest(self, ledger: Ledger, status: RobotiqStatus) -> str:
         if status.timestamp - ledger.now.time > KEEP_S:
             return "the newest status is old: something holds up the event loop"
-        # A late object status is worth a wait. A write that was lost with the link is not.
+        # A late object status is worth a wait. A write in doubt is not.
         is_late = not status.moving and status.timestamp < self._until
-        if ledger.has_lost_write or (not ledger.is_certain and not is_late):
+        if ledger.has_recent_doubt or (not ledger.is_certain and not is_late):
             return "what the gripper was asked is not known for certain"
         if ledger.acts() and not status.go_echo:
             return "rGTO was clear"

@@ -15,7 +15,7 @@ T_contra = TypeVar("T_contra", contravariant=True)
 
 
 class Waiter(Protocol[T_contra]):
-    """The answer to one caller. It is done, too, once the caller has given up, and waits for one request."""
+    """The answer to one caller, of one request. It is done, too, once the caller has given up."""
 
     def done(self) -> bool: ...
 
@@ -26,7 +26,7 @@ class Waiter(Protocol[T_contra]):
 
 @dataclass(slots=True, eq=False)
 class Call:
-    """A caller of a command or a hold. It waits until the entry that it was written as is acknowledged."""
+    """A caller that waits: for the acknowledgement of a command or a hold, or for the end of a Move."""
 
     waiter: Waiter[Any]
     axes: Finger = NO_AXES  # those that it moves

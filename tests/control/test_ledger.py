@@ -601,7 +601,7 @@ def test_our_write_that_shows_after_another_clients_is_gone_on_from() -> None:
     history.deliver(image(30), 1.1, Finger.ALL)
     history.look(shows(77, 1.2))
     history.adopt(history.latest)
-    assert history.has_lost_write, "our write may still act"
+    assert history.has_recent_doubt, "our write may still act"
     assert history.ours == NO_AXES
     history.look(shows(30, 1.3))
     assert history.base == image(30)
@@ -884,7 +884,7 @@ def cost_of_a_look(writes: int) -> int:
 
     def look() -> None:
         history.update(shows(255, now), now)
-        assert not history.has_lost_write
+        assert not history.has_recent_doubt
 
     return calls(look)
 
