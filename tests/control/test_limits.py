@@ -8,6 +8,7 @@ import pytest
 
 from robotiq_async import ConnectionLostError, Finger, MoveSupersededError, ObjectStatus, State
 from robotiq_async.control.entry import Entry
+from robotiq_async.control.ledger import WINDOW_S
 from robotiq_async.control.limits import ALONE_S, Limits
 from robotiq_async.simulator import Habits
 from robotiq_async.values.model import THREE_FINGER
@@ -77,6 +78,20 @@ def test_a_limit_that_no_axis_has_proven_is_dropped_when_another_client_is_seen(
     scan.run(1.0)
     assert scan.controller.foreign_commands == 2
     assert isinstance(again.error, MoveSupersededError)
+
+
+def test_a_move_from_a_limit_beyond_it_ends_there_and_the_limit_is_the_request() -> None:
+    """The echo does not change, and is that of the move before as well as that of this one."""
+    scan = echoing()
+    scan.moved(255, S)
+    scan.run(1.0)
+    scan.command(S, position=HIGH)
+    scan.run(1.0)
+    asked = scan.now
+    assert scan.moved(250, S).positions == {S: HIGH}
+    assert scan.now - asked < WINDOW_S, "known by its limit, and not only because all else is too old to show"
+    scan.moved(100, A)
+    assert scan.last_image.position(S) == HIGH
 
 
 def test_an_axis_at_its_limit_rests_and_is_left_alone() -> None:
