@@ -38,8 +38,9 @@ class Entry:
         """Note that the link went down before its acknowledgement."""
         self.sent = max(self.sent, now)
 
-    def renumber(self, number: int) -> None:
-        self.number = number
+    def overtaken(self, number: int) -> None:
+        """Note that another client's image shows: from its new place on it may act once more, if at all."""
+        self.number, self.acts_since = number, None
 
     def correct(self, image: Request, echo: Echo) -> None:
         """Take in what a status has shown of it: another client's requests, or limits in place of ours."""

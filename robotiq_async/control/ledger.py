@@ -302,6 +302,7 @@ class Ledger:
         # A client that keeps writing must not make us wait again each time.
         since = self.now if self._adoption is None else self._adoption.since
         before = self._settle_base()
+        self._note_acting()  # what has shown in a fault, for one: from here on nothing asks for it
         self._adoption = Adoption(status, self.now, since)
         image, time = self._adoption.request(before.axes), self.now.time
         other = Entry(self._newest.number + 1, image, status.echo, False, time, time, self.now)
@@ -309,7 +310,7 @@ class Ledger:
         for recent in self._unproven.values():
             recent.note_overtaken(self._doubtful, self.now)
         for number, each in enumerate(self._doubtful, other.number + 1):
-            each.renumber(number)
+            each.overtaken(number)
         self._note_changes(other, before)
         # If another client has activated the gripper, no axis moves because of us.
         moved = (axis for axis, old in before.by_axis if old.position != image.position(axis))

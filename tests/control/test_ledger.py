@@ -744,6 +744,21 @@ def test_a_short_move_before_another_client_wrote_does_not_end_the_next_one() ->
     assert history.unrested & A
 
 
+def test_a_write_that_shows_after_another_client_s_image_acts_from_then_on() -> None:
+    """It was old enough to have acted before that image, and its motion may begin only now."""
+    history = History(100)
+    entry = history.deliver(image(100).with_positions({A: 200}), 1.0, A)
+    other = status_of(0x39, 0xFF, echo=(100, 101, 100, 100), position=100, at=1.0 + WINDOW_S)
+    assert history.look(other) is None
+    history.adopt(other)
+    history.update_rest(other)
+    at = 1.0 + WINDOW_S + EPSILON
+    late = status_of(0x39, 0b11_11_11_10, echo=(200, 100, 100, 100), position=(150, 100, 100, 100), at=at)
+    assert history.look(late) is entry
+    history.update_rest(late)
+    assert history.unrested & A
+
+
 def test_a_contact_that_shows_as_rgto_rises_may_be_from_before() -> None:
     """With rGTO clear gDT means nothing, so nothing contradicts it."""
     history = History(100)

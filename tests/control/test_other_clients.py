@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import gc
+
 import pytest
 
-from robotiq_async import Finger, MoveSupersededError, NotActivatedError, RobotiqStatus, State
+from robotiq_async import Fault, Finger, MoveSupersededError, NotActivatedError, RobotiqStatus, State
+from robotiq_async.control.entry import Entry
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
 from tests.control.other_client import image, used_by_another
@@ -238,3 +241,28 @@ def test_an_activation_by_crossing_a_reset_is_taken_back_on_a_link_that_returns_
     assert (State.DISCONNECTED, State.WF_ACTIVATION) in [each[:2] for each in scan.transitions]
     scan.until(lambda: scan.state is State.RESET)
     assert not scan.gripper.is_moving
+
+
+def test_a_loop_goes_on_after_a_fault_with_no_more_entries_than_before() -> None:
+    """A write showed in the fault, where no axis comes to rest: it was kept for ever, and all after it."""
+    scan = Scan(device_cycle=0.02, speed=20)
+    scan.start()
+
+    def entries() -> int:
+        return sum(isinstance(each, Entry) for each in gc.get_objects())
+
+    def loop(seconds: float) -> int:
+        for number in range(round(seconds / POLL_S)):
+            scan.command(A, position=number % 256)
+            scan.step()
+        return entries()
+
+    before = loop(2.0)
+    scan.gripper.inject_fault(Fault.SCISSOR_INTERFERENCE)
+    scan.run(0.04)
+    scan.gripper.write(0, image(dict.fromkeys(THREE_FINGER.axes, 200), speed=20))
+    scan.run(0.03)
+    scan.gripper.clear_faults()
+    scan.until(lambda: scan.state is State.RUNNING_IDLE)
+    assert scan.controller.foreign_commands == 1
+    assert loop(4.0) <= before + 10
