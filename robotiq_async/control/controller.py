@@ -467,11 +467,11 @@ class Controller:
             # No axis moves, so there is nothing to write, and what the gripper has answers the callers. If an
             # earlier write does not act yet, an axis may begin to move: ask again then.
             if ledger.acts():
-                self._requests.sending(ledger.last, changes=True, holds=True)
+                self._requests.sending(ledger.last, everything=True)
                 self._requests.acknowledged()
                 self._update_state(Trigger.DELIVERED)
             return None
-        return self._send(image, status, now, changes=True, holds=True).image
+        return self._send(image, status, now, everything=True).image
 
     def _send(
         self,
@@ -479,15 +479,15 @@ class Controller:
         status: RobotiqStatus,
         now: float,
         *,
-        changes: bool = False,
+        everything: bool = False,
         holds: bool = False,
         of: Procedure | None = None,
     ) -> Entry:
         """Put an image through the gate and into the ledger; decide() returns it to be sent."""
         releases = of is not None and of.releases
         image = gate(image, status, activates=of is not None and not releases, releases=releases)
-        entry = self._ledger.write(image, self._requests.pending.moved if changes else NO_AXES, now)
-        self._requests.sending(entry, changes=changes, holds=holds)
+        entry = self._ledger.write(image, self._requests.pending.moved if everything else NO_AXES, now)
+        self._requests.sending(entry, everything=everything, holds=holds)
         self._free_at = now + self._spacing
         return entry
 

@@ -132,13 +132,15 @@ class OpenRequests:
 
     # -- what becomes of it ----------------------------------------------------------------------------
 
-    def sending(self, entry: Entry, *, changes: bool, holds: bool) -> None:
-        """An entry leaves with the pending changes, the pending holds, both or none, or has them already."""
-        pending, empty = self.pending, Pending()
-        self._sent = replace(pending if changes else empty, hold=pending.hold if holds else NO_AXES)
-        self.pending = replace(empty if changes else pending, hold=NO_AXES if holds else pending.hold)
+    def sending(self, entry: Entry, *, everything: bool = False, holds: bool = False) -> None:
+        """An entry has everything that is pending, the holds alone, or nothing of it."""
+        pending, self._sent = self.pending, Pending()
+        if everything:
+            self._sent, self.pending = pending, Pending()
+        elif holds:
+            self._sent, self.pending = Pending(hold=pending.hold), replace(pending, hold=NO_AXES)
         for call in self.calls:
-            if call.entry is None and (holds if call.held else changes):
+            if call.entry is None and (everything or (holds and call.held)):
                 call.written(entry)
 
     def acknowledged(self) -> None:

@@ -218,7 +218,7 @@ def ask(moves: OpenRequests, move: Move) -> None:
 
 
 def write(moves: OpenRequests, entry: Entry = ENTRY) -> None:
-    moves.sending(entry, changes=True, holds=True)
+    moves.sending(entry, everything=True)
 
 
 def test_a_move_that_was_not_written_yet_does_not_end() -> None:

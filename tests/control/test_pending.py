@@ -194,7 +194,7 @@ def test_a_halt_takes_the_holds_with_it() -> None:
     requests, setter, holder = OpenRequests(), Outcome(), Outcome()
     requests.command(Command(B, None, 50), setter)
     requests.hold(A, "hold", holder)
-    requests.sending(Ledger(128, 64).last, changes=False, holds=True)
+    requests.sending(Ledger(128, 64).last, holds=True)
     assert requests.pending == Pending(speeds={B: 50})
     requests.acknowledged()
     assert (holder.answers, waiting(requests)) == ([None], [setter])
@@ -204,7 +204,7 @@ def test_a_write_of_a_stop_or_a_procedure_takes_nothing_with_it() -> None:
     requests, setter, holder = OpenRequests(), Outcome(), Outcome()
     requests.command(Command(B, None, 50), setter)
     requests.hold(A, "hold", holder)
-    requests.sending(Ledger(128, 64).last, changes=False, holds=False)
+    requests.sending(Ledger(128, 64).last)
     requests.acknowledged()
     assert requests.pending == Pending(speeds={B: 50}, hold=A)
     assert waiting(requests) == [setter, holder]
