@@ -57,12 +57,12 @@ class RecentRequests:
         self, axis: Finger, before: Target, *, is_at_rest: bool, changes: Iterable[tuple[Entry, bool]] = ()
     ) -> None:
         self._axis: Final = axis
-        # The entries that change its request, the oldest first, and whether it tries again; and its request
-        # before them, or None if no status can be from that time any more. If it was proven to rest then, a
-        # motion is due to one of them.
+        # The entries that change its request, the oldest first, and whether each makes it try again.
         self._changes: Final = [*changes]
+        # Its request before them; None if no status can be from that time any more.
         self._before: Target | None = before
-        self._may_start: Final = is_at_rest
+        # Whether it was proven to rest under that: then any motion is due to one of the changes.
+        self._was_at_rest: Final = is_at_rest
 
     def add(self, entry: Entry, now: Moment, *, again: bool) -> None:
         changes = self._changes
@@ -90,7 +90,7 @@ class RecentRequests:
 
     def note_motion(self) -> None:
         """An axis at rest moves only for a new request: every later status is from after it [follows]."""
-        if self._may_start:
+        if self._was_at_rest:
             self._before = None
 
     def waiting(self) -> Iterator[Entry]:

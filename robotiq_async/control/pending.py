@@ -34,7 +34,7 @@ class Command:
 
 @dataclass(slots=True)
 class Pending:
-    """What one write changes, by axis."""
+    """The changes of one write, by axis."""
 
     positions: dict[Finger, int] = field(default_factory=dict)
     speeds: dict[Finger, int] = field(default_factory=dict)

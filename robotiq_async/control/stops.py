@@ -184,7 +184,7 @@ class Keeping(Stop):
         self._since = math.inf
 
     def after(self, ledger: Ledger, status: RobotiqStatus, log: Log) -> Stop | None:
-        """What it becomes with a status: a shutdown in any doubt, and None once every axis rests."""
+        """The stop after a status: a shutdown in any doubt, this one, or None once every axis rests."""
         ledger.update_rest(status)
         why = self._why_no_grip
         if not self.writes or ledger.acts(self.writes[-1].entry):  # if not, a hold will overwrite what shows

@@ -632,7 +632,7 @@ def test_of_two_overtaken_writes_the_first_is_no_more_in_doubt_once_the_second_s
 
 
 def test_an_axis_of_a_gripper_whose_rgto_another_client_has_set_is_not_doubted() -> None:
-    """What it was asked while rGTO was clear is not known, and needs no hold."""
+    """The request from the time with rGTO clear is not known, and needs no hold."""
     history = History(100)
     history.deliver(image(100, go=False), 1.0)
     history.look(shows(100, 1.1, go=False))
