@@ -47,10 +47,16 @@ def park():
 
 atexit.register(park)
 """
+# A thread that prints its error while the interpreter ends can abort CPython itself: so it prints none.
 THREAD = """
 hand = RobotiqHand(ADDRESS)
 hand.start()
-threading.Thread(target=hand.move, args=(255,), kwargs={"speed": 0}, daemon=True).start()
+
+def wait():
+    with contextlib.suppress(Exception):
+        hand.move(255, speed=0)
+
+threading.Thread(target=wait, daemon=True).start()
 while not hand.is_moving:
     pass
 """
