@@ -354,7 +354,7 @@ class Controller:
             self._take_back("the gripper was reset as it was commanded: its activation is taken back")
 
     def _take_back(self, why: str) -> None:
-        """End an activation that nobody has asked for."""
+        """End an activation that was not asked for."""
         self.machine.log.warning("%s", why)
         self._begin_reset(Trigger.ASK_RESET, NotActivatedError(why))
 

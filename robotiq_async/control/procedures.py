@@ -54,12 +54,12 @@ class Procedure:
 class Begun(NamedTuple):
     """An activation that a write of ours has begun, or may have: stopping the hand takes it back.
 
-    A write begins one that nobody has asked for if another client resets the gripper just before it: then
+    A write begins one that was not asked for if another client resets the gripper just before it: then
     its rACT rises [follows]. An emergency stop shows the same [seen], and moves nothing.
     """
 
     entry: Entry
-    first: RobotiqStatus | None = None  # the first status of one that nobody has asked for
+    first: RobotiqStatus | None = None  # the first status of one that was not asked for
 
     def is_over(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether a status shows its end. What shows may be from before it."""
@@ -67,7 +67,7 @@ class Begun(NamedTuple):
         return (has_ended or status.fault.severity is Severity.MAJOR) and ledger.acts(self.entry)
 
     def is_stray(self, status: RobotiqStatus) -> bool:
-        """Whether nobody has asked for it, and it moves an axis."""
+        """Whether it was not asked for, and moves an axis."""
         if self.first is None:
             return False
         pairs = ((status.position(axis), self.first.position(axis)) for axis in status.model.axes)

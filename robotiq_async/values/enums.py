@@ -266,8 +266,8 @@ class Fault(Code):
 class State(Enum):
     """The state of a hand: the thirteen states of the thesis, and RESET.
 
-    DO_ states last until their request is acknowledged, WF_ states (wait for) until the gripper reports
-    the result.
+    DO_ states last until their request is acknowledged (DO_SHUTDOWN until the hand has stopped), WF_ states
+    (wait for) until the gripper reports the result.
     """
 
     # Members compare by identity. Enum hashes the name, which is too slow for a lookup at every poll.

@@ -539,7 +539,7 @@ def test_a_contact_under_our_request_that_no_status_showed_ends_no_later_move(si
     scan.step()
     for _ in range(30):
         scan.now += POLL_S
-        scan.status()  # what the gripper shows comes late, but nobody asks for it
+        scan.status()  # what the gripper shows comes late, and no poll asks for it
     scan.gripper.write(0, changed(scan.gripper.request_registers, {B: 40}))
     scan.now += POLL_S
     scan.run(since)
