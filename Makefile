@@ -87,6 +87,7 @@ fuzz: $(STAMP)  ## A million mutated replies through the decoder, 100,000 throug
 	@$(BIN)/python -m tests.adversity.fuzz
 
 explore: $(STAMP)  ## Try random examples that the tests do not, for some minutes
+	@$(BIN)/python -m tests.link.lives
 	@HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest -o hangs_after=1800 \
 		tests/adversity/test_model.py tests/control/test_random.py
 
