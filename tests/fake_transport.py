@@ -12,7 +12,6 @@ from robotiq_async.values.errors import (
     ConnectFailedError,
     ConnectionLostError,
     ResponseTimeoutError,
-    RobotiqConnectionError,
 )
 from robotiq_async.values.registers import Registers, gPR
 from robotiq_async.values.request import Request
@@ -45,7 +44,7 @@ class Wire:
         self.is_open = False
         self.calls: list[str] = []
         self.written: list[Request] = []
-        self.failing: dict[str, RobotiqConnectionError] = {}
+        self.failing: dict[str, Exception] = {}
         self.silent: set[str] = set()
         self.closing_s = 0.0
 

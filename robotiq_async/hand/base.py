@@ -31,8 +31,9 @@ class Hand(Kind):
 
     Use a hand with ``async with``, or call :meth:`start` and :meth:`stop`. A hand belongs to the event loop
     in which it was started: any number of tasks of that loop may call it. No call blocks the loop, and each
-    ends in bounded time unless its arguments allow longer. From another thread or another loop every call
-    raises RuntimeError and sends nothing; the properties can be read from anywhere.
+    ends in bounded time unless its arguments allow longer. Every such time counts while the event loop runs:
+    what holds up the loop lets no call time out. From another thread or another loop every call raises
+    RuntimeError and sends nothing; the properties can be read from anywhere.
 
     Many calls take the same arguments. Any other value raises TypeError or ValueError, and nothing is sent:
 

@@ -24,11 +24,10 @@ from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Final, Literal
 
-import anyio
-
 from ..control.pending import Command
 from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
 from ..link.transport import Transport
+from ..runtime.limit import Limit
 from ..session.options import (
     ACTIVATION_TIMEOUT_S,
     CONNECT_TIMEOUT_S,
@@ -244,7 +243,7 @@ class RobotiqHand(Hand):
         session = self._asked()
         with session.moving(target, axes, speed, force) as (ended, usual), session.counters.move() as note:
             limit = usual if timeout is None else timeout
-            with anyio.move_on_after(limit):
+            with Limit(limit):
                 result = await ended
                 note(result)
                 return result
@@ -315,7 +314,7 @@ class RobotiqHand(Hand):
         limit = timeout or RECOVER_TIMEOUT_S
         self._asked()
         watch, resets = StallWatch(self._channels.listeners, self._machine), 0
-        with anyio.move_on_after(limit), watch as stall:
+        with Limit(limit), watch as stall:
             while self.state not in RUNNING:
                 with stall.ends_early() as step:
                     await self._recover_step()

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import socket
 from collections.abc import Callable
 from typing import Any, Final
 
-import anyio
 from pymodbus import FramerType
 from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
 
 from ..runtime.host_names import addresses_of, why_no_socket, why_unreachable
+from ..runtime.limit import Limit
 from ..values.errors import ConnectFailedError
 from .address import Address
 from .serial_ports import hasten, why_no_port
@@ -57,7 +56,7 @@ async def connected_client(
         client.ctx.data_received = on_data  # type: ignore[method-assign, assignment]
         _keep_reasons(client, reasons)
         try:
-            with anyio.move_on_after(math.inf if host is hosts[-1] else seconds / len(hosts)):
+            with Limit(None if host is hosts[-1] else seconds / len(hosts)):
                 connected = await client.connect()
         except Exception as error:
             raise ConnectFailedError(str(address), str(error)) from error
@@ -94,7 +93,7 @@ async def _hosts(address: Address) -> list[str]:
         return [address.host]
     try:
         return await addresses_of(address.host, address.port)
-    except (OSError, UnicodeError) as error:
+    except Exception as error:  # also RuntimeError, if no thread can be started
         why = f"the name cannot be resolved: {getattr(error, 'strerror', None) or error}"
         raise ConnectFailedError(str(address), why) from error
 

@@ -18,9 +18,8 @@ from collections.abc import Callable
 from typing import Any, Final, TypeVar
 from weakref import WeakKeyDictionary, WeakSet, WeakValueDictionary
 
-import anyio
-
 from ..runtime.clock import clock_of
+from ..runtime.limit import Limit
 from ..values.errors import (
     ConnectFailedError,
     ConnectionLostError,
@@ -170,11 +169,11 @@ class Connection:
         self._watchdog = Watchdog(loop, lambda: self._is_waiting, self._on_timeout)
         self._failure, self._end, self._is_disturbed = None, None, False
         self.echo.is_on = None if self._is_rtu else False
-        try:
-            with anyio.fail_after(seconds):
-                client = await connected_client(self._address, self._on_data, self._on_connection, seconds)
-        except TimeoutError:
-            raise ConnectFailedError(str(self._address), f"no connection within {seconds:g} s") from None
+        client: Client | None = None
+        with Limit(seconds):
+            client = await connected_client(self._address, self._on_data, self._on_connection, seconds)
+        if client is None:
+            raise ConnectFailedError(str(self._address), f"no connection within {seconds:g} s")
         self._client, self._transport = client, client.ctx.transport
         _connected[id(self)] = self
         self.silence.heard = self.clock()  # whatever the line carried for the last connection

@@ -7,7 +7,8 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-HELD_S: Final = 0.01  # a timer or tick that fires this late shows that the event loop was blocked
+from ..runtime.limit import HELD_S
+
 GRACE_S: Final = 0.02
 """Extra time after a block for a peer in the same loop (the simulated gripper), which was blocked as well."""
 

@@ -8,7 +8,8 @@ from collections.abc import Awaitable, Callable
 from typing import Any, Final, TypeVar
 
 from ..runtime.concurrency import LateError
-from .watchdog import GRACE_S, HELD_S
+from ..runtime.limit import HELD_S
+from .watchdog import GRACE_S
 
 T = TypeVar("T")
 

@@ -9,6 +9,7 @@ from typing import Final
 
 import anyio
 
+from ..runtime.limit import Limit
 from ..values.errors import (
     ConnectFailedError,
     ConnectionLostError,
@@ -30,7 +31,6 @@ class Opener:
         self._connect = connect
         self._options = options
         self._log = options.log
-        self._loop = asyncio.get_running_loop()
         self._has_ended = False
         self._scope: anyio.CancelScope | None = None
 
@@ -89,7 +89,20 @@ class Opener:
         delay: float | None = None,
     ) -> bool:
         """Try; ``failed`` is called with the error of each try but the last, which is raised."""
-        since, doubled = self._loop.time(), policy.first_delay
+        limit = Limit(policy.give_up_after)
+        try:
+            return await self._try_until(limit, policy, failed, delay)
+        finally:
+            limit.stop()
+
+    async def _try_until(
+        self,
+        limit: Limit,
+        policy: ReconnectPolicy,
+        failed: Callable[[RobotiqConnectionError], None],
+        delay: float | None,
+    ) -> bool:
+        doubled = policy.first_delay
         while not self._has_ended:
             try:
                 with anyio.CancelScope() as self._scope:
@@ -99,11 +112,8 @@ class Opener:
                     return True
             except RobotiqConnectionError as error:
                 delay = doubled = min(max(2 * doubled, SHORTEST_S), policy.max_delay)
-                if policy.give_up_after is not None:
-                    # The last try begins when that is over, and no later.
-                    left = since + policy.give_up_after - self._loop.time()
-                    if left <= 0:
-                        raise
-                    delay = doubled = min(delay, left)
+                if (left := limit.left) < SHORTEST_S:
+                    raise
+                delay = doubled = min(delay, left)  # the last try begins when the time is over, and no later
                 failed(error)
         return False

@@ -200,7 +200,7 @@ class ReconnectPolicy:
     Attributes:
         first_delay: seconds before the first try, 0..10.
         max_delay: the delay doubles up to this, in seconds, 0.01..60.
-        give_up_after: seconds after which the hand gives up; None tries for ever.
+        give_up_after: seconds after which the hand gives up, while the event loop runs; None tries for ever.
         activate: whether a gripper that comes back without its activation is activated. The fingers MOVE
             then, at a moment that you do not choose: leave it off unless nothing can be in their way.
     """

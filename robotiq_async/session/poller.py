@@ -22,15 +22,14 @@ import sys
 from time import strftime
 from typing import Final
 
-import anyio
-
 from ..control.controller import Controller, Due
 from ..control.waiters import fail, resolve
 from ..link.transport import CyclicLink, Link, SharedLink
-from ..link.watchdog import HELD_S
+from ..runtime.limit import HELD_S, Limit
 from ..runtime.tick import Tick
 from ..values.enums import StopLevel
 from ..values.errors import (
+    ConnectFailedError,
     ConnectionLostError,
     NotStartedError,
     ResponseTimeoutError,
@@ -55,10 +54,9 @@ with contextlib.suppress(ImportError):
 
 STOP_S: Final = 1.4
 """From stop() to the disconnection at the latest. stop() promises 2 s, and a transport object may take half a
-second to close."""
+second to close. Like every limit it counts while the loop runs: a stop is tried at least once."""
 IN_FLIGHT_S: Final = 0.9
 """Of STOP_S: how long the exchange in flight may take before the link is closed and reopened."""
-SHUTDOWN_S: Final = 1.2  # of STOP_S: time to reach the gripper and to see the fingers stop
 SHUTDOWN_PAUSE_S: Final = 0.05  # between two attempts at that
 READS: Final = 3  # the most reads in a cycle that has a request to write, while the loop is held up
 FRESH_S: Final = 0.006
@@ -113,11 +111,12 @@ class Poller:
         self.lost_since = ""
         """The time of day at which the link went down, if it is down."""
         self._stopping = False
-        self._end_by = math.inf
+        self._in_flight = Limit()  # of the exchange in flight when a stop comes
+        self._ending = Limit(shield=True)
         self._level = StopLevel.LEAVE
         """The strongest requested so far."""
         self._opener = Opener(self._connect, options)
-        self._polling: anyio.CancelScope | None = None
+        self._is_polling = False
         self._tick = Tick(options.poll_interval)
         self._last_poll = 0.0
         self._asked = -math.inf  # when the newest status was asked for
@@ -135,14 +134,14 @@ class Poller:
         if not self._stopping:
             # A halt, a reset or a hold that is not over is dropped with the rest: this stop must replace it.
             self._level = max(level, StopLevel.KEEP) if self._controller.has_open_stop else level
-            self._end_by = self._loop.time() + STOP_S
-            if self._polling is not None:
-                self._polling.deadline = self._loop.time() + IN_FLIGHT_S
+            self._ending.restart(STOP_S)
+            if self._is_polling:
+                self._in_flight.restart(IN_FLIGHT_S)
             self._refuse_requests()
         elif level > self._level:
             self._log.info("a stronger stop came: the fingers are %s", level.done)
             self._level = level
-            self._end_by = self._loop.time() + STOP_S
+            self._ending.restart(STOP_S)
             if level is StopLevel.SHUTDOWN:
                 self._controller.keep_no_grip()
         elif level < self._level:
@@ -174,9 +173,11 @@ class Poller:
         bug: Exception | None = None
         try:
             if await self._connect_first():
-                with anyio.CancelScope() as self._polling:
+                self._is_polling = True
+                with self._in_flight:
                     await self._poll()
-                if self._polling.cancelled_caught:
+                self._is_polling = False
+                if self._in_flight.is_over:
                     self._controller.lost(
                         ResponseTimeoutError("no answer until the hand was stopped"), self._tick.time()
                     )
@@ -214,7 +215,7 @@ class Poller:
 
     async def _connect(self) -> None:
         """Open the link and read the first status; read on while its fault 0x09 may be a passing one."""
-        await self._transport.open()
+        await self._open()
         self._last_poll = 0.0  # the time without a link counts as no period
         await self._poll_once(is_first=True)
         while self._controller.is_undecided:  # the silence before may show as a fault, once
@@ -222,6 +223,18 @@ class Poller:
             await self._poll_once()
         self._tick.start()
         self._counters.tick = self._tick.source
+
+    async def _open(self) -> None:
+        try:
+            await self._transport.open()
+        except RobotiqConnectionError:
+            raise
+        except Exception as error:
+            if not self.connected.done():
+                raise  # the first contact: a mistake of ours, or of a transport object
+            # No thread, no memory, no descriptor: what the system lacks now it may have at the next try.
+            self._log.debug("the link could not be opened", exc_info=error)
+            raise ConnectFailedError(self._options.link.address, repr(error)) from error
 
     async def _reconnect(self, why: RobotiqConnectionError) -> bool:
         """Open the link again; False when that is given up, or when asked to stop."""
@@ -494,6 +507,7 @@ class Poller:
                     done = self._level
                     await self._end_motion()
             finally:
+                self._ending.stop()
                 if not self._loop.is_closed():
                     await self._transport.close()
             if done == self._level:
@@ -502,10 +516,9 @@ class Poller:
     async def _end_motion(self) -> None:
         if self._controller.status is None:
             return
-        deadline = min(self._end_by, self._loop.time() + SHUTDOWN_S)
-        with anyio.CancelScope(deadline=deadline, shield=True) as scope:
+        with self._ending:
             await self._stop_fingers()
-        if scope.cancelled_caught:
+        if self._ending.is_over:
             self._log.warning("the gripper did not confirm in time that the fingers were stopped")
 
     async def _stop_fingers(self) -> None:
@@ -527,7 +540,7 @@ class Poller:
         if not self._transport.is_open:
             # A gripper without a client keeps moving. Read first: if it has lost its power, an image
             # with rACT would activate it.
-            await self._transport.open()
+            await self._open()
             await self._poll_once()
         self._controller.stop_fingers(self._level)
         while True:

@@ -23,14 +23,13 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, ClassVar, ParamSpec, TypeVar
 
-import anyio
-
 from ..control.controller import Controller
 from ..control.motion import Move
 from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
 from ..control.waiters import Waiter
 from ..runtime.clock import now
 from ..runtime.concurrency import check_loop, wait_shielded
+from ..runtime.limit import Limit
 from ..values.enums import Fault, Finger, State, Trigger
 from ..values.errors import (
     ActivationTimeoutError,
@@ -288,7 +287,7 @@ class Session:
         with self._waiters.watching(states, ends) as reached:
             if ask is not None:
                 self.ask(ask)
-            with anyio.move_on_after(timeout):
+            with Limit(timeout):
                 state = await reached
         if state is None:
             raise StateTimeoutError(f"{what} within {timeout:g} s (now {self.machine.state.name})")

@@ -175,6 +175,51 @@ async def test_a_move_cancelled_while_the_loop_was_held_up_stops_where_it_is_by_
     assert abs(here.gripper.position(A) - at) < 10
 
 
+# -- limits of time --------------------------------------------------------------------------------------
+
+
+@inside(started, speedup=1.0)
+@pytest.mark.parametrize("held_s", [1.0, 1.5, 10.0])
+@pytest.mark.parametrize("turns", range(1, 3 * POLL_TURNS))
+async def test_a_stop_is_written_wherever_in_it_the_loop_is_held_up(
+    here: World, turns: int, held_s: float
+) -> None:
+    """When its time was over after the block, it was not even tried."""
+    moving = asyncio.create_task(here.hand.close(speed=0))
+    await asyncio.sleep(0.3)
+    here.loop.after_turns(turns, lambda: here.loop.hold_up(held_s))
+    await here.hand.stop()
+    assert isinstance(await asyncio.gather(moving, return_exceptions=True), list)
+    assert not here.gripper.is_moving
+    assert not Request.from_registers(here.gripper.request_registers).go
+
+
+@inside(started)
+async def test_a_move_that_has_arrived_while_the_loop_was_held_up_has_arrived(here: World) -> None:
+    """It was a MoveTimeoutError: the limit passed in that time."""
+    moving = asyncio.create_task(here.hand.move(200, A))
+    await asyncio.sleep(0.1)
+    here.loop.hold_up(30.0)
+    assert abs((await moving).positions[A] - 200) <= 2
+
+
+@inside(started)
+@pytest.mark.parametrize("turns", range(1, POLL_TURNS))
+async def test_a_reset_that_was_done_while_the_loop_was_held_up_is_done(here: World, turns: int) -> None:
+    here.loop.after_turns(turns, lambda: here.loop.hold_up(6.0))
+    await here.hand.reset()
+    assert here.hand.state is State.RESET
+
+
+@inside(world)
+@pytest.mark.parametrize("turns", range(1, 3 * POLL_TURNS))
+async def test_a_start_outlasts_a_loop_that_is_held_up(here: World, turns: int) -> None:
+    """It was a ConnectFailedError: no connection within 2 s."""
+    await here.activate_beforehand()
+    here.loop.after_turns(turns, lambda: here.loop.hold_up(2.5))
+    await here.hand.start()
+
+
 # -- a loop that is not run, as between the prompts of IPython's terminal ---------------------------------
 
 

@@ -424,6 +424,19 @@ async def test_an_unknown_host_name_is_reported() -> None:
         await transport.open()
 
 
+async def test_a_host_name_without_a_thread_to_resolve_it_in_is_a_failed_try(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def start(_: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", start)
+    address = parse_address("gripper.example")
+    transport = ModbusTransport(address, TCP_REGISTERS, connect_timeout=5.0, response_timeout=0.1)
+    with pytest.raises(ConnectFailedError, match="the name cannot be resolved: can't start new thread"):
+        await transport.open()
+
+
 @pytest.mark.parametrize(
     ("number", "why"),
     [

@@ -25,6 +25,7 @@ from robotiq_async.values.errors import (
 from robotiq_async.values.request import Request
 from tests.fake_transport import LOST
 from tests.session.polled import POLL_S, Polled, polled
+from tests.virtual import VirtualLoop
 
 pytestmark = pytest.mark.virtual_time
 
@@ -266,6 +267,33 @@ async def test_without_a_policy_a_lost_link_is_the_end() -> None:
         assert here.poller.failure is LOST
 
 
+@pytest.mark.parametrize("why", [RuntimeError("can't start new thread"), MemoryError(), KeyError("odd")])
+async def test_whatever_keeps_a_link_from_being_opened_again_is_a_failed_try(why: Exception) -> None:
+    """The hand had given up for good, with an internal error."""
+    async with polled() as here:
+        await here.polls(3)
+        here.wire.failing["read"] = LOST
+        here.wire.failing["open"] = why
+        await asyncio.sleep(1.0)
+        assert here.machine.state is State.DISCONNECTED
+        assert repr(why) in str(here.machine.why_down)
+        here.wire.failing.clear()
+        await here.polls(3)
+        assert here.counters.reconnects == 1
+
+
+async def test_whatever_keeps_a_link_from_being_opened_for_a_stop_is_a_failed_try() -> None:
+    async with polled() as here:
+        here.controller.command(Command(Finger.ABC, 255, 0))
+        await here.polls(10)
+        here.wire.failing = {"read": LOST, "write": LOST, "open": RuntimeError("can't start new thread")}
+        here.poller.request_stop(halt=True)
+        await asyncio.sleep(0.3)
+        here.wire.failing.clear()
+        await here.end()
+        assert not here.wire.gripper.is_moving
+
+
 async def test_the_delays_between_tries_double_up_to_their_limit() -> None:
     async with polled(ReconnectPolicy(first_delay=0.1, max_delay=0.5)) as here:
         await here.polls(3)
@@ -324,6 +352,22 @@ async def test_when_it_is_tried_and_given_up(
         assert await opener.again(policy, failed.append)
     assert tried == pytest.approx(tries)
     assert failed == [LOST] * (len(tried) - 1)
+
+
+async def test_time_in_which_the_loop_was_held_up_is_no_time_of_a_hand_that_tries() -> None:
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualLoop)
+    began, tried = loop.time(), list[float]()
+
+    async def connect() -> None:
+        tried.append(loop.time() - began)
+        raise LOST
+
+    loop.call_later(0.35, loop.hold_up, 60.0)
+    with pytest.raises(ConnectionLostError):
+        await Opener(connect, HandOptions()).again(ReconnectPolicy(0.1, 0.1, give_up_after=1), lambda _: None)
+    assert tried[-1] == pytest.approx(61.0, abs=0.1)
+    assert len(tried) >= 9
 
 
 @pytest.mark.parametrize(

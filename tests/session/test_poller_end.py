@@ -9,7 +9,7 @@ import pytest
 
 from robotiq_async.control.pending import Command
 from robotiq_async.session.options import ReconnectPolicy
-from robotiq_async.session.poller import SHUTDOWN_S
+from robotiq_async.session.poller import STOP_S
 from robotiq_async.values.enums import Finger, State
 from robotiq_async.values.errors import NotStartedError
 from tests.fake_transport import LOST
@@ -111,7 +111,7 @@ async def test_the_end_comes_in_time_without_any_answer(
     began = here.loop.time()
     here.poller.request_stop(halt=True)
     await here.end()
-    assert here.loop.time() - began == pytest.approx(SHUTDOWN_S, abs=0.3)
+    assert here.loop.time() - began == pytest.approx(STOP_S, abs=0.3)
     assert "did not confirm in time that the fingers were stopped" in caplog.text
 
 
