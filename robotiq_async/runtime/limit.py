@@ -50,7 +50,7 @@ class Limit:
         self._scope: anyio.CancelScope | None = None
         self._end = math.inf
         self._look_at = math.inf  # the time of the next look
-        self._timer: asyncio.Handle | None = None
+        self._timers: list[asyncio.Handle] = []  # for the end, and for the look
         self._has_grace = False
         self.restart(seconds)
 
@@ -60,7 +60,7 @@ class Limit:
         self._scope.__enter__()
         if self.left <= 0:
             self.restart(GRACE_S)
-        elif self._timer is None:
+        elif not self._timers:
             self._wait()
         return self
 
@@ -89,26 +89,36 @@ class Limit:
 
     def stop(self) -> None:
         """Look no more, until the block is entered again or the limit restarted."""
-        timer, self._timer, self._look_at = self._timer, None, math.inf
-        if timer is not None:
+        for timer in self._timers:
             timer.cancel()
+        self._timers.clear()
+        self._look_at = math.inf
 
     def _wait(self) -> None:
         self.stop()
         if self._end < math.inf:
-            self._look_at = min(self._end, self._loop.time() + SLICE_S)
-            self._timer = self._loop.call_at(self._look_at, self._look)
+            # Not by the last look: what is due together runs in the order in which it was set.
+            self._timers.append(self._loop.call_at(self._end, self._expire))
+            self._wait_for_look()
+
+    def _wait_for_look(self) -> None:
+        self._look_at = min(self._end, self._loop.time() + SLICE_S)
+        if self._look_at < self._end:
+            self._timers[1:] = [self._loop.call_at(self._look_at, self._look)]
 
     def _look(self) -> None:
-        is_last = self._look_at >= self._end
-        if self._is_late() and not (is_last and self._has_grace):
+        if self._is_late():
             self._skip_block()
-        elif not is_last:
-            self._wait()
         else:
-            self.stop()
-            if self._scope is not None:
-                self._scope.cancel()
+            self._wait_for_look()
+
+    def _expire(self) -> None:
+        if self._is_late() and not self._has_grace:
+            self._skip_block()
+            return
+        self.stop()
+        if self._scope is not None:
+            self._scope.cancel()
 
     def _is_late(self) -> bool:
         return self._loop.time() - self._look_at > HELD_S + resolution_of(self._loop)
