@@ -7,7 +7,7 @@ import re
 from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import NamedTuple, Self
 
 from robotiq_async import Finger, RobotiqError, State
@@ -17,7 +17,7 @@ from robotiq_async.simulator import parse_troubles
 from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values.registers import Registers
 from tests.adversity.phases import PHASES, TARGET, Call, Phase
-from tests.adversity.world import HABITS, World
+from tests.adversity.world import HABITS, UrcapServer, World
 from tests.docs.pages import read, table
 
 LINE_PULLED = "line pulled"
@@ -84,6 +84,8 @@ class Before(NamedTuple):
     @classmethod
     def of(cls, world: World) -> Self:
         world.states.clear()
+        if isinstance(world.server, UrcapServer):
+            world.server.motions.clear()
         gripper = world.gripper
         return cls(world.loop.time(), world.travels(), len(gripper.writes), gripper.request_registers)
 
@@ -160,7 +162,13 @@ async def _rest(world: World, settled: Collection[State]) -> None:
 
 def _check_motions(world: World, before: Before, phase: Phase, kind: str, ending: str) -> None:
     """No command was sent twice, neither in a row nor the one of the phase; only addressed axes moved."""
+    if isinstance(world.server, UrcapServer):
+        lines = world.server.motions
+        assert all(one != another for one, another in pairwise(lines)), lines
+        assert sum(b" POS %d " % TARGET in line for line in lines) <= 1, lines
     motions = world.motions(before.writes)
+    if kind == "one-by-one":
+        motions = [motion for motion, _ in groupby(motions)]  # each variable was a write of its own
     assert all(one != another for one, another in pairwise(motions)), motions
     assert sum(motion[0] == TARGET for motion in motions) <= 1, motions
     if kind in MOVES_EVERYTHING:

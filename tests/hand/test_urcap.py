@@ -13,6 +13,7 @@ from robotiq_async import (
     HAND_E,
     JAW,
     TWO_FINGER_85,
+    ConnectionLostError,
     InvalidStateError,
     Model,
     MoveSupersededError,
@@ -21,6 +22,7 @@ from robotiq_async import (
     State,
 )
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble, UrcapSimulatorServer
+from robotiq_async.simulator.troubles.corruption import unchanged
 from tests.grippers import activate_beforehand, until_moving
 from tests.virtual import until
 
@@ -91,6 +93,40 @@ async def test_a_stream_of_commands_is_never_taken_for_those_of_another_client()
         assert hand.statistics.foreign_commands == 0
 
 
+# -- a command that the URCap takes one variable after the other ---------------------------------------------
+
+SPACINGS = [0.0005, 0.003, 0.01, 0.03]
+
+
+@pytest.mark.parametrize("spacing", SPACINGS)
+async def test_what_is_taken_one_by_one_is_ours(spacing: float) -> None:
+    async with at_a_ur() as (server, hand), server.fault_injector.making(Trouble("one-by-one", spacing)):
+        server.gripper.place_object(JAW, 180)
+        await hand.move(100)
+        moving = asyncio.ensure_future(hand.close(speed=0))
+        for stop in (hand.halt, hand.hold, hand.open):
+            await until_moving(server, hand)
+            await stop()
+            with pytest.raises(MoveSupersededError):
+                await moving
+            moving = asyncio.ensure_future(hand.close(speed=0))
+        assert (await moving).contacts == JAW
+        await hand.reset()
+        await hand.activate()
+        await hand.move(20)
+        assert hand.statistics.foreign_commands == 0
+
+
+@pytest.mark.parametrize("spacing", SPACINGS[:2])
+async def test_a_stream_that_is_taken_one_by_one_is_ours(spacing: float) -> None:
+    async with at_a_ur() as (server, hand), server.fault_injector.making(Trouble("one-by-one", spacing)):
+        for step in range(100):
+            hand.command(position=2 * step, speed=255, force=step)
+            await asyncio.sleep(5 * spacing)
+        await hand.halt()
+        assert hand.statistics.foreign_commands == 0
+
+
 # -- other clients -------------------------------------------------------------------------------------------
 
 
@@ -154,6 +190,28 @@ async def test_the_gripper_that_was_asked_for_is_chosen() -> None:
 
 
 # -- troubles ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("pause", [0.0, 0.02, 0.1])
+@pytest.mark.parametrize("cycle", [0.05, 0.1, 0.2])
+async def test_an_activation_that_was_not_acknowledged_is_taken_back(cycle: float, pause: float) -> None:
+    """The connection ends in place of the acknowledgement, and the gripper is slow: it shows nothing yet."""
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, model=TWO_FINGER_85)
+    async with UrcapSimulatorServer(gripper) as server:
+        await server.fault_injector.begin(Trouble("slow-device", cycle))
+        hand = RobotiqHand(server.address)
+        await hand.start(activate=False)
+        server.policy = lambda reply: None if reply == b"ack" else unchanged(reply)
+        with pytest.raises(ConnectionLostError):
+            await hand.activate()
+        server.policy = unchanged
+        await asyncio.sleep(pause)
+        await hand.stop()
+        await asyncio.sleep(cycle)  # the stop acts
+        assert not gripper.is_moving
+        travel = gripper.travel(JAW)
+        await asyncio.sleep(20)
+        assert gripper.travel(JAW) == travel
 
 
 @pytest.mark.parametrize(

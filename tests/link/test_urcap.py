@@ -255,6 +255,18 @@ async def test_a_release_is_taken_back_by_the_next_write() -> None:
         assert served.lines[-1] == "SET GTO 0 SPE 50 FOR 60 POS 0"
 
 
+async def test_a_reset_is_in_the_line_although_the_gripper_shows_it() -> None:
+    """An activation that seemed to be lost may act after this line, also one of a connection that is lost."""
+    async with linked() as (link, served):
+        served.values |= {"ACT": 0, "STA": 0}
+        for _ in range(2):
+            await link.read()
+            await link.write(image(0, go=False, activate=False))
+            assert served.lines[-1] == "SET ACT 0 GTO 0 ATR 0 SPE 50 FOR 60 POS 0"
+            await link.close()
+            await link.open()
+
+
 async def test_what_was_not_read_yet_is_set() -> None:
     async with linked() as (link, served):
         await link.write(image(255))
@@ -298,6 +310,117 @@ async def test_a_stream_of_positions_goes_on_with_the_short_read() -> None:
         served.values["PRE"] = 7
         await link.read()
         assert served.asked == ["PRE", *ALL], "a position that another client has written"
+
+
+# -- a command that the URCap takes one variable after the other ---------------------------------------------
+
+MOVE, HALT = image(200), image(120, go=False)
+WAITED_S = 0.5
+"""Seconds for which the rest of a command is waited for."""
+
+
+def takes_nothing(served: Port) -> Answer:
+    return lambda line: b"ack" if line.startswith("SET") else served.good(line)
+
+
+@asynccontextmanager
+async def taking(
+    before: dict[str, int], written: Registers, taken: dict[str, int]
+) -> AsyncIterator[tuple[UrcapTransport, Port]]:
+    """A link that has read, then written something of which the gripper has taken a part."""
+    async with linked() as (link, served):
+        served.values |= before
+        await link.read()
+        served.answer = takes_nothing(served)
+        await link.write(written)
+        served.values |= taken
+        yield link, served
+
+
+HALVES = {
+    "a go": ({"GTO": 0, "PRE": 7}, MOVE, {"PRE": 200}),
+    "a halt": ({"GTO": 1, "PRE": 255}, HALT, {"GTO": 0}),
+}
+
+
+@pytest.mark.parametrize("what", HALVES)
+async def test_a_command_that_is_taken_half_shows_as_the_image_before(what: str) -> None:
+    async with taking(*HALVES[what]) as (link, served):
+        before, written, _ = HALVES[what]
+        served.values |= {"OBJ": 0, "POS": 99}
+        shown = await status(link)
+        assert shown.echo == (True, bool(before["GTO"]), before["PRE"])
+        assert (shown.is_moving, shown.position(JAW)) == (before["GTO"] == 1, 99), "the rest as it is"
+        asked = Request.from_registers(written, TWO_FINGER_85)
+        served.values |= {"GTO": int(asked.go), "PRE": asked.position(JAW)}
+        assert (await status(link)).echo == asked.echo
+
+
+@pytest.mark.parametrize("what", HALVES)
+async def test_what_stays_half_a_command_is_shown_in_the_end(what: str) -> None:
+    async with taking(*HALVES[what]) as (link, served):
+        hidden = await status(link)
+        await asyncio.sleep(WAITED_S)
+        shown = await status(link)
+        assert shown.echo != hidden.echo
+        assert shown.echo == (True, bool(served.values["GTO"]), served.values["PRE"])
+
+
+async def test_a_command_of_a_lost_connection_may_be_taken_half() -> None:
+    async with taking(*HALVES["a go"]) as (link, served):
+        served.answer = always(None)
+        with pytest.raises(ConnectionLostError):
+            await link.read()
+        served.answer = takes_nothing(served)
+        await link.open()
+        assert (await status(link)).echo == (True, False, 7)
+        served.values["GTO"] = 1
+        for _ in range(3):
+            assert (await status(link)).echo in {(True, False, 7), (True, True, 200)}
+        await asyncio.sleep(WAITED_S)
+        assert (await status(link)).echo == (True, True, 200)
+
+
+async def test_a_command_of_a_lost_connection_that_acts_late_shows_whole() -> None:
+    async with taking({"GTO": 0, "PRE": 7}, MOVE, {}) as (link, served):
+        await link.close()
+        await link.open()
+        for _ in range(2):  # the second of these asked for GTO
+            await link.read()
+        await asyncio.sleep(WAITED_S)
+        served.values |= {"GTO": 1, "PRE": 200}
+        assert (await status(link)).echo == (True, True, 200), "with the go that came with the position"
+
+
+async def test_the_second_of_two_commands_is_taken_half() -> None:
+    async with taking({"GTO": 0, "PRE": 7}, MOVE, {}) as (link, served):
+        await link.write(HALT)
+        served.values |= {"GTO": 0, "PRE": 200}
+        assert (await status(link)).echo == (True, False, 7), "half of the first"
+        served.values["GTO"] = 1
+        assert (await status(link)).echo == (True, True, 200), "the first"
+        served.values["GTO"] = 0
+        assert (await status(link)).echo == (True, True, 200), "half of the second"
+        served.values["PRE"] = 120
+        assert (await status(link)).echo == (True, False, 120)
+        served.values["PRE"] = 200
+        assert (await status(link)).echo == (True, False, 200), "both are over: this is another client's"
+
+
+@pytest.mark.parametrize("foreign", [{"PRE": 60}, {"PRE": 60, "GTO": 1}, {"ACT": 0}, {"ACT": 0, "PRE": 0}])
+async def test_what_is_no_half_of_ours_shows_at_once(foreign: dict[str, int]) -> None:
+    """Another client's SET, or a gripper that has lost its power."""
+    async with taking({"GTO": 0, "PRE": 7}, MOVE, foreign) as (link, served):
+        assert (await status(link)).echo == tuple(served.values[name] for name in ("ACT", "GTO", "PRE"))
+
+
+@pytest.mark.parametrize(
+    ("taken", "echo"), [({"ACT": 0}, (False, True, 255)), ({"GTO": 0}, (True, False, 255))]
+)
+async def test_while_a_reset_is_taken_everything_shows(taken: dict[str, int], echo: tuple[int, ...]) -> None:
+    """Half of it looks like a gripper without power."""
+    async with taking({"GTO": 1, "PRE": 255}, image(0, go=False, activate=False), taken) as (link, _):
+        assert (await status(link)).echo == echo
 
 
 @pytest.mark.parametrize("said", [b"ack\n", b"ack\r\n", b"\nack"])

@@ -82,6 +82,7 @@ EXPECTED: Final = {
     "function-3-only": Expected(CONDITION, MODBUS),
     "no-function-23": Expected(CONDITION, LINES),
     "one-connection-only": Expected(CONDITION, CONNECTIONS),
+    "one-by-one": Expected(CONDITION, ("urcap",), (0.01, 0, 1)),
 }
 
 CONDITIONS: Final = [name for name, kind in EXPECTED.items() if kind.form == CONDITION]

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import struct
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
 
 import pytest
 
-from robotiq_async.simulator import Habits, SimulatorServer, Trouble
+from robotiq_async import JAW, TWO_FINGER_85
+from robotiq_async.simulator import Habits, SimulatedGripper, SimulatorServer, Trouble, UrcapSimulatorServer
 from robotiq_async.simulator import parse_troubles as plan_of
 from robotiq_async.simulator.physics.habits import REAL_ACTIVATION
 from robotiq_async.simulator.troubles.trouble import KINDS
@@ -153,6 +156,76 @@ async def is_reset(server: SimulatorServer) -> bool:
         except (ConnectionResetError, asyncio.IncompleteReadError):
             return True
     return False
+
+
+@asynccontextmanager
+async def text_port() -> AsyncIterator[tuple[UrcapSimulatorServer, Callable[[str], Awaitable[str]]]]:
+    """A jaw behind a text port, which takes variables one by one, and what says a line to it."""
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, spread=False, model=TWO_FINGER_85)
+    async with UrcapSimulatorServer(gripper) as server:
+        reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
+
+        async def say(line: str) -> str:
+            writer.write(f"{line}\n".encode())
+            return (await reader.read(100)).decode()
+
+        await server.fault_injector.begin(Trouble("one-by-one", 0.1))
+        yield server, say
+        writer.close()
+        await asyncio.sleep(0.01)
+
+
+def asked(server: UrcapSimulatorServer) -> tuple[bool, bool, int]:
+    image = Request.from_registers(server.gripper.request_registers, TWO_FINGER_85)
+    return image.activate, image.go, image.position(JAW)
+
+
+async def test_the_variables_of_a_set_are_taken_one_by_one_and_in_order() -> None:
+    async with text_port() as (server, say):
+        assert await say("SET SID 9") == "ack"
+        assert await say("SET ACT 1 POS 50 GTO 1") == "ack"
+        assert await say("SET GTO 0 POS 20") == "ack", "it waits behind the other"
+        assert asked(server) == (False, False, 0), "acknowledged, and not taken"
+        seen = []
+        for _ in range(6):
+            seen.append(asked(server))
+            await asyncio.sleep(0.1)
+        assert seen[1:] == [
+            *((True, False, 0), (True, False, 50), (True, True, 50)),
+            *((True, False, 50), (True, False, 20)),
+        ]
+
+
+@pytest.mark.parametrize(
+    "line", ["SET POS 50 OBJ 1", "SET POS 50 GTO", "SET POS 50 GTO 2", "SET POS 50 SID 1"]
+)
+async def test_nothing_of_a_set_that_is_refused_is_taken(line: str) -> None:
+    async with text_port() as (server, say):
+        assert await say(line) == "?"
+        await asyncio.sleep(1)
+        assert asked(server) == (False, False, 0)
+
+
+async def test_without_power_nothing_more_is_taken() -> None:
+    async with text_port() as (server, say):
+        await say("SET ACT 1 POS 50 GTO 1")
+        await asyncio.sleep(0.1)
+        server.gripper.power_cycle()
+        await asyncio.sleep(0.05)
+        server.gripper.power_off()
+        await asyncio.sleep(0.1)
+        server.gripper.power_on()
+        await asyncio.sleep(1)
+        assert asked(server) == (False, False, 0)
+
+
+async def test_a_server_that_is_stopped_takes_nothing_more() -> None:
+    async with text_port() as (server, say):
+        await say("SET ACT 1 POS 50 GTO 1")
+        await asyncio.sleep(0.15)
+        await server.stop()
+        await asyncio.sleep(1)
+        assert asked(server) == (True, False, 0)
 
 
 async def test_an_emergency_stop_for_a_while(server: SimulatorServer) -> None:

@@ -14,7 +14,7 @@ from typing import Final
 
 from ...values import registers as reg
 from ...values.errors import ProtocolError
-from ...values.registers import Registers
+from ...values.registers import Echo, Registers
 
 HIGHEST: Final = {"ACT": 1, "GTO": 1, "PRE": 255, "OBJ": 3, "STA": 3, "FLT": 255, "POS": 255}
 """The variables of a status, and the highest value of each."""
@@ -38,9 +38,10 @@ def command(image: Sequence[int], activation: int | None) -> bytes:
     order that is right for both. What stops the fingers comes first; what starts them comes last, when
     position, speed and force are set.
 
-    A motion is the line that clients send: position, speed, force, go. Activation and release are in it only
-    if the image changes them: a motion must not activate a gripper that another client has just reset. ARD
-    means nothing without ATR.
+    A motion is the line that clients send: position, speed, force, go. Activation and release are left out
+    of it: a motion must not activate a gripper that another client has just reset. ACT 0 is in the line even
+    if it was read: an activation that was not acknowledged may still be on its way, from this connection or
+    one that was lost, and this line takes it back. ARD means nothing without ATR.
 
     Args:
         image: the eight request registers.
@@ -48,7 +49,7 @@ def command(image: Sequence[int], activation: int | None) -> bytes:
     """
     act, gto, atr, ard = (field.read(image) for field in (reg.rACT, reg.rGTO, reg.rATR, reg.rARD))
     release = [("ARD", ard), ("ATR", atr)] if atr else [("ATR", atr)]
-    is_motion = act == activation and not atr
+    is_motion = act == activation == 1 and not atr
     go = [("GTO", gto)]
     pairs = [
         *([] if is_motion else [("ACT", act)]),
@@ -61,6 +62,21 @@ def command(image: Sequence[int], activation: int | None) -> bytes:
 
 
 _MOTION: Final = (("SPE", reg.rSP), ("FOR", reg.rFR), ("POS", reg.rPR))
+
+
+def midway(before: Echo, after: Echo) -> Echo | None:
+    """The echo of a command that is taken half, where a URCap takes its variables one by one.
+
+    None for a command that changes ACT, which shows as it is: half a reset looks like a power cut.
+
+    Args:
+        before: the echo of the image before.
+        after: that of the command: ACT, GTO and the position.
+    """
+    (activation, go, position), (wanted, goes, target) = before, after
+    if activation != wanted:
+        return None
+    return (activation, go, target) if goes else (activation, goes, position)
 
 
 def choice(gripper: int) -> bytes:

@@ -15,6 +15,11 @@ translation). What the port makes different is decided here:
   time, the connection is closed. A new connection begins with a silence, and with another question than the
   one that was open before: what a proxy delivers late is noticed by that.
 * A write is one line and never repeated. Another client's SET shows in the echo, as it does over Modbus.
+* No source says whether a URCap takes the variables of a line at once. An echo that is half that of a line
+  just written and half that of the image before is not another client's: until the rest shows, for half a
+  second at most, the status has the echo of the image before. OBJ, STA, FLT and POS are as they were read.
+* An activation that seemed to be lost may act later, whatever the gripper shows before: each image with
+  rACT = 0 sets ACT (:func:`lines.command`).
 
 Nothing of this has met a real controller.
 """
@@ -25,12 +30,13 @@ import asyncio
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Final, TypeVar
 
 from ...runtime.log import Log, log
 from ...values import registers as reg
 from ...values.errors import ConnectFailedError, ProtocolError, ResponseTimeoutError
-from ...values.registers import Registers
+from ...values.registers import Echo, Registers
 from ..address import Address
 from ..connection import Connection
 from ..exchange import Exchange
@@ -41,7 +47,9 @@ SHOWS_S: Final = 0.5
 SLOW: Final = ("GTO", "STA", "FLT", "ACT")
 """Asked for in turn, one in each read."""
 LATEST: Final = 4
-"""Written positions that may still show as echo: a write or two in flight, in a fast stream."""
+"""Written images that may still show as echo: a write or two in flight, in a fast stream."""
+NOTHING: Final = (-1, -1, -1)
+"""The echo of no image."""
 TRIES: Final = 4
 """Of reading activation, go and echo of one moment. Both change at a stop or a start, not all the time."""
 
@@ -104,12 +112,14 @@ class UrcapTransport:
         """Which of the slow variables comes next."""
         self._changes = True
         """Whether the next read asks for everything."""
-        self._positions: deque[int] = deque(maxlen=LATEST)
-        """The positions that were written last: an echo of one is expected."""
+        self._whole: Echo = NOTHING
+        """The echo of the image that was last seen to be taken whole."""
+        self._sent: deque[Echo] = deque(maxlen=LATEST)
+        """The echoes of what was written since, also on a connection that was lost: they are expected."""
         self._releases = False
         """Whether the last write set ATR."""
-        self._written: tuple[int, ...] = ()
-        """Activation, go and echo that the last write will show, if it changes activation or go."""
+        self._written: Echo = NOTHING
+        """The echo of the last write, if it changes activation or go and does not show yet."""
         self._shows_by = -math.inf
         """Until when that is awaited."""
 
@@ -127,9 +137,8 @@ class UrcapTransport:
             ResponseTimeoutError: the connection is open, but no answer comes.
         """
         await self.close()
-        self._changes, self._written = True, ()
+        self._changes, self._written = True, NOTHING
         self._values.clear()
-        self._positions.clear()
         await self._connection.open(self, self._connect_timeout)
         await self._get("FLT" if self._asked == lines.question("STA") else "STA")
         if self._gripper is not None:
@@ -146,7 +155,8 @@ class UrcapTransport:
             await self._read_some(by)
         if self._changes:
             await self._read_all(by)
-        return lines.status_registers(self._values)
+        activation, go, position = self._echo()
+        return lines.status_registers(self._values | {"ACT": activation, "GTO": go, "PRE": position})
 
     async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
         """Write what ``decide`` returns, if anything.
@@ -168,10 +178,10 @@ class UrcapTransport:
             RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
         """
         act, go, position = (field.read(registers) for field in (reg.rACT, reg.rGTO, reg.rPR[0]))
-        self._positions.append(position)
+        self._sent.append((act, go, position))
         if self._changes or (act, go) != (self._values["ACT"], self._values["GTO"]):
             self._changes, self._shows_by = True, self._now() + SHOWS_S
-            self._written = act, go, position
+            self._written = self._sent[-1]
         shown = None if self._releases else self._values.get("ACT")
         self._releases = bool(reg.rATR.read(registers))
         await self._set(lines.command(registers, shown))
@@ -184,7 +194,7 @@ class UrcapTransport:
 
     async def _read_some(self, by: float) -> None:
         """The variables that change in a motion, and one of the slow ones."""
-        if await self._is_new("PRE", by) and self._values["PRE"] not in self._positions:
+        if await self._is_new("PRE", by) and self._shown not in self._sent:
             self._changes = True
             return
         await self._is_new("OBJ", by)
@@ -205,10 +215,26 @@ class UrcapTransport:
             raise ProtocolError(f"{self._address}: ACT and GTO change too often to be read")
         for name in ("OBJ", "STA", "FLT", "POS"):
             await self._is_new(name, by)
-        shown = tuple(self._values[name] for name in ("ACT", "GTO", "PRE"))
-        if shown == self._written or self._now() >= self._shows_by:
-            self._written = ()
-        self._changes = bool(self._written)
+        if self._shown == self._written or self._now() >= self._shows_by:
+            self._written = NOTHING
+        self._changes = self._written is not NOTHING
+
+    @property
+    def _shown(self) -> Echo:
+        """Activation, go and echo as they were read."""
+        return self._values["ACT"], self._values["GTO"], self._values["PRE"]
+
+    def _echo(self) -> Echo:
+        """The echo as it was read, or that of the image before if a command is taken half."""
+        shown, images = self._shown, (self._whole, *self._sent)
+        if shown not in images and self._now() < self._shows_by:
+            for before, after in pairwise(images):
+                if shown == lines.midway(before, after):
+                    return before
+        while shown in self._sent and self._sent.popleft() != shown:
+            pass  # what was written before the image that shows will not show any more
+        self._whole = shown
+        return shown
 
     async def _read_pair(self, by: float) -> bool:
         """Read ACT and GTO; whether one of them has changed."""

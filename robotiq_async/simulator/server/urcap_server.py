@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections import deque
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Final
 
 from robotiq_async.values import registers as reg
@@ -9,6 +12,7 @@ from robotiq_async.values.checks import check_int
 from robotiq_async.values.model import TWO_FINGER_85
 from robotiq_async.values.registers import RTU_REGISTERS
 
+from ..physics.driven_axis import PhysicsError
 from ..physics.gripper import SimulatedGripper
 from ..troubles.corruption import Reply, TextReply
 from ..troubles.like_hardware import own_habits
@@ -56,7 +60,8 @@ class UrcapSimulatorServer(SimulatorServer):
 
     A line is ``GET NAME`` or ``SET NAME VALUE NAME VALUE ...``. The answer to a GET ends with an end of line,
     the ``ack`` of a SET without one, as clients want it that ran on hardware. All variables of a SET take
-    effect at once. Other lines are answered by a question mark.
+    effect at once, unless the trouble ``one-by-one`` spaces them: then the ``ack`` comes before the first.
+    Other lines are answered by a question mark.
     """
 
     link = "urcap"
@@ -85,6 +90,10 @@ class UrcapSimulatorServer(SimulatorServer):
         if len(jaw.model.axes) > 1:
             raise ValueError(f"a URCap has a 2F-85, 2F-140 or Hand-E, got a {jaw.model.title}")
         super().__init__(jaw, host=host, port=port, device_id=check_int("device_id", device_id, 1, 247))
+        self._waiting: deque[tuple[Field, int]] = deque()
+        """Variables that were set and are not taken yet."""
+        self._taking: asyncio.TimerHandle | None = None
+        """The timer of the next of them."""
 
     @property
     def address(self) -> str:
@@ -130,25 +139,65 @@ class UrcapSimulatorServer(SimulatorServer):
         digits = _FAULT_DIGITS if name == "FLT" else 1
         return f"{name} {value:0{digits}}\n".encode()
 
+    def _close(self) -> None:
+        super()._close()
+        self._take_no_more()
+
     def _set(self, names: list[str], values: list[str]) -> bytes:
-        image = list(self.gripper.request_registers)
         try:
-            for name, value in zip(names, values, strict=True):
-                self._put(image, name, value)
+            pairs = [self._checked(name, value) for name, value in zip(names, values, strict=True)]
         except _RefusedError:
             return REFUSED
-        if names != ["SID"]:
-            self.gripper.write(0, image[:_REGISTERS])
+        asked = [(field, number) for field, number in pairs if field is not None]
+        if asked and not self._waiting and not self.fault_injector.set_spacing:
+            self._take(asked)
+        elif asked:
+            self._waiting += asked
+            if self._taking is None:
+                self._take_later()
         return b"ack"
 
-    def _put(self, image: list[int], name: str, value: str) -> None:
-        field: Field | None = _REQUEST.get(name)
+    def _checked(self, name: str, value: str) -> tuple[Field | None, int]:
+        """The field that a variable sets, and its value; SID sets none."""
+        field = _REQUEST.get(name)
         if not (value.isascii() and value.isdigit() and len(value) <= 3):
             raise _RefusedError
+        number = int(value)
         if name == "SID":
-            if int(value) != self._device_id:
-                raise _RefusedError
-        elif field is None or int(value) >= 1 << field.width:
-            raise _RefusedError
+            is_known = number == self._device_id
         else:
-            field.write(image, int(value))
+            is_known = field is not None and number < 1 << field.width
+        if not is_known:
+            raise _RefusedError
+        return field, number
+
+    def _take(self, asked: Iterable[tuple[Field, int]]) -> None:
+        image = list(self.gripper.request_registers)
+        for field, number in asked:
+            field.write(image, number)
+        self.gripper.write(0, image[:_REGISTERS])
+
+    # -- one by one ------------------------------------------------------------------------------------------
+
+    def _take_later(self) -> None:
+        spacing = self.fault_injector.set_spacing
+        self._taking = asyncio.get_running_loop().call_later(spacing, self._take_next)
+
+    def _take_next(self) -> None:
+        self._taking = None
+        if not self.gripper.is_powered:
+            self._take_no_more()
+            return
+        try:
+            self._take([self._waiting.popleft()])
+        except PhysicsError as error:
+            self.fail(error)
+            return
+        if self._waiting:
+            self._take_later()
+
+    def _take_no_more(self) -> None:
+        self._waiting.clear()
+        if self._taking is not None:
+            self._taking.cancel()
+            self._taking = None

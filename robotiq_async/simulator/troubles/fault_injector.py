@@ -89,6 +89,7 @@ class FaultInjector:
         echoes: whether the line echoes the bytes that are sent.
         strict_silence: seconds after a reply in which no request is heard.
         served_registers: the number of registers of each block that are served.
+        set_spacing: seconds between the variables of a SET; 0 if they are taken at once.
     """
 
     def __init__(self, target: Target) -> None:
@@ -205,12 +206,14 @@ class FaultInjector:
         silences = [trouble.amount for trouble in self._lasting("strict-silence")]
         served = [int(trouble.amount) for trouble in self._lasting("registers")]
         waits = [trouble.amount for trouble in self._lasting("idle-reset")]
+        spacings = [trouble.amount for trouble in self._lasting("one-by-one")]
         self.is_multiplexed = bool(self._lasting("multiplexer"))
         self.refused_functions = frozenset(refusing[trouble.kind] for trouble in self._lasting(*refusing))
         self.reads_only_with_function_3 = bool(self._lasting("function-3-only"))
         self.echoes = bool(self._lasting("echo"))
         self.strict_silence = max(silences, default=0.0)
         self.served_registers = min(served, default=REGISTER_COUNT)
+        self.set_spacing = max(spacings, default=0.0)
         self._idle_after = min(waits, default=None)
 
     # Called by the simulator.

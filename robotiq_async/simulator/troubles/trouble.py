@@ -40,7 +40,8 @@ class Kind(NamedTuple):
         high: the greatest value.
         corruption: its change of a reply, if it has one.
         on: the requests whose replies it can be about.
-        link: tcp for a trouble of connections, or of frames of Modbus TCP; rtu for one of frames of a line.
+        link: tcp for a trouble of connections, or of frames of Modbus TCP; rtu for one of frames of a line;
+            urcap for one of the text port.
         habit: the habit of the gripper that it changes, if it does.
         is_modbus: whether it concerns functions, registers or checksums, which only Modbus has.
     """
@@ -62,10 +63,11 @@ class Kind(NamedTuple):
         A serial server has the frames of a line, and connections. It keeps the silence between frames itself.
         """
         if link == "urcap":
-            return self.link in (None, "tcp") and not self.is_modbus
+            return self.link in (None, "tcp", "urcap") and not self.is_modbus
         if link == "rtu+tcp":
             is_about_frames = self.corruption is not None
-            return self is not KINDS["strict-silence"] and (self.link != "tcp" or not is_about_frames)
+            is_elsewhere = self.link == "urcap" or (self.link == "tcp" and is_about_frames)
+            return self is not KINDS["strict-silence"] and not is_elsewhere
         return self.link in (None, link)
 
     @property
@@ -210,6 +212,11 @@ KINDS: Final[dict[str, Kind]] = {
     ),
     "no-function-23": Kind("function 23 is refused: no answer on a serial line", _CONDITION, link="rtu"),
     "one-connection-only": Kind("while there is a connection, a new one is reset", _CONDITION, link="tcp"),
+    "one-by-one": Kind(
+        "the variables of a SET are taken one by one, VALUE seconds apart",
+        *(_CONDITION, 0.01, 0, 1),
+        link="urcap",
+    ),
 }
 """Every kind of trouble, by its name."""
 
