@@ -8,9 +8,10 @@ writes, and acknowledged(); and lost() if the link goes down at any point.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final, NamedTuple
 
-from ..values.enums import NO_AXES, Finger, State, StopLevel, Trigger
+from ..values.enums import NO_AXES, Fault, Finger, State, StopLevel, Trigger
 from ..values.errors import (
     ConnectionLostError,
     GripperFaultError,
@@ -61,12 +62,15 @@ class Controller:
         closing_time: Callable[[int], float],
         write_spacing: float = 0.0,
         model: Model = THREE_FINGER,
+        before: Controller | None = None,
     ) -> None:
+        """``before`` had the gripper in the session before: what it has written may still act."""
         self.machine: Final = machine
         self.status: RobotiqStatus | None = None  # the newest; None before the first
         self.activates = False  # whether a gripper that is found reset is activated
         self.foreign_commands = 0  # how often another client was seen to command the gripper
-        self._ledger: Final = Ledger(speed, force, model, machine.log)
+        left = None if before is None else before.ledger
+        self.ledger: Final[Ledger] = Ledger(speed, force, model, machine.log, left)
         self._closing_time: Final = closing_time  # seconds of a full closing at a speed
         # Seconds from sending a write to the next one: a gripper may acknowledge one that comes sooner and
         # forget it. A stop does not wait; it is repeated.
@@ -93,7 +97,7 @@ class Controller:
         self.command(Command(move.axes, move.position, speed, force))
         self._requests.add(move)
         assert self.status is not None, "the hand takes commands, so a status has been read"
-        written = {axis: asked.speed for axis, asked in self._ledger.base.by_axis}
+        written = {axis: asked.speed for axis, asked in self.ledger.base.by_axis}
         speeds = written | self._requests.pending.speeds
         return move.default_timeout(self.status, speeds, self._closing_time)
 
@@ -108,10 +112,12 @@ class Controller:
             requests.merge_hold(move.axes & requests.pending.moved)
         if unseen and not is_open and self._evidence.condition is not None:
             # Axes that another client moves by now are left to it. On a new link that is found out first.
-            requests.hold_only(self._ledger.ours)
+            requests.hold_only(self.ledger.ours)
 
     def hold(self, axes: Finger, waiter: Waiter[None]) -> None:
-        """Hold those axes that move, whichever client moves them. In a procedure there is nothing to do."""
+        """Hold those axes that move, whichever client moves them. It ends no activation and no release."""
+        if self.is_driven:
+            self.machine.log.warning("a hold ends no activation and no release: halt() does, by a reset")
         if self.machine.ask(Trigger.ASK_HOLD, self.status):
             self._requests.hold(axes, "a hold took over", waiter)
             self._update_state(Trigger.ASK_HOLD)
@@ -135,9 +141,10 @@ class Controller:
             self._begin(Trigger.ASK_ACTIVATE)
 
     def reset(self, trigger: Trigger = Trigger.ASK_RESET) -> None:
-        """Begin a reset, unless one is about to be sent; ``trigger`` is ASK_HALT if a halt asks for it."""
+        """Begin a reset, unless one is about to be sent; ASK_HALT or HALT_RESETS if a halt asks for it."""
         if self.machine.ask(trigger, self.status):
-            self._begin_reset(trigger, MoveSupersededError(f"a {trigger.value.removesuffix('()')} took over"))
+            who = "reset" if trigger is Trigger.ASK_RESET else "halt"
+            self._begin_reset(trigger, MoveSupersededError(f"a {who} took over"))
 
     def release(self) -> None:
         """Begin an automatic release. Of a gripper that is reset it would raise rACT and activate it."""
@@ -183,7 +190,7 @@ class Controller:
         if self._activation is not None:
             self._stop = Stop(StopLevel.RESET)
         elif status is not None and level is StopLevel.KEEP:
-            self._stop = Keeping(status, self._why_no_grip).after(self._ledger, status, self.machine.log)
+            self._stop = Keeping(status, self._why_no_grip).after(self.ledger, status, self.machine.log)
         elif status is not None:
             self._stop = Stop(StopLevel.SHUTDOWN)
 
@@ -191,7 +198,7 @@ class Controller:
 
     def _begin(self, trigger: Trigger) -> None:
         releases = trigger is Trigger.ASK_RELEASE
-        self._procedure, self._stop = Procedure(self._ledger, releases=releases), None
+        self._procedure, self._stop = Procedure(self.ledger, releases=releases), None
         self._update_state(trigger)
 
     def _begin_reset(self, trigger: Trigger, error: RobotiqError) -> None:
@@ -215,12 +222,23 @@ class Controller:
 
     @property
     def is_moving(self) -> bool:
-        """Whether an axis moves, or will because of a command that does not act yet."""
+        """Whether an axis moves, or will because of what does not act yet."""
         if self.status is None:
             return False
-        if self.status.is_moving or self.machine.state not in RUNNING:
-            return self.status.is_moving
-        return bool(self._requests.pending.positions) or self._ledger.may_begin_to_move
+        if self.status.is_moving or self.is_driven:
+            return True
+        if self.machine.state not in RUNNING:
+            return False
+        return bool(self._requests.pending.positions) or self.ledger.may_begin_to_move
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether an activation or a release moves the fingers, or may begin: only rACT = 0 ends these."""
+        status = self.status
+        if status is None or self._procedure is not None:
+            return status is not None
+        shows = classify(status) is Trigger.SEEN_BUSY or status.fault is Fault.AUTOMATIC_RELEASE
+        return shows or self.ledger.may_drive(status)
 
     @property
     def is_busy(self) -> bool:
@@ -270,7 +288,7 @@ class Controller:
         """Take in a status that was read after every acknowledgement so far."""
         # ``asked`` is when it was asked for, in monotonic seconds; None for the time of the reply.
         asked = status.timestamp if asked is None else asked
-        ledger, stop, before = self._ledger, self._stop, self._evidence.condition
+        ledger, stop, before = self.ledger, self._stop, self._evidence.condition
         self.status = status
         ledger.update(status, asked)
         condition = self._evidence.update(status, asked)
@@ -301,7 +319,7 @@ class Controller:
 
     def _note_news(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
         """A new condition, or an image that no entry explains: whose image acts, what ends, what is held."""
-        ledger, requests = self._ledger, self._requests
+        ledger, requests = self.ledger, self._requests
         if before is None:  # the link is back: continue from our image if the gripper shows one
             if ledger.match is None or not ledger.match.is_ours:
                 ledger.adopt(status)
@@ -336,20 +354,20 @@ class Controller:
     def _advance_stop(self, stop: Stop, status: RobotiqStatus) -> None:
         log, judged = self.machine.log, self._evidence.status
         assert judged is not None
-        stop.fail_overdue(self._ledger, status, log)
-        if stop.has_activated(self._ledger, status):
+        stop.fail_overdue(self.ledger, status, log)
+        if stop.has_activated(self.ledger, status):
             self._take_back("the gripper was reset as it was stopped: its activation is taken back")
         elif isinstance(stop, Keeping):
-            self._stop = stop.after(self._ledger, judged, log)
-        elif stop.is_reached(self._ledger, status):
+            self._stop = stop.after(self.ledger, judged, log)
+        elif stop.is_reached(self.ledger, status):
             self._stop = None
             stop.answer(status, log)
             if stop.level is not StopLevel.HALT:
-                self._finish(status, is_known=self._ledger.restart(status))
+                self._finish(status, is_known=self.ledger.restart(status))
 
     def _follow_activation(self, status: RobotiqStatus) -> None:
-        if self._activation is None and is_activating(status) and self._ledger.may_activate(status):
-            self._activation = Begun(self._ledger.last, status)
+        if self._activation is None and is_activating(status) and self.ledger.may_activate(status):
+            self._activation = Begun(self.ledger.last, status)
         if self._activation is not None and self._activation.is_stray(status):
             self._take_back("the gripper was reset as it was commanded: its activation is taken back")
 
@@ -360,7 +378,7 @@ class Controller:
 
     def _adopt_other_client(self, status: RobotiqStatus) -> None:
         """Another client commands the gripper: adopt its requests, or our next write would undo them."""
-        ledger = self._ledger
+        ledger = self.ledger
         self.foreign_commands += 1
         if status.timestamp - self._warned >= WARNING_S:
             self._warned = status.timestamp
@@ -383,7 +401,7 @@ class Controller:
         if not self.has_request:
             return None
         stop, status = self._stop, self._evidence.status
-        urgent = stop is not None and status is not None and stop.is_urgent(self._ledger, status)
+        urgent = stop is not None and status is not None and stop.is_urgent(self.ledger, status)
         return Due(self._wait(now), urgent, stop is None and self._procedure is None)
 
     def _wait(self, now: float) -> float:
@@ -404,7 +422,7 @@ class Controller:
         return self._next_changes(status, now)
 
     def _next_stop(self, stop: Stop, status: RobotiqStatus, now: float) -> Request | None:
-        ledger = self._ledger
+        ledger = self.ledger
         if stop.writes:
             image = stop.again(ledger, status)
         else:
@@ -423,7 +441,7 @@ class Controller:
         return entry.image
 
     def _next_step(self, procedure: Procedure, status: RobotiqStatus, now: float) -> Request | None:
-        ledger, entry = self._ledger, procedure.entry
+        ledger, entry = self.ledger, procedure.entry
         if entry is not None and not ledger.acts(entry):
             return None
         if entry is None and not procedure.releases and self._evidence.may_pass:
@@ -451,27 +469,28 @@ class Controller:
         return entry.image
 
     def _next_changes(self, status: RobotiqStatus, now: float) -> Request | None:
-        ledger, pending = self._ledger, self._requests.pending
+        ledger, pending = self.ledger, self._requests.pending
         if self._evidence.condition not in FOLLOWS or not ledger.is_certain:
             return None
         if self._evidence.may_pass and pending.has_changes:
             return None  # if the fault lasts, no motion is sent at all
         base = ledger.base
-        # After a halt a motion waits until the halt acts: only then is it known where the fingers stopped.
-        if pending.positions and not base.go and status.go_echo and not ledger.acts():
-            return None
-        gripping = ledger.grips.held(status, base) if pending.positions else NO_AXES
-        may_move = ledger.may_move(status) if pending.hold else NO_AXES
+        gripping = ledger.gripping(status) if pending.positions else NO_AXES
+        may_move = later = NO_AXES
+        if pending.hold:
+            may_move, (pressing, is_open) = ledger.may_move(status), ledger.pressing_again(status)
+            pending = replace(pending, hold=pending.hold & ~pressing)
+            later = pressing & self._requests.pending.hold & ~pending.moved if is_open else NO_AXES
         image = merged(base, pending, status, gripping=gripping, may_move=may_move)
-        if not pending.has_changes and gate(image, status) == base:
+        if not pending.has_changes and gate(image, status, may_reset=ledger.may_reset) == base:
             # No axis moves, so there is nothing to write, and what the gripper has answers the callers. If an
             # earlier write does not act yet, an axis may begin to move: ask again then.
-            if ledger.acts():
-                self._requests.sending(ledger.last, everything=True)
+            if ledger.is_settled:
+                self._requests.sending(ledger.last, everything=True, later=later)
                 self._requests.acknowledged()
                 self._update_state(Trigger.DELIVERED)
             return None
-        return self._send(image, status, now, everything=True).image
+        return self._send(image, status, now, everything=True, later=later).image
 
     def _send(
         self,
@@ -481,18 +500,20 @@ class Controller:
         *,
         everything: bool = False,
         holds: bool = False,
+        later: Finger = NO_AXES,
         of: Procedure | None = None,
     ) -> Entry:
         """Put an image through the gate and into the ledger; decide() returns it to be sent."""
         releases = of is not None and of.releases
-        image = gate(image, status, activates=of is not None and not releases, releases=releases)
-        entry = self._ledger.write(image, self._requests.pending.moved if everything else NO_AXES, now)
-        self._requests.sending(entry, everything=everything, holds=holds)
+        activates, may_reset = of is not None and not releases, self.ledger.may_reset
+        image = gate(image, status, may_reset=may_reset, activates=activates, releases=releases)
+        entry = self.ledger.write(image, self._requests.pending.moved if everything else NO_AXES, now)
+        self._requests.sending(entry, everything=everything, holds=holds, later=later)
         self._free_at = now + self._spacing
         return entry
 
     def acknowledged(self, now: float) -> None:
-        self._ledger.acknowledge(now)
+        self.ledger.acknowledge(now)
         self._requests.acknowledged()
         self._update_state(Trigger.DELIVERED)
 
@@ -509,5 +530,5 @@ class Controller:
         self._requests.lost(error)
         self._procedure, self._stop = None, None
         self._evidence.lost()
-        self._ledger.lost(now)
+        self.ledger.lost(now)
         self._update_state(Trigger.LINK_LOST)

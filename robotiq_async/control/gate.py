@@ -3,7 +3,8 @@
 A rising rACT moves all fingers to their stops, and rATR releases the part [manual 2012, 4.6]. An image is
 made from an older one, so either could be carried along by accident: by a command after another client's
 reset, by a stop that crosses a power cycle, by a hold after a release. So an image has rACT only if the
-gripper shows it, and rATR never; an activation may raise rACT, and a release rATR.
+gripper shows it and nothing of ours may clear it first, and rATR never; an activation may raise rACT, and a
+release rATR.
 """
 
 from __future__ import annotations
@@ -64,13 +65,19 @@ def at_rest(base: Request, status: RobotiqStatus) -> Request:
 
 
 def gate(
-    image: Request, status: RobotiqStatus, *, activates: bool = False, releases: bool = False
+    image: Request,
+    status: RobotiqStatus,
+    *,
+    may_reset: bool = False,
+    activates: bool = False,
+    releases: bool = False,
 ) -> Request:
     """The image as it may be written: ``activates`` or ``releases`` if it begins what was asked for."""
+    # ``may_reset`` if an earlier image of ours may reset the gripper before this one acts.
     # The status may be a device cycle old. If another client resets the gripper within it, rACT passes and
     # activates [follows]. That is taken back: after a stop has_activated() in stops.py finds it, after a
     # command or a hold Begun in procedures.py.
-    activate = image.activate and (activates or status.activation_echo)
+    activate = image.activate and (activates or (status.activation_echo and not may_reset))
     release = image.release and releases
     if activate is image.activate and release is image.release:
         return image  # the usual case

@@ -24,6 +24,7 @@ No I/O and no clock: callers give the time of a write, and questions are about t
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 from itertools import takewhile
 from operator import attrgetter
 from typing import Final
@@ -37,7 +38,7 @@ from ..values.status import RobotiqStatus
 from .adoption import Adoption
 from .entry import Entry, RecentRequests
 from .limits import Limits
-from .rest import LONG_AGO, Grips, Moment, Rest, Target, may_move, rest_of
+from .rest import LONG_AGO, Contacts, Moment, Rest, Target, may_move, rest_of
 
 WINDOW_S: Final = 0.5
 """Time after its acknowledgement in which a write shows, if it acts: the slowest device cycle considered is
@@ -52,7 +53,15 @@ _number: Final = attrgetter("number")
 class Ledger:
     """The entries, the oldest first. Every axis has ``speed`` and ``force`` until they are set otherwise."""
 
-    def __init__(self, speed: int, force: int, model: Model = THREE_FINGER, log: Log = log) -> None:
+    def __init__(
+        self,
+        speed: int,
+        force: int,
+        model: Model = THREE_FINGER,
+        log: Log = log,
+        before: Ledger | None = None,
+    ) -> None:
+        """``before`` is the ledger of the session before: what it has written may still act."""
         first = Request(axes=(AxisRequest(0, speed, force),) * len(model.axes), model=model)
         self.shown = Entry(0, first, first.echo, False, NEVER, NEVER, LONG_AGO)  # the newest that showed
         self.match: Entry | None = None  # the one that the newest status shows
@@ -61,11 +70,12 @@ class Ledger:
         self.now = Moment(0.0, 0)
         self.ours = NO_AXES  # the axes that may move because of us: we gave them their position
         self.unrested = NO_AXES  # those not known to have come to rest under their last request
-        self.grips: Final = Grips()
+        self.contacts: Final[Contacts] = Contacts() if before is None else before.contacts
         self.limits: Final = Limits(log)
         self._model: Final = model
         self._entries = deque([self.shown])  # those that are certain, and that a status may show
-        self._doubtful: list[Entry] = []  # by number; each may act after those with a lower one
+        # By number; each may act after those with a lower one.
+        self._doubtful: list[Entry] = [] if before is None else before.left()
         # The entry that showed as a status was adopted. It is an entry no more; but if it is ours, it may
         # activate: after a reset our own image is taken for another client's.
         self._mistaken: Entry | None = None
@@ -97,7 +107,7 @@ class Ledger:
     def has_recent_doubt(self) -> bool:
         """Whether an entry in doubt may still act: an image from before it would undo it."""
         doubtful = self._doubtful  # usually there is none
-        return bool(doubtful) and any(self.now.time - each.time < SILENT_S for each in doubtful)
+        return bool(doubtful) and not all(map(self._is_past, doubtful))
 
     @property
     def is_certain(self) -> bool:
@@ -109,10 +119,14 @@ class Ledger:
         """The axes that are known to rest under their last request, and those that the model lacks."""
         return Finger.ALL & ~self.unrested
 
-    def acts(self, entry: Entry | None = None) -> bool:
-        """Whether an entry, or a later one, acts by now; None for the newest, even if it is in doubt."""
+    @property
+    def is_settled(self) -> bool:
+        """Whether every entry acts by now, or never will."""
+        return self.acts(self._newest)
+
+    def acts(self, entry: Entry) -> bool:
+        """Whether an entry, or a later one, acts by now."""
         # It does when its echo has shown, or a long enough time after its acknowledgement.
-        entry = entry or self._newest
         if entry.number <= self.shown.number:
             return True
         if self._is_in_flight(entry):
@@ -136,17 +150,41 @@ class Ledger:
         return any(self.now.time - each.time < WINDOW_S for each in activating)
 
     @property
+    def ahead(self) -> list[Entry]:
+        """What may still act, in the order in which it would; an entry in doubt may also never act."""
+        # Every question about what the gripper may get is one about these, whatever a status shows today.
+        waiting = self._waiting()
+        return [each for each in waiting if not (self.acts(each) or self._is_past(each))] if waiting else []
+
+    @property
+    def may_reset(self) -> bool:
+        """Whether the gripper may be reset by the time at which the next image acts: its rACT would rise."""
+        return any(not each.image.activate for each in self.ahead)
+
+    @property
     def may_set_go(self) -> bool:
-        """Whether an image that does not show yet sets rGTO."""
-        return any(each.image.go for each in self._waiting())
+        return any(each.image.go for each in self.ahead)
+
+    def may_drive(self, status: RobotiqStatus) -> bool:
+        """Whether an activation or a release may begin, which rGTO = 0 does not end."""
+        return any(
+            each.image.release or (each.image.activate and not status.activation_echo) for each in self.ahead
+        )
 
     @property
     def may_begin_to_move(self) -> bool:
         """Whether an image that does not act yet, or does not show in gDT yet, may start an axis."""
-        # While rGTO is clear a speed or a force does not: then all entries that wait have the same echo.
-        if not self.acts():
-            return self.base.go or len({each.echo for each in (*self._entries, *self._doubtful)}) > 1
-        return bool(self.unrested) and self.base.go
+        return self.may_set_go or (bool(self.unrested) and self.shown.image.go)
+
+    def gripping(self, status: RobotiqStatus) -> Finger:
+        """The axes that are known to press on a part, or did when rGTO was cleared."""
+        return self.contacts.pressing(status, self.base)[0]
+
+    def pressing_again(self, status: RobotiqStatus) -> tuple[Finger, bool]:
+        """The axes that show a motion where they were in contact, and whether it may be one after all."""
+        # To hold one that presses would end its grip. If it moves, it has moved off before long.
+        known, unknown = self.contacts.pressing(status, self.base) if self.contacts else (NO_AXES, NO_AXES)
+        return (known | unknown) & status.moving, self.now.time - self.last.time < WINDOW_S
 
     def may_move(self, status: RobotiqStatus) -> Finger:
         """The axes that may move, or be about to, although the status shows them at rest."""
@@ -157,6 +195,10 @@ class Ledger:
                 moving |= axis
         return moving
 
+    def left(self) -> list[Entry]:
+        """What the ledger of the next session has in doubt."""
+        return [replace(each, acts_since=None) for each in self._waiting()]
+
     # -- what is written -------------------------------------------------------------------------------
 
     def write(self, image: Request, axes: Finger, now: float) -> Entry:
@@ -164,7 +206,7 @@ class Ledger:
         before = self._settle_base()
         entry = Entry(self._newest.number + 1, image, image.echo, is_ours=True, sent=now)
         self.limits.forget(axes)
-        self.grips.forget(axes)  # a new position may let go
+        self.contacts.ask(axes)
         # With rGTO clear gDT has no meaning, so no axis was proven to rest under what was asked before.
         self._note_changes(entry, before, is_at_rest=before.go)
         self.ours |= axes
@@ -239,6 +281,10 @@ class Ledger:
     def _is_in_flight(self, entry: Entry) -> bool:
         # One is written at a time, and no status is taken in meanwhile: only the last can be on the line.
         return entry.acknowledged is None and entry is self.last
+
+    def _is_past(self, entry: Entry) -> bool:
+        """Whether an entry in doubt would have acted by now."""
+        return entry in self._doubtful and self.now.time - entry.time >= SILENT_S
 
     def _is_old(self, entry: Entry) -> bool:
         return not self._is_in_flight(entry) and self.now.time - entry.time > WINDOW_S
@@ -317,7 +363,9 @@ class Ledger:
         self.ours = NO_AXES if is_found else self.ours & ~Finger(sum(moved))
         self._mistaken = self.match or self._mistaken
         self._entries, self.shown, self.match = deque([other]), other, other
-        self.grips.forget()
+        if is_found:
+            self.contacts.forget()
+        self.contacts.ask(Finger.ALL)
 
     def restart(self, status: RobotiqStatus) -> bool:
         """A procedure has ended: the gripper has its last image, and no other write is on its way."""
@@ -329,6 +377,7 @@ class Ledger:
         self._entries, self._doubtful, self._unproven = deque([self.shown]), [], {}
         self._adoption = self._mistaken = None
         self.unrested, self.ours = NO_AXES, Finger.ALL
+        self.contacts.forget()
         return status.echo == image.echo and not image.release
 
     # -- which axes rest -------------------------------------------------------------------------------
@@ -341,11 +390,11 @@ class Ledger:
             # from it: a late gDT alone may make an axis look as if it was asked for where it is.
             if status.go_echo and (self._adoption is None or self._adoption.is_certain):
                 self._find_rest(status)
-        if status.go_echo and (self.grips or status.contacts):
+        if status.go_echo and (self.contacts or status.contacts):
             contacts = status.contacts
             if contacts & self.unrested:
                 contacts &= ~self.may_move(status)
-            self.grips.remember(status, contacts)
+            self.contacts.see(status, contacts)
 
     def _note_acting(self) -> None:
         # Images act in their order, so what comes after one that does not act need not be looked at.

@@ -132,15 +132,17 @@ class OpenRequests:
 
     # -- what becomes of it ----------------------------------------------------------------------------
 
-    def sending(self, entry: Entry, *, everything: bool = False, holds: bool = False) -> None:
-        """An entry has everything that is pending, the holds alone, or nothing of it."""
+    def sending(
+        self, entry: Entry, *, everything: bool = False, holds: bool = False, later: Finger = NO_AXES
+    ) -> None:
+        """An entry has everything that is pending but the holds of some axes, the holds alone, or nothing."""
         pending, self._sent = self.pending, Pending()
         if everything:
-            self._sent, self.pending = pending, Pending()
+            self._sent, self.pending = replace(pending, hold=pending.hold & ~later), Pending(hold=later)
         elif holds:
             self._sent, self.pending = Pending(hold=pending.hold), replace(pending, hold=NO_AXES)
         for call in self.calls:
-            if call.entry is None and (everything or (holds and call.held)):
+            if call.entry is None and not call.held & later and (everything or (holds and call.held)):
                 call.written(entry)
 
     def acknowledged(self) -> None:
@@ -154,7 +156,8 @@ class OpenRequests:
         limited = ledger.limits.limited
         for move in self._written_moves:
             move.note_currents(status)
-            if ledger.acts(move.entry) and move.has_arrived(status, ledger.resting, limited):
+            is_acting = move.entry is not None and ledger.acts(move.entry)
+            if is_acting and move.has_arrived(status, ledger.resting, limited):
                 self.leave(move)
                 self._warn_of_unreached(move, move.end(status), limited)
 

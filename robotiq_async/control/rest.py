@@ -137,33 +137,48 @@ def _is_true_since(
     return fits
 
 
-class Grips:
-    """The contacts when rGTO was last seen set: gDT shows none while it is clear. False while it is empty.
+class Contacts:
+    """Where each axis was last seen in contact, until it has moved off: what may press. False while empty.
 
-    What becomes of a grip at rGTO = 0 is unknown [conceivable]: an axis that has not moved since and is asked
-    to press on is taken to grip still. A reset and an activation end the grip: from then on the axis is asked
-    for where it is.
+    An axis in contact that is asked to press on keeps its request, and with it its grip: when others are
+    held, and when rGTO rises (gDT shows no contact while that is clear; what becomes of a grip then is
+    unknown [conceivable]). More force and a rising rGTO make it press again: for a while it shows a motion
+    and stays where it is [conceivable]. Until a contact shows, or it has moved off, that is open.
     """
 
     def __init__(self) -> None:
-        self._contacts: dict[Finger, tuple[ObjectStatus, int]] = {}
+        self._at: dict[Finger, tuple[ObjectStatus, int]] = {}
+        self._open = NO_AXES
 
     def __bool__(self) -> bool:
-        return bool(self._contacts)
+        return bool(self._at)
 
-    def remember(self, status: RobotiqStatus, contacts: Finger) -> None:
-        self._contacts = {axis: (status.finger_status(axis), status.position(axis)) for axis in contacts}
+    def see(self, status: RobotiqStatus, contacts: Finger) -> None:
+        """Take in a status with gGTO = 1, and those of its contacts that can be believed."""
+        before, self._open = self._at, NO_AXES
+        self._at = {axis: (status.finger_status(axis), status.position(axis)) for axis in contacts}
+        for axis in before.keys() - self._at.keys():  # usually none
+            at = before[axis]
+            if axis in status.moving and abs(status.position(axis) - at[1]) <= TOLERANCE:
+                self._at[axis] = at
+                self._open |= axis
 
-    def forget(self, axes: Finger = Finger.ALL) -> None:
-        """Forget the grips of axes that are asked for another position, by us or by another client."""
-        self._contacts = {axis: at for axis, at in self._contacts.items() if axis not in axes}
+    def ask(self, axes: Finger) -> None:
+        """Axes are asked for a position, perhaps the same: what they do next is open."""
+        self._open |= axes
 
-    def held(self, status: RobotiqStatus, base: Request) -> Finger:
-        """The axes that gripped when rGTO was last set, have not moved since, and by ``base`` still grip."""
-        held = (
-            axis
-            for axis, (what, at) in self._contacts.items()
-            if abs(status.position(axis) - at) <= TOLERANCE
-            and agrees(status.model, base.position(axis), what, at, direction=0)
+    def forget(self) -> None:
+        """A reset and an activation end every grip."""
+        self._at = {}
+
+    def pressing(self, status: RobotiqStatus, base: Request) -> tuple[Finger, Finger]:
+        """The axes that have not moved since and that ``base`` asks to press on: those that do, or may."""
+        pressing = Finger(
+            sum(
+                axis
+                for axis, (what, at) in self._at.items()
+                if abs(status.position(axis) - at) <= TOLERANCE
+                and agrees(status.model, base.position(axis), what, at, direction=0)
+            )
         )
-        return Finger(sum(held))
+        return pressing & ~self._open, pressing & self._open

@@ -53,7 +53,7 @@ def _all(triggers: tuple[Trigger, ...], entry: State | Verdict) -> Row:
 # state, wherever no procedure runs, in SEEN. Third: a hand that is off refuses, in _OFF.
 _STOPS: Final = (Trigger.ASK_HOLD, Trigger.ASK_HALT)
 _MOTIONS: Final = (Trigger.ASK_ACTIVATE, Trigger.ASK_COMMAND)
-_USER: Final = (*_MOTIONS, *_STOPS, Trigger.ASK_RELEASE, Trigger.ASK_RESET)
+_USER: Final = (*_MOTIONS, *_STOPS, Trigger.ASK_RELEASE, Trigger.ASK_RESET, Trigger.HALT_RESETS)
 SEEN: Final = {
     Trigger.SEEN_READY: State.RUNNING_IDLE,
     Trigger.SEEN_BUSY: State.WF_ACTIVATION,
@@ -75,8 +75,7 @@ def _row(entries: Row) -> Row:
         **{trigger: Verdict.IGNORED if trigger.is_seen else Verdict.NOT_NOW for trigger in Trigger},
         # In a sequence no axis moves by a command, and only rACT = 0 ends it.
         Trigger.ASK_HOLD: Verdict.IGNORED,
-        Trigger.ASK_HALT: State.DO_RESET,
-        Trigger.ASK_RESET: State.DO_RESET,
+        **_all((Trigger.ASK_HALT, Trigger.HALT_RESETS, Trigger.ASK_RESET), State.DO_RESET),
         Trigger.ASK_STOP: State.DO_SHUTDOWN,
         Trigger.LINK_LOST: State.DISCONNECTED,
         **entries,
@@ -109,7 +108,8 @@ TABLE: Final[dict[State, Row]] = {
     State.WF_ATR: _row(_SEEN),
     State.ATR_DONE: _row(_FAULTY | {Trigger.ASK_HALT: Verdict.IGNORED}),
     State.DO_RESET: _row(
-        _all((Trigger.ASK_HALT, Trigger.ASK_RESET), Verdict.IGNORED) | {Trigger.DELIVERED: State.WF_RESET}
+        _all((Trigger.ASK_HALT, Trigger.HALT_RESETS, Trigger.ASK_RESET), Verdict.IGNORED)
+        | {Trigger.DELIVERED: State.WF_RESET}
     ),
     # A fault may show for a device cycle after the reset was written: only the reset itself counts.
     State.WF_RESET: _row({Trigger.SEEN_RESET: State.RESET}),

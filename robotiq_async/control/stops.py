@@ -87,14 +87,12 @@ class Stop:
         match self.level:
             case StopLevel.RESET:  # rACT = 0 clears faults and ends what runs [manual 2012, 4.6]
                 return replace(at_rest(base, status), activate=False)
-            case StopLevel.HALT:  # positions and speeds stay as they were asked
-                return replace(base, go=False) if classify(status) in FOLLOWS else None
-        # A write of ours that does not act yet may set rGTO after this status: then it is not settled.
-        is_settled = ledger.acts()
-        if is_settled and not status.go_echo:
-            return None
-        # A shutdown must not reset a gripper that another client has activated.
-        return replace(base, activate=base.activate or is_settled, go=False)
+            case StopLevel.HALT:
+                is_due = classify(status) in FOLLOWS
+            case _:  # what does not act yet may set rGTO, or activate
+                is_due = status.go_echo or not ledger.is_settled
+        # Positions and speeds stay as they were asked, and what is active stays so: the gate sees to rACT.
+        return replace(base, activate=True, go=False) if is_due else None
 
     def again(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
         """The image of its last write, if that is due again."""
@@ -116,7 +114,7 @@ class Stop:
         if not self.writes or self.writes[-1].is_early or self.writes[-1].entry.acknowledged is None:
             return False
         if self.level is StopLevel.HALT and not status.go_echo and not ledger.may_set_go:
-            return True  # nothing that may act later sets rGTO, so it need not act
+            return True  # then it need not act
         is_reset = classify(status) is Trigger.SEEN_RESET
         entry = self.writes[-1].entry
         shows = {
@@ -208,14 +206,14 @@ class Keeping(Stop):
 
     def rests(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether every axis is known to rest under its last request; also true while rGTO is clear."""
-        return not status.moving and not ledger.unrested and ledger.is_certain and ledger.acts()
+        return not status.moving and not ledger.unrested and ledger.is_certain and ledger.is_settled
 
     def image(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
         """The image that holds every axis that moves or is about to; None if no axis does."""
         if not ledger.is_certain:
             return None
-        base = ledger.base
-        held = merged(base, Pending(hold=Finger.ALL), status, may_move=ledger.may_move(status))
+        base, (pressing, _) = ledger.base, ledger.pressing_again(status)
+        held = merged(base, Pending(hold=Finger.ALL & ~pressing), status, may_move=ledger.may_move(status))
         return None if held == base else held
 
     def _trouble(self, ledger: Ledger, status: RobotiqStatus) -> str:
@@ -232,7 +230,7 @@ class Keeping(Stop):
         is_late = not status.moving and status.timestamp < self._until
         if ledger.has_recent_doubt or (not ledger.is_certain and not is_late):
             return "what the gripper was asked is not known for certain"
-        if ledger.acts() and not status.go_echo:
+        if ledger.is_settled and not status.go_echo:
             return "rGTO was clear"
         if status.timestamp >= self._until and not self.rests(ledger, status):
             return f"not every axis came to rest within {KEEP_S:g} s"

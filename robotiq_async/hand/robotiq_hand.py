@@ -208,7 +208,12 @@ class RobotiqHand(Hand):
         if self._session is None and isinstance(self._options.address, NoAddress):
             self._options.log.warning("no address was given: the gripper is simulated, nothing real moves")
         self._session = session = Session(
-            self._options, self._machine, self._channels, activate=activate, wait=wait
+            self._options,
+            self._machine,
+            self._channels,
+            activate=activate,
+            wait=wait,
+            before=self._session,
         )
         try:
             await session.connected()
@@ -258,7 +263,9 @@ class RobotiqHand(Hand):
     async def _halt(self) -> None:
         session = self._asked()
         if self.state in SEQUENCES:
-            await self._reset_for(Trigger.ASK_HALT)  # rGTO does not stop these
+            await self._reset_for(Trigger.ASK_HALT)  # rGTO = 0 does not end these
+        elif session.controller.is_driven:
+            await self._reset_for(Trigger.HALT_RESETS)
         else:
             await session.answered(session.controller.halt)
 

@@ -78,20 +78,23 @@ class Session:
         *,
         activate: bool,
         wait: float = 0.0,
+        before: Session | None = None,
     ) -> None:
+        """``before`` is the run before this one, of the same hand."""
         self.options = options
         self.is_over = True  # until the poller task runs
         self._loop = asyncio.get_running_loop()
         self.machine = machine
         self._claim()
         machine.why_down = None
-        self.controller = Controller(
+        self.controller: Controller = Controller(
             machine,
             options.speed,
             options.force,
             options.units.closing_s,
             options.write_spacing,
             options.model,
+            None if before is None else before.controller,
         )
         self.controller.activates = activate
         self.counters = Counters()

@@ -41,6 +41,7 @@ TRIGGER_WORDS: Final = {each: each.value.removesuffix("()") for each in Trigger}
     Trigger.ASK_RELEASE: "release",
     Trigger.ASK_START: "the start",
     Trigger.ASK_STOP: "the end",
+    Trigger.HALT_RESETS: "halt, by a reset",
 }
 """A description of each trigger."""
 

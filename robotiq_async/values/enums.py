@@ -301,7 +301,8 @@ class Trigger(Enum):
 
     ``ASK_`` marks a call of the user, ``SEEN_`` a condition found in a status; the others concern the link
     and the delivery of a request. DELIVERED comes, too, if there is nothing left to deliver: what was asked
-    was dropped, or is in force already.
+    was dropped, or is in force already. HALT_RESETS is a halt in a state that shows no activation and no
+    release, while one drives the fingers or is about to: only a reset ends it.
     """
 
     __hash__ = object.__hash__  # see State
@@ -314,6 +315,7 @@ class Trigger(Enum):
     ASK_RELEASE = "atr()"
     ASK_RESET = "reset()"
     ASK_STOP = "stop()"
+    HALT_RESETS = "halt(), by a reset"
     ACTIVATES = "gripper is reset, and is to be activated"
     DELIVERED = "request acknowledged"
     SEEN_READY = "gripper is active"

@@ -72,10 +72,12 @@ class Scan:
         lag: int = 0,
         spacing: float = 0.0,
         model: Model = THREE_FINGER,
+        before: Controller | None = None,
         **options: Any,
     ) -> None:
         """``after`` is the program before this one: the gripper is its, and so is the time.
 
+        ``before`` is the controller of a session of this program, before this one.
         ``lag`` is by how many polls gDT and gSTA come late, ``spacing`` the hand's ``write_spacing``; the
         options are the gripper's.
         """
@@ -92,7 +94,7 @@ class Scan:
         self.transitions: list[tuple[State, State, Trigger]] = []
         self.machine = StateMachine(self._change)
         self.controller = Controller(
-            self.machine, speed, 64, units_of(None, None, model).closing_s, spacing, model
+            self.machine, speed, 64, units_of(None, None, model).closing_s, spacing, model, before
         )
         self.written: list[Registers] = []
         self.forgets = 0

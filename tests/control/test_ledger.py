@@ -419,7 +419,7 @@ def test_the_first_image_shown_is_not_ours_but_settled(status: RobotiqStatus) ->
     assert ledger.ours == NO_AXES
     assert ledger.resting == Finger.ALL
     assert not ledger.may_begin_to_move
-    assert ledger.acts()
+    assert ledger.is_settled
     assert ledger.is_certain
 
 
@@ -504,9 +504,9 @@ def test_a_lost_write_that_shows_late_acts_before_what_was_written_since() -> No
     ledger.acknowledge(0.8)
     ledger.update_rest(shown(200, 110, ObjectStatus.IN_MOTION, 0.805))
     assert ledger.base == image
-    assert not ledger.acts()
+    assert not ledger.is_settled
     ledger.update_rest(shown(150, 150, ObjectStatus.AT_POSITION, 0.9))
-    assert ledger.acts()
+    assert ledger.is_settled
     assert A in ledger.resting
 
 
@@ -568,7 +568,7 @@ def test_a_speed_that_does_not_act_yet_sets_nothing_in_motion_while_rgto_is_clea
     for at in (1.01, 1.1 + WINDOW_S):
         history.look(shows(200, at, go=False))
     history.deliver(image(200, go=False, speed=7), 2.0)
-    assert not history.acts()
+    assert not history.is_settled
     assert not history.may_begin_to_move
     history.deliver(image(200, speed=7), 2.0)
     assert history.may_begin_to_move
@@ -660,7 +660,7 @@ def test_a_procedure_ends_with_what_was_written_last_or_another_client_has_writt
     history.deliver(image(30), 1.1)
     history.look(shows(shown, 1.2))
     assert history.restart(history.latest) == (shown == 30)
-    assert history.acts()
+    assert history.is_settled
 
 
 # -- axes that grip, and axes at rest ----------------------------------------------------------------------
@@ -682,7 +682,7 @@ def later() -> History:
 
 
 def gripping(history: History, status: RobotiqStatus = HALTED) -> Finger:
-    return history.grips.held(status, history.base)
+    return history.gripping(status)
 
 
 def test_axes_that_gripped_when_rgto_was_set_still_grip(later: History) -> None:
@@ -854,7 +854,7 @@ def test_our_own_writes_are_never_foreign_and_never_act_too_early(
                 assert acting.number >= each.number or acting.image == each.image
     now += WINDOW_S + cycle
     assert history.look(status_from(device, now)) is not None
-    assert history.acts()
+    assert history.is_settled
 
 
 @given(STEPS, st.integers(1, 99))

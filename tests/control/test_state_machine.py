@@ -51,23 +51,24 @@ GOES = {
     Trigger.ASK_RELEASE: State.DO_ATR,
     Trigger.ASK_RESET: State.DO_RESET,
     Trigger.ASK_STOP: State.DO_SHUTDOWN,
+    Trigger.HALT_RESETS: State.DO_RESET,
 }
 ASKED = """
-                start()  activate()  command  hold()   halt()   atr()    reset()  stop()
-DISCONNECTED  | goes   | lost      | lost   | lost   | lost   | lost   | lost   | goes
-DO_ACTIVATION | not now| nothing   | not now| nothing| resets | not now| goes   | goes
-WF_ACTIVATION | not now| nothing   | not now| nothing| resets | not now| goes   | goes
-RUNNING_IDLE  | not now| nothing   | goes   | goes   | goes   | not now| goes   | goes
-RUNNING_CC    | not now| nothing   | goes   | goes   | goes   | not now| goes   | goes
-FAULT         | not now| fault     | fault  | stays  | stays  | goes   | goes   | goes
-DO_ATR        | not now| not now   | not now| nothing| resets | not now| goes   | goes
-WF_ATR        | not now| not now   | not now| nothing| resets | not now| goes   | goes
-ATR_DONE      | not now| fault     | fault  | nothing| nothing| not now| goes   | goes
-DO_RESET      | not now| not now   | not now| nothing| nothing| not now| nothing| goes
-WF_RESET      | not now| not now   | not now| nothing| resets | not now| goes   | goes
-RESET         | not now| goes      | reset  | nothing| nothing| not now| goes   | goes
-DO_SHUTDOWN   | not now| off       | off    | off    | off    | off    | off    | nothing
-SHUTDOWN      | goes   | off       | off    | off    | off    | off    | off    | nothing
+                start()  activate()  command  hold()   halt()   atr()    reset()  stop()   halt(), by a reset
+DISCONNECTED  | goes   | lost      | lost   | lost   | lost   | lost   | lost   | goes   | lost
+DO_ACTIVATION | not now| nothing   | not now| nothing| resets | not now| goes   | goes   | goes
+WF_ACTIVATION | not now| nothing   | not now| nothing| resets | not now| goes   | goes   | goes
+RUNNING_IDLE  | not now| nothing   | goes   | goes   | goes   | not now| goes   | goes   | goes
+RUNNING_CC    | not now| nothing   | goes   | goes   | goes   | not now| goes   | goes   | goes
+FAULT         | not now| fault     | fault  | stays  | stays  | goes   | goes   | goes   | goes
+DO_ATR        | not now| not now   | not now| nothing| resets | not now| goes   | goes   | goes
+WF_ATR        | not now| not now   | not now| nothing| resets | not now| goes   | goes   | goes
+ATR_DONE      | not now| fault     | fault  | nothing| nothing| not now| goes   | goes   | goes
+DO_RESET      | not now| not now   | not now| nothing| nothing| not now| nothing| goes   | nothing
+WF_RESET      | not now| not now   | not now| nothing| resets | not now| goes   | goes   | goes
+RESET         | not now| goes      | reset  | nothing| nothing| not now| goes   | goes   | goes
+DO_SHUTDOWN   | not now| off       | off    | off    | off    | off    | off    | nothing| off
+SHUTDOWN      | goes   | off       | off    | off    | off    | off    | off    | nothing| off
 """
 """The fate of each request: the next state, "nothing" to do, or the error."""
 LEADS = {

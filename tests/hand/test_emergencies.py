@@ -17,6 +17,8 @@ from robotiq_async import (
 )
 from robotiq_async.control.state_machine import SEQUENCES
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.values.enums import Trigger
+from robotiq_async.values.model import MODELS
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
 from tests.conftest import Clock
@@ -245,3 +247,56 @@ async def test_a_stop_does_not_wait_for_the_next_poll(
             group.create_task(getattr(hand, emergency)())
             await asyncio.sleep(0.01)
             assert not gripper.is_moving, "a tenth of the interval later"
+
+
+# -- a halt where rGTO = 0 ends nothing --------------------------------------------------------------------
+
+
+async def halted_for_good(hand: RobotiqHand, gripper: SimulatedGripper) -> None:
+    """Halt while the fingers move; from then on no axis does."""
+    async with asyncio.timeout(5):
+        while not gripper.is_moving:  # noqa: ASYNC110  # there is no event to wait for
+            await asyncio.sleep(0.1)
+    assert hand.is_moving
+    await hand.halt()
+    assert hand.state is State.RESET
+    assert not gripper.is_moving
+    before = [gripper.travel(axis) for axis in gripper.model.axes]
+    await asyncio.sleep(15)
+    assert [gripper.travel(axis) for axis in gripper.model.axes] == before
+    assert not hand.is_moving
+
+
+@pytest.mark.parametrize("model", ["3f", "2f85", "hand-e"])
+async def test_a_halt_ends_an_emergency_release(model: str) -> None:
+    """It returned as done, and the fingers opened on."""
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, model=MODELS[model])
+    async with (
+        SimulatorServer(port=0, gripper=gripper) as server,
+        RobotiqHand(server.address, model=model) as hand,
+    ):
+        await hand.close()
+        transitions = hand.transitions()
+        gripper.emergency_release()
+        await hand.wait_for_state(State.FAULT)
+        await halted_for_good(hand, gripper)
+        changes = [await anext(transitions) for _ in range(2)]
+        assert changes[-1].target is State.DO_RESET
+        assert changes[-1].trigger is Trigger.HALT_RESETS
+
+
+@pytest.mark.parametrize("what", ["activation", "release"])
+async def test_a_halt_ends_what_another_client_has_begun(what: str) -> None:
+    gripper = SimulatedGripper(asyncio.get_running_loop().time)
+    async with SimulatorServer(port=0, gripper=gripper) as server, RobotiqHand(server.address) as hand:
+        await hand.close()
+        image = gripper.request_registers
+        if what == "activation":
+            gripper.write(0, [0x0000])
+            await hand.wait_for_state(State.RESET)
+            gripper.write(0, [0x0100])
+            await hand.wait_for_state(State.WF_ACTIVATION)
+        else:
+            gripper.write(0, (image[0] | 0x1000, *image[1:]))
+            await hand.wait_for_state(State.FAULT)
+        await halted_for_good(hand, gripper)

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
+from functools import partial
 
 import pytest
 
@@ -36,9 +37,10 @@ class Bench:
         self.keeps = keeps
 
     @asynccontextmanager
-    async def holding(self) -> AsyncIterator[RobotiqHand]:
+    async def holding(self, poll_interval: float = POLL_S) -> AsyncIterator[RobotiqHand]:
         """The first program: B and C hold something."""
-        async with RobotiqHand(self.server.address, keep_grip=self.keeps, poll_interval=POLL_S) as hand:
+        address = self.server.address
+        async with RobotiqHand(address, keep_grip=self.keeps, poll_interval=poll_interval) as hand:
             self.gripper.place_object(HELD, 150)
             await hand.close(HELD)
             assert self.gripper.grips == HELD
@@ -151,6 +153,20 @@ async def another_is_held(here: Bench) -> str:
         return here.word
 
 
+async def held_while_it_presses_again(here: Bench) -> str:
+    async with here.holding(0.001) as hand:
+        for again in (hand.halt, partial(hand.set_force, 255)):
+            await again()
+            closing = asyncio.create_task(hand.close(HELD))
+            async with asyncio.timeout(1.0):
+                await anext(status async for status in hand.statuses() if HELD in status.moving)
+            await hand.hold()
+            await asyncio.gather(closing, return_exceptions=True)
+            await asyncio.sleep(1)
+            assert here.word == "grip"
+        return here.word
+
+
 async def halted(here: Bench) -> str:
     async with here.holding() as hand:
         await hand.halt()
@@ -218,6 +234,9 @@ PROBES: dict[str, Callable[[Bench], Awaitable[str]]] = {
     "it is left in a fault": left_in_a_fault,
     "another axis is moved": another_is_moved,
     "a move of another axis is cancelled, or `hold()`": another_is_held,
+    "`hold()` while the finger presses again: after more force, or a command after `halt()`": (
+        held_while_it_presses_again
+    ),
     "`halt()`": halted,
     "`reset()`, `atr()`, `recover()` after a major fault": reset,
     "the power goes": power_lost,
