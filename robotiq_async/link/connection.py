@@ -28,12 +28,11 @@ from ..values.errors import (
     RobotiqConnectionError,
 )
 from .address import Address, canonical_address
-from .connecting import Client, connected_client, disconnect
 from .exchange import Echo, Exchange, strays
 from .frames import MisfitError, RefusedError
-from .serial_ports import GONE
 from .silence import Silence
 from .watchdog import Watchdog
+from .wires import Send, wire_to
 
 SETTLE_S: Final = 0.02
 """From connecting to the first request over TCP: a few round trips of a network in a building."""
@@ -108,9 +107,9 @@ class Connection:
         """Those whose line it is, and who open it again after a loss, whether they are users now or not."""
         self._rests: WeakKeyDictionary[object, float] = WeakKeyDictionary()
         """The time of the next turn of a user whose gripper did not answer, by the clock of the loop."""
-        self._client: Client | None = None
-        self._transport: Any = None
-        """The asyncio transport of the connection; pymodbus's class for serial ports is not typed."""
+        self._wire = wire_to(address)
+        self._send: Send | None = None
+        """Sends a frame; None while there is no connection."""
         self._exchange: Exchange[Any] | None = None
         """The exchange in flight."""
         self._failure: RobotiqConnectionError | None = None
@@ -152,7 +151,7 @@ class Connection:
             RobotiqConnectionError: the connection was closed at once, or bytes arrive without a request.
         """
         async with self._turns:
-            if self._client is None:
+            if self._send is None:
                 await self._connect(seconds)
             self._users.add(user)
             try:
@@ -169,12 +168,10 @@ class Connection:
         self._watchdog = Watchdog(loop, lambda: self._is_waiting, self._on_timeout)
         self._failure, self._end, self._is_disturbed = None, None, False
         self.echo.is_on = None if self._is_rtu else False
-        client: Client | None = None
         with Limit(seconds):
-            client = await connected_client(self._address, self._on_data, self._on_connection, seconds)
-        if client is None:
+            self._send = await self._wire.open(self._on_data, self._fail, seconds)
+        if self._send is None:
             raise ConnectFailedError(str(self._address), f"no connection within {seconds:g} s")
-        self._client, self._transport = client, client.ctx.transport
         _connected[id(self)] = self
         self.silence.heard = self.clock()  # whatever the line carried for the last connection
 
@@ -210,15 +207,15 @@ class Connection:
         self.leave(user)
 
     def _disconnect(self) -> None:
-        client, self._client = self._client, None
+        send, self._send = self._send, None
         self._users.clear()
-        if client is not None:
+        if send is not None:
             self._watchdog.stop()
-            disconnect(client)
+            self._wire.close()
 
     def disconnect_if_abandoned(self) -> None:
         """Disconnect if the loop was closed before."""
-        if self._client is not None and self._loop.is_closed():
+        if self._send is not None and self._loop.is_closed():
             with contextlib.suppress(RuntimeError):  # asyncio's sockets tell the loop that they close
                 self._disconnect()
 
@@ -239,7 +236,7 @@ class Connection:
 
     async def pause(self, user: object) -> None:
         """Keep the silence between frames: what follows sooner may be taken for part of the last frame."""
-        if not self.keeps_silence or self._client is None:
+        if not self.keeps_silence or self._send is None:
             return
         try:
             await self.silence.keep(self.clock)
@@ -286,7 +283,8 @@ class Connection:
         self._exchange, self._allowed_s = exchange, seconds
         self._watchdog.watch(min(self._loop.time() + seconds, by))
         try:
-            self._transport.write(exchange.frame)
+            assert self._send is not None, "its users are connected"
+            self._send(exchange.frame)
             return await exchange.answer
         except RobotiqConnectionError as error:
             if isinstance(error, ResponseTimeoutError):
@@ -371,11 +369,6 @@ class Connection:
             error = self._strays(data)
         if error is not None:
             self._fail(error)
-
-    def _on_connection(self, connected: bool) -> None:
-        if not connected:
-            why = " closed the connection" if self._address.is_socket else f": {GONE}"
-            self._fail(ConnectionLostError(f"{self._address}{why}"))
 
 
 _connected: Final[WeakValueDictionary[int, Connection]] = WeakValueDictionary()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import os
 import threading
 from collections.abc import Callable
@@ -38,7 +39,7 @@ def in_a_thread(work: Callable[[], T]) -> asyncio.Future[T]:
     """Start a call that may block for ever (a disk, a pipe) in a daemon thread of its own.
 
     Neither the end of the loop nor the end of the interpreter waits for it, and a full thread pool does not
-    delay it.
+    delay it. If the system starts no thread, awaiting the result raises an OSError, as for other resources.
     """
     loop = asyncio.get_running_loop()
     future: asyncio.Future[T] = loop.create_future()
@@ -59,7 +60,10 @@ def in_a_thread(work: Callable[[], T]) -> asyncio.Future[T]:
         else:
             tell(future.set_result, result)
 
-    threading.Thread(target=run, name="robotiq_async", daemon=True).start()
+    try:
+        threading.Thread(target=run, name="robotiq_async", daemon=True).start()
+    except RuntimeError as error:
+        future.set_exception(OSError(errno.EAGAIN, str(error)))
     return future
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import threading
 from collections import Counter
 from collections.abc import AsyncIterator, Iterable, Iterator
@@ -161,7 +162,7 @@ async def serve_metrics(
 
     Raises:
         ValueError: no hand, two of the same name, or a port outside 0..65535.
-        OSError: the port is taken.
+        OSError: the port is taken, or no thread can be started.
     """
     if not hands:
         raise ValueError("hands must name at least one hand, got none")
@@ -170,7 +171,11 @@ async def serve_metrics(
     registry.register(HandCollector(hands))
     server = _Server(host, port, registry)
     thread = threading.Thread(target=server.serve_forever, daemon=True, name="robotiq_async metrics")
-    thread.start()
+    try:
+        thread.start()
+    except RuntimeError as error:
+        server.server_close()
+        raise OSError(errno.EAGAIN, str(error)) from error
     try:
         yield host, int(server.socket.getsockname()[1])
     finally:
@@ -181,4 +186,7 @@ async def serve_metrics(
             thread.join()
 
         # It may be answering a scrape that waits for this loop: close it in a thread, also when cancelled.
-        await wait_shielded(in_a_thread(close))
+        closing = in_a_thread(close)
+        await wait_shielded(closing)
+        if (failure := closing.exception()) is not None:
+            log.warning("the server of the metrics is still open: %s", failure)

@@ -112,7 +112,10 @@ class _User:
         self._images = 0
 
     async def live(self, calls: list[Call]) -> None:
+        # Never at the same instant as the other: who comes first would depend on the turns of the loop.
+        apart = 0.00013 * self._number
         for _ in range(CALLS):
+            await asyncio.sleep(self._rng.choice((0.0, 0.001, 0.005, 0.03)) + apart)
             if self._rng.random() < 0.25:
                 self._trouble()
             what = self._rng.choice(CHOICES) if self._link.is_open else "open"
@@ -122,7 +125,6 @@ class _User:
             except RobotiqConnectionError as error:
                 result = f"{type(error).__name__}: {error}"
             calls.append(Call(self._number, what, result, round(self._loop.time() - self._began, 5)))
-            await asyncio.sleep(self._rng.choice((0.0, 0.001, 0.005, 0.03)))
         await self._link.close()
 
     # -- its calls -------------------------------------------------------------------------------------

@@ -50,6 +50,17 @@ async def test_a_thread_gives_its_result_or_its_error() -> None:
         await in_a_thread(lambda: int("x"))
 
 
+async def test_a_thread_that_cannot_be_started_is_an_error_of_the_system(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refused(_: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", refused)
+    with pytest.raises(OSError, match="can't start new thread"):
+        await in_a_thread(list)
+
+
 async def test_a_stuck_thread_is_not_waited_for() -> None:
     stuck = threading.Event()
     work = in_a_thread(stuck.wait)

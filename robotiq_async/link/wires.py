@@ -1,0 +1,259 @@
+"""Wires: what carries the bytes of a line. Sockets and serial ports, which pymodbus's clients open and close.
+
+All that this package knows of the inside of a pymodbus client is here. A client is made for each connection,
+without retries and without reconnecting. Its receiver is replaced before the first byte can arrive: its
+buffer silently drops what does not fit, and its framer accepts replies that frames.py refuses. Its connect()
+only logs why it fails; the call inside it raises that.
+
+Serial ports are read and written by descriptor. pyserial's read() waits with select(), which refuses
+descriptors of 1024 and above, and its write() tries again in a busy loop while the port takes no more. Ports
+without a descriptor, as on Windows, are left to pymodbus.
+
+What others raise becomes an error of ours by a table for each call.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import socket
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Final, Protocol
+
+from pymodbus import FramerType
+from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
+
+from ..runtime.host_names import addresses_of, why_no_socket, why_unreachable
+from ..runtime.limit import Limit
+from ..values.errors import ConnectFailedError, ConnectionLostError, RobotiqConnectionError
+from .address import Address
+from .serial_ports import GONE, hasten, why_no_port
+
+Client = AsyncModbusTcpClient | AsyncModbusSerialClient
+AsyncioTransport = Any
+"""Of a connection: one of asyncio's, or pymodbus's for serial ports, which is not typed."""
+Send = Callable[[bytes], None]
+OnData = Callable[[bytes], None]
+OnEnd = Callable[[RobotiqConnectionError], None]
+OnConnection = Callable[[bool], None]
+
+LARGEST_READ: Final = 4096  # bytes read at a time; the longest Modbus frame has 260
+KEEPALIVE: Final = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 5}
+"""TCP keepalive: seconds of silence before the first probe, seconds between probes, probes without an answer.
+A polling hand is never that silent. But while its program is suspended (a debugger, a sleeping machine),
+nothing else shows either end that the other is gone."""
+OPTIONS: Final[dict[str, Any]] = {"retries": 0, "reconnect_delay": 0}
+
+Table = Mapping[type[Exception], Callable[[Any], str]]
+"""The reason to show for each kind of error that a call may raise; the first kind that fits counts."""
+RESOLVING: Final[Table] = {
+    OSError: lambda error: f"the name cannot be resolved: {error.strerror or error}",
+    Exception: lambda error: f"the name cannot be resolved: {error}",  # no host name, or no thread for it
+}
+CONNECTING: Final[Table] = {
+    OSError: lambda error: why_no_socket() or why_unreachable(error),
+    Exception: lambda error: str(error) or repr(error),
+}
+OPENING: Final[Table] = {OSError: why_no_port, Exception: lambda error: str(error) or repr(error)}
+
+
+class Wire(Protocol):
+    """What carries the frames of a line. It may be opened again after it was closed."""
+
+    @property
+    def may_echo(self) -> bool:
+        """Whether what is sent may come back before the reply."""
+
+    async def open(self, on_data: OnData, on_end: OnEnd, seconds: float) -> Send:
+        """Connect; return what sends a frame, which never blocks and raises OSError when the wire has ended.
+
+        Args:
+            on_data: gets what arrives, from the first byte on.
+            on_end: gets the reason when the wire ends by itself.
+            seconds: for how long the caller waits; it cancels the call then.
+
+        Raises:
+            ConnectFailedError: it cannot be opened, for whatever reason.
+        """
+
+    def close(self) -> None:
+        """Close it at once; does nothing when closed."""
+
+
+def wire_to(address: Address) -> Wire:
+    """The wire to a serial port or a socket."""
+    return SerialWire(address) if address.kind == "rtu" else SocketWire(address)
+
+
+@contextlib.contextmanager
+def failing_as(table: Table, address: Address) -> Iterator[None]:
+    """Turn what a call raises into a ConnectFailedError."""
+    try:
+        yield
+    except RobotiqConnectionError:
+        raise
+    except Exception as error:
+        why = next(reason for kind, reason in table.items() if isinstance(error, kind))
+        raise ConnectFailedError(str(address), why(error)) from error
+
+
+class _ClientWire:
+    """A connection of a pymodbus client."""
+
+    _client: Client | None = None
+    _ending: str
+    """How the end of the wire is told, after its address."""
+
+    def __init__(self, address: Address) -> None:
+        self._address = address
+        self.may_echo = address.is_rtu
+
+    def close(self) -> None:
+        client, self._client = self._client, None
+        if client is not None:
+            client.close()
+
+    async def _connect(
+        self, make: Callable[[OnConnection], Client], on_data: OnData, on_end: OnEnd
+    ) -> AsyncioTransport:
+        """Connect a client; return its asyncio transport."""
+        made = asyncio.get_running_loop().create_future()
+
+        def on_connection(is_connected: bool) -> None:
+            if not is_connected:
+                on_end(ConnectionLostError(f"{self._address}{self._ending}"))
+            elif not made.done():
+                made.set_result(None)
+
+        self._client = client = make(on_connection)
+        client.ctx.data_received = on_data  # type: ignore[method-assign, assignment]
+        try:
+            transport, _ = await client.ctx.call_create()
+            client.ctx.transport = transport
+            self._set_up(transport, on_data, on_end)
+            await made  # a serial port is watched from the next turn of the loop on
+        except BaseException:
+            self.close()
+            raise
+        return transport
+
+    def _set_up(self, transport: AsyncioTransport, on_data: OnData, on_end: OnEnd) -> None:
+        raise NotImplementedError
+
+
+class SocketWire(_ClientWire):
+    """A TCP connection."""
+
+    _ending = " closed the connection"
+
+    async def open(self, on_data: OnData, on_end: OnEnd, seconds: float) -> Send:
+        """Connect to the first address of the host that can be reached.
+
+        Each address but the last gets an equal part of the time: one that does not answer leaves some for the
+        others.
+        """
+        address = self._address
+        framer = FramerType.RTU if address.is_rtu else FramerType.SOCKET
+        with failing_as(RESOLVING, address):
+            *others, last = await addresses_of(address.host, address.port)
+
+        async def connected(host: str) -> Send:
+            def make(on_connection: OnConnection) -> Client:
+                options = {**OPTIONS, "port": address.port, "trace_connect": on_connection}
+                return AsyncModbusTcpClient(host, framer=framer, **options)
+
+            send: Send = (await self._connect(make, on_data, on_end)).write
+            return send
+
+        with failing_as(CONNECTING, address):
+            for host in others:
+                with contextlib.suppress(OSError), Limit(seconds / (len(others) + 1)):
+                    return await connected(host)
+            return await connected(last)
+
+    def _set_up(self, transport: AsyncioTransport, on_data: OnData, on_end: OnEnd) -> None:  # noqa: ARG002
+        """Tune the connection for quick replies and for noticing a dead peer. Nothing depends on it."""
+        # asyncio reads into a buffer of 256 KiB, whose allocation costs several times the handling of a
+        # reply. The attribute is undocumented: without it nothing is lost but time.
+        with contextlib.suppress(AttributeError):
+            transport.max_size = LARGEST_READ
+        line = transport.get_extra_info("socket")
+        with contextlib.suppress(OSError):
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+            for name, value in KEEPALIVE.items():
+                if hasattr(socket, name):
+                    line.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
+
+    def close(self) -> None:
+        """Close the connection for every process that has it.
+
+        A process that was forked from this one has a copy of the socket: closing ours alone would leave the
+        gripper connected, and one that serves a single client would never take us back.
+        """
+        transport: Any = None if self._client is None else self._client.ctx.transport
+        # By a copy of our own: uvloop's sockets cannot be shut down, and not every loop gives one.
+        with contextlib.suppress(AttributeError, OSError):
+            line = transport.get_extra_info("socket")
+            with socket.fromfd(line.fileno(), line.family, line.type) as copy:
+                copy.shutdown(socket.SHUT_RDWR)
+        super().close()
+
+
+class SerialWire(_ClientWire):
+    """A serial port of this machine."""
+
+    _ending = f": {GONE}"
+
+    async def open(self, on_data: OnData, on_end: OnEnd, seconds: float) -> Send:  # noqa: ARG002
+        """Open the port with the settings of the address."""
+        address, line = self._address, self._address.line
+        try:
+            import serial  # noqa: F401, PLC0415
+        except ImportError:
+            from ..runtime.extras import install  # noqa: PLC0415  # nothing else needs it
+
+            why = f"serial ports need pyserial: {install('serial')}"
+            raise ConnectFailedError(str(address), why) from None
+
+        def make(on_connection: OnConnection) -> Client:
+            form: dict[str, Any] = {"baudrate": line.baud, "parity": line.parity, "stopbits": line.stopbits}
+            options = {**OPTIONS, **form, "bytesize": 8, "trace_connect": on_connection}
+            return AsyncModbusSerialClient(address.host, framer=FramerType.RTU, **options)
+
+        with failing_as(OPENING, address):
+            transport = await self._connect(make, on_data, on_end)
+        port = transport.sync_serial
+        if not hasattr(port, "fd"):
+            send: Send = transport.write
+            return send
+
+        def write(frame: bytes) -> None:
+            try:
+                written = os.write(port.fd, frame)
+            except BlockingIOError:
+                written = 0
+            if written < len(frame):
+                transport.write(frame[written:])
+
+        return write
+
+    def _set_up(self, transport: AsyncioTransport, on_data: OnData, on_end: OnEnd) -> None:
+        port = transport.sync_serial
+        hasten(port)
+
+        def read() -> None:
+            data = b""
+            try:
+                data = os.read(port.fd, LARGEST_READ)
+            except (BlockingIOError, InterruptedError):
+                return
+            except OSError:
+                pass  # as the end of the port, which is no bytes
+            if data:
+                on_data(data)
+            else:
+                on_end(ConnectionLostError(f"{self._address}{self._ending}"))
+
+        if hasattr(port, "fd"):
+            transport.intern_read_ready = read
