@@ -48,6 +48,13 @@ class Due(NamedTuple):
     is_command: bool  # a command or a hold, and no step of something longer
 
 
+class Left(NamedTuple):
+    """What a session leaves to the next one of the same gripper: what may still act, and the contacts."""
+
+    ledger: Ledger
+    activation: Begun | None
+
+
 class Controller:
     """State, requests and moves of one hand.
 
@@ -62,15 +69,13 @@ class Controller:
         closing_time: Callable[[int], float],
         write_spacing: float = 0.0,
         model: Model = THREE_FINGER,
-        before: Controller | None = None,
+        left: Left | None = None,
     ) -> None:
-        """``before`` had the gripper in the session before: what it has written may still act."""
         self.machine: Final = machine
         self.status: RobotiqStatus | None = None  # the newest; None before the first
         self.activates = False  # whether a gripper that is found reset is activated
         self.foreign_commands = 0  # how often another client was seen to command the gripper
-        left = None if before is None else before.ledger
-        self.ledger: Final[Ledger] = Ledger(speed, force, model, machine.log, left)
+        self._ledger: Final = Ledger(speed, force, model, machine.log, left and left.ledger)
         self._closing_time: Final = closing_time  # seconds of a full closing at a speed
         # Seconds from sending a write to the next one: a gripper may acknowledge one that comes sooner and
         # forget it. A stop does not wait; it is repeated.
@@ -79,7 +84,7 @@ class Controller:
         self._requests: Final = OpenRequests(machine.log)
         self._stop: Stop | None = None
         self._procedure: Procedure | None = None
-        self._activation: Begun | None = None  # stopping the hand takes it back
+        self._activation = left and left.activation  # stopping the hand takes it back
         self._why_no_grip = ""  # why a hand that is being stopped must not leave rGTO set
         self._warned = NEVER  # when another client was warned of
         self._free_at = NEVER  # when the spacing after the last write is over
@@ -97,7 +102,7 @@ class Controller:
         self.command(Command(move.axes, move.position, speed, force))
         self._requests.add(move)
         assert self.status is not None, "the hand takes commands, so a status has been read"
-        written = {axis: asked.speed for axis, asked in self.ledger.base.by_axis}
+        written = {axis: asked.speed for axis, asked in self._ledger.base.by_axis}
         speeds = written | self._requests.pending.speeds
         return move.default_timeout(self.status, speeds, self._closing_time)
 
@@ -112,7 +117,7 @@ class Controller:
             requests.merge_hold(move.axes & requests.pending.moved)
         if unseen and not is_open and self._evidence.condition is not None:
             # Axes that another client moves by now are left to it. On a new link that is found out first.
-            requests.hold_only(self.ledger.ours)
+            requests.hold_only(self._ledger.ours)
 
     def hold(self, axes: Finger, waiter: Waiter[None]) -> None:
         """Hold those axes that move, whichever client moves them. It ends no activation and no release."""
@@ -190,7 +195,7 @@ class Controller:
         if self._activation is not None:
             self._stop = Stop(StopLevel.RESET)
         elif status is not None and level is StopLevel.KEEP:
-            self._stop = Keeping(status, self._why_no_grip).after(self.ledger, status, self.machine.log)
+            self._stop = Keeping(status, self._why_no_grip).after(self._ledger, status, self.machine.log)
         elif status is not None:
             self._stop = Stop(StopLevel.SHUTDOWN)
 
@@ -198,7 +203,7 @@ class Controller:
 
     def _begin(self, trigger: Trigger) -> None:
         releases = trigger is Trigger.ASK_RELEASE
-        self._procedure, self._stop = Procedure(self.ledger, releases=releases), None
+        self._procedure, self._stop = Procedure(self._ledger, releases=releases), None
         self._update_state(trigger)
 
     def _begin_reset(self, trigger: Trigger, error: RobotiqError) -> None:
@@ -220,6 +225,10 @@ class Controller:
     def passing_faults(self) -> int:
         return self._evidence.passed
 
+    def left(self) -> Left:
+        """What the next session of this gripper must know."""
+        return Left(self._ledger, self._activation)
+
     @property
     def is_moving(self) -> bool:
         """Whether an axis moves, or will because of what does not act yet."""
@@ -229,7 +238,7 @@ class Controller:
             return True
         if self.machine.state not in RUNNING:
             return False
-        return bool(self._requests.pending.positions) or self.ledger.may_begin_to_move
+        return bool(self._requests.pending.positions) or self._ledger.may_begin_to_move
 
     @property
     def is_driven(self) -> bool:
@@ -238,7 +247,7 @@ class Controller:
         if status is None or self._procedure is not None:
             return status is not None
         shows = classify(status) is Trigger.SEEN_BUSY or status.fault is Fault.AUTOMATIC_RELEASE
-        return shows or self.ledger.may_drive(status)
+        return shows or self._ledger.may_drive(status)
 
     @property
     def is_busy(self) -> bool:
@@ -288,7 +297,7 @@ class Controller:
         """Take in a status that was read after every acknowledgement so far."""
         # ``asked`` is when it was asked for, in monotonic seconds; None for the time of the reply.
         asked = status.timestamp if asked is None else asked
-        ledger, stop, before = self.ledger, self._stop, self._evidence.condition
+        ledger, stop, before = self._ledger, self._stop, self._evidence.condition
         self.status = status
         ledger.update(status, asked)
         condition = self._evidence.update(status, asked)
@@ -319,7 +328,7 @@ class Controller:
 
     def _note_news(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
         """A new condition, or an image that no entry explains: whose image acts, what ends, what is held."""
-        ledger, requests = self.ledger, self._requests
+        ledger, requests = self._ledger, self._requests
         if before is None:  # the link is back: continue from our image if the gripper shows one
             if ledger.match is None or not ledger.match.is_ours:
                 ledger.adopt(status)
@@ -354,20 +363,20 @@ class Controller:
     def _advance_stop(self, stop: Stop, status: RobotiqStatus) -> None:
         log, judged = self.machine.log, self._evidence.status
         assert judged is not None
-        stop.fail_overdue(self.ledger, status, log)
-        if stop.has_activated(self.ledger, status):
+        stop.fail_overdue(self._ledger, status, log)
+        if stop.has_activated(self._ledger, status):
             self._take_back("the gripper was reset as it was stopped: its activation is taken back")
         elif isinstance(stop, Keeping):
-            self._stop = stop.after(self.ledger, judged, log)
-        elif stop.is_reached(self.ledger, status):
+            self._stop = stop.after(self._ledger, judged, log)
+        elif stop.is_reached(self._ledger, status):
             self._stop = None
             stop.answer(status, log)
             if stop.level is not StopLevel.HALT:
-                self._finish(status, is_known=self.ledger.restart(status))
+                self._finish(status, is_known=self._ledger.restart(status))
 
     def _follow_activation(self, status: RobotiqStatus) -> None:
-        if self._activation is None and is_activating(status) and self.ledger.may_activate(status):
-            self._activation = Begun(self.ledger.last, status)
+        if self._activation is None and is_activating(status) and self._ledger.may_activate(status):
+            self._activation = Begun(self._ledger.last, status)
         if self._activation is not None and self._activation.is_stray(status):
             self._take_back("the gripper was reset as it was commanded: its activation is taken back")
 
@@ -378,7 +387,7 @@ class Controller:
 
     def _adopt_other_client(self, status: RobotiqStatus) -> None:
         """Another client commands the gripper: adopt its requests, or our next write would undo them."""
-        ledger = self.ledger
+        ledger = self._ledger
         self.foreign_commands += 1
         if status.timestamp - self._warned >= WARNING_S:
             self._warned = status.timestamp
@@ -401,7 +410,7 @@ class Controller:
         if not self.has_request:
             return None
         stop, status = self._stop, self._evidence.status
-        urgent = stop is not None and status is not None and stop.is_urgent(self.ledger, status)
+        urgent = stop is not None and status is not None and stop.is_urgent(self._ledger, status)
         return Due(self._wait(now), urgent, stop is None and self._procedure is None)
 
     def _wait(self, now: float) -> float:
@@ -422,7 +431,7 @@ class Controller:
         return self._next_changes(status, now)
 
     def _next_stop(self, stop: Stop, status: RobotiqStatus, now: float) -> Request | None:
-        ledger = self.ledger
+        ledger = self._ledger
         if stop.writes:
             image = stop.again(ledger, status)
         else:
@@ -441,7 +450,7 @@ class Controller:
         return entry.image
 
     def _next_step(self, procedure: Procedure, status: RobotiqStatus, now: float) -> Request | None:
-        ledger, entry = self.ledger, procedure.entry
+        ledger, entry = self._ledger, procedure.entry
         if entry is not None and not ledger.acts(entry):
             return None
         if entry is None and not procedure.releases and self._evidence.may_pass:
@@ -469,7 +478,7 @@ class Controller:
         return entry.image
 
     def _next_changes(self, status: RobotiqStatus, now: float) -> Request | None:
-        ledger, pending = self.ledger, self._requests.pending
+        ledger, pending = self._ledger, self._requests.pending
         if self._evidence.condition not in FOLLOWS or not ledger.is_certain:
             return None
         if self._evidence.may_pass and pending.has_changes:
@@ -505,15 +514,15 @@ class Controller:
     ) -> Entry:
         """Put an image through the gate and into the ledger; decide() returns it to be sent."""
         releases = of is not None and of.releases
-        activates, may_reset = of is not None and not releases, self.ledger.may_reset
+        activates, may_reset = of is not None and not releases, self._ledger.may_reset
         image = gate(image, status, may_reset=may_reset, activates=activates, releases=releases)
-        entry = self.ledger.write(image, self._requests.pending.moved if everything else NO_AXES, now)
+        entry = self._ledger.write(image, self._requests.pending.moved if everything else NO_AXES, now)
         self._requests.sending(entry, everything=everything, holds=holds, later=later)
         self._free_at = now + self._spacing
         return entry
 
     def acknowledged(self, now: float) -> None:
-        self.ledger.acknowledge(now)
+        self._ledger.acknowledge(now)
         self._requests.acknowledged()
         self._update_state(Trigger.DELIVERED)
 
@@ -530,5 +539,5 @@ class Controller:
         self._requests.lost(error)
         self._procedure, self._stop = None, None
         self._evidence.lost()
-        self.ledger.lost(now)
+        self._ledger.lost(now)
         self._update_state(Trigger.LINK_LOST)

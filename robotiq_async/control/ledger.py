@@ -24,7 +24,6 @@ No I/O and no clock: callers give the time of a write, and questions are about t
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import replace
 from itertools import takewhile
 from operator import attrgetter
 from typing import Final
@@ -63,7 +62,10 @@ class Ledger:
     ) -> None:
         """``before`` is the ledger of the session before: what it has written may still act."""
         first = Request(axes=(AxisRequest(0, speed, force),) * len(model.axes), model=model)
-        self.shown = Entry(0, first, first.echo, False, NEVER, NEVER, LONG_AGO)  # the newest that showed
+        number: int = 0 if before is None else before.shown.number
+        self.shown: Entry = Entry(
+            number, first, first.echo, False, NEVER, NEVER, LONG_AGO
+        )  # the newest that showed
         self.match: Entry | None = None  # the one that the newest status shows
         # When that was asked for. It may show the state of that time, however late a busy loop reads the
         # reply; so the age of a write is measured by this.
@@ -75,7 +77,9 @@ class Ledger:
         self._model: Final = model
         self._entries = deque([self.shown])  # those that are certain, and that a status may show
         # By number; each may act after those with a lower one.
-        self._doubtful: list[Entry] = [] if before is None else before.left()
+        self._doubtful: list[Entry] = [] if before is None else before.waiting()
+        for each in self._doubtful:
+            each.overtaken(each.number)
         # The entry that showed as a status was adopted. It is an entry no more; but if it is ours, it may
         # activate: after a reset our own image is taken for another client's.
         self._mistaken: Entry | None = None
@@ -138,7 +142,7 @@ class Ledger:
         # images act at once; a speed or a force may take SILENT_S.
         return not any(
             each.echo != entry.echo or (age < SILENT_S and each.image != entry.image)
-            for each in (self.shown, *self._waiting())
+            for each in (self.shown, *self.waiting())
             if each.number < entry.number
         )
 
@@ -153,7 +157,7 @@ class Ledger:
     def ahead(self) -> list[Entry]:
         """What may still act, in the order in which it would; an entry in doubt may also never act."""
         # Every question about what the gripper may get is one about these, whatever a status shows today.
-        waiting = self._waiting()
+        waiting = self.waiting()
         return [each for each in waiting if not (self.acts(each) or self._is_past(each))] if waiting else []
 
     @property
@@ -194,10 +198,6 @@ class Ledger:
             if may_move(recent.targets(self.now), self._model, what, position):
                 moving |= axis
         return moving
-
-    def left(self) -> list[Entry]:
-        """What the ledger of the next session has in doubt."""
-        return [replace(each, acts_since=None) for each in self._waiting()]
 
     # -- what is written -------------------------------------------------------------------------------
 
@@ -267,7 +267,7 @@ class Ledger:
         # wait, an echo of the entry shown before is its own unless a limit makes it ambiguous.
         shown = self.shown
         is_same = shown.echo == status.echo and shown.number >= entries[0].number
-        if is_same and (shown is entries[-1] or not self.limits.has_alias(self._waiting)):
+        if is_same and (shown is entries[-1] or not self.limits.has_alias(self.waiting)):
             self.match = shown
         else:
             self.match = self._find(status)
@@ -294,7 +294,7 @@ class Ledger:
         found = self._entry_of(status.echo)
         # A write in doubt may not have arrived: then another client explains the echo better.
         may_be_limit = found is None and not self._doubtful
-        if may_be_limit and self.limits.explains(self.shown, self._waiting(), status, self.now.time):
+        if may_be_limit and self.limits.explains(self.shown, self.waiting(), status, self.now.time):
             # Even so it may have to wait: while the echo has not changed, the write may not act yet.
             return self._entry_of(status.echo)
         return found
@@ -302,7 +302,7 @@ class Ledger:
     def _entry_of(self, echo: Echo) -> Entry | None:
         """Of the entries that fit an echo the first after the one shown before."""
         # A control loop leaves a hundred entries in the window. Those that wait are few, and looked at first.
-        for each in self._waiting():
+        for each in self.waiting():
             if each.echo == echo or self._shows_limit(each, echo):
                 if each in self._doubtful:
                     self._revive(each)
@@ -319,7 +319,7 @@ class Ledger:
             return False
         return self.limits.shows(entry, echo)
 
-    def _waiting(self) -> list[Entry]:
+    def waiting(self) -> list[Entry]:
         """The entries after the one that shows, the oldest first."""
         shown = self.shown.number
         waiting = [*takewhile(lambda each: each.number > shown, reversed(self._entries))][::-1]
@@ -352,7 +352,7 @@ class Ledger:
         self._adoption = Adoption(status, self.now, since)
         image, time = self._adoption.request(before.axes), self.now.time
         other = Entry(self._newest.number + 1, image, status.echo, False, time, time, self.now)
-        self._doubtful = self._waiting()
+        self._doubtful = self.waiting()
         for recent in self._unproven.values():
             recent.note_overtaken(self._doubtful, self.now)
         for number, each in enumerate(self._doubtful, other.number + 1):

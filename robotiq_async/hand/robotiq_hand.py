@@ -208,12 +208,7 @@ class RobotiqHand(Hand):
         if self._session is None and isinstance(self._options.address, NoAddress):
             self._options.log.warning("no address was given: the gripper is simulated, nothing real moves")
         self._session = session = Session(
-            self._options,
-            self._machine,
-            self._channels,
-            activate=activate,
-            wait=wait,
-            before=self._session,
+            self._options, self._machine, self._channels, activate=activate, wait=wait
         )
         try:
             await session.connected()

@@ -26,6 +26,7 @@ _LINE: Final = " (two grippers on one serial line: give each of the hands its de
 _URCAP: Final = " (two grippers behind one URCap: give each of the hands its device_id)"
 
 T = TypeVar("T")
+L = TypeVar("L")
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,12 +155,13 @@ class _Claim(Generic[T]):
     loop: asyncio.AbstractEventLoop
 
 
-class Claims(Generic[T]):
-    """Grippers and their owners. Thread-safe."""
+class Claims(Generic[T, L]):
+    """Grippers and their owners, and what the last owner of each has left for the next. Thread-safe."""
 
     def __init__(self) -> None:
         self._claiming = threading.Lock()
         self._claims: dict[T, _Claim[T]] = {}
+        self._left: dict[Gripper, L] = {}
 
     def claim(self, gripper: Callable[[], Gripper], owner: T, is_over: Callable[[T], bool]) -> T | None:
         """Claim a gripper for the running loop; return its present owner if it has one.
@@ -180,9 +182,15 @@ class Claims(Generic[T]):
             self._claims[owner] = _Claim(gripper, owner, here)
         return None
 
-    def release(self, owner: T) -> None:
-        """Give up a claim. Takes no lock: any thread may call it."""
-        self._claims.pop(owner, None)
+    def release(self, owner: T, left: L | None = None) -> None:
+        """Give up a claim, and leave something for the next owner. Takes no lock: any thread may call it."""
+        claim = self._claims.pop(owner, None)
+        if claim is not None and left is not None:
+            self._left[claim.gripper()] = left
+
+    def left(self, gripper: Gripper) -> L | None:
+        """What the last owner of a gripper has left."""
+        return self._left.get(gripper)
 
 
 def _conflict(owned: Gripper, wanted: Gripper, *, is_here: bool) -> bool:

@@ -23,7 +23,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, ClassVar, ParamSpec, TypeVar
 
-from ..control.controller import Controller
+from ..control.controller import Controller, Left
 from ..control.motion import Move
 from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
 from ..control.waiters import Waiter
@@ -68,7 +68,7 @@ class Session:
         InvalidStateError: another hand of this process owns the gripper.
     """
 
-    _claims: ClassVar[Claims[Session]] = Claims()
+    _claims: ClassVar[Claims[Session, Left]] = Claims()
 
     def __init__(
         self,
@@ -78,23 +78,21 @@ class Session:
         *,
         activate: bool,
         wait: float = 0.0,
-        before: Session | None = None,
     ) -> None:
-        """``before`` is the run before this one, of the same hand."""
         self.options = options
         self.is_over = True  # until the poller task runs
         self._loop = asyncio.get_running_loop()
         self.machine = machine
-        self._claim()
+        left = self._claim()
         machine.why_down = None
-        self.controller: Controller = Controller(
+        self.controller = Controller(
             machine,
             options.speed,
             options.force,
             options.units.closing_s,
             options.write_spacing,
             options.model,
-            None if before is None else before.controller,
+            left,
         )
         self.controller.activates = activate
         self.counters = Counters()
@@ -159,7 +157,8 @@ class Session:
         self.controller.close()
         self._channels.publish_changes()
 
-    def _claim(self) -> None:
+    def _claim(self) -> Left | None:
+        """Claim the gripper; return what the last run of any hand of it has left to act."""
         gripper = self.options.link.gripper
         owner = self._claims.claim(gripper, self, lambda each: each.is_over)
         if owner is not None:
@@ -170,10 +169,11 @@ class Session:
                 self.machine.state,
                 {State.DISCONNECTED, State.SHUTDOWN},
             )
+        return self._claims.left(gripper())
 
     def _release(self) -> None:
         self.is_over = True
-        self._claims.release(self)
+        self._claims.release(self, self.controller.left())
 
     def _end_with(self, task: asyncio.Task[None]) -> None:
         """The task has ended, perhaps before it ran."""

@@ -69,15 +69,15 @@ class Scan:
         device_cycle: float = 0.005,
         speed: int = 128,
         after: Scan | None = None,
+        goes_on: bool = False,
         lag: int = 0,
         spacing: float = 0.0,
         model: Model = THREE_FINGER,
-        before: Controller | None = None,
         **options: Any,
     ) -> None:
         """``after`` is the program before this one: the gripper is its, and so is the time.
 
-        ``before`` is the controller of a session of this program, before this one.
+        With ``goes_on`` it is the session before this one, in the same program.
         ``lag`` is by how many polls gDT and gSTA come late, ``spacing`` the hand's ``write_spacing``; the
         options are the gripper's.
         """
@@ -93,8 +93,14 @@ class Scan:
             )
         self.transitions: list[tuple[State, State, Trigger]] = []
         self.machine = StateMachine(self._change)
-        self.controller = Controller(
-            self.machine, speed, 64, units_of(None, None, model).closing_s, spacing, model, before
+        self.controller: Controller = Controller(
+            self.machine,
+            speed,
+            64,
+            units_of(None, None, model).closing_s,
+            spacing,
+            model,
+            after.controller.left() if after is not None and goes_on else None,
         )
         self.written: list[Registers] = []
         self.forgets = 0

@@ -450,7 +450,7 @@ def test_nothing_is_known_under_what_does_not_act() -> None:
 
 def asked_of(scan: Scan, axis: Finger) -> int:
     """The number of requests of an axis that a status may be from."""
-    ledger = scan.controller.ledger
+    ledger = scan.controller._ledger
     return len([*ledger._unproven[axis].targets(ledger.now)])
 
 

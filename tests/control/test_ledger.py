@@ -53,7 +53,7 @@ class History(Ledger):
         return entry
 
     @property
-    def waiting(self) -> list[Entry]:
+    def unanswered(self) -> list[Entry]:
         """The images written that do not act yet."""
         return [each for each in self.written if not self.acts(each)]
 
@@ -298,8 +298,8 @@ def test_a_history_of_writes(name: str) -> None:
     history = History(position)
     for at, event, waiting, in_doubt in story:
         event(history, at)
-        assert history.waiting == history.written[len(history.written) - waiting :], at
-        assert any(each in history._doubtful for each in history.waiting) == in_doubt, at
+        assert history.unanswered == history.written[len(history.written) - waiting :], at
+        assert any(each in history._doubtful for each in history.unanswered) == in_doubt, at
 
 
 @pytest.mark.parametrize(

@@ -177,7 +177,7 @@ def test_a_command_to_another_axis_does_not_resume_what_the_last_session_left_on
     at = first.positions()[A]
     first.hold(A)
     first.step(answer=not link_is_lost)
-    scan = Scan(after=first, before=first.controller)
+    scan = Scan(after=first, goes_on=True)
     scan.now += 0.001
     scan.connect()
     scan.command(B, position=100)
@@ -191,7 +191,7 @@ def test_a_stop_ends_a_motion_that_the_last_session_left_on_its_way(device_cycle
     first = started(device_cycle)
     first.command(A, position=255, speed=0)
     first.step()
-    scan = Scan(after=first, before=first.controller)
+    scan = Scan(after=first, goes_on=True)
     scan.now += 0.001
     scan.connect()
     assert scan.controller.is_moving
@@ -206,7 +206,7 @@ def test_a_hold_keeps_the_grip_that_the_last_session_has_halted() -> None:
     first.gripper.place_object(A, 150)
     first.moved(255, A)
     first.stop(keep_grip=True)
-    scan = Scan(after=first, before=first.controller)
+    scan = Scan(after=first, goes_on=True)
     scan.connect()
     scan.move(255, A, force=255)
     scan.until(lambda: A in scan.latest.moving)
@@ -214,3 +214,27 @@ def test_a_hold_keeps_the_grip_that_the_last_session_has_halted() -> None:
     scan.run(1.0)
     assert asked.answers == [None]
     assert scan.gripper.grips == A
+
+
+def test_a_stop_takes_back_an_activation_that_the_last_session_has_begun() -> None:
+    first = Scan(device_cycle=0.1)
+    first.connect()
+    first.step()
+    scan = Scan(after=first, goes_on=True)
+    scan.now += 0.001
+    scan.connect(activate=False)
+    scan.until(lambda: scan.state is State.WF_ACTIVATION)
+    scan.run(0.5)
+    assert scan.state is State.WF_ACTIVATION, "it was asked for"
+    scan.stop()
+    before = scan.travels()
+    scan.now += 20
+    assert scan.travels() == before
+
+
+def test_a_stop_leaves_the_activation_of_a_session_that_ended_after_it_alone() -> None:
+    first = started()
+    scan = Scan(after=first, goes_on=True)
+    scan.connect()
+    scan.stop()
+    assert scan.status().is_activated

@@ -16,7 +16,7 @@ def never(_: object) -> bool:
 
 
 @pytest.fixture
-def claims() -> Claims[str]:
+def claims() -> Claims[str, str]:
     return Claims()
 
 
@@ -38,7 +38,7 @@ def test_unit_ids_tell_grippers_apart_where_both_are_given(
     assert one.may_be(other) is other.may_be(one) is may_be
 
 
-async def test_the_first_owns_it_until_it_gives_it_back(claims: Claims[str]) -> None:
+async def test_the_first_owns_it_until_it_gives_it_back(claims: Claims[str, str]) -> None:
     assert claims.claim(lambda: Gripper("x"), "first", never) is None
     for who in ("second", "first"):
         assert claims.claim(lambda: Gripper("x"), who, never) == "first"
@@ -47,7 +47,7 @@ async def test_the_first_owns_it_until_it_gives_it_back(claims: Claims[str]) -> 
     assert claims.claim(lambda: Gripper("x"), "third", never) is None
 
 
-async def test_where_a_gripper_is_is_asked_again(claims: Claims[str]) -> None:
+async def test_where_a_gripper_is_is_asked_again(claims: Claims[str, str]) -> None:
     places = {"by-id": "ttyUSB0"}
     claims.claim(lambda: Gripper(places["by-id"]), "first", never)
     assert claims.claim(lambda: Gripper("ttyUSB0"), "second", never) == "first"
@@ -56,13 +56,13 @@ async def test_where_a_gripper_is_is_asked_again(claims: Claims[str]) -> None:
     assert claims.claim(lambda: Gripper("ttyUSB0"), "second", never) is None
 
 
-async def test_an_owner_that_is_over_owns_nothing(claims: Claims[str]) -> None:
+async def test_an_owner_that_is_over_owns_nothing(claims: Claims[str, str]) -> None:
     claims.claim(lambda: Gripper("x"), "first", never)
     assert claims.claim(lambda: Gripper("x"), "second", lambda who: who == "first") is None
     assert claims.claim(lambda: Gripper("x"), "third", never) == "second"
 
 
-def test_an_owner_whose_loop_was_closed_owns_nothing(claims: Claims[str]) -> None:
+def test_an_owner_whose_loop_was_closed_owns_nothing(claims: Claims[str, str]) -> None:
     async def claim(who: str) -> str | None:
         return claims.claim(lambda: Gripper("x"), who, never)
 
@@ -70,7 +70,7 @@ def test_an_owner_whose_loop_was_closed_owns_nothing(claims: Claims[str]) -> Non
     assert asyncio.run(claim("second")) is None
 
 
-async def test_an_owner_of_another_loop_is_not_asked_whether_it_is_over(claims: Claims[str]) -> None:
+async def test_an_owner_of_another_loop_is_not_asked_whether_it_is_over(claims: Claims[str, str]) -> None:
     """It may be about to begin."""
     claims.claim(lambda: Gripper("x"), "first", never)
 
@@ -80,7 +80,7 @@ async def test_an_owner_of_another_loop_is_not_asked_whether_it_is_over(claims: 
     assert await asyncio.to_thread(asyncio.run, claim()) == "first"
 
 
-async def test_of_many_threads_one_gets_it(claims: Claims[str]) -> None:
+async def test_of_many_threads_one_gets_it(claims: Claims[str, str]) -> None:
     def slowly() -> Gripper:
         time.sleep(0.001)  # another thread's turn, in the middle of a claim
         return Gripper("another")
@@ -102,7 +102,7 @@ async def test_of_many_threads_one_gets_it(claims: Claims[str]) -> None:
         assert sum(got) == 1
 
 
-async def test_a_serial_line_is_shared_in_one_event_loop(claims: Claims[str]) -> None:
+async def test_a_serial_line_is_shared_in_one_event_loop(claims: Claims[str, str]) -> None:
     """Its connection belongs to one."""
     left, right = Gripper("x", 9, is_on_line=True), Gripper("x", 12, is_on_line=True)
 
@@ -113,3 +113,14 @@ async def test_a_serial_line_is_shared_in_one_event_loop(claims: Claims[str]) ->
     assert await asyncio.to_thread(asyncio.run, claim()) == "first"
     assert claims.claim(lambda: right, "second", never) is None
     assert claims.claim(lambda: Gripper("x", 14), "Modbus TCP to the same socket", never) == "first"
+
+
+async def test_the_next_owner_gets_what_the_last_one_has_left(claims: Claims[str, str]) -> None:
+    here, there = Gripper("x"), Gripper("y")
+    assert claims.left(here) is None
+    claims.claim(lambda: here, "first", never)
+    claims.release("first", "what is on its way")
+    claims.release("first", "too late")
+    claims.claim(lambda: here, "second", never)
+    claims.release("second")
+    assert (claims.left(here), claims.left(there)) == ("what is on its way", None)
