@@ -89,7 +89,8 @@ fuzz: $(STAMP)  ## A million mutated replies through the decoder, 100,000 throug
 explore: $(STAMP)  ## Try random examples that the tests do not, for some minutes
 	@$(BIN)/python -m tests.link.lives
 	@HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest -o hangs_after=1800 \
-		tests/adversity/test_model.py tests/control/test_random.py
+		tests/adversity/test_model.py tests/control/test_random.py tests/control/test_lives.py
+	@$(BIN)/python -m tests.adversity.held_part --lives 60
 
 bench: $(STAMP)  ## Measure steadiness and cost beside bare pymodbus and a C thread (12 minutes; needs gcc)
 	@$(BIN)/python -m tests.benchmarks --json benchmarks.json

@@ -81,7 +81,7 @@ class Scan:
         ``lag`` is by how many polls gDT and gSTA come late, ``spacing`` the hand's ``write_spacing``; the
         options are the gripper's.
         """
-        self._lag_s = lag * POLL_S
+        self.lag_s = lag * POLL_S
         self._late: deque[tuple[float, Registers]] = deque()
         self._time: list[float] = [100.0] if after is None else after._time
         self.gripper: SimulatedGripper
@@ -127,9 +127,9 @@ class Scan:
     def status(self) -> RobotiqStatus:
         self.polls += 1
         now, registers = self.now, self.gripper.status_registers()
-        if self._lag_s:
+        if self.lag_s:
             self._late.append((now, registers))
-            while len(self._late) > 1 and self._late[1][0] <= now - self._lag_s + ROUNDING_S:
+            while len(self._late) > 1 and self._late[1][0] <= now - self.lag_s + ROUNDING_S:
                 self._late.popleft()
             registers = with_object_status(registers, self._late[0][1])
         return RobotiqStatus(registers, now, self.polls, self.gripper.model)

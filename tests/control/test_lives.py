@@ -21,13 +21,28 @@ from robotiq_async.values.enums import NO_AXES, Trigger
 from robotiq_async.values.errors import RobotiqError
 from robotiq_async.values.model import THREE_FINGER, TOLERANCE
 from robotiq_async.values.request import Request
+from tests.control.held_parts import JudgedScan
 from tests.control.other_client import image
-from tests.control.scan import Outcome, Scan
+from tests.control.scan import Outcome
 
 AXES: Final = THREE_FINGER.axes
 OURS: Final = ("move", "move", "command", "cancel", "overtake", "hold", "halt")
+CLOSED: Final = 255
 KINDS: Final = {
     "ours": (*OURS, "place", "forget"),
+    "held": (
+        "grasp",
+        "press",
+        "press",
+        "press",
+        "cancel",
+        "overtake",
+        "hold",
+        "hold",
+        "halt",
+        "lose",
+        "blip",
+    ),
     "link": (*OURS, "lose", "lose"),
     "fault": (*OURS, "fault", "clear", "reset", "activate", "release"),
     "foreign": (*OURS, "foreign", "foreign"),
@@ -64,7 +79,7 @@ steps = st.lists(
 )
 
 
-class Watched(Scan):
+class Watched(JudgedScan):
     """Checks each image before it is written."""
 
     motions: Counter[tuple[Finger, int]]
@@ -97,8 +112,6 @@ class Life:
         self.scan = scan
         self.calls: list[Outcome] = []
         self.moves: list[tuple[Move, Outcome]] = []
-        self.asked: Counter[tuple[Finger, int]] = Counter()
-        """Number of requests for an axis to go to a position."""
         self.stays: dict[Finger, float] = {}
         """The axes without any request to move, with the travel of each."""
         self.given_up = NO_AXES
@@ -114,8 +127,8 @@ class Life:
     def ask(self, axes: Finger, position: int) -> None:
         for axis in AXES:
             if axis in axes:
-                self.asked[axis, position] += 1
                 self.stays.pop(axis, None)
+        self.scan.ask(axes, position)
         self.given_up &= ~axes
 
     def live_move(self, step: Step) -> tuple[Move, Outcome] | None:
@@ -138,6 +151,7 @@ class Life:
     def disturb(self) -> None:
         self.disturbed = self.scan.now
         self.stays.clear()
+        self.scan.parts.forget(Finger.ALL)
         self.given_up = NO_AXES
 
     def happen(self, what: str, step: Step) -> None:
@@ -175,7 +189,19 @@ class Life:
                     self.stand(Finger.ALL)
             case "place":
                 gripper.place_object(axes, 20 + position * 210 // 255)
+                scan.parts.forget(axes)
                 self.given_up &= ~axes  # it may have been taken from a finger, which presses on after a halt
+            case "grasp":
+                gripper.place_object(axes, at := 40 + position * 150 // 255)
+                scan.parts.forget(axes)
+                self.press(axes, force=at)
+                scan.run(3.0)
+            case "press":
+                self.press(axes, force=position)
+            case "blip":
+                gripper.inject_fault(0x09)
+                scan.run(0.02 + step.chance / 10)
+                gripper.clear_faults()
             case "forget":
                 scan.forgets += 1
             case "lose":
@@ -193,6 +219,12 @@ class Life:
                 wanted = {axis: (position + 67 * number) % 256 for number, axis in enumerate(AXES)}
                 gripper.write(0, image(wanted, go=step.chance < 0.7))
                 self.disturb()
+
+    def press(self, axes: Finger, force: int) -> None:
+        move, outcome = self.scan.move(CLOSED, axes, speed=255, force=force)
+        self.moves.append((move, outcome))
+        self.calls.append(outcome)
+        self.ask(axes, CLOSED)
 
     def move_all(self, what: str) -> None:
         scan = self.scan
@@ -236,9 +268,10 @@ class Life:
         scan.run(1.0)
         before = scan.travels()
         if scan.state in RUNNING:
-            scan.until(lambda: not scan.controller.is_moving, 60)
+            scan.until(lambda: not scan.gripper.is_moving, 60)
             scan.run(0.6)
             assert not scan.gripper.is_moving
+            assert not scan.controller.is_moving
             assert all(each.is_answered for each in self.calls), "a caller waits for ever"
             moved = [axis for axis, travel in scan.travels().items() if travel > before[axis] + TOLERANCE]
             assert not self.given_up & reduce(or_, moved, NO_AXES), "it goes on, and was to stand"
@@ -268,6 +301,6 @@ def test_whatever_happens_the_hand_does_what_was_asked_and_nothing_else(
     lived.live(KINDS[kind], life)
     if "foreign" not in KINDS[kind]:  # another client's request is repeated with our own
         assert all(
-            count <= lived.asked[motion] for motion, count in scan.motions.items() if lived.asked[motion]
+            count <= scan.asked[motion] for motion, count in scan.motions.items() if scan.asked[motion]
         )
     lived.end(keep_grip=keep_grip)

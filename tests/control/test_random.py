@@ -10,12 +10,14 @@ from robotiq_async import JAW, Finger, MoveResult, ObjectStatus, State
 from robotiq_async.control.motion import Move
 from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.values.model import THREE_FINGER, TOLERANCE, TWO_FINGER_85, Model
+from tests.control.held_parts import JudgedScan
 from tests.control.other_client import image
 from tests.control.scan import Outcome, Scan
 from tests.register_words import only_holds
 
 masks = st.integers(1, 15).map(Finger)
 values = st.integers(0, 255)
+CLOSED = 255
 WAITS_S = 0.05
 """Seconds between polls while nothing is asked and everything comes to rest."""
 PAUSES = st.sampled_from([0.0, 0.005, 0.01, 0.05])
@@ -34,7 +36,7 @@ class RandomUse(RuleBasedStateMachine):
         model=st.sampled_from([THREE_FINGER, TWO_FINGER_85]),
     )
     def begin(self, device_cycle: float, model: Model) -> None:
-        self.scan, self.model = Scan(device_cycle=device_cycle, model=model), model
+        self.scan, self.model = JudgedScan(device_cycle=device_cycle, model=model), model
         self.scan.start()
         self.asked: set[Finger] = set()
         """Axes that were ever addressed by a position since the last activation."""
@@ -53,11 +55,15 @@ class RandomUse(RuleBasedStateMachine):
     def running(self) -> bool:
         return self.scan.state in RUNNING
 
+    def ask(self, axes: Finger, position: int) -> None:
+        self.asked |= {axis for axis in self.model.axes if axis in axes}
+        self.scan.ask(axes, position)
+
     @rule(axes=masks, position=values, speed=st.none() | values)
     @precondition(lambda self: self.running)
     def move(self, axes: Finger, position: int, speed: int | None) -> None:
         axes = axes & self.model.all_axes or JAW
-        self.asked |= {axis for axis in self.model.axes if axis in axes}
+        self.ask(axes, position)
         self.outcomes.append(self.scan.move(position, axes, speed=speed))
 
     @rule(axes=masks, position=st.none() | values, force=values)
@@ -65,7 +71,7 @@ class RandomUse(RuleBasedStateMachine):
     def command(self, axes: Finger, position: int | None, force: int) -> None:
         axes = axes & self.model.all_axes or JAW
         if position is not None:
-            self.asked |= {axis for axis in self.model.axes if axis in axes}
+            self.ask(axes, position)
         self.outcomes.append((None, self.scan.command(axes, position=position, force=force)))
 
     @rule(which=st.integers(0, 1000))
@@ -97,6 +103,17 @@ class RandomUse(RuleBasedStateMachine):
     def place(self, axes: Finger, position: int) -> None:
         axes = axes & self.model.all_axes or JAW
         self.scan.gripper.place_object(axes, position)
+        self.scan.parts.forget(axes)
+
+    @rule(axes=masks, position=st.integers(20, 230), force=values)
+    @precondition(lambda self: self.running)
+    def grip(self, axes: Finger, position: int, force: int) -> None:
+        axes = axes & self.model.all_axes or JAW
+        self.scan.gripper.place_object(axes, position)
+        self.scan.parts.forget(axes)
+        self.ask(axes, CLOSED)
+        self.outcomes.append(self.scan.move(CLOSED, axes, speed=255, force=force))
+        self.scan.run(2.0)
 
     @rule(answered=st.booleans(), away=st.sampled_from([0.0, 0.01, 1.0]))
     @precondition(lambda self: self.running)
@@ -134,9 +151,10 @@ class RandomUse(RuleBasedStateMachine):
     @precondition(lambda self: self.running)
     def everything_comes_to_rest(self) -> None:
         self.scan.step()  # an object taken away sets axes in motion without a command
-        self.scan.until(lambda: not self.scan.controller.is_moving, 60, WAITS_S)
+        self.scan.until(lambda: not self.scan.gripper.is_moving, 60, WAITS_S)
         wait(self.scan, 0.6)  # what has no echo is given half a second to act
         assert not self.scan.gripper.is_moving
+        assert not self.scan.controller.is_moving
         for move, outcome in self.outcomes:
             assert outcome.is_answered
             if move is not None and isinstance(outcome.answers[0], MoveResult):
