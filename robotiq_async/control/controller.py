@@ -89,6 +89,10 @@ class Controller:
         self._warned = NEVER  # when another client was warned of
         self._free_at = NEVER  # when the spacing after the last write is over
 
+    def allow_activation(self, allowed: bool) -> None:
+        """Whether a gripper that is found reset is activated, from here on."""
+        self.activates = allowed
+
     # -- what is asked ---------------------------------------------------------------------------------
     # Each call raises the error by which the state machine refuses it. A refusal changes nothing.
 
@@ -263,6 +267,11 @@ class Controller:
     @property
     def has_request(self) -> bool:
         return self._stop is not None or self._procedure is not None or not self._requests.pending.is_empty
+
+    @property
+    def is_off(self) -> bool:
+        """Whether the hand is to stop, or has stopped."""
+        return self.machine.state in _OFF
 
     @property
     def has_open_stop(self) -> bool:

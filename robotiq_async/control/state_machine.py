@@ -166,6 +166,14 @@ class StateMachine:
         self.log.log(level, "%s -> %s (%s)", source.name, target.name, trigger.value)
         self.changed(source, target, trigger)
 
+    def begin(self, changed: Callable[[State, State, Trigger], None]) -> None:
+        """A run begins: call this function after each change from here on."""
+        self.changed, self.why_down = changed, None
+
+    def note_down(self, why: object) -> None:
+        """The link is down, for the error of what is refused then."""
+        self.why_down = why
+
 
 def refusal(
     trigger: Trigger, state: State, status: RobotiqStatus | None = None, why_down: object = None

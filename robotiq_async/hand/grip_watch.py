@@ -58,9 +58,14 @@ class _Grip:
     was_pressed: bool = False
     is_slipping: bool = False
 
-    def is_pressed(self, model: Model, request: int) -> bool:
-        """Whether a request lies beyond the contact, so that the axis presses."""
-        return agrees(model, request, self.contact, self.touched, direction=0)
+    def note_request(self, model: Model, request: int) -> bool:
+        """Note a request; whether it lies beyond the contact, so that the axis presses."""
+        is_pressed = agrees(model, request, self.contact, self.touched, direction=0)
+        self.was_pressed |= is_pressed
+        return is_pressed
+
+    def slip(self, position: int, *, is_touching: bool) -> None:
+        self.position, self.is_slipping = position, not is_touching
 
     def is_left(self, moved: int) -> bool:
         """Whether an axis that has moved by this many counts has left the part."""
@@ -129,8 +134,7 @@ class GripWatch:
         is_touching = _contact(axis, status) is grip.contact
         if is_touching and grip.is_slipping:
             return self._gain(axis, status)
-        is_pressed = grip.is_pressed(status.model, status.requested_position(axis))
-        grip.was_pressed |= is_pressed
+        is_pressed = grip.note_request(status.model, status.requested_position(axis))
         lets_go = not is_pressed and _follows_requests(status)
         moved = status.position(axis) - grip.position
         if is_touching or (is_pressed and _moves(axis, status)):
@@ -138,7 +142,7 @@ class GripWatch:
             is_leaving = lets_go and grip.was_pressed
             if grip.is_slipping or is_leaving or abs(moved) <= self._slip:
                 return []
-            grip.position, grip.is_slipping = status.position(axis), not is_touching
+            grip.slip(status.position(axis), is_touching=is_touching)
             return [(GripChange.SLIPPED, moved)]
         del self._grips[axis]
         is_released = lets_go and (grip.was_pressed or grip.is_left(moved))
@@ -150,7 +154,7 @@ class GripWatch:
         if contact is None:
             return []
         self._grips[axis] = grip = _Grip(contact, position, position)
-        grip.was_pressed = grip.is_pressed(status.model, status.requested_position(axis))
+        grip.note_request(status.model, status.requested_position(axis))
         return [(GripChange.GAINED, 0)]
 
 

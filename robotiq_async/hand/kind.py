@@ -124,9 +124,8 @@ class Kind(ABC):
         return channel.open(buffer, limit, self._no_status_for)
 
     def _no_status_for(self, seconds: float) -> ConnectionLostError:
-        error = ConnectionLostError(f"no status for {seconds:g} s (the hand is in {self.state.name})")
-        error.hand = self._given_name
-        return error
+        why = f"no status for {seconds:g} s (the hand is in {self.state.name})"
+        return ConnectionLostError(why).of_hand(self._given_name)
 
     def _abandon_if_loop_closed(self) -> None:
         if self._session is not None and self._session.lost_its_loop:

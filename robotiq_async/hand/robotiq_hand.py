@@ -401,8 +401,8 @@ class RobotiqHand(Hand):
             return super()._no_status_for(seconds)
         why = self._session.link_lost()
         error = ConnectionLostError(f"no status for {seconds:g} s: {why.message}")
-        error.__cause__, error.hand = why.__cause__, why.hand
-        return error
+        error.__cause__ = why.__cause__
+        return error.of_hand(why.hand)
 
     def _is_moving(self) -> bool:
         assert self._session is not None, "only asked of a hand that runs"

@@ -42,7 +42,7 @@ class NamesErrors:
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if self._name and isinstance(error, RobotiqError):
-            error.hand = self._name
+            error.of_hand(self._name)
 
 
 def refuse_copy(hand: object) -> NoReturn:

@@ -24,6 +24,7 @@ from typing import ClassVar, Final, Literal
 
 from . import fine_waits
 from .clock import clock_of, resolution_of
+from .limit import HELD_S
 from .timerfd import TimerFd
 
 Source = Literal["timerfd", "loop timer"]
@@ -41,9 +42,10 @@ class Tick:
         interval: seconds between ticks; longer than asked for where the clock cannot tell them apart.
         time: the clock of the deadlines.
         due: the next deadline.
-        late: the longest delay of a tick in seconds, since its reader last set this to 0. What a step of the
-            clock may hide is no delay.
+        late: the longest delay in seconds of the ticks that ended the last wait. What a step of the clock may
+            hide is no delay.
         longest_late: the longest delay so far.
+        held_up_at: the time of the last tick that was so late that the loop was held up before it.
     """
 
     def __init__(self, interval: float) -> None:
@@ -55,6 +57,8 @@ class Tick:
         self.due = 0.0
         self.late = 0.0
         self.longest_late = 0.0
+        self.held_up_at = -math.inf
+        self._late = 0.0  # the longest delay since the last wait
         self._passed = 0
         self._hurried = False
         self._waiter: asyncio.Future[None] | None = None
@@ -65,7 +69,7 @@ class Tick:
         self._timer = timer = _LoopTimer.of(self._loop)
         phase = self.interval * timer.next_phase()
         self.due = math.ceil((self.time() - phase) / self.interval) * self.interval + phase
-        self._passed, self._hurried, self.late = 0, False, 0.0
+        self._passed, self._hurried, self._late = 0, False, 0.0
         timer.add(self)
 
     def close(self) -> None:
@@ -93,14 +97,17 @@ class Tick:
             self._waiter = self._loop.create_future()
             await self._waiter
         passed, self._passed, self._hurried = self._passed, 0, False
+        self.late, self._late = self._late, 0.0
         return passed
 
     def expire(self, now: float) -> None:
         """Count the deadline, and any further ones, that have passed; set the next."""
         passed = now - self.due
-        if passed - self._step > self.late:
-            self.late = passed - self._step
-            self.longest_late = max(self.longest_late, self.late)
+        if passed - self._step > self._late:
+            self._late = passed - self._step
+            self.longest_late = max(self.longest_late, self._late)
+        if passed - self._step > HELD_S:
+            self.held_up_at = now
         count = 1 + int(passed / self.interval)
         self.due += count * self.interval
         self._passed += count

@@ -2,19 +2,19 @@
 
 # Theory of operation
 #
-# The controller decides and knows no task. The poller is the one task that uses the link. Callers run in
+# The controller decides and knows no task. The run is the one task that uses the link. Callers run in
 # tasks of their own, and never touch the link: ask() gives a request to the controller in the caller's turn
-# of the loop, publishes the changes of state that follow, and wakes the poller if something is due. A caller
+# of the loop, publishes the changes of state that follow, and wakes the run if something is due. A caller
 # then waits for a future. The controller answers the future of a request or a move; StateWaiters answers
 # that of a state.
 #
 # A wait is in vain in DISCONNECTED and in DO_SHUTDOWN. An activation has further states that end it. Only
 # wait_for_state() waits all of them out.
 #
-# A run ends once, in _end(): after a stop, when the link is given up, or when the poller fails by a mistake
-# of ours. It ends in the turn of the loop in which the poller does. The gripper is given back before SHUTDOWN
-# is published, because a reader of that may start a hand, and every future that is left fails. If the event
-# loop was closed, no turn is left: abandon() ends the run and does not touch the futures of that loop.
+# A run ends once, in Run.end_with(), and _end() is called in that turn of the loop. The gripper is given back
+# before SHUTDOWN is published, because a reader of that may start a hand, and every future that is left
+# fails. If the event loop was closed, no turn is left: abandon() ends the run and does not touch the futures
+# of that loop.
 
 from __future__ import annotations
 
@@ -33,7 +33,6 @@ from ..runtime.limit import Limit
 from ..values.enums import Fault, Finger, State, Trigger
 from ..values.errors import (
     ActivationTimeoutError,
-    ConnectionLostError,
     GripperFaultError,
     InvalidStateError,
     NotActivatedError,
@@ -48,7 +47,7 @@ from ..values.statistics import Counters
 from ..values.status import RobotiqStatus
 from .gripper_link import Claims
 from .options import HandOptions
-from .poller import Poller
+from .run import Run, RunState
 from .streams import Channels
 from .waiting import STALLED_S, ActivationProgress, StallWatch, StateWaiters
 
@@ -80,11 +79,13 @@ class Session:
         wait: float = 0.0,
     ) -> None:
         self.options = options
-        self.is_over = True  # until the poller task runs
-        self._loop = asyncio.get_running_loop()
         self.machine = machine
         left = self._claim()
-        machine.why_down = None
+        self._loop = asyncio.get_running_loop()
+        self._channels = channels
+        self._waiters = StateWaiters()
+        self._progress = ActivationProgress(self._loop, options.log)
+        self.counters = Counters()
         self.controller = Controller(
             machine,
             options.speed,
@@ -94,38 +95,26 @@ class Session:
             options.model,
             left,
         )
-        self.controller.activates = activate
-        self.counters = Counters()
-        self._channels = channels
-        self._waiters = StateWaiters()
-        self._progress = ActivationProgress(self._loop, options.log)
+        self.controller.allow_activation(activate)
+        try:
+            link = options.make_transport()
+        except BaseException:
+            self._claims.release(self)
+            raise
+        self.run = Run(link, self.controller, self.counters, channels, options, self._end)
         channels.reopen(self._loop)
-        machine.changed = self._on_transition
-        self._poller = Poller(
-            options.make_transport(), self.controller, self.counters, channels, options, wait=wait
-        )
+        machine.begin(self._on_transition)
         machine.show(State.DISCONNECTED, Trigger.ASK_START)
         channels.publish_changes()
-        self.is_over = False
-        self._task = self._loop.create_task(self._run(), name="robotiq_async poller")
+        self._task = self._loop.create_task(self.run.run(wait), name="robotiq_async poller")
         self._task.add_done_callback(self._end_with)
 
-    async def _run(self) -> None:
-        """Run the poller; the run is over in the same turn of the loop.
-
-        A stop() in a turn between would strengthen an ending that has ended, and be lost.
-        """
-        bug: BaseException | None = None
-        try:
-            await self._poller.run()
-        except Exception as error:
-            bug = error
-            raise
-        finally:
-            if not self._loop.is_closed():
-                self._end(bug)
-
     # -- its end ---------------------------------------------------------------------------------------
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it has ended."""
+        return self.run.state is RunState.OVER
 
     @property
     def lost_its_loop(self) -> bool:
@@ -135,7 +124,7 @@ class Session:
     async def stop(self, *, halt: bool, keep_grip: bool = False) -> None:
         """Stop as :meth:`Hand.stop` promises, also when cancelled during it."""
         self.check_loop("hand.stop()")
-        self._poller.request_stop(halt=halt, keep_grip=keep_grip)
+        self.run.request_stop(halt=halt, keep_grip=keep_grip)
         await self.ended()
 
     async def ended(self) -> None:
@@ -149,8 +138,8 @@ class Session:
     def abandon(self) -> None:
         """End a run whose event loop was closed. Its callers' futures belong to that loop: leave them."""
         self.options.log.warning("the event loop was closed before stop(); the fingers may still move")
-        self._release()
-        self._poller.abandon()
+        self.run.abandon()
+        self._claims.release(self, self.controller.left())
         self._waiters = StateWaiters()
         self._channels.end()
         self.controller.refuse_requests()
@@ -171,29 +160,19 @@ class Session:
             )
         return self._claims.left(gripper())
 
-    def _release(self) -> None:
-        self.is_over = True
-        self._claims.release(self, self.controller.left())
-
     def _end_with(self, task: asyncio.Task[None]) -> None:
         """The task has ended, perhaps before it ran."""
-        self._end(None if task.cancelled() else task.exception())
+        self.run.end_with(None if task.cancelled() else task.exception())
 
-    def _end(self, bug: BaseException | None) -> None:
+    def _end(self) -> None:
         """The run is over: no caller may wait for it."""
-        if self.is_over:
-            return
-        self._release()  # before SHUTDOWN is published: a reader of it may start a hand
+        run = self.run
+        # Before SHUTDOWN is published: a reader of it may start a hand.
+        self._claims.release(self, self.controller.left())
         self.controller.close()
         self._channels.publish_changes()
-        failure: Callable[[], RobotiqError] | None = None
-        if bug is not None:
-            self.options.log.critical("the task that owns the link failed", exc_info=bug)
-            failure = lambda: ConnectionLostError(f"internal error: {bug!r}")  # noqa: E731
-        elif self._poller.failure is not None:
-            failure = self.link_lost
-        self._waiters.fail(failure or self._stopped)
-        self._channels.end(failure)
+        self._waiters.fail(run.why_over)
+        self._channels.end(None if run.failure is None else run.why_over)
 
     # -- whether it takes calls ------------------------------------------------------------------------
 
@@ -204,7 +183,7 @@ class Session:
     def check_running(self) -> None:
         """Raise NotStartedError, or ConnectionLostError if the link was given up, unless the hand runs."""
         if self.is_over:
-            if self._poller.failure is not None:
+            if isinstance(self.run.failure, RobotiqConnectionError):
                 raise self.link_lost()
             raise NotStartedError("the hand is not started", advice="use 'async with' or start()")
         if self._loop.is_closed():
@@ -216,19 +195,13 @@ class Session:
             raise self._stopped()
 
     def link_lost(self) -> RobotiqConnectionError:
-        """Make the error for a link that is down, with the reason if that is known."""
-        failure = self._poller.failure or self._poller.why_lost
-        since = f" (down since {self._poller.lost_since})" if self._poller.lost_since else ""
-        error = ConnectionLostError(f"the link is down{'' if failure is None else f': {failure}'}{since}")
-        error.__cause__ = failure
-        error.hand = self.options.given_name
-        return error
+        return self.run.link_error()
 
     # -- waiting ---------------------------------------------------------------------------------------
 
     async def connected(self) -> None:
         """Wait for the first status; raises RobotiqError if there is none."""
-        await self._poller.connected
+        await self.run.connected
 
     def waiter(self) -> asyncio.Future[Any]:
         return self._loop.create_future()
@@ -239,7 +212,7 @@ class Session:
             return request(*args, **kwargs)
         finally:
             self._channels.publish_changes()
-            self._poller.hurry()
+            self.run.hurry()
 
     async def answered(self, request: Callable[[Waiter[None]], None]) -> None:
         """Make a request and wait for its acknowledgement; raises RobotiqError if there is none."""
@@ -373,7 +346,8 @@ class Session:
         return GripperFaultError(self.controller.status.fault)
 
     def _on_transition(self, source: State, target: State, trigger: Trigger) -> None:
-        self.counters.faults += target is State.FAULT
+        if target is State.FAULT:
+            self.counters.note_fault()
         self._waiters.reached(target)
         self._progress.reached(target)
         self._channels.changes.append(Transition(source, target, trigger, now()))

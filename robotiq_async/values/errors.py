@@ -35,7 +35,7 @@ Bad arguments raise ValueError or TypeError.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from .enums import Fault, State
 
@@ -58,6 +58,11 @@ class RobotiqError(Exception):
         super().__init__(*args)
         if advice:
             self.advice = advice
+
+    def of_hand(self, name: str) -> Self:
+        """Name the hand; returns the error itself."""
+        self.hand = name
+        return self
 
     @property
     def message(self) -> str:

@@ -111,6 +111,26 @@ class Counters:
         self._busy += took
         self.status_ages.append(age)
 
+    def note_begun_to_write(self) -> None:
+        """A write leaves, acknowledged later or not."""
+        self.has_begun_to_write = True
+
+    def note_missed(self, ticks: int) -> None:
+        self.overruns += ticks
+
+    def note_stall(self, seconds: float) -> None:
+        """Note the longest delay of a tick so far."""
+        self.longest_stall = seconds
+
+    def note_tick(self, source: str) -> None:
+        self.tick = source
+
+    def note_reconnect(self) -> None:
+        self.reconnects += 1
+
+    def note_fault(self) -> None:
+        self.faults += 1
+
     @contextmanager
     def move(self) -> Iterator[Callable[[MoveResult], None]]:
         """Count a move by its outcome; call the function that this yields with its result."""

@@ -1,4 +1,4 @@
-"""A poller that has had its first contact with an active gripper; and a session at one, with its wire."""
+"""A run that has had its first contact with an active gripper; and a session at one, with its wire."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A poller with what it owns, on a wire without a network, in virtual time."""
+"""A run with what it owns, on a wire without a network, in virtual time."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from typing import TypeVar
 
 from robotiq_async.control.controller import Controller
 from robotiq_async.control.state_machine import StateMachine
+from robotiq_async.session.ending import STOP_S
 from robotiq_async.session.options import ReconnectPolicy
-from robotiq_async.session.poller import STOP_S, Poller
+from robotiq_async.session.run import Run
 from robotiq_async.session.streams import Channel, Channels, Listeners
 from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.enums import State, Trigger
@@ -30,7 +31,7 @@ POLL_S = 0.01
 
 
 class Published(Channel[T]):
-    """The published items; an error of a receiver is an error of the poller."""
+    """The published items; an error of a receiver is an error of the run."""
 
     def __init__(self, push: Callable[[T], None]) -> None:
         super().__init__(Listeners())
@@ -41,7 +42,7 @@ class Published(Channel[T]):
 
 
 class Polled:
-    """A poller with what it owns, and what it has published."""
+    """A run with what it owns, and what it has published."""
 
     def __init__(
         self, policy: ReconnectPolicy | None, *, activate: bool = False, poll_interval: float = POLL_S
@@ -50,7 +51,7 @@ class Polled:
         self.changes: list[tuple[State, State, Trigger]] = []
         self.machine = StateMachine(lambda *change: self.changes.append(change))
         self.controller = Controller(self.machine, 128, 64, closing_time)
-        self.controller.activates = activate
+        self.controller.allow_activation(activate)
         self.counters = Counters()
         self.statuses: list[RobotiqStatus] = []
         self.requests: list[SentRequest] = []
@@ -59,7 +60,7 @@ class Polled:
         channels.requests = Published(self.requests.append)
         channels.numbers = itertools.count(7)
         given = replace(options(self.wire, policy), poll_interval=poll_interval)
-        self.poller = Poller(self.wire, self.controller, self.counters, channels, given)
+        self.run = Run(self.wire, self.controller, self.counters, channels, given)
         self.at_next_status: Callable[[], None] | None = None
         self._published = asyncio.Event()
         self.task: asyncio.Task[None]
@@ -73,7 +74,7 @@ class Polled:
             call()
 
     def start(self) -> None:
-        self.task = asyncio.create_task(self.poller.run())
+        self.task = asyncio.create_task(self.run.run())
 
     async def polls(self, count: int = 1) -> None:
         """Wait until so many more statuses have come."""
@@ -107,12 +108,12 @@ async def polled(
     active: bool = True,
     poll_interval: float = POLL_S,
 ) -> AsyncIterator[Polled]:
-    """A poller that has had its first contact with a gripper, active or just switched on."""
+    """A run that has had its first contact with a gripper, active or just switched on."""
     here = Polled(policy, activate=activate, poll_interval=poll_interval)
     if active:
         await here.wire.activate()
     here.start()
-    await here.poller.connected
+    await here.run.connected
     yield here
-    here.poller.request_stop(halt=True)
+    here.run.request_stop(halt=True)
     await here.end()

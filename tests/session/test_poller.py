@@ -11,9 +11,11 @@ from itertools import pairwise
 import pytest
 
 from robotiq_async.control.pending import Command
+from robotiq_async.session.cycle import READS
+from robotiq_async.session.ending import STOP_S
+from robotiq_async.session.late_polls import LATE_WARNING_S
 from robotiq_async.session.opening import SHORTEST_S, Opener
 from robotiq_async.session.options import LATE_POLLS, HandOptions, ReconnectPolicy
-from robotiq_async.session.poller import LATE_WARNING_S, READS, STOP_S
 from robotiq_async.values.enums import Finger, State
 from robotiq_async.values.errors import (
     ConnectFailedError,
@@ -65,8 +67,8 @@ async def test_a_halt_does_not_wait_for_the_tick_and_shifts_no_tick(here: Polled
     del here.wire.calls[:]
     before, asked = here.statuses[-1].timestamp, here.loop.time()
     here.controller.halt(asyncio.get_running_loop().create_future())
-    here.poller.hurry()
-    here.poller.hurry()
+    here.run.hurry()
+    here.run.hurry()
     await here.polls()
     assert here.wire.calls == ["write", "read"]
     assert here.statuses[-1].timestamp - asked < POLL_S / 2
@@ -83,7 +85,7 @@ async def test_a_request_that_is_no_stop_waits_for_the_tick(here: Polled) -> Non
     await here.polls(3)
     before = here.statuses[-1].timestamp
     here.controller.command(Command(Finger.A, 200))
-    here.poller.hurry()
+    here.run.hurry()
     await here.polls()
     assert here.statuses[-1].timestamp == pytest.approx(before + POLL_S)
 
@@ -143,7 +145,7 @@ async def test_when_the_loop_was_held_up_between_two_cycles_a_stop_reads_first(h
         here.wire.gripper.write(0, Request().registers)
         here.loop.hold_up(0.5)
         here.controller.halt(waiter)
-        here.poller.hurry()
+        here.run.hurry()
 
     here.loop.call_later(POLL_S / 2, hold_up)
     await here.polls(1)
@@ -221,11 +223,11 @@ async def test_a_failed_first_contact_is_reported_and_ends_the_task(
     here.wire.failing[failing] = error
     here.start()
     with pytest.raises(expected) as caught:
-        await here.poller.connected
+        await here.run.connected
     assert caught.value is error or caught.value.__cause__ is error
     await here.end()
     assert "write" not in here.wire.calls
-    assert here.poller.failure is None, "the hand has not given up: it has never begun"
+    assert here.run.failure is None, "the hand has not given up: it has never begun"
 
 
 @pytest.mark.parametrize(
@@ -264,7 +266,7 @@ async def test_without_a_policy_a_lost_link_is_the_end() -> None:
         await here.polls(3)
         here.wire.failing["read"] = here.wire.failing["open"] = LOST
         await here.end()
-        assert here.poller.failure is LOST
+        assert here.run.failure is LOST
 
 
 @pytest.mark.parametrize("why", [RuntimeError("can't start new thread"), MemoryError(), KeyError("odd")])
@@ -287,7 +289,7 @@ async def test_whatever_keeps_a_link_from_being_opened_for_a_stop_is_a_failed_tr
         here.controller.command(Command(Finger.ABC, 255, 0))
         await here.polls(10)
         here.wire.failing = {"read": LOST, "write": LOST, "open": RuntimeError("can't start new thread")}
-        here.poller.request_stop(halt=True)
+        here.run.request_stop(halt=True)
         await asyncio.sleep(0.3)
         here.wire.failing.clear()
         await here.end()
@@ -317,7 +319,7 @@ async def test_the_policy_may_give_up_and_says_why() -> None:
         here.wire.failing["read"] = LOST
         here.wire.failing["open"] = why = ConnectFailedError("wire", "no route")
         await here.end(within=0.6 + STOP_S)
-        assert here.poller.failure is why
+        assert here.run.failure is why
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ import logging
 import pytest
 
 from robotiq_async.control.pending import Command
+from robotiq_async.session.ending import STOP_S
 from robotiq_async.session.options import ReconnectPolicy
-from robotiq_async.session.poller import STOP_S
 from robotiq_async.values.enums import Finger, State
 from robotiq_async.values.errors import NotStartedError
 from tests.fake_transport import LOST
@@ -27,11 +27,11 @@ async def moves(here: Polled, position: int = 200, speed: int = 0, polls: int = 
 async def test_a_stronger_stop_while_the_link_closes_opens_it_again(here: Polled) -> None:
     await moves(here)
     here.wire.closing_s = 0.3
-    here.poller.request_stop(halt=False)
+    here.run.request_stop(halt=False)
     await asyncio.sleep(0.1)
     assert here.wire.calls[-1] == "close"
     assert here.wire.gripper.is_moving
-    here.poller.request_stop(halt=True)
+    here.run.request_stop(halt=True)
     await here.end()
     assert not here.wire.gripper.is_moving
     assert here.wire.calls.count("open") == 2
@@ -39,9 +39,9 @@ async def test_a_stronger_stop_while_the_link_closes_opens_it_again(here: Polled
 
 async def test_a_stronger_stop_ends_one_that_keeps_a_grip(here: Polled) -> None:
     await moves(here, 50, 255, polls=300)
-    here.poller.request_stop(halt=True, keep_grip=True)
+    here.run.request_stop(halt=True, keep_grip=True)
     await here.polls(2)
-    here.poller.request_stop(halt=True)
+    here.run.request_stop(halt=True)
     await here.end()
     assert not here.requests[-1].request.go
 
@@ -52,7 +52,7 @@ async def test_a_final_hold_is_written_before_anything_is_read(here: Polled) -> 
 
     def stop() -> None:
         here.wire.silent.add("read")
-        here.poller.request_stop(halt=True, keep_grip=True)
+        here.run.request_stop(halt=True, keep_grip=True)
 
     here.at_next_status = stop
     await here.end()
@@ -66,7 +66,7 @@ async def test_a_link_that_is_lost_at_the_end_lets_a_grip_go(here: Polled) -> No
 
     def stop() -> None:
         here.wire.failing["read"] = LOST
-        here.poller.request_stop(halt=True, keep_grip=True)
+        here.run.request_stop(halt=True, keep_grip=True)
         asyncio.get_running_loop().call_later(0.1, here.wire.failing.clear)
 
     here.at_next_status = stop
@@ -78,7 +78,7 @@ async def test_a_stop_that_was_not_heard_is_sent_again(here: Polled) -> None:
     """Unlike a motion: a gripper that lost its client keeps moving."""
     await moves(here)
     here.wire.failing["write"] = LOST
-    here.poller.request_stop(halt=True)
+    here.run.request_stop(halt=True)
     await asyncio.sleep(0.3)
     assert here.wire.gripper.is_moving
     here.wire.failing.clear()
@@ -93,7 +93,7 @@ async def test_a_link_that_is_down_is_tried_once_more_at_the_end() -> None:
         await asyncio.sleep(0.1)
         here.wire.failing.clear()
         assert here.machine.state is State.DISCONNECTED
-        here.poller.request_stop(halt=True)
+        here.run.request_stop(halt=True)
         await here.end()
         assert not here.wire.gripper.is_moving
 
@@ -109,7 +109,7 @@ async def test_the_end_comes_in_time_without_any_answer(
         here.wire.failing["read"] = LOST
         await asyncio.sleep(0.02)
     began = here.loop.time()
-    here.poller.request_stop(halt=True)
+    here.run.request_stop(halt=True)
     await here.end()
     assert here.loop.time() - began == pytest.approx(STOP_S, abs=0.3)
     assert "did not confirm in time that the fingers were stopped" in caplog.text
@@ -122,9 +122,9 @@ async def test_a_stop_while_it_connects_ends_that_at_once(when: str) -> None:
     here.start()
     await asyncio.sleep(0.1)
     began = here.loop.time()
-    here.poller.request_stop(halt=True)
+    here.run.request_stop(halt=True)
     with pytest.raises(NotStartedError, match="stopped while it connected"):
-        await here.poller.connected
+        await here.run.connected
     await here.end()
     assert here.loop.time() - began < 0.01
 
@@ -133,7 +133,7 @@ async def test_a_stop_between_two_tries_does_not_wait_for_the_next() -> None:
     async with polled(ReconnectPolicy(first_delay=10.0, max_delay=10.0)) as here:
         here.wire.failing["read"] = LOST
         await asyncio.sleep(0.1)
-        here.poller.request_stop(halt=False)
+        here.run.request_stop(halt=False)
         await here.end()
         assert here.wire.calls.count("open") == 1
 
@@ -142,7 +142,7 @@ async def test_a_bug_does_not_keep_the_fingers_from_being_stopped() -> None:
     here = Polled(ReconnectPolicy())
     await here.wire.activate()
     here.start()
-    await here.poller.connected
+    await here.run.connected
     await moves(here)
 
     def bug() -> None:

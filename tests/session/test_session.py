@@ -56,7 +56,7 @@ async def test_in_shutdown_the_address_is_free() -> None:
 
 
 async def test_a_refused_session_keeps_the_reason_why_the_link_is_down(session: Session) -> None:
-    session.machine.why_down = LOST
+    session.machine.note_down(LOST)
     with pytest.raises(InvalidStateError, match="this hand runs"):
         Session(session.options, session.machine, session._channels, activate=False)
     assert session.machine.why_down is LOST

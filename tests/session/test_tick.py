@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import os
 import sys
 import threading
@@ -109,8 +110,10 @@ async def test_a_slow_reader_is_not_late_and_a_loop_that_is_held_up_is() -> None
         loop_of_this_test().hold_up(0.2)
         assert await tick.wait() == 40
         assert tick.late == pytest.approx(0.2, abs=INTERVAL)
-        tick.late = 0.0
+        held_up_at = tick.held_up_at
+        assert held_up_at == pytest.approx(tick.time(), abs=INTERVAL)
         await tick.wait()
+        assert tick.held_up_at == held_up_at
         assert tick.late < 0.001
         assert tick.longest_late == pytest.approx(0.2, abs=INTERVAL)
 
@@ -119,7 +122,10 @@ async def test_a_slow_reader_is_not_late_and_a_loop_that_is_held_up_is() -> None
 async def test_a_delay_is_noticed_while_no_reader_waits() -> None:
     with ticking() as tick:
         loop_of_this_test().hold_up(0.1)
+        assert tick.held_up_at == -math.inf
         await asyncio.sleep(0.001)
+        assert tick.held_up_at == pytest.approx(tick.time(), abs=0.002)
+        await tick.wait()
         assert tick.late == pytest.approx(0.1, abs=INTERVAL)
 
 

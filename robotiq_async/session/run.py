@@ -1,0 +1,352 @@
+"""A run of a hand: the one task that owns the link, from the first contact to the disconnection.
+
+No other task touches the transport: callers leave their requests with the controller and wait. So no exchange
+is cancelled in flight, except when a stop has waited for it long enough; then the link is closed with it.
+start() and stop() may be called from different tasks.
+"""
+
+# Theory of operation
+#
+# State        Since                                        Until
+#
+# CONNECTING   the making                                   the first status, a stop, or there is no gripper
+# POLLING      the first status, or the link is back        the link fails, a stop, or a mistake of ours
+# LOST         the link failed                              the link is back or given up, or a stop
+# ENDING       request_stop(), also by the run itself       the fingers are stopped and the link is closed
+# OVER         end_with(), or abandon()                     -
+#
+# _become() alone sets the state, and _NEXT has the order. A stop may come in any turn of the loop, also in
+# that in which a link was opened: after each wait the state is looked at, and ENDING never goes back.
+#
+# ENDING takes no requests. Its level and its time are those of an Ending. A run that ends by itself requests
+# its own stop: the link was given up, there is none, or its task was cancelled.
+#
+# A run has ended by a stop, unless `failure` is set: the error of a link that was given up, or a mistake of
+# ours. why_over() makes the error for everybody who waits then.
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import importlib
+from collections.abc import Callable, Mapping
+from enum import Enum
+from time import strftime
+from typing import Final, NamedTuple
+
+from ..control.controller import Controller
+from ..control.waiters import fail, resolve
+from ..link.transport import Link
+from ..runtime.limit import Limit
+from ..values.enums import StopLevel
+from ..values.errors import (
+    ConnectFailedError,
+    ConnectionLostError,
+    NotStartedError,
+    ResponseTimeoutError,
+    RobotiqConnectionError,
+    RobotiqError,
+)
+from ..values.statistics import Counters
+from .ending import IN_FLIGHT_S, Ending
+from .opening import Opener
+from .options import HandOptions
+from .poller import Poller
+from .streams import Channels
+
+# anyio loads its backend at its first use, which would hold up the loop for some 20 ms when a hand starts.
+# The name of the backend is not documented; if it changes, it only costs those 20 ms.
+with contextlib.suppress(ImportError):
+    importlib.import_module("anyio._backends._asyncio")
+
+STOP_PAUSE_S: Final = 0.05  # between two attempts to stop the fingers
+
+
+class RunState(Enum):
+    """The course of a run."""
+
+    CONNECTING = "the link is opened for the first time"
+    POLLING = "the link is open"
+    LOST = "the link is down, and opened again"
+    ENDING = "the fingers are stopped, if they are to be, and the link is closed"
+    OVER = "the link is closed"
+
+
+_NEXT: Final[Mapping[RunState, frozenset[RunState]]] = {
+    RunState.CONNECTING: frozenset({RunState.POLLING, RunState.ENDING, RunState.OVER}),
+    RunState.POLLING: frozenset({RunState.LOST, RunState.ENDING, RunState.OVER}),
+    RunState.LOST: frozenset({RunState.POLLING, RunState.ENDING, RunState.OVER}),
+    RunState.ENDING: frozenset({RunState.OVER}),
+    RunState.OVER: frozenset(),
+}
+
+
+class Down(NamedTuple):
+    """A link that is down: the newest reason, and the time of day since when."""
+
+    why: RobotiqConnectionError
+    since: str
+
+
+class Run:
+    """Owns the link of one hand from start to stop; :meth:`run` is the body of its task.
+
+    Attributes:
+        state: where it is in its course.
+        connected: done after the first status; holds the error if there is none.
+        down: the link while it is down; of one that was given up, for good.
+        failure: what has ended the run, unless that was a stop.
+    """
+
+    def __init__(
+        self,
+        link: Link,
+        controller: Controller,
+        counters: Counters,
+        channels: Channels,
+        options: HandOptions,
+        ended: Callable[[], None] = lambda: None,
+    ) -> None:
+        """``ended`` is called once, in the turn of the loop in which the run ends."""
+        self.state = RunState.CONNECTING
+        self.connected: Final[asyncio.Future[None]] = asyncio.get_running_loop().create_future()
+        self.down: Down | None = None
+        self.failure: BaseException | None = None
+        self._ended: Final = ended
+        self._link: Final = link
+        self._controller: Final = controller
+        self._counters: Final = counters
+        self._channels: Final = channels
+        self._options: Final = options
+        self._loop: Final = asyncio.get_running_loop()
+        self._poller: Final = Poller(link, controller, counters, channels, options)
+        self._opener: Final = Opener(self._connect, options)
+        self._in_flight: Final = Limit()  # of the exchange in flight when a stop comes
+        self._ending: Ending | None = None
+
+    def _become(self, state: RunState) -> None:
+        assert state in _NEXT[self.state], f"{self.state.name} -> {state.name}"
+        self._options.log.debug("run: %s -> %s", self.state.name, state.name)
+        self.state = state
+
+    # -- what others ask -------------------------------------------------------------------------------
+
+    def hurry(self) -> None:
+        """Begin the next cycle at once, and not with the tick, if it may begin with a write."""
+        self._poller.hurry()
+
+    def request_stop(self, *, halt: bool, keep_grip: bool = False) -> None:
+        """End the task as a :class:`StopLevel` says; the strongest of several requests counts. Never blocks.
+
+        From here on the controller refuses every request and has dropped those that were not sent: between
+        the read and the write of this cycle it would still take one and begin a motion.
+        """
+        level = StopLevel.of(halt=halt, keep_grip=keep_grip)
+        if self._ending is None:
+            # A halt, a reset or a hold that is not over is dropped with the rest: this stop must replace it.
+            level = max(level, StopLevel.KEEP) if self._controller.has_open_stop else level
+            self._ending = Ending(level, self._options.log)
+            if self.state is not RunState.CONNECTING:
+                self._in_flight.restart(IN_FLIGHT_S)
+            self._become(RunState.ENDING)
+            self._controller.refuse_requests()
+            self._channels.publish_changes()
+        elif self._ending.strengthen(level) and level is StopLevel.SHUTDOWN:
+            self._controller.keep_no_grip()
+        self._opener.end()
+
+    def link_error(self) -> RobotiqConnectionError:
+        """Make the error for a link that is down, with the reason if that is known."""
+        down = self.down
+        why = "" if down is None else f": {down.why} (down since {down.since})"
+        error = ConnectionLostError(f"the link is down{why}")
+        error.__cause__ = None if down is None else down.why
+        return error.of_hand(self._options.given_name)
+
+    def why_over(self) -> RobotiqError:
+        """Make the error for those who wait for anything of a run that is over."""
+        if self.failure is None:
+            return NotStartedError("the hand was stopped")
+        if isinstance(self.failure, RobotiqConnectionError):
+            return self.link_error()
+        return ConnectionLostError(f"internal error: {self.failure!r}")
+
+    # -- its course ------------------------------------------------------------------------------------
+
+    async def run(self, wait: float = 0.0) -> None:
+        """Own the link until asked to stop, or until it is given up.
+
+        Args:
+            wait: seconds to keep trying for the first status.
+        """
+        bug: BaseException | None = None
+        try:
+            try:
+                if await self._connect_first(wait):
+                    with self._in_flight:
+                        await self._poll()
+                    if self._in_flight.is_over:
+                        self._lose(ResponseTimeoutError("no answer until the hand was stopped"))
+            finally:
+                # An abandoned task is ended when it is collected: the hand may run again by then.
+                if not self._loop.is_closed():
+                    await self._finish()
+        except Exception as error:
+            bug = error
+            raise
+        finally:
+            # In this turn: a stop() in a turn between would strengthen an ending that has ended, and be lost.
+            if not self._loop.is_closed():
+                self.end_with(bug)
+
+    def end_with(self, bug: BaseException | None) -> None:
+        """The run is over, perhaps before its task ran: no caller may wait for it. Idempotent."""
+        if self.state is RunState.OVER:
+            return
+        if bug is not None:
+            self._options.log.critical("the task that owns the link failed", exc_info=bug)
+            self.failure = bug
+        self._become(RunState.OVER)
+        stopped = NotStartedError("the hand was stopped while it connected")
+        fail([self.connected], stopped if self.failure is None else self.why_over())
+        self._ended()
+
+    def abandon(self) -> None:
+        """The loop was closed: release the shared timer. The futures of that loop are left."""
+        if self.state is not RunState.OVER:
+            self._become(RunState.OVER)
+        self._poller.tick.close()
+
+    # -- connecting ------------------------------------------------------------------------------------
+
+    async def _connect_first(self, wait: float) -> bool:
+        try:
+            connected = await self._opener.first(wait)
+        except RobotiqConnectionError as error:
+            if not self.connected.done():  # start() may have been cancelled
+                self.connected.set_exception(error)
+            return False
+        if not connected or self.state is not RunState.CONNECTING:
+            return False
+        self._become(RunState.POLLING)
+        resolve([self.connected])
+        policy = self._options.policy
+        # From here on the reconnect policy decides about activations.
+        self._controller.allow_activation(policy is not None and policy.activate)
+        return True
+
+    async def _connect(self) -> None:
+        """Open the link and read the first status; read on while its fault 0x09 may be a passing one."""
+        await self._open()
+        self._poller.break_period()
+        await self._poller.read(is_first=True)
+        while self._controller.is_undecided:  # the silence before may show as a fault, once
+            await asyncio.sleep(self._options.poll_interval)
+            await self._poller.read()
+        self._poller.start_ticking()
+
+    async def _open(self) -> None:
+        try:
+            await self._link.open()
+        except RobotiqConnectionError:
+            raise
+        except Exception as error:
+            if self.state is RunState.CONNECTING:
+                raise  # a mistake of ours, or of a transport object
+            # No thread, no memory, no descriptor: what the system lacks now it may have at the next try.
+            self._options.log.debug("the link could not be opened", exc_info=error)
+            raise ConnectFailedError(self._options.link.address, repr(error)) from error
+
+    # -- polling ---------------------------------------------------------------------------------------
+
+    async def _poll(self) -> None:
+        while self.state is RunState.POLLING:
+            is_regular = await self._poller.wait()
+            if self.state is not RunState.POLLING:
+                return
+            try:
+                await self._poller.cycle()
+                if not is_regular:
+                    self._poller.break_period()
+            except RobotiqConnectionError as error:
+                await self._reconnect(error)
+
+    async def _reconnect(self, why: RobotiqConnectionError) -> None:
+        """Open the link again, unless a stop comes; if it is given up, the run has failed."""
+        log, policy, since = self._options.log, self._options.policy, self._loop.time()
+        log.warning("link lost: %s", why)
+        self._note_down(why)
+        if self.state is RunState.POLLING:
+            self._become(RunState.LOST)
+        self._lose(why)
+        try:
+            connected = policy is not None and await self._opener.again(policy, self._note_down)
+        except RobotiqConnectionError as error:
+            self._note_down(error)
+            self.failure = error
+            return
+        if self.state is not RunState.LOST:
+            return  # a stop came
+        if not connected:
+            self.failure = why
+            return
+        self.down = None
+        self._become(RunState.POLLING)
+        self._counters.note_reconnect()
+        log.warning("link back after %.2f s", self._loop.time() - since)
+
+    def _note_down(self, why: RobotiqConnectionError) -> None:
+        """The newest reason counts: the first one is often the least telling."""
+        self.down = Down(why, strftime("%H:%M:%S") if self.down is None else self.down.since)
+        self._controller.machine.note_down(f"{why} (down since {self.down.since})")
+
+    def _lose(self, why: RobotiqConnectionError) -> None:
+        self._controller.lost(why, self._poller.tick.time())
+        self._channels.publish_changes()
+
+    # -- the end ---------------------------------------------------------------------------------------
+
+    async def _finish(self) -> None:
+        """Stop the fingers if there is time, then disconnect."""
+        if self._ending is None:
+            # A hand that has only looked leaves the fingers to the client that moves them.
+            has_written = self._counters.has_begun_to_write
+            self.request_stop(halt=has_written, keep_grip=self._options.keep_grip)
+        assert self._ending is not None, "it was requested"
+        try:
+            await self._ending.carry_out(self._stop_fingers, self._close)
+        finally:
+            if not self._loop.is_closed():
+                self._poller.tick.close()
+
+    async def _close(self) -> None:
+        if not self._loop.is_closed():
+            await self._link.close()
+
+    async def _stop_fingers(self) -> None:
+        """Clear rGTO and see it, trying until the time is over. Unlike a motion, a stop may be sent again."""
+        failed = False
+        while self._controller.status is not None:
+            try:
+                await self._stop_fingers_once()
+                return
+            except RobotiqConnectionError as error:
+                if not failed:
+                    self._options.log.warning("the stop was not delivered, trying again: %s", error)
+                failed = True
+                self._lose(error)
+            await asyncio.sleep(STOP_PAUSE_S)
+
+    async def _stop_fingers_once(self) -> None:
+        if not self._link.is_open:
+            # A gripper without a client keeps moving. Read first: if it has lost its power, an image
+            # with rACT would activate it.
+            await self._open()
+            await self._poller.read()
+        assert self._ending is not None, "the fingers are stopped at the end"
+        self._controller.stop_fingers(self._ending.level)
+        while True:
+            await self._poller.cycle()
+            if not self._controller.is_busy:
+                return
+            await asyncio.sleep(self._options.poll_interval)

@@ -1,0 +1,54 @@
+"""The shape of what owns a hand: few fields, and each changed by its own class."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import robotiq_async
+from robotiq_async.session.ending import Ending
+from robotiq_async.session.poller import Poller
+from robotiq_async.session.run import _NEXT, Run, RunState
+from robotiq_async.session.session import Session
+
+PACKAGE = Path(robotiq_async.__file__).parent
+MODULES = sorted(path for room in ("session", "hand") for path in (PACKAGE / room).rglob("*.py"))
+
+
+def stored(node: ast.AST) -> Iterator[ast.Attribute]:
+    for each in ast.walk(node):
+        if isinstance(each, ast.Attribute) and isinstance(each.ctx, ast.Store) and each.attr != "__cause__":
+            yield each
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: f"{path.parent.name}-{path.stem}")
+def test_no_class_changes_the_fields_of_another(path: Path) -> None:
+    fields = stored(ast.parse(path.read_text(encoding="utf-8")))
+    owners = {(ast.unparse(each.value), each.attr) for each in fields}
+    assert not {(owner, name) for owner, name in owners if owner != "self"}
+
+
+@pytest.mark.parametrize("kind", [Poller, Run, Session, Ending])
+def test_an_object_of_a_run_has_few_fields_and_changes_fewer(kind: type) -> None:
+    (tree,) = ast.parse(inspect.getsource(kind)).body
+    assert isinstance(tree, ast.ClassDef)
+    made = {field.attr for each in tree.body if is_init(each) for field in stored(each)}
+    changed = {field.attr for each in tree.body if not is_init(each) for field in stored(each)}
+    assert changed <= made, "all fields are made at the making"
+    assert len(made) <= 15
+    assert len(changed) <= 5
+
+
+def is_init(node: ast.AST) -> bool:
+    return isinstance(node, ast.FunctionDef) and node.name == "__init__"
+
+
+def test_a_run_comes_to_its_end_from_every_state_and_never_back_from_there() -> None:
+    assert _NEXT.keys() == set(RunState)
+    assert all(RunState.OVER in after for state, after in _NEXT.items() if state is not RunState.OVER)
+    assert _NEXT[RunState.ENDING] == {RunState.OVER}
+    assert not _NEXT[RunState.OVER]
