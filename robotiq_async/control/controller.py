@@ -25,7 +25,7 @@ from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .entry import Entry
 from .evidence import FOLLOWS, Evidence, classify, is_activating
-from .gate import gate, merged
+from .gate import NO_PLACES, gate, merged
 from .ledger import NEVER, Ledger
 from .motion import Move
 from .pending import Command, OpenRequests
@@ -499,7 +499,8 @@ class Controller:
             may_move, (pressing, is_open) = ledger.may_move(status), ledger.pressing_again(status)
             pending = replace(pending, hold=pending.hold & ~pressing)
             later = pressing & self._requests.pending.hold & ~pending.moved if is_open else NO_AXES
-        image = merged(base, pending, status, gripping=gripping, may_move=may_move)
+        places = ledger.places(status, now - ledger.now.time) if pending.hold & status.moving else NO_PLACES
+        image = merged(base, pending, status, gripping=gripping, may_move=may_move, places=places)
         if not pending.has_changes and gate(image, status, may_reset=ledger.may_reset) == base:
             # No axis moves, so there is nothing to write, and what the gripper has answers the callers. If an
             # earlier write does not act yet, an axis may begin to move: ask again then.

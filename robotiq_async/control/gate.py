@@ -9,13 +9,18 @@ release rATR.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
+from typing import Final
 
 from ..values.enums import NO_AXES, Finger
 from ..values.request import AxisRequest, Request
 from ..values.status import RobotiqStatus
 from .pending import Pending
 from .rest import drifts
+
+NO_PLACES: Final[Mapping[Finger, int]] = MappingProxyType({})
 
 
 def merged(
@@ -25,10 +30,11 @@ def merged(
     *,
     gripping: Finger = NO_AXES,
     may_move: Finger = NO_AXES,
+    places: Mapping[Finger, int] = NO_PLACES,
 ) -> Request:
     """Merge pending changes into ``base``. Other axes keep their requests, unless this sets rGTO."""
     # ``gripping`` has the axes that were in contact when rGTO was last set, ``may_move`` those that show rest
-    # and may move all the same.
+    # and may move all the same, ``places`` where those will be that move when this acts.
     if pending.positions and not base.go:
         # rGTO starts every axis [manual 2012, 4.6]: ask each for where it is. An axis that gripped keeps its
         # request, or it would lose its grip.
@@ -38,7 +44,7 @@ def merged(
     # With rGTO set, an axis that is not addressed keeps its position request, and with it its motion or grip:
     # so speed and force alone start nothing.
     held = {
-        axis: status.position(axis)
+        axis: places.get(axis, status.position(axis))
         for axis in status.model.axes
         if axis in pending.hold and drifts(axis, base, status, may_move)
     }

@@ -35,6 +35,7 @@ from ..values.registers import Echo
 from ..values.request import AxisRequest, Request
 from ..values.status import RobotiqStatus
 from .adoption import Adoption
+from .course import Course
 from .entry import Entry, RecentRequests
 from .limits import Limits
 from .rest import LONG_AGO, Contacts, Moment, Rest, Target, may_move, rest_of
@@ -74,6 +75,8 @@ class Ledger:
         self.unrested = NO_AXES  # those not known to have come to rest under their last request
         self.contacts: Final[Contacts] = Contacts() if before is None else before.contacts
         self.limits: Final = Limits(log)
+        self.delay = 0.0  # seconds from sending a write to its effect, at least, as the newest that showed tells
+        self._course: Final = Course()
         self._model: Final = model
         self._entries = deque([self.shown])  # those that are certain, and that a status may show
         # By number; each may act after those with a lower one.
@@ -190,6 +193,15 @@ class Ledger:
         known, unknown = self.contacts.pressing(status, self.base) if self.contacts else (NO_AXES, NO_AXES)
         return (known | unknown) & status.moving, self.now.time - self.last.time < WINDOW_S
 
+    def places(self, status: RobotiqStatus, age: float = 0.0) -> dict[Finger, int]:
+        """Where a hold finds the moving axes when it acts, if it is sent when the status is of that age."""
+        places, base = {}, self.base
+        for axis in status.moving:
+            at, request = status.position(axis), base.position(axis)  # it goes no further than to its request
+            low, high = min(at, request), max(at, request)
+            places[axis] = min(high, max(low, self._course.after(axis, status, age + self.delay)))
+        return places
+
     def may_move(self, status: RobotiqStatus) -> Finger:
         """The axes that may move, or be about to, although the status shows them at rest."""
         moving = NO_AXES
@@ -258,8 +270,8 @@ class Ledger:
 
     def update(self, status: RobotiqStatus, asked: float) -> None:
         """Take in a status: from then on the questions are about it."""
+        before, entries = self.now.time, self._entries
         self.now = Moment(asked, self.now.reads + 1)
-        entries = self._entries
         # This comes before the status is looked at: after a silence it must not show an echo of long ago.
         while len(entries) > 1 and self._is_old(entries[1]):
             entries.popleft()
@@ -271,6 +283,8 @@ class Ledger:
             self.match = shown
         else:
             self.match = self._find(status)
+            if self.shown is not shown and self.shown.is_ours:
+                self.delay = max(0.0, before - self.shown.sent)
         if self._doubtful:  # drop those that did not show in time, now that this status was compared
             later = (each for each in self._doubtful if each.number > self.shown.number)
             self._doubtful = [each for each in later if not self._is_old(each)]
@@ -384,6 +398,7 @@ class Ledger:
 
     def update_rest(self, status: RobotiqStatus) -> None:
         """Find out which axes have come to rest. Not in a fault: it keeps axes from starting."""
+        self._course.update(status)
         if self._unproven:
             self._note_acting()
             # gDT has no meaning without rGTO [manual]. While an adopted request is a guess, no rest follows

@@ -213,7 +213,13 @@ class Keeping(Stop):
         if not ledger.is_certain:
             return None
         base, (pressing, _) = ledger.base, ledger.pressing_again(status)
-        held = merged(base, Pending(hold=Finger.ALL & ~pressing), status, may_move=ledger.may_move(status))
+        held = merged(
+            base,
+            Pending(hold=Finger.ALL & ~pressing),
+            status,
+            may_move=ledger.may_move(status),
+            places=ledger.places(status),
+        )
         return None if held == base else held
 
     def _trouble(self, ledger: Ledger, status: RobotiqStatus) -> str:
