@@ -29,7 +29,7 @@ from .gate import NO_PLACES, gate, merged
 from .ledger import NEVER, Ledger
 from .motion import Move
 from .pending import Command, OpenRequests
-from .procedures import Begun, Procedure
+from .procedures import Begun, Procedure, activation, automatic_release, reset_and_activation
 from .state_machine import RUNNING, SEEN, StateMachine
 from .stops import Keeping, Stop
 from .waiters import Waiter, fail
@@ -206,8 +206,10 @@ class Controller:
     # -- what follows from that ------------------------------------------------------------------------
 
     def _begin(self, trigger: Trigger) -> None:
-        releases = trigger is Trigger.ASK_RELEASE
-        self._procedure, self._stop = Procedure(self._ledger, releases=releases), None
+        is_stranded = self._evidence.condition is Trigger.SEEN_STRANDED
+        activates = reset_and_activation if is_stranded else activation
+        begin = automatic_release if trigger is Trigger.ASK_RELEASE else activates
+        self._procedure, self._stop = Procedure(self._ledger, begin), None
         self._update_state(trigger)
 
     def _begin_reset(self, trigger: Trigger, error: RobotiqError) -> None:
@@ -241,7 +243,7 @@ class Controller:
         if self.status.is_moving or self.is_driven:
             return True
         if self.machine.state not in RUNNING:
-            return False
+            return self._ledger.may_set_go
         return bool(self._requests.pending.positions) or self._ledger.may_begin_to_move
 
     @property
@@ -250,7 +252,8 @@ class Controller:
         status = self.status
         if status is None or self._procedure is not None:
             return status is not None
-        shows = classify(status) is Trigger.SEEN_BUSY or status.fault is Fault.AUTOMATIC_RELEASE
+        condition = self._evidence.condition
+        shows = condition is Trigger.SEEN_BUSY or status.fault is Fault.AUTOMATIC_RELEASE
         return shows or self._ledger.may_drive(status)
 
     @property
@@ -261,8 +264,8 @@ class Controller:
 
     @property
     def is_undecided(self) -> bool:
-        """Whether the first status on a new link shows 0x09, perhaps because of the silence before it."""
-        return self._evidence.condition is None and self._evidence.may_pass
+        """Whether it takes more statuses to tell the condition on a new link."""
+        return self._evidence.is_undecided
 
     @property
     def has_request(self) -> bool:
@@ -323,7 +326,8 @@ class Controller:
             if self.machine.state in _OFF:
                 return
             self._note_news(before, condition, status)
-            if before is None and condition is Trigger.SEEN_RESET and self.activates:
+            is_reset = condition in (Trigger.SEEN_RESET, Trigger.SEEN_STRANDED)
+            if before is None and is_reset and self.activates:
                 self._begin(Trigger.ACTIVATES)
                 return
         if condition is Trigger.SEEN_READY:
@@ -366,7 +370,7 @@ class Controller:
                 self._requests.drop(GripperFaultError(status.fault), holds=False)
             case Trigger.SEEN_RELEASED:
                 self._fail_all(GripperFaultError(status.fault))
-            case Trigger.SEEN_BUSY | Trigger.SEEN_RESET:
+            case Trigger.SEEN_BUSY | Trigger.SEEN_RESET | Trigger.SEEN_STRANDED:
                 self._fail_all(NotActivatedError("the gripper lost its activation"))
 
     def _advance_stop(self, stop: Stop, status: RobotiqStatus) -> None:
@@ -408,7 +412,8 @@ class Controller:
 
     def _finish(self, status: RobotiqStatus, *, is_known: bool) -> None:
         """A procedure, a reset or a shutdown is over: the condition counts again."""
-        condition = classify(status)
+        condition = self._evidence.condition
+        assert condition is not None, "it has ended by a status"
         self._update_state(condition)
         if condition in FOLLOWS and not is_known and self.machine.state not in _OFF:
             self._adopt_other_client(status)

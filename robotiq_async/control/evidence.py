@@ -1,15 +1,19 @@
-"""Evidence: the condition that a status shows, without a fault that only passes.
+"""Evidence: the condition that statuses show, without a fault that only passes.
 
 Fault 0x09 may pass. The 3-Finger's manual calls it "communication chip not ready (may be booting)" (2012,
 4.7). The two-finger and vacuum grippers of the same family, whose older manuals use the same words, show it
 in the first read after a second of silence and not again [seen on real ones]. So 0x09 counts as a fault only
 when it lasts.
+
+A gripper may be found stranded: gACT = 1 with gIMC = 0 and no fault, its fingers at rest [seen: a 2F-85, in the
+first status of a session; its user reset and activated it]. Only a rising rACT activates, so it stays there for
+ever. A gripper that has just taken rACT over shows the same for a moment; so it counts when it lasts.
 """
 
 from __future__ import annotations
 
 from functools import cache
-from typing import Final
+from typing import Final, NamedTuple
 
 from ..runtime.log import Log
 from ..values import registers as reg
@@ -26,6 +30,11 @@ fingers that must stop move on in this time, a count or two at full speed."""
 SILENCE_S: Final = 0.9
 """After this time without a read a gripper may show it again, and the count begins again. One second is what
 is known [seen]. A program that is stepped through in a debugger makes such silences."""
+STRANDED_S: Final = 0.5
+"""Seconds, and reads, for which a gripper must show gACT = 1 with gIMC = 0, and the same positions, to count as
+stranded: no figure is published for how soon an activation shows; a device cycle of 0.2 s is the slowest
+considered."""
+STRANDED_READS: Final = 10
 FOLLOWS: Final = frozenset({Trigger.SEEN_READY, Trigger.SEEN_FAULT})
 """The conditions in which the gripper follows requests, ours or another client's."""
 
@@ -33,7 +42,7 @@ _CODE: Final = int(Fault.COMMUNICATION_NOT_READY)
 
 
 def classify(status: RobotiqStatus) -> Trigger:
-    """The condition that a status shows, one of five."""
+    """The condition that a status shows by itself, one of five."""
     # A serious fault comes first: gIMC = 0 with a fault is an automatic release and not a reset [manual 2014,
     # p. 50; 2018, p. 39]. Only gACT, gIMC and gFLT decide: they rarely change, so what they show is cached.
     registers = status.registers
@@ -60,6 +69,26 @@ def _classify(activation: int, fault: int, model: Model) -> Trigger:
     return Trigger.SEEN_BUSY
 
 
+class Stuck(NamedTuple):
+    """Statuses in a row that show rACT without an activation, and the same positions."""
+
+    positions: tuple[int, ...]
+    since: float  # when the first of them was asked for
+    until: float
+    reads: int = 1
+
+    @classmethod
+    def after(cls, before: Stuck | None, status: RobotiqStatus, asked: float) -> Stuck:
+        positions = tuple(status.position(axis) for axis in status.model.axes)
+        if before is None or before.positions != positions:
+            return cls(positions, asked, asked)
+        return cls(positions, before.since, asked, before.reads + 1)
+
+    @property
+    def is_long(self) -> bool:
+        return self.until - self.since >= STRANDED_S and self.reads >= STRANDED_READS
+
+
 class Evidence:
     """The newest status as decisions see it: without a 0x09 that may pass."""
 
@@ -71,6 +100,13 @@ class Evidence:
         # When the reads in a row that have shown it were asked for: all, and those since the last silence.
         self._row: Final[list[float]] = []
         self._since_silence: Final[list[float]] = []
+        self._stuck: Stuck | None = None  # while the gripper shows what a stranded one does
+
+    @property
+    def is_undecided(self) -> bool:
+        """Whether the first statuses on a new link show 0x09, or perhaps a stranded gripper: more may tell."""
+        may_be_stranded = self._stuck is not None and not self._stuck.is_long
+        return self.condition is None and (self.may_pass or may_be_stranded)
 
     @property
     def may_pass(self) -> bool:
@@ -85,13 +121,18 @@ class Evidence:
             # In a fault 0x09 is no news, and counts at once: hiding it would show the fault as cleared.
             status = status if self.condition is Trigger.SEEN_FAULT else judged
             condition = classify(status)
+        if condition is Trigger.SEEN_BUSY and status.is_reset and status.fault is Fault.NONE:
+            self._stuck = Stuck.after(self._stuck, status, asked)
+            condition = Trigger.SEEN_STRANDED if self._stuck.is_long else condition
+        elif self._stuck is not None:
+            self._stuck = None
         self.status = status
-        if self.condition is not None or not self.may_pass:
+        if self.condition is not None or not self.is_undecided:
             self.condition = condition
         return self.condition
 
     def lost(self) -> None:
-        self.condition = None  # the next one is the first
+        self.condition, self._stuck = None, None  # the next one is the first
 
     def judged(self, status: RobotiqStatus, asked: float) -> RobotiqStatus:
         """Return a status without 0x09 until that has lasted; it was asked for at ``asked``."""

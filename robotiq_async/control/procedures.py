@@ -26,6 +26,9 @@ STRAY_COUNTS: Final = 10
 """An axis that moves further in an activation is driven by it. One that a stop catches at full speed goes on
 for less: 10 counts take 0.09 s [thesis]."""
 
+RESET_S: Final = 5.0
+"""Time for a stranded gripper to show a reset: as long as reset() waits for one."""
+
 Steps = Generator[Request | None, RobotiqStatus, None]
 Image = Callable[[RobotiqStatus], Request]  # makes the image to begin from, given the newest status
 
@@ -33,20 +36,21 @@ Image = Callable[[RobotiqStatus], Request]  # makes the image to begin from, giv
 class Procedure:
     """An activation or an automatic release, from its request to its end."""
 
-    def __init__(self, ledger: Ledger, *, releases: bool) -> None:
-        begin = automatic_release if releases else activation
-        self.releases: Final = releases
+    def __init__(self, ledger: Ledger, begin: Callable[[Image], Steps]) -> None:
+        self.releases: Final = begin is automatic_release
         self.steps: Final = begin(lambda status: at_rest(ledger.base, status))
-        self.entry: Entry | None = None
+        self.entry: Entry | None = None  # of its newest image
+        self._first: Entry | None = None
         next(self.steps)  # to its first yield: what the gripper shows decides whether it begins
 
     def written(self, entry: Entry) -> None:
         """Its image is about to be sent. If it has none to send, what shows stands in for that."""
         self.entry = entry
+        self._first = self._first or entry
 
     @property
     def state(self) -> State:
-        if self.entry is None or self.entry.acknowledged is None:
+        if self._first is None or self._first.acknowledged is None:
             return State.DO_ATR if self.releases else State.DO_ACTIVATION
         return State.WF_ATR if self.releases else State.WF_ACTIVATION
 
@@ -93,6 +97,17 @@ def activation(image: Image) -> Steps:
             raise NotActivatedError(f"the gripper {why} (power cycle, or another client)")
         begun = begun or status.activation_echo
         status = yield None
+
+
+def reset_and_activation(image: Image) -> Steps:
+    """Clear rACT of a stranded gripper, and activate it once that shows."""
+    status = yield None
+    asked, status = status.timestamp, (yield replace(image(status), activate=False))
+    while classify(status) is not Trigger.SEEN_RESET:
+        if status.timestamp - asked > RESET_S:
+            raise NotActivatedError("the gripper has rACT, does not activate, and does not report a reset")
+        status = yield None
+    yield from activation(image)
 
 
 def automatic_release(image: Image) -> Steps:

@@ -58,6 +58,7 @@ SEEN: Final = {
     Trigger.SEEN_READY: State.RUNNING_IDLE,
     Trigger.SEEN_BUSY: State.WF_ACTIVATION,
     Trigger.SEEN_RESET: State.RESET,
+    Trigger.SEEN_STRANDED: State.RESET,  # an activation resets it first
     Trigger.SEEN_FAULT: State.FAULT,
     Trigger.SEEN_RELEASED: State.ATR_DONE,
 }

@@ -321,6 +321,7 @@ class Trigger(Enum):
     SEEN_READY = "gripper is active"
     SEEN_BUSY = "gripper is activating"
     SEEN_RESET = "gripper is reset"
+    SEEN_STRANDED = "gripper has rACT and does not activate"
     SEEN_FAULT = "gripper reports a fault"
     SEEN_RELEASED = "automatic release completed"
     LINK_LOST = "link lost"

@@ -75,25 +75,26 @@ LEADS = {
     Trigger.SEEN_READY: State.RUNNING_IDLE,
     Trigger.SEEN_BUSY: State.WF_ACTIVATION,
     Trigger.SEEN_RESET: State.RESET,
+    Trigger.SEEN_STRANDED: State.RESET,
     Trigger.SEEN_FAULT: State.FAULT,
     Trigger.SEEN_RELEASED: State.ATR_DONE,
 }
 HAPPENS = """
-                active   busy     reset    fault    released  acknowledged    link lost      stopped
-DISCONNECTED  | leads  | leads  | leads  | leads  | leads   | not now       | stays        | not now
-DO_ACTIVATION | nothing| nothing| nothing| nothing| nothing | WF_ACTIVATION | DISCONNECTED | not now
-WF_ACTIVATION | leads  | leads  | leads  | leads  | leads   | not now       | DISCONNECTED | not now
-RUNNING_IDLE  | leads  | leads  | leads  | leads  | leads   | not now       | DISCONNECTED | not now
-RUNNING_CC    | stays  | leads  | leads  | leads  | leads   | RUNNING_IDLE  | DISCONNECTED | not now
-FAULT         | leads  | leads  | leads  | leads  | leads   | not now       | DISCONNECTED | not now
-DO_ATR        | nothing| nothing| nothing| nothing| nothing | WF_ATR        | DISCONNECTED | not now
-WF_ATR        | leads  | leads  | leads  | leads  | leads   | not now       | DISCONNECTED | not now
-ATR_DONE      | leads  | leads  | leads  | leads  | leads   | not now       | DISCONNECTED | not now
-DO_RESET      | nothing| nothing| nothing| nothing| nothing | WF_RESET      | DISCONNECTED | not now
-WF_RESET      | nothing| nothing| leads  | nothing| nothing | not now       | DISCONNECTED | not now
-RESET         | leads  | leads  | leads  | leads  | leads   | not now       | DISCONNECTED | not now
-DO_SHUTDOWN   | nothing| nothing| nothing| nothing| nothing | not now       | nothing      | SHUTDOWN
-SHUTDOWN      | nothing| nothing| nothing| nothing| nothing | not now       | nothing      | nothing
+                active   busy     reset    stranded fault    released  acknowledged    link lost      stopped
+DISCONNECTED  | leads  | leads  | leads  | leads  | leads  | leads   | not now       | stays        | not now
+DO_ACTIVATION | nothing| nothing| nothing| nothing| nothing| nothing | WF_ACTIVATION | DISCONNECTED | not now
+WF_ACTIVATION | leads  | leads  | leads  | leads  | leads  | leads   | not now       | DISCONNECTED | not now
+RUNNING_IDLE  | leads  | leads  | leads  | leads  | leads  | leads   | not now       | DISCONNECTED | not now
+RUNNING_CC    | stays  | leads  | leads  | leads  | leads  | leads   | RUNNING_IDLE  | DISCONNECTED | not now
+FAULT         | leads  | leads  | leads  | leads  | leads  | leads   | not now       | DISCONNECTED | not now
+DO_ATR        | nothing| nothing| nothing| nothing| nothing| nothing | WF_ATR        | DISCONNECTED | not now
+WF_ATR        | leads  | leads  | leads  | leads  | leads  | leads   | not now       | DISCONNECTED | not now
+ATR_DONE      | leads  | leads  | leads  | leads  | leads  | leads   | not now       | DISCONNECTED | not now
+DO_RESET      | nothing| nothing| nothing| nothing| nothing| nothing | WF_RESET      | DISCONNECTED | not now
+WF_RESET      | nothing| nothing| leads  | nothing| nothing| nothing | not now       | DISCONNECTED | not now
+RESET         | leads  | leads  | leads  | leads  | leads  | leads   | not now       | DISCONNECTED | not now
+DO_SHUTDOWN   | nothing| nothing| nothing| nothing| nothing| nothing | not now       | nothing      | SHUTDOWN
+SHUTDOWN      | nothing| nothing| nothing| nothing| nothing| nothing | not now       | nothing      | nothing
 """
 """A condition in a status never leads to a state that sends something, and none before an acknowledgement."""
 HAPPENING = (*LEADS, Trigger.DELIVERED, Trigger.LINK_LOST, Trigger.STOPPED)

@@ -135,6 +135,18 @@ def test_a_hand_may_move_if_an_activation_was_lost_with_the_link(device_cycle: f
     assert scan.controller.is_driven
 
 
+@SLOW
+def test_a_hand_moves_in_a_reset_before_which_a_motion_in_doubt_may_act(device_cycle: float) -> None:
+    scan = started(device_cycle)
+    scan.command(A, position=255)
+    lost_in_doubt(scan)
+    scan.controller.reset()
+    while scan.state is not State.RESET:
+        before, is_moving = scan.travels(), scan.controller.is_moving
+        scan.step()
+        assert is_moving or scan.travels() == before
+
+
 # -- a halt where rGTO = 0 ends nothing --------------------------------------------------------------------
 
 
