@@ -7,13 +7,13 @@
 # * what callers have asked: changes and holds (pending.py), one stop (stops.py), one procedure
 #   (procedures.py), moves that wait for their end (motion.py);
 # * what the gripper may have: the images written, by us or by others (ledger.py);
-# * what it shows: one of six conditions (evidence.py), which axes rest or may press (rest.py), and where those
-#   that move will be (course.py).
+# * what it shows: one of six conditions (evidence.py), which axes rest or may press (rest.py), and where
+#   those that move will be (course.py).
 #
-# What a status shows may change without a further write: an image of ours may be on its way, or was lost with
-# the link and acts all the same. So whoever asks what the gripper will do asks the ledger for what is ahead:
-# the gate (rACT would rise after a reset of ours), a halt (rGTO = 0 ends no activation), and is_moving. What a
-# session leaves ahead is in doubt in the next one of the same gripper.
+# What a status shows may change without a further write: an image of ours may be on its way, or was lost
+# with the link and acts all the same. So whoever asks what the gripper will do asks the ledger for what is
+# ahead: the gate (rACT would rise after a reset of ours), a halt (rGTO = 0 ends no activation), is_moving.
+# What a session leaves ahead is in doubt in the next one of the same gripper.
 #
 # A cycle is see(), then decide(); the first write of a stop is decided before the read, which may never be
 # answered. An image is made from the base, the last image that the gripper has or is about to have. So an
@@ -30,10 +30,11 @@
 # in which it may act. A speed or a force has no echo: it counts as acting a time after its acknowledgement.
 #
 # Holds only stop an axis, and are decided when they are written: an axis at rest or in contact keeps its
-# request, and with it its grip. One that moves where it was in contact may press on its part again, and to hold
-# it there would end the grip: its hold waits until it reports the contact, or has moved off. So they may be sent again. They survive a lost link, unless another client
-# has moved the axis since. A fault puts a hold on all axes that may move because of us: a minor fault clears
-# without a reset [manual 2012, 4.7], and nothing must resume then.
+# request, and with it its grip. One that moves where it was in contact may press on its part again, and to
+# hold it there would end the grip: its hold waits until it reports the contact, or has moved off. So they
+# may be sent again. They survive a lost link, unless another client has moved the axis since. A fault puts
+# a hold on all axes that may move because of us: a minor fault clears without a reset [manual 2012, 4.7],
+# and nothing must resume then.
 #
 # A stop goes before commands and holds: a halt, a reset, the end of the hand. It may be written again, as it
 # only ends motion; stops.py has for each level when it is written, and when it is over. A halt that does not

@@ -24,7 +24,7 @@ from ..values.model import THREE_FINGER, Model
 from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .entry import Entry
-from .evidence import FOLLOWS, Evidence, classify, is_activating
+from .evidence import FOLLOWS, Evidence, is_activating
 from .gate import NO_PLACES, gate, merged
 from .ledger import NEVER, Ledger
 from .motion import Move

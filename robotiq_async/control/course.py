@@ -1,8 +1,8 @@
 """The course of axes that move: how far each will have gone when a write acts.
 
-A write acts a device cycle after it was sent. An axis that is to be held goes on meanwhile: asked for where it
-was seen, it would drive back, 20 counts at full speed if the cycle is 0.2 s. So it is asked for where it will be,
-as far as statuses tell.
+A write acts a device cycle after it was sent. An axis that is to be held moves on meanwhile: asked for where
+it was seen, it would drive back, 20 counts if the cycle is 0.2 s. So it is asked for where it will be, as far
+as statuses tell.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from ..values.enums import Finger
 from ..values.status import RobotiqStatus
 
 BASELINE_S: Final = 0.25
-"""The newest statuses of this time give the speed. Positions are whole counts: over 0.25 s that is 4 counts/s."""
+"""The statuses of this time give the speed. Positions are whole counts: it is right to 4 counts a second."""
 MOST_STATUSES: Final = 256  # as many as the shortest poll interval makes in that time
 
 

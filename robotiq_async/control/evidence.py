@@ -5,9 +5,10 @@ Fault 0x09 may pass. The 3-Finger's manual calls it "communication chip not read
 in the first read after a second of silence and not again [seen on real ones]. So 0x09 counts as a fault only
 when it lasts.
 
-A gripper may be found stranded: gACT = 1 with gIMC = 0 and no fault, its fingers at rest [seen: a 2F-85, in the
-first status of a session; its user reset and activated it]. Only a rising rACT activates, so it stays there for
-ever. A gripper that has just taken rACT over shows the same for a moment; so it counts when it lasts.
+A gripper may be found stranded: gACT = 1 with gIMC = 0 and no fault, its fingers at rest [seen: a 2F-85, in
+the first status of a session; its user reset and activated it]. Only a rising rACT activates, so it stays
+there for ever. A gripper that has just taken rACT over shows the same for a moment; so it counts when it
+lasts.
 """
 
 from __future__ import annotations
@@ -31,10 +32,10 @@ SILENCE_S: Final = 0.9
 """After this time without a read a gripper may show it again, and the count begins again. One second is what
 is known [seen]. A program that is stepped through in a debugger makes such silences."""
 STRANDED_S: Final = 0.5
-"""Seconds, and reads, for which a gripper must show gACT = 1 with gIMC = 0, and the same positions, to count as
-stranded: no figure is published for how soon an activation shows; a device cycle of 0.2 s is the slowest
-considered."""
+"""Seconds for which a gripper must show gACT = 1 with gIMC = 0 and the same positions to count as stranded.
+No figure is published for how soon an activation shows; 0.2 s is the slowest device cycle considered."""
 STRANDED_READS: Final = 10
+"""The reads that this takes at least."""
 FOLLOWS: Final = frozenset({Trigger.SEEN_READY, Trigger.SEEN_FAULT})
 """The conditions in which the gripper follows requests, ours or another client's."""
 
@@ -104,7 +105,7 @@ class Evidence:
 
     @property
     def is_undecided(self) -> bool:
-        """Whether the first statuses on a new link show 0x09, or perhaps a stranded gripper: more may tell."""
+        """Whether the first statuses on a new link show 0x09, or what may be a stranded gripper."""
         may_be_stranded = self._stuck is not None and not self._stuck.is_long
         return self.condition is None and (self.may_pass or may_be_stranded)
 

@@ -75,7 +75,7 @@ class Ledger:
         self.unrested = NO_AXES  # those not known to have come to rest under their last request
         self.contacts: Final[Contacts] = Contacts() if before is None else before.contacts
         self.limits: Final = Limits(log)
-        self.delay = 0.0  # seconds from sending a write to its effect, at least, as the newest that showed tells
+        self._delay = 0.0  # seconds from sending to acting, at least, of the newest write that showed
         self._course: Final = Course()
         self._model: Final = model
         self._entries = deque([self.shown])  # those that are certain, and that a status may show
@@ -199,7 +199,7 @@ class Ledger:
         for axis in status.moving:
             at, request = status.position(axis), base.position(axis)  # it goes no further than to its request
             low, high = min(at, request), max(at, request)
-            places[axis] = min(high, max(low, self._course.after(axis, status, age + self.delay)))
+            places[axis] = min(high, max(low, self._course.after(axis, status, age + self._delay)))
         return places
 
     def may_move(self, status: RobotiqStatus) -> Finger:
@@ -284,7 +284,7 @@ class Ledger:
         else:
             self.match = self._find(status)
             if self.shown is not shown and self.shown.is_ours:
-                self.delay = max(0.0, before - self.shown.sent)
+                self._delay = max(0.0, before - self.shown.sent)
         if self._doubtful:  # drop those that did not show in time, now that this status was compared
             later = (each for each in self._doubtful if each.number > self.shown.number)
             self._doubtful = [each for each in later if not self._is_old(each)]

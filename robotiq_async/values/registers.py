@@ -75,7 +75,7 @@ rFR: Final = tuple(Field(5 + 3 * n, doc=f"force of {name}") for n, name in enume
 gACT: Final = Field(0, 0, 1, "echo of rACT; 1 while the activation still runs")
 gMOD: Final = Field(0, 1, 2, "echo of rMOD")
 gGTO: Final = Field(0, 3, 1, "echo of rGTO")
-gIMC: Final = Field(0, 4, 2, "0 reset, automatic release or not begun, 1 activating, 2 changing mode, 3 complete")
+gIMC: Final = Field(0, 4, 2, "0 reset, release or not begun, 1 activating, 2 changing mode, 3 complete")
 gSTA: Final = Field(0, 6, 2, "0 moving, 1 one or two fingers stopped early, 2 all early, 3 all reached")
 gDT: Final = tuple(
     Field(1, 2 * n, 2, f"{name}: 0 moving, 1 contact opening, 2 contact closing, 3 at position")

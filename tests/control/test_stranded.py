@@ -105,7 +105,7 @@ def test_one_that_does_not_reset_gives_an_error(caplog: pytest.LogCaptureFixture
 
 
 def test_an_activation_that_another_client_has_just_begun_is_left_alone() -> None:
-    """gACT shows before gIMC does: for a moment that looks the same."""
+    """Its gACT shows before gIMC does: for a moment that looks the same."""
     evidence, at = Evidence(), 100.0
     while at < 100.0 + STRANDED_S - POLL_S:
         assert evidence.update(status_of(0x01, at=at), at) is None
