@@ -1,6 +1,8 @@
-"""One request on its way, and what has arrived of its reply: of any protocol, and of Modbus.
+"""One request and what has arrived of its reply: bytes in, an answer or an outcome out.
 
-A connection sends an exchange and hands it what arrives; the exchange knows when its reply is whole.
+No I/O, no clock and no event loop. A line sends :attr:`Exchange.frame` and feeds what arrives; the first
+thing that comes out is the last. An answer is its body from the function code on; of other protocols, its
+text.
 
 A line that echoes what is sent (a half-duplex adapter that receives its own bytes) is recognised by the first
 read of a connection. It needs no option: a reply to a read does not begin with the whole request, checksum
@@ -10,51 +12,82 @@ never taken for its acknowledgement, which begins with the same six bytes.
 
 from __future__ import annotations
 
-import asyncio
+import math
 from abc import ABC, abstractmethod
-from typing import Generic, TypeVar
 
-from ..values.errors import ProtocolError, RobotiqConnectionError
-from .address import Address
-from .frames import MisfitError, RefusedError, check_sum, expected_reply, is_write, show
+from ..values.errors import ProtocolError, ResponseTimeoutError
+from .frames import (
+    CHECKSUM,
+    expected_over_tcp,
+    expected_reply,
+    is_write,
+    serial_frame,
+    show,
+    stray,
+    tcp_frame,
+)
+from .outcome import Noise, Outcome, Silent, Stray
 
-T = TypeVar("T")
+Answer = bytes | Outcome
 
 
-class Exchange(ABC, Generic[T]):
+class Exchange(ABC):
     """A request and its reply, whatever the protocol.
 
     Attributes:
         frame: the bytes to send.
-        answer: what the whole reply says, or why there is none.
+        seconds: the longest time from the request to the end of the reply.
+        by: when it must be over even so, in the loop's time.
+        is_long: whether the longer silence is kept before it.
+        extra: bytes that came after the answer and answer nothing, if any did.
     """
+
+    seconds = math.inf
+    by = math.inf
+    is_long = False
+    extra: Stray | None = None
 
     def __init__(self, frame: bytes) -> None:
         self.frame = frame
-        self.answer: asyncio.Future[T] = asyncio.get_running_loop().create_future()
         self._received = b""
 
-    @property
-    def is_waiting(self) -> bool:
-        """Whether the reply, or an end without one, has yet to come."""
-        return not self.answer.done()
-
     @abstractmethod
-    def take(self, data: bytes) -> ProtocolError | None:
-        """Take bytes; the last one of the reply ends the exchange, or the first wrong one.
+    def feed(self, data: bytes) -> Answer | None:
+        """Take bytes; None while more must come."""
 
-        Returns:
-            An error of the link that leaves the answer valid.
-        """
+    def late(self, place: object) -> Silent:
+        """The outcome when the reply has not come in time."""
+        return Silent(ResponseTimeoutError(f"{place} did not answer within {self.seconds:g} s"))
 
-    def fail(self, error: RobotiqConnectionError) -> None:
-        """End the exchange with an error."""
-        if self.is_waiting:
-            self.answer.set_exception(error)
 
-    def late(self, address: Address, seconds: float) -> str:
-        """The message for a reply that has not come in time."""
-        return f"{address} did not answer within {seconds:g} s"
+class TcpExchange(Exchange):
+    """A request over Modbus TCP."""
+
+    def __init__(self, number: int, request: bytes) -> None:
+        super().__init__(tcp_frame(number, request))
+        self._expected = expected_over_tcp(request)
+
+    def feed(self, data: bytes) -> Answer | None:
+        self._received = received = self._received + data
+        header, expected = self.frame[:4], self._expected
+        # The usual case, which is cheap: the header is the only part of a reply that is not as the last time.
+        is_usual = len(received) == 4 + expected.size and received.startswith(expected.start, 4)
+        if is_usual and received.startswith(header):
+            return received[7:]
+        return expected.after(header).verdict(received)
+
+
+class PduExchange(Exchange):
+    """A request in a tunnel, which carries whole PDUs."""
+
+    def __init__(self, request: bytes) -> None:
+        super().__init__(request[1:])
+        self._unit = request[:1]
+        self._expected = expected_reply(request)
+
+    def feed(self, data: bytes) -> Answer | None:
+        verdict = self._expected.verdict(self._unit + data)
+        return Noise(ProtocolError(f"not the whole answer: {show(data)}")) if verdict is None else verdict
 
 
 class Echo:
@@ -68,81 +101,38 @@ class Echo:
         self.is_on: bool | None = False
 
 
-class TcpExchange(Exchange[bytes]):
-    """A request over Modbus TCP. Every byte of its reply is checked as it comes."""
+class SerialExchange(Exchange):
+    """A request on a serial line; it notes in ``echo`` what it learns."""
 
-    def __init__(self, frame: bytes) -> None:
-        super().__init__(frame)
-        self._expected = expected_reply(frame, serial=False)
-
-    def take(self, data: bytes) -> ProtocolError | None:
-        self._received += data
-        try:
-            if self._expected.is_complete(self._received):
-                self.answer.set_result(self._received)
-        except ProtocolError as error:
-            self.fail(error)
-        return None
-
-
-class SerialExchange(Exchange[bytes]):
-    """A request on a serial line. Every byte of its reply is checked as it comes, the checksum at its end."""
-
-    def __init__(self, frame: bytes, echo: Echo) -> None:
-        """An exchange that is not sent; it notes in ``echo`` what it learns."""
-        super().__init__(frame)
+    def __init__(self, request: bytes, echo: Echo) -> None:
+        super().__init__(serial_frame(request))
         self._echo = echo
-        self._expected = expected_reply(frame, serial=True)
+        self._expected = expected_reply(request, checksum=CHECKSUM)
 
-    def take(self, data: bytes) -> ProtocolError | None:
-        """Take bytes; the error is for those after an acknowledgement, which counts all the same."""
+    def feed(self, data: bytes) -> Answer | None:
         self._received += data
-        try:
-            reply = self._without_echo(self._received)
-            extra = self._beyond_acknowledgement(reply)
-            reply = reply[: len(reply) - len(extra)]
-            if not self._is_whole(reply):
-                return None
-        except ProtocolError as error:
-            self.fail(error)
-            return None
-        self._echo.is_on = bool(self._echo.is_on)
-        self.answer.set_result(reply)
-        return strays(extra) if extra else None
+        reply = self._received if self._echo.is_on is False else self._without_echo(self._received)
+        if isinstance(reply, Noise):
+            return reply
+        size = self._expected.size
+        if len(reply) > size and is_write(self.frame):
+            # A floating line makes up a byte when the device stops sending. The write is acknowledged
+            # nonetheless, and reporting it as in doubt would end the motion. A read is cheap to repeat.
+            reply, self.extra = reply[:size], stray(reply[size:])
+        verdict = self._expected.verdict(reply)
+        if type(verdict) is bytes:
+            self._echo.is_on = bool(self._echo.is_on)
+        return verdict
 
-    def _is_whole(self, reply: bytes) -> bool:
-        try:
-            is_whole = self._expected.is_complete(reply)
-        except RefusedError:
-            check_sum(reply)  # a damaged reply refuses nothing
-            raise
-        if is_whole:
-            check_sum(reply)
-        return is_whole
-
-    def _without_echo(self, received: bytes) -> bytes:
+    def _without_echo(self, received: bytes) -> bytes | Noise:
         """The part of the bytes that belongs to the reply."""
-        if self._echo.is_on is False:
-            return received
         size = len(self.frame)
         if received[:size] != self.frame[: len(received)]:
             if self._echo.is_on:
-                raise MisfitError(f"the line echoes what is sent, but not this time: {show(received)}")
+                what = f"the line echoes what is sent, but not this time: {show(received)}"
+                return Noise(ProtocolError(what))
             return received
         if len(received) < size:
             return b""
         self._echo.is_on = True
         return received[size:]
-
-    def _beyond_acknowledgement(self, reply: bytes) -> bytes:
-        """The bytes after a whole acknowledgement.
-
-        A floating line makes up a byte when the device stops sending. The write is acknowledged nonetheless,
-        and reporting it as in doubt would end the motion. For a read it costs nothing to read again.
-        """
-        return reply[self._expected.size :] if is_write(self.frame) else b""
-
-
-def strays(data: bytes) -> MisfitError:
-    """The error for bytes that answer nothing."""
-    return MisfitError(f"{len(data)} bytes without a request: {show(data)}")

@@ -15,6 +15,7 @@ from pymodbus.framer import FramerRTU
 
 from ..values.errors import ProtocolError
 from ..values.registers import REGISTER_COUNT, RegisterMap, Registers
+from .outcome import Noise, Refused, Stray
 
 _EXCEPTIONS = {
     1: "illegal function",
@@ -28,12 +29,8 @@ _EXCEPTIONS = {
 }
 _FROM_GATEWAYS: Final = (10, 11)
 """The exceptions that only a gateway sends (Modbus Application Protocol 7)."""
-_ILLEGAL_FUNCTION: Final = 1
-_PASSING: Final = (5, 6, 11)
-"""The exceptions of a device that may answer the next time: it works, is busy, or was not reached in time."""
 
-
-_CHECKSUM: Final = 2
+CHECKSUM: Final = 2
 """Bytes of the checksum at the end of a frame on a serial line."""
 _READS: Final = (3, 4)
 """Function codes of reads of registers."""
@@ -80,25 +77,14 @@ def tcp_frame(number: int, request: bytes) -> bytes:
 @lru_cache(maxsize=16)  # a poll is always the same
 def serial_frame(request: bytes) -> bytes:
     """A request with the checksum of a serial line."""
-    return request + FramerRTU.compute_CRC(request).to_bytes(_CHECKSUM, "big")
+    return request + FramerRTU.compute_CRC(request).to_bytes(CHECKSUM, "big")
 
 
-def check_sum(frame: bytes) -> None:
-    """Refuse a damaged frame of a serial line.
-
-    Raises:
-        MisfitError: its checksum is wrong.
-    """
-    if not FramerRTU.check_CRC(frame[:-_CHECKSUM], int.from_bytes(frame[-_CHECKSUM:], "big")):
-        raise MisfitError(f"a wrong checksum: {show(frame)}")
-
-
-def registers_in(reply: bytes, *, serial: bool) -> Registers:
-    """The registers in a complete reply to a read; those that it did not ask for are 0."""
-    at = 3 if serial else 9
-    if reply[at - 1] == _BLOCK.size:
-        return _BLOCK.unpack_from(reply, at)  # the usual case
-    return _BLOCK.unpack(reply[at : at + reply[at - 1]].ljust(_BLOCK.size, b"\0"))
+def registers_in(body: bytes) -> Registers:
+    """The registers in the body of a reply to a read; those that it did not ask for are 0."""
+    if body[1] == _BLOCK.size:
+        return _BLOCK.unpack_from(body, 2)  # the usual case
+    return _BLOCK.unpack(body[2 : 2 + body[1]].ljust(_BLOCK.size, b"\0"))
 
 
 def is_write(frame: bytes) -> bool:
@@ -106,66 +92,48 @@ def is_write(frame: bytes) -> bool:
     return frame[1] in (_WRITE, _WRITE_AND_READ)
 
 
-class RefusedError(ProtocolError):
-    """A whole reply that refuses the request.
-
-    Attributes:
-        code: the exception code.
-    """
-
-    code = 0
-
-    @property
-    def is_passing(self) -> bool:
-        """Whether the same request may be answered the next time."""
-        return self.code in _PASSING
-
-    @property
-    def is_unknown_function(self) -> bool:
-        """Whether the device does not serve the function."""
-        return self.code == _ILLEGAL_FUNCTION
-
-
-class MisfitError(ProtocolError):
-    """Bytes that do not begin like the answer; noise on a serial line can cause that."""
-
-
 class Expected(NamedTuple):
     """The one reply that answers a request.
 
     Attributes:
         start: the first bytes of the good reply: header, function code and what must follow it.
-        size: bytes of the good reply, checksum included (:func:`check_sum` checks that).
+        size: bytes of the good reply.
         refusal: the first bytes of an exception reply: header and function code.
         refusal_size: bytes of an exception reply.
+        checksum: bytes of the checksum, at the end of both; 0 if there is none.
     """
 
     start: bytes
     size: int
     refusal: bytes
     refusal_size: int
+    checksum: int
 
-    def is_complete(self, frame: bytes) -> bool:
-        """Whether the bytes so far are the whole answer; False while more must come.
-
-        Raises:
-            MisfitError: the bytes cannot become the answer.
-            RefusedError: the device refuses the request.
-        """
+    def verdict(self, frame: bytes) -> bytes | Refused | Noise | None:
+        """The body of a whole answer, from the function code on; None while more must come."""
         if len(frame) == self.size and frame.startswith(self.start):
-            return True  # the usual case
+            return self._damage(frame) or frame[len(self.refusal) - 1 : self.size - self.checksum]
         if _agree(frame, self.start):
-            if len(frame) > self.size:
-                raise MisfitError(f"{len(frame) - self.size} bytes more than the answer: {show(frame)}")
-            return len(frame) == self.size
+            if len(frame) < self.size:
+                return None
+            return _noise(f"{len(frame) - self.size} bytes more than the answer: {show(frame)}")
         if not _agree(frame, self.refusal):
-            raise self._misfit(frame)
+            return _noise(self._misfit(frame))
         if len(frame) < self.refusal_size:
-            return False
-        code = frame[len(self.refusal)]
-        refused = RefusedError(self._refused(code))
-        refused.code = code
-        raise refused
+            return None
+        code = frame[len(self.refusal)]  # but a damaged reply refuses nothing
+        return self._damage(frame) or Refused(ProtocolError(self._refused(code)), code)
+
+    def _damage(self, frame: bytes) -> Noise | None:
+        end = len(frame) - self.checksum
+        if not self.checksum or FramerRTU.check_CRC(frame[:end], int.from_bytes(frame[end:], "big")):
+            return None
+        return _noise(f"a wrong checksum: {show(frame)}")
+
+    def after(self, header: bytes) -> Expected:
+        """The same reply with a header before it."""
+        start, refusal, more = header + self.start, header + self.refusal, len(header)
+        return Expected(start, more + self.size, refusal, more + self.refusal_size, self.checksum)
 
     @property
     def _function(self) -> int:
@@ -183,40 +151,24 @@ class Expected(NamedTuple):
         said = f"the {who} refuses function {function}: exception {code} ({_EXCEPTIONS.get(code, 'unknown')})"
         if function == _WRITE and code in (1, 2, 3):
             return said + _whole(self._count)
-        if function in _READS and code == _ILLEGAL_FUNCTION:
+        if function in _READS and code == 1:
             return f"{said}: read_function={7 - function} asks with the other one"
         return said
 
-    def _misfit(self, frame: bytes) -> MisfitError:
-        """The error for bytes that are not the answer."""
+    def _misfit(self, frame: bytes) -> str:
+        """The message for bytes that are not the answer."""
         at = len(self.start) - 2
         count = int.from_bytes(frame[at : at + 2], "big")  # of registers, in the answer to a write
         is_shorter = len(frame) == self.size and frame.startswith(self.start[:at]) and count < self._count
         if self._function == _WRITE and is_shorter:
             what = f"it reports {count} registers written, and not {self._count}{_whole(self._count)}"
-            return MisfitError(f"not the answer: {what}")
-        return MisfitError(f"not the answer: {show(frame)}, expected {show(self.start)}...")
+            return f"not the answer: {what}"
+        return f"not the answer: {show(frame)}, expected {show(self.start)}..."
 
 
-def expected_reply(request: bytes, *, serial: bool) -> Expected:
-    """The reply that answers a request frame of function 3, 4, 16 or 23."""
-    if serial:
-        return _expected(request, _CHECKSUM)
-    # Over TCP a header precedes it: transaction and protocol as in the request, then the length.
-    start, size, refusal, refusal_size = _expected_over_tcp(request[6:])
-    header = request[:4]
-    return Expected(header + start, size, header + refusal, refusal_size)
-
-
-@lru_cache(maxsize=16)
-def _expected_over_tcp(request: bytes) -> Expected:
-    """The same from the length field on, cached because a poll never changes."""
-    start, size, refusal, refusal_size = _expected(request, 0)
-    return Expected(_length(size) + start, size + 6, _length(refusal_size) + refusal, refusal_size + 6)
-
-
-def _expected(request: bytes, checksum: int) -> Expected:
-    """The same for a frame that begins with the unit and ends with a checksum of this size."""
+@lru_cache(maxsize=32)  # a poll is always the same
+def expected_reply(request: bytes, *, checksum: int = 0) -> Expected:
+    """The reply to a request (unit and PDU) of function 3, 4, 16 or 23, with a checksum of this size."""
     unit, function, payload = request[:1], request[1], 0
     if function == _WRITE:
         pdu = request[1:6]  # the echo of address and count
@@ -224,7 +176,14 @@ def _expected(request: bytes, checksum: int) -> Expected:
         payload = 2 * int.from_bytes(request[4:6], "big")
         pdu = bytes((function, payload))
     refusal = unit + bytes((function | 0x80,))
-    return Expected(unit + pdu, 1 + len(pdu) + payload + checksum, refusal, 3 + checksum)
+    return Expected(unit + pdu, 1 + len(pdu) + payload + checksum, refusal, 3 + checksum, checksum)
+
+
+@lru_cache(maxsize=32)
+def expected_over_tcp(request: bytes) -> Expected:
+    """The same over Modbus TCP, from the length on, which stands after transaction and protocol."""
+    start, size, refusal, refusal_size, _ = expected_reply(request)
+    return Expected(_length(size) + start, size + 2, _length(refusal_size) + refusal, refusal_size + 2, 0)
 
 
 def _whole(count: int) -> str:
@@ -239,6 +198,15 @@ def _length(size: int) -> bytes:
 def show(frame: bytes) -> str:
     """Bytes for a message, shortened: a confused peer often sends long frames."""
     return frame.hex(" ") if len(frame) <= 32 else f"{frame[:32].hex(' ')}... ({len(frame)} bytes)"
+
+
+def _noise(message: str) -> Noise:
+    return Noise(ProtocolError(message))
+
+
+def stray(data: bytes) -> Stray:
+    """The outcome of bytes that answer nothing."""
+    return Stray(ProtocolError(f"{len(data)} bytes without a request: {show(data)}"))
 
 
 def _agree(frame: bytes, start: bytes) -> bool:

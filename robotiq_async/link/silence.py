@@ -11,8 +11,7 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Final
 
 SHORT_CHARACTERS: Final = 3.5
@@ -39,21 +38,12 @@ class Silence:
         self.heard = -math.inf
         self.is_long = False
 
-    @contextmanager
-    def long(self) -> Iterator[None]:
-        """Keep the longer silence during a block."""
-        before, self.is_long = self.is_long, True
-        try:
-            yield
-        finally:
-            self.is_long = before
-
-    async def keep(self, clock: Callable[[], float]) -> None:
-        """Wait until the line has been silent for long enough; returns at once if it has.
+    async def keep(self, clock: Callable[[], float], *, is_long: bool = False) -> None:
+        """Wait until the line has been silent for long enough, or for the longer time; at once if it has.
 
         ``clock`` is that of the event loop (``clock_of``). uvloop's own ``time()`` counts whole milliseconds.
         """
-        until = self.heard + (max(LONG_S, self.short_s) if self.is_long else self.short_s)
+        until = self.heard + (max(LONG_S, self.short_s) if self.is_long or is_long else self.short_s)
         if (left := until - clock()) <= 0:
             return
         if clock is not time.monotonic or IS_COARSE:

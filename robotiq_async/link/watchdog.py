@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+from ..runtime.clock import clock_of
 from ..runtime.limit import HELD_S
 
 GRACE_S: Final = 0.02
@@ -18,15 +19,16 @@ class Watchdog:
 
     Setting and cancelling a timer for each exchange would cost more than the exchange itself. So one timer
     runs until it expires, and then checks when the exchange of that moment is due.
+
+    Attributes:
+        loop: the event loop.
+        clock: its time, in finer steps where the loop's own are coarse.
     """
 
-    def __init__(
-        self,
-        loop: asyncio.AbstractEventLoop,
-        is_waiting: Callable[[], bool],
-        on_timeout: Callable[[], None],
-    ) -> None:
-        self._loop = loop
+    def __init__(self, is_waiting: Callable[[], bool], on_timeout: Callable[[], None]) -> None:
+        """Watch in the running loop."""
+        self.loop: Final = asyncio.get_running_loop()
+        self.clock: Final = clock_of(self.loop)
         self._is_waiting = is_waiting
         self._on_timeout = on_timeout
         self._due = 0.0
@@ -55,7 +57,7 @@ class Watchdog:
         self._timer = None
         if not self._is_waiting():
             return
-        now = self._loop.time()
+        now = self.loop.time()
         if now >= self._due and now - when > HELD_S and not self._has_grace:
             self._due, self._has_grace = now + GRACE_S, True
         if now < self._due:
@@ -65,4 +67,4 @@ class Watchdog:
 
     def _set_timer(self) -> None:
         self._timer_due = self._due
-        self._timer = self._loop.call_at(self._due, self._look, self._due)
+        self._timer = self.loop.call_at(self._due, self._look, self._due)

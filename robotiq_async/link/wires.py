@@ -28,6 +28,7 @@ from ..runtime.host_names import addresses_of, why_no_socket, why_unreachable
 from ..runtime.limit import Limit
 from ..values.errors import ConnectFailedError, ConnectionLostError, RobotiqConnectionError
 from .address import Address
+from .outcome import Lost, Outcome
 from .serial_ports import GONE, hasten, why_no_port
 
 Client = AsyncModbusTcpClient | AsyncModbusSerialClient
@@ -35,7 +36,7 @@ AsyncioTransport = Any
 """Of a connection: one of asyncio's, or pymodbus's for serial ports, which is not typed."""
 Send = Callable[[bytes], None]
 OnData = Callable[[bytes], None]
-OnEnd = Callable[[RobotiqConnectionError], None]
+OnEnd = Callable[[Outcome], None]
 OnConnection = Callable[[bool], None]
 
 LARGEST_READ: Final = 4096  # bytes read at a time; the longest Modbus frame has 260
@@ -70,15 +71,21 @@ class Wire(Protocol):
 
         Args:
             on_data: gets what arrives, from the first byte on.
-            on_end: gets the reason when the wire ends by itself.
+            on_end: gets Lost when the wire has ended, or what a request comes to that has no answer.
             seconds: for how long the caller waits; it cancels the call then.
 
         Raises:
             ConnectFailedError: it cannot be opened, for whatever reason.
         """
 
+    def give_up(self) -> None:
+        """Wait no longer for what the last frame brings."""
+
     def close(self) -> None:
         """Close it at once; does nothing when closed."""
+
+    async def closed(self) -> None:
+        """Wait until it is closed; limits its own time."""
 
 
 def wire_to(address: Address) -> Wire:
@@ -109,10 +116,17 @@ class _ClientWire:
         self._address = address
         self.may_echo = address.is_rtu
 
+    def give_up(self) -> None: ...
+
     def close(self) -> None:
         client, self._client = self._client, None
         if client is not None:
             client.close()
+
+    async def closed(self) -> None: ...
+
+    def _lost(self) -> Lost:
+        return Lost(ConnectionLostError(f"{self._address}{self._ending}"))
 
     async def _connect(
         self, make: Callable[[OnConnection], Client], on_data: OnData, on_end: OnEnd
@@ -122,7 +136,7 @@ class _ClientWire:
 
         def on_connection(is_connected: bool) -> None:
             if not is_connected:
-                on_end(ConnectionLostError(f"{self._address}{self._ending}"))
+                on_end(self._lost())
             elif not made.done():
                 made.set_result(None)
 
@@ -253,7 +267,7 @@ class SerialWire(_ClientWire):
             if data:
                 on_data(data)
             else:
-                on_end(ConnectionLostError(f"{self._address}{self._ending}"))
+                on_end(self._lost())
 
         if hasattr(port, "fd"):
             transport.intern_read_ready = read

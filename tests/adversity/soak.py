@@ -28,7 +28,7 @@ from typing import Any
 
 from robotiq_async import JAW, Finger, Model, MoveResult, RobotiqError, RobotiqHand, State
 from robotiq_async.control.state_machine import RUNNING
-from robotiq_async.link.connection import LONGEST_HUSH_S
+from robotiq_async.link.line import LONGEST_HUSH_S
 from robotiq_async.session.options import RESPONSE_TIMEOUT_S
 from robotiq_async.simulator import KINDS, Trouble
 from robotiq_async.values.model import MODELS, THREE_FINGER, model_of

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pytest
 
 from robotiq_async import ProtocolError, ResponseTimeoutError, RobotiqConnectionError
-from robotiq_async.link.connection import HUSH_S
+from robotiq_async.link.line import HUSH_S
 from robotiq_async.link.modbus import ModbusTransport
 from robotiq_async.link.silence import LONG_S
 from tests.link.scripted_device import Device, unopened, wrong_checksum

@@ -15,6 +15,7 @@ from typing import Final
 from ...values import registers as reg
 from ...values.errors import ProtocolError
 from ...values.registers import Echo, Registers
+from ..outcome import Stray
 
 HIGHEST: Final = {"ACT": 1, "GTO": 1, "PRE": 255, "OBJ": 3, "STA": 3, "FLT": 255, "POS": 255}
 """The variables of a status, and the highest value of each."""
@@ -122,10 +123,10 @@ def without_ends(received: bytes) -> bytes:
     return received.lstrip(_END)
 
 
-def strays(received: bytes) -> ProtocolError | None:
-    """The error for bytes that answer nothing; None for empty lines."""
+def stray(received: bytes) -> Stray | None:
+    """The outcome of bytes that answer nothing; None for empty lines."""
     text = without_ends(received)
-    return ProtocolError(f"{len(text)} bytes without a question: {show(text)}") if text else None
+    return Stray(ProtocolError(f"{len(text)} bytes without a question: {show(text)}")) if text else None
 
 
 def status_registers(values: Mapping[str, int]) -> Registers:

@@ -26,20 +26,20 @@ Nothing of this has met a real controller.
 
 from __future__ import annotations
 
-import asyncio
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from itertools import pairwise
-from typing import Final, TypeVar
+from typing import Any, Final
 
 from ...runtime.log import Log, log
 from ...values import registers as reg
 from ...values.errors import ConnectFailedError, ProtocolError, ResponseTimeoutError
 from ...values.registers import Echo, Registers
 from ..address import Address
-from ..connection import Connection
-from ..exchange import Exchange
+from ..exchange import Answer, Exchange
+from ..line import Dialogue, Line, Step
+from ..outcome import Noise, Outcome, Silent
 from . import lines
 
 SHOWS_S: Final = 0.5
@@ -53,32 +53,32 @@ NOTHING: Final = (-1, -1, -1)
 TRIES: Final = 4
 """Of reading activation, go and echo of one moment. Both change at a stop or a start, not all the time."""
 
-T = TypeVar("T")
 
-
-class _Question(Exchange[T]):
+class _Question(Exchange):
     """A line and the check of its answer."""
 
-    def __init__(self, line: bytes, read: Callable[[bytes], T | None]) -> None:
+    def __init__(self, line: bytes, read: Callable[[bytes], int | None]) -> None:
         super().__init__(line)
         self._read = read
+        self.value = 0
+        """What the whole answer says."""
 
-    def take(self, data: bytes) -> None:
-        """Take bytes; the last one of the answer ends the question, or the first wrong one."""
+    def feed(self, data: bytes) -> Answer | None:
         self._received += data
         try:
             said = self._read(self._received)
         except ProtocolError as error:
-            self.fail(error)
-        else:
-            if said is not None:
-                self.answer.set_result(said)
+            return Noise(error)
+        if said is None:
+            return None
+        self.value = said
+        return self._received
 
-    def late(self, address: Address, seconds: float) -> str:
-        """The message for an answer that has not come in time."""
+    def late(self, place: object) -> Silent:
         half = lines.without_ends(self._received)
         what = f"half a line, {lines.show(half)}, answers" if half else "no answer to"
-        return f"{address}: {what} {self.frame.decode().strip()} within {seconds:g} s"
+        asked = self.frame.decode().strip()
+        return Silent(ResponseTimeoutError(f"{place}: {what} {asked} within {self.seconds:g} s"))
 
 
 class UrcapTransport:
@@ -103,7 +103,7 @@ class UrcapTransport:
         self._gripper = gripper
         self._connect_timeout = connect_timeout
         self._response_timeout = response_timeout
-        self._connection = Connection(address, lines.strays)
+        self._line = Line(address, stray=lines.stray)
         self._asked = b""
         """The question that has no answer; that of a connection that has ended, too."""
         self._values: dict[str, int] = {}
@@ -125,7 +125,7 @@ class UrcapTransport:
 
     @property
     def is_open(self) -> bool:
-        return self._connection.is_open_for(self)
+        return self._line.is_open_for(self)
 
     async def open(self) -> None:
         """Connect, and make sure that no answer to an earlier question is taken for one to come.
@@ -139,83 +139,93 @@ class UrcapTransport:
         await self.close()
         self._changes, self._written = True, NOTHING
         self._values.clear()
-        await self._connection.open(self, self._connect_timeout)
-        await self._get("FLT" if self._asked == lines.question("STA") else "STA")
-        if self._gripper is not None:
-            await self._choose(self._gripper)
+        await self._line.open(self, self._connect_timeout)
+        await self._line.talk(self, self._opening())
 
-    async def read(self) -> Registers:
+    def read(self) -> Coroutine[Any, Any, Registers]:
         """The status registers of a jaw; the variables were asked for one after the other.
 
         Raises:
             RobotiqConnectionError: no clean answer in time; the transport is closed.
         """
-        by = self._now() + self._response_timeout
-        if not self._changes:
-            await self._read_some(by)
-        if self._changes:
-            await self._read_all(by)
-        activation, go, position = self._echo()
-        return lines.status_registers(self._values | {"ACT": activation, "GTO": go, "PRE": position})
+        return self._line.talk(self, self._reading())
 
-    async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
-        """Write what ``decide`` returns, if anything.
+    def send(self, decide: Callable[[], Sequence[int] | None]) -> Coroutine[Any, Any, bool]:
+        """Write what ``decide`` returns, if anything, with one SET, exactly once.
 
         Raises:
             RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
         """
-        self._connection.check_open(self)
-        image = decide()
-        if image is None:
-            return False
-        await self.write(image)
-        return True
+        return self._line.talk(self, self._writing(decide))
 
     async def write(self, registers: Sequence[int]) -> None:
-        """Write the request registers with one SET, exactly once.
-
-        Raises:
-            RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
-        """
-        act, go, position = (field.read(registers) for field in (reg.rACT, reg.rGTO, reg.rPR[0]))
-        self._sent.append((act, go, position))
-        if self._changes or (act, go) != (self._values["ACT"], self._values["GTO"]):
-            self._changes, self._shows_by = True, self._now() + SHOWS_S
-            self._written = self._sent[-1]
-        shown = None if self._releases else self._values.get("ACT")
-        self._releases = bool(reg.rATR.read(registers))
-        await self._set(lines.command(registers, shown))
+        """Write the request registers."""
+        await self.send(lambda: registers)
 
     async def close(self) -> None:
         """Disconnect; does nothing when closed."""
-        self._connection.leave(self)
+        self._line.leave(self)
+
+    # -- dialogues ---------------------------------------------------------------------------------------
+
+    def _opening(self) -> Dialogue[None]:
+        yield from self._get("FLT" if self._asked == lines.question("STA") else "STA")
+        if self._gripper is not None:
+            outcome = yield self._ask(lines.choice(self._gripper), _acknowledged)
+            if isinstance(outcome, Noise | Silent):
+                why = f"the URCap does not choose gripper {self._gripper}: {outcome.error}"
+                raise ConnectFailedError(str(self._address), why) from outcome.error
+            self._end(outcome)
+
+    def _reading(self) -> Dialogue[Registers]:
+        by = self._line.now() + self._response_timeout
+        if not self._changes:
+            yield from self._read_some(by)
+        if self._changes:
+            yield from self._read_all(by)
+        activation, go, position = self._echo()
+        return lines.status_registers(self._values | {"ACT": activation, "GTO": go, "PRE": position})
+
+    def _writing(self, decide: Callable[[], Sequence[int] | None]) -> Dialogue[bool]:
+        if isinstance(obstacle := (yield Step.READY), Outcome):
+            raise obstacle.error
+        if (image := decide()) is None:
+            return False
+        act, go, position = (field.read(image) for field in (reg.rACT, reg.rGTO, reg.rPR[0]))
+        self._sent.append((act, go, position))
+        if self._changes or (act, go) != (self._values["ACT"], self._values["GTO"]):
+            self._changes, self._shows_by = True, self._line.now() + SHOWS_S
+            self._written = self._sent[-1]
+        shown = None if self._releases else self._values.get("ACT")
+        self._releases = bool(reg.rATR.read(image))
+        self._end((yield self._ask(lines.command(image, shown), _acknowledged)))
+        return True
 
     # -- a status ----------------------------------------------------------------------------------------
 
-    async def _read_some(self, by: float) -> None:
+    def _read_some(self, by: float) -> Dialogue[None]:
         """The variables that change in a motion, and one of the slow ones."""
-        if await self._is_new("PRE", by) and self._shown not in self._sent:
+        if (yield from self._is_new("PRE", by)) and self._shown not in self._sent:
             self._changes = True
             return
-        await self._is_new("OBJ", by)
-        await self._is_new("POS", by)
+        yield from self._is_new("OBJ", by)
+        yield from self._is_new("POS", by)
         slow = SLOW[self._turn]
         self._turn = (self._turn + 1) % len(SLOW)
-        self._changes = await self._is_new(slow, by)
+        self._changes = yield from self._is_new(slow, by)
 
-    async def _read_all(self, by: float) -> None:
+    def _read_all(self, by: float) -> Dialogue[None]:
         """Every variable; activation, go and echo as they were in one moment."""
-        await self._read_pair(by)
+        yield from self._read_pair(by)
         for _ in range(TRIES):
-            await self._is_new("PRE", by)
-            if not await self._read_pair(by):
+            yield from self._is_new("PRE", by)
+            if not (yield from self._read_pair(by)):
                 break
         else:
-            await self.close()
             raise ProtocolError(f"{self._address}: ACT and GTO change too often to be read")
         for name in ("OBJ", "STA", "FLT", "POS"):
-            await self._is_new(name, by)
-        if self._shown == self._written or self._now() >= self._shows_by:
+            yield from self._is_new(name, by)
+        if self._shown == self._written or self._line.now() >= self._shows_by:
             self._written = NOTHING
         self._changes = self._written is not NOTHING
 
@@ -227,7 +237,7 @@ class UrcapTransport:
     def _echo(self) -> Echo:
         """The echo as it was read, or that of the image before if a command is taken half."""
         shown, images = self._shown, (self._whole, *self._sent)
-        if shown not in images and self._now() < self._shows_by:
+        if shown not in images and self._line.now() < self._shows_by:
             for before, after in pairwise(images):
                 if shown == lines.midway(before, after):
                     return before
@@ -236,39 +246,36 @@ class UrcapTransport:
         self._whole = shown
         return shown
 
-    async def _read_pair(self, by: float) -> bool:
+    def _read_pair(self, by: float) -> Dialogue[bool]:
         """Read ACT and GTO; whether one of them has changed."""
-        is_new = await self._is_new("ACT", by)
-        return await self._is_new("GTO", by) or is_new
+        is_new = yield from self._is_new("ACT", by)
+        return (yield from self._is_new("GTO", by)) or is_new
 
-    async def _is_new(self, name: str, by: float) -> bool:
+    def _is_new(self, name: str, by: float) -> Dialogue[bool]:
         """Read a variable; whether it has changed."""
-        before, self._values[name] = self._values.get(name), await self._get(name, by)
+        before = self._values.get(name)
+        self._values[name] = yield from self._get(name, by)
         return self._values[name] != before
 
     # -- one question ------------------------------------------------------------------------------------
 
-    async def _get(self, name: str, by: float = math.inf) -> int:
-        return await self._ask(lines.question(name), lambda received: lines.value_in(received, name), by)
+    def _get(self, name: str, by: float = math.inf) -> Dialogue[int]:
+        question = self._ask(lines.question(name), lambda received: lines.value_in(received, name), by)
+        self._end((yield question))
+        return question.value
 
-    async def _set(self, line: bytes) -> None:
-        await self._ask(line, lambda received: lines.is_acknowledged(received) or None)
-
-    async def _choose(self, gripper: int) -> None:
-        try:
-            await self._set(lines.choice(gripper))
-        except (ProtocolError, ResponseTimeoutError) as error:
-            why = f"the URCap does not choose gripper {gripper}: {error}"
-            raise ConnectFailedError(str(self._address), why) from error
-
-    async def _ask(self, line: bytes, read: Callable[[bytes], T | None], by: float = math.inf) -> T:
-        """Send a line and wait for its answer; every other outcome closes the connection."""
+    def _ask(self, line: bytes, read: Callable[[bytes], int | None], by: float = math.inf) -> _Question:
         self._asked = line
         question = _Question(line, read)
-        answer = await self._connection.exchange(self, question, self._response_timeout, by)
-        self._asked = b""
-        return answer
+        question.seconds, question.by = self._response_timeout, by
+        return question
 
-    def _now(self) -> float:
-        """The time by the loop's own clock, as the watchdog has it."""
-        return asyncio.get_running_loop().time()
+    def _end(self, came_to: Answer | None) -> None:
+        """Note that the question was answered; every other outcome closes the connection."""
+        if isinstance(came_to, Outcome):
+            raise came_to.error
+        self._asked = b""
+
+
+def _acknowledged(received: bytes) -> int | None:
+    return lines.is_acknowledged(received) or None

@@ -1,0 +1,286 @@
+"""What is said to a gripper over Modbus: one generator for each thing that a hand wants of its link.
+
+A dialogue yields steps (line.py) and gets what they come to. It returns what was read or written. Where it
+raises, it gives the line up, and the next one begins with an opening. No I/O and no event loop: a line
+carries it out, and a test can, too.
+
+* **A read is asked once more** where its answer can be missing or damaged without harm. The second answer
+  must not be the first one that was only late: so first silence, then a read of another length. If the first
+  answer arrives now, it has the wrong length and ends the connection. Only then the status is read.
+* **A write is never repeated.** Whether it was carried out is unknown, and the status that is read next
+  tells.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Generator, Sequence
+from typing import Final
+
+from ..runtime.log import Log
+from ..values.errors import ResponseTimeoutError, RobotiqConnectionError
+from ..values.registers import REGISTER_COUNT, RegisterMap, Registers
+from . import transport
+from .exchange import Answer, Exchange
+from .frames import read_request, registers_in, write_and_read_request, write_request
+from .line import Dialogue, Line, Step
+from .outcome import Noise, Outcome, Refused, Silent
+
+REPEAT_S: Final = 0.15
+"""Time for a repeated read, so that a write after it still fails within a second."""
+USUAL_RESPONSE_S: Final = 0.4
+"""A longer response timeout means a slow line: a repeated read then gets that timeout instead of REPEAT_S."""
+SHORT_READS: Final = 3
+"""Reads after the short silence, at opening, before a line is trusted with it."""
+MOST_UNANSWERED: Final = 3
+UNANSWERED_S: Final = 60.0
+"""With so many unanswered reads in so many seconds, a line gets the longer silence."""
+REPEAT_WARNING_S: Final = 60.0
+"""At most one warning about repeated reads in this time."""
+
+Decide = Callable[[], Sequence[int] | None]
+"""Returns the image to write, or None; called in the turn of the loop in which a write leaves."""
+Part = Generator[Exchange | Step, Answer | None, Outcome | None]
+"""A part of a dialogue; returns the outcome that ended it badly, or None."""
+
+
+class Dialogues:
+    """What is said to one gripper, over all connections to it.
+
+    Attributes:
+        line: the line to it; another one may be set before an opening.
+        repeats: number of reads repeated because an answer was missing or damaged.
+        serves_23: whether function 23 is used.
+        has_served_23: whether it was answered once.
+    """
+
+    def __init__(
+        self,
+        line: Line,
+        registers: RegisterMap,
+        make: Callable[[bytes], Exchange],
+        response_timeout: float,
+        log: Log,
+    ) -> None:
+        """``make`` makes the exchange of a request (unit and PDU) in the form of the line."""
+        self.line = line
+        self.repeats = 0
+        self.serves_23 = registers.write_function == 23
+        self.has_served_23 = False
+        self._map: Final = registers
+        self._make: Final = make
+        self._response_s: Final = response_timeout
+        self._repeat_s: Final = response_timeout if response_timeout > USUAL_RESPONSE_S else REPEAT_S
+        self._log: Final = log
+        self._poll: Final = read_request(registers, registers.count)
+        self._has_probed = False
+        self._probe = registers.count - 1
+        """Registers that the last read to bring the line in step asked for."""
+        self._rest: Registers = ()
+        """The registers after those that a poll reads, as the first opening found them, if any was not 0."""
+        self._unanswered: Final[deque[float]] = deque(maxlen=MOST_UNANSWERED)
+        """The times of the last reads that were repeated because there was no answer."""
+        self._warned = -math.inf
+        """The time of the last warning about a repeated read."""
+
+    # -- dialogues ---------------------------------------------------------------------------------------
+
+    def opening(self) -> Dialogue[None]:
+        """Make sure that no answer to an earlier request is taken for one to come.
+
+        The first exchange is made twice if it fails harmlessly: the tool port of some arms loses the first
+        request of a connection, and ``socat`` with ``waitslave`` connects only when it sees one. A device
+        with three registers may refuse the read of eight, or not answer it.
+        """
+        asks_for_rest = not self._has_probed and self._map.count < REGISTER_COUNT
+        first = yield from self._probed()
+        if first is not None:
+            is_harmless = asks_for_rest and isinstance(first, Refused | Silent)
+            if not (is_harmless or self._can_repeat(first)):
+                raise first.error
+            yield Step.TURN
+            if (again := (yield from self._in_step(self._repeat_by()))) is not None:
+                raise first.error from again.error
+            if asks_for_rest:
+                what = "%s did not answer a read of all registers: %s"
+                self._log.info(what, self.line.address, first.error)
+        if self.line.keeps_silence and not self.line.silence.is_long:
+            yield from self._try_short_silence()
+
+    def read(self) -> Dialogue[Registers]:
+        """Read the status."""
+        came_to = yield self._ask(self._poll)
+        if not isinstance(came_to, bytes):
+            came_to = yield from self._again(came_to)
+        return self._status_in(came_to)
+
+    def write(self, decide: Decide) -> Dialogue[bool]:
+        """Write what ``decide`` returns, with function 16; return whether there was anything."""
+        yield from self._ready()
+        if (image := decide()) is None:
+            return False
+        came_to = yield self._ask(write_request(self._map, image))
+        if isinstance(came_to, Outcome):
+            raise came_to.error
+        return True
+
+    def write_and_read(self, decide: Decide) -> Dialogue[transport.Answer | None]:
+        """Write what ``decide`` returns, and read the status, with function 23; None if nothing was written.
+
+        After a reply that is missing or damaged the write is in doubt, and the status that is read tells. A
+        device that refuses the function, or does not answer the first of these, gets function 16 from then
+        on. Only what was refused, and so not carried out, is written with it at once: what ``decide`` returns
+        then, for a stop may have come since.
+        """
+        yield from self._ready()
+        if (image := decide()) is None:
+            return None
+        came_to = yield self._ask(write_and_read_request(self._map, image))
+        if isinstance(came_to, bytes):
+            self.has_served_23 = True
+            return transport.Answer(self._status_in(came_to), None)
+        assert came_to is not None, "an exchange comes to something"
+        if not self.has_served_23 and isinstance(came_to, Refused | Silent):
+            self.serves_23 = False
+            what = "%s is written with function 16: %s"
+            self._log.warning(what, self.line.address, came_to.error)
+        if isinstance(came_to, Refused) and came_to.is_unknown_function:
+            if not (yield from self.write(decide)):
+                return None
+            yield Step.TURN
+            return transport.Answer((yield from self.read()), None)
+        if not (isinstance(came_to, Refused) or self._can_repeat(came_to)):
+            raise came_to.error
+        return transport.Answer(self._status_in((yield from self._second(came_to))), came_to.error)
+
+    def stop_or_read(self, decide: Decide) -> Dialogue[Registers | None]:
+        """Write what ``decide`` returns when the turn has come; read the status if that is nothing.
+
+        After a disturbance it reads, which brings the line in step before a write.
+        """
+        if (yield Step.READY) is None and (image := decide()) is not None:
+            came_to = yield self._ask(write_request(self._map, image))
+            if isinstance(came_to, Outcome):
+                raise came_to.error
+            return None
+        return (yield from self.read())
+
+    # -- parts of them -------------------------------------------------------------------------------------
+
+    def _ready(self) -> Dialogue[None]:
+        """What follows leaves at once: a write must not meet what is left of a disturbance."""
+        obstacle = yield Step.READY
+        if isinstance(obstacle, Outcome) and self._can_repeat(obstacle):
+            if (worse := (yield from self._in_step())) is not None:
+                raise worse.error
+            obstacle = yield Step.READY  # once: some lines add a byte to every reply
+        if isinstance(obstacle, Outcome):
+            raise obstacle.error
+
+    def _again(self, first: Answer | None) -> Dialogue[bytes]:
+        assert isinstance(first, Outcome)
+        if not self._can_repeat(first):
+            raise first.error
+        return (yield from self._second(first))
+
+    def _second(self, first: Outcome) -> Dialogue[bytes]:
+        """Read once more on a line that lost or damaged a byte, as USB adapters occasionally do.
+
+        Raises:
+            RobotiqConnectionError: that of the first request, if there is again no clean answer.
+        """
+        yield Step.TURN
+        by = self._repeat_by()
+        bad = yield from self._in_step(by, is_long=True)  # the shorter silence may be why there was no answer
+        if bad is None:
+            came_to = yield self._ask(self._poll, by=by, is_long=True)
+            if isinstance(came_to, bytes):
+                self._note_repeat(first.error)
+                return came_to
+            bad = came_to
+        raise first.error from (bad.error if bad else None)
+
+    def _in_step(self, by: float = math.inf, *, is_long: bool = False) -> Part:
+        """Wait for silence, and drop the rest of a damaged reply; then make sure that nothing can come."""
+        noise = yield Step.HUSH
+        return noise if isinstance(noise, Outcome) else (yield from self._probed(by, is_long=is_long))
+
+    def _probed(self, by: float = math.inf, *, is_long: bool = False) -> Part:
+        """Make sure that no answer to an earlier request is still on its way.
+
+        Serial replies carry no transaction id, and a gateway from TCP to a serial line gives a late reply the
+        id of the next request. So this reads fewer registers than a poll, another number each time. A late
+        answer to a poll has another length. The gripper answers in order, so after an answer of the right
+        length nothing older than the last of these reads can follow, and so no status.
+
+        The first one of all asks a jaw for eight registers, which show a wrong model.
+        """
+        count, is_first, self._has_probed = self._map.count, not self._has_probed, True
+        if is_first and count < REGISTER_COUNT:
+            came_to = yield self._ask(read_request(self._map, REGISTER_COUNT), by=by, is_long=is_long)
+            if isinstance(came_to, bytes):
+                rest = registers_in(came_to)[count:]
+                self._rest = rest if any(rest) else ()
+        else:
+            self._probe = self._probe % (count - 1) + 1
+            came_to = yield self._ask(read_request(self._map, self._probe), by=by, is_long=is_long)
+        return came_to if isinstance(came_to, Outcome) else None
+
+    def _try_short_silence(self) -> Dialogue[None]:
+        """Read a few times after 3.5 characters of silence; take the longer one if an answer is missing."""
+        for _ in range(SHORT_READS):
+            yield Step.TURN  # one exchange for each: a slow gripper keeps others waiting
+            if (bad := (yield from self._probed())) is None:
+                continue
+            if not self._can_repeat(bad):
+                raise bad.error
+            if not isinstance(bad, Refused):
+                self._keep_long_silence(bad.error)
+            yield Step.TURN
+            if (worse := (yield from self._in_step())) is not None:
+                raise worse.error
+            return
+
+    # -- requests, and what outcomes mean ------------------------------------------------------------------
+
+    def _ask(self, request: bytes, *, by: float = math.inf, is_long: bool = False) -> Exchange:
+        exchange = self._make(request)
+        exchange.seconds, exchange.by, exchange.is_long = self._response_s, by, is_long
+        return exchange
+
+    def _can_repeat(self, outcome: Outcome) -> bool:
+        """Whether a read can be asked again after this."""
+        if isinstance(outcome, Refused):
+            return outcome.is_passing
+        return self.line.forgives and isinstance(outcome, Noise | Silent)
+
+    def _repeat_by(self) -> float:
+        """The latest end of a repeated read, in the loop's time."""
+        return self.line.now() + self._repeat_s
+
+    def _status_in(self, answer: bytes) -> Registers:
+        registers = registers_in(answer)
+        return registers[: self._map.count] + self._rest if self._rest else registers
+
+    def _note_repeat(self, why: RobotiqConnectionError) -> None:
+        self.repeats += 1
+        now = self.line.now()
+        if isinstance(why, ResponseTimeoutError):
+            self._note_unanswered(why, now)
+        if now - self._warned >= REPEAT_WARNING_S:
+            self._warned = now
+            self._log.warning("a read was repeated: %s (%d times so far)", why, self.repeats)
+
+    def _note_unanswered(self, why: RobotiqConnectionError, now: float) -> None:
+        """Take the longer silence if reads stay unanswered that are answered when they are repeated."""
+        self._unanswered.append(now)
+        is_often = len(self._unanswered) == MOST_UNANSWERED and now - self._unanswered[0] < UNANSWERED_S
+        if is_often and self.line.keeps_silence and not self.line.silence.is_long:
+            self._keep_long_silence(why)
+
+    def _keep_long_silence(self, why: RobotiqConnectionError) -> None:
+        silence = self.line.silence
+        silence.is_long = True
+        what = "%s does not answer after a silence of %.1f ms, so it gets 1.75 ms: %s"
+        self._log.warning(what, self.line.address, 1000 * silence.short_s, why)

@@ -1,0 +1,63 @@
+"""What a request came to, other than an answer. A dialogue decides by the kind, and by nothing else.
+
+======== ============================================ ===================================
+outcome  what happened                                what may still come
+======== ============================================ ===================================
+Refused  a whole exception reply                      nothing
+Noise    bytes that cannot become the answer          the rest of them, or the answer
+Stray    bytes without a request; nothing was sent    more of them
+Silent   nothing, or half an answer, in time          the answer
+Lost     the wire has ended, or was never there       nothing
+======== ============================================ ===================================
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from ..values.errors import RobotiqConnectionError
+
+_PASSING: Final = (5, 6, 11)
+"""The exceptions of a device that may answer the next time: it works, is busy, or was not reached in time."""
+_ILLEGAL_FUNCTION: Final = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """An end without an answer; ``error`` is what users see of it."""
+
+    error: RobotiqConnectionError
+
+
+@dataclass(frozen=True, slots=True)
+class Refused(Outcome):
+    """A whole reply that refuses the request, with its exception code."""
+
+    code: int
+
+    @property
+    def is_passing(self) -> bool:
+        """Whether the same request may be answered the next time."""
+        return self.code in _PASSING
+
+    @property
+    def is_unknown_function(self) -> bool:
+        """Whether the device does not serve the function: nothing was carried out."""
+        return self.code == _ILLEGAL_FUNCTION
+
+
+class Noise(Outcome):
+    """Bytes that are not the answer; a lost or damaged byte can cause that."""
+
+
+class Stray(Noise):
+    """Bytes without a request."""
+
+
+class Silent(Outcome):
+    """No whole answer in time."""
+
+
+class Lost(Outcome):
+    """There is no wire, or none any more."""
