@@ -131,7 +131,7 @@ def request_fields() -> str:
 
 def status_fields() -> str:
     """The status block."""
-    return _fields("g")
+    return _fields("gk")
 
 
 def _fields(prefix: str) -> str:
@@ -153,7 +153,7 @@ def _fields(prefix: str) -> str:
 def _named(prefix: str) -> Iterator[tuple[str, Sequence[Field]]]:
     """The fields of a block with the names of the manual; those that every axis has are one row."""
     for name, value in vars(registers).items():
-        if re.fullmatch(f"{prefix}[A-Z]{{2,3}}", name):
+        if re.fullmatch(f"[{prefix}][A-Z]{{2,3}}", name):
             if isinstance(value, Field):
                 yield name, (value,)
             else:

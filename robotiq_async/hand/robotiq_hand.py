@@ -332,11 +332,15 @@ class RobotiqHand(Hand):
             fault = self.status.fault
             why = f"{fault.description} (gFLT 0x{int(fault):02X})"
             advice = "" if fault.is_known else "reset() may clear it, and DROPS the part"
+        if text := self.status.controller_fault_text:
+            why, advice = f"{why}; {text}", "look at the controller before the gripper"
         return StateTimeoutError(f"the gripper is not active after {seconds:g} s: {why}", advice=advice)
 
     def _check_worth_a_reset(self, resets: int) -> None:
         fault = self.status.fault
         what = f"the gripper makes no progress: {fault.description} (gFLT 0x{int(fault):02X})"
+        if text := self.status.controller_fault_text:
+            what += f"; {text}"
         if resets == RESETS:
             raise StateTimeoutError(
                 f"{what}, also after {resets} resets. Is its emergency stop released, and is it powered?",

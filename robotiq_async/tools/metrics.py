@@ -33,6 +33,7 @@ from ..runtime.log import log
 from ..runtime.sockets import listen
 from ..values.checks import check_int
 from ..values.enums import State
+from ..values.errors import NotStartedError
 from ..values.statistics import Statistics
 
 LOOPBACK: Final = "127.0.0.1"
@@ -107,6 +108,16 @@ class HandCollector(Collector):
                 state.add_metric([hand, each.name], float(each is present))
         yield moves
         yield state
+        yield self._controller_faults()
+
+    def _controller_faults(self) -> Metric:
+        """The kFLT of each hand with a status: a hand without one has no figure."""
+        meaning = "Fault code of the controller before a 2F or a Hand-E (kFLT); 0 for none."
+        metric = GaugeMetricFamily("robotiq_controller_fault", meaning, labels=["hand"])
+        for hand in self._hands:
+            with contextlib.suppress(NotStartedError):
+                metric.add_metric([hand.name], hand.status.controller_fault)
+        return metric
 
     async def _figures(self) -> dict[str, tuple[State, Statistics]]:
         return {hand.name: (hand.state, hand.statistics) for hand in self._hands}

@@ -118,6 +118,8 @@ def _problem(state: State, age: float | None, status: RobotiqStatus | None) -> s
         return "no status has been read yet"
     if state is State.DISCONNECTED or age > FRESH_S:
         return f"the link is down: no status for {age:.1f} s"
+    if status.controller_fault:
+        return status.controller_fault_text
     if status.fault.is_serious:
         return f"fault 0x{int(status.fault):02X}: {status.fault.description}"
     if state in RUNNING:

@@ -120,6 +120,16 @@ class ObjectStatus(Code):
         return self in (ObjectStatus.CONTACT_OPENING, ObjectStatus.CONTACT_CLOSING)
 
 
+CONTROLLER_FAULTS: Final = {
+    0x04: "no 24 V supply",
+    0x05: "no gripper is connected",
+    0x09: "it is booting",
+    0x0C: "emergency stop",
+    0x0E: "over-current",
+}
+"""Faults of the Universal Controller (kFLT), from the manual of the 2F."""
+
+
 class Initialization(Code):
     """gIMC: progress of the activation or of a mode change."""
 

@@ -45,7 +45,8 @@ class Model:
         tcp: registers over Modbus TCP.
         rtu: registers on a serial line.
         stroke: openings of the fingers by position.
-        open_reading_max: the most, in counts, that an open finger reads.
+        open_reading_min: the least, in counts, that an open finger reads.
+        open_reading_max: the most.
         closed_reading_min: the least, in counts, that a closed finger reads.
         speeds_mm_s: nominal speeds at the values 0 and 255.
         forces_n: nominal forces at the values 0 and 255.
@@ -67,6 +68,7 @@ class Model:
     tcp: RegisterMap
     rtu: RegisterMap
     stroke: Stroke
+    open_reading_min: int
     open_reading_max: int
     closed_reading_min: int
     speeds_mm_s: tuple[float, float]
@@ -142,11 +144,12 @@ class Model:
 
     def has_reached(self, request: int, position: int) -> bool:
         """Whether an axis that rests at a position, in counts, can have reached a request."""
+        if abs(request - position) <= TOLERANCE:
+            return True
+        # A stop may lie before the request, but not behind it.
         if request <= self.open_reading_max:
-            return position <= self.open_reading_max + TOLERANCE
-        if request >= self.closed_reading_min:
-            return position >= self.closed_reading_min - TOLERANCE
-        return abs(request - position) <= TOLERANCE
+            return request < position <= self.open_reading_max + TOLERANCE
+        return request > position >= self.closed_reading_min - TOLERANCE
 
     def contradiction(self, registers: Registers) -> str:
         """The status registers that only another model can have, as a text; empty if there are none.
@@ -178,6 +181,7 @@ THREE_FINGER: Final = Model(
     rtu=reg.RTU_REGISTERS,
     # Manual of the 3-Finger, specifications: stroke, speed, force. Readings: the manual's worked example.
     stroke=Stroke(155.0, open_reading=6, closed_reading=241),
+    open_reading_min=6,
     open_reading_max=7,
     closed_reading_min=240,
     speeds_mm_s=(22.0, 110.0),
@@ -214,8 +218,10 @@ def _with_jaw(
         rtu=replace(_GATEWAY, write_function=23),
         # A 2F-85 reads 3 and 227 to 230 (PickNik's driver); no other source gives the readings of the others.
         stroke=Stroke(mm, open_reading=3, closed_reading=228, arc=arc),
-        open_reading_max=6,
-        closed_reading_min=226,
+        # Recorded: 2 and 3 open, 225 to 230 closed; 12 and 13 open on units of 2015 and in the manual.
+        open_reading_min=2,
+        open_reading_max=13,
+        closed_reading_min=224,
         speeds_mm_s=speeds_mm_s,
         forces_n=forces_n,
     )

@@ -83,10 +83,13 @@ gDT: Final = tuple(
 )
 gOBJ: Final = Field(0, 6, 2, "as gDT, of a 2F or a Hand-E: in place of gSTA and gDT")
 gFLT: Final = Field(2, 0, 4, "fault code; the high nibble is not part of it")
+kFLT: Final = Field(
+    2, 4, 4, "fault of the Universal Controller before a 2F or a Hand-E; 0 where there is none"
+)
 gPR: Final = tuple(Field(3 + 3 * n, doc=f"echo of the position of {name}") for n, name in enumerate("ABCS"))
 gPO: Final = tuple(Field(4 + 3 * n, doc=f"position of {name}") for n, name in enumerate("ABCS"))
 gCU: Final = tuple(Field(5 + 3 * n, doc=f"current of {name}, 10 mA a count") for n, name in enumerate("ABCS"))
-STATUS_RESERVED: Final = (Field(2, 4, 4), Field(15))  # bits without a meaning in the manual: they read 0
+_RESERVED: Final = (Field(2, 4, 4), Field(15))
 
 MILLIAMPERE_PER_COUNT: Final = 10
 """gCU: the manual's worked example reads 0x0F as 150 mA (2014, p. 69); where it describes the register, the
@@ -116,6 +119,11 @@ class RegisterMap:
 
 TCP_REGISTERS: Final = RegisterMap(request=0x0000, status=0x0000, read_function=4, device_id=2)
 RTU_REGISTERS: Final = RegisterMap(request=0x03E8, status=0x07D0, read_function=3, device_id=9)
+
+
+def status_reserved(has_modes: bool) -> tuple[Field, ...]:
+    """The status bits without a meaning in the manual, which read 0. Byte 2 of a sibling has kFLT as well."""
+    return _RESERVED if has_modes else _RESERVED[1:]
 
 
 def check_registers(registers: Sequence[int]) -> Registers:

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from . import registers as reg
 from .checks import check_flag, check_int, check_seconds
-from .enums import Fault, Finger, Initialization, Mode, ObjectStatus
+from .enums import CONTROLLER_FAULTS, Fault, Finger, Initialization, Mode, ObjectStatus
 from .model import THREE_FINGER, TOLERANCE, Model
 from .stroke import Stroke
 
@@ -234,6 +234,21 @@ class RobotiqStatus:
         return self._model.faults[reg.gFLT.read(self._registers)]
 
     @property
+    def controller_fault(self) -> int:
+        """The fault code of the controller before a 2F or a Hand-E (kFLT), 0..15; 0 for none.
+
+        Only the retired Universal Controller has one; behind another link, and on a 3-Finger, it is 0.
+        """
+        return 0 if self._model.has_modes else reg.kFLT.read(self._registers)
+
+    @property
+    def controller_fault_text(self) -> str:
+        """The fault of the controller for people; empty for none."""
+        code = self.controller_fault
+        what = CONTROLLER_FAULTS.get(code, "a fault that no manual names")
+        return f"its controller reports: {what} (kFLT 0x{code:02X})" if code else ""
+
+    @property
     def activation_echo(self) -> bool:
         """Echo of the activation bit (gACT); true while the activation still runs."""
         return bool(reg.gACT.read(self._registers))
@@ -366,6 +381,7 @@ class RobotiqStatus:
             "sequence": self._sequence,
             "fault": fault.name,
             "fault_code": int(fault),
+            "controller_fault": self.controller_fault,
             "is_activated": self.is_activated,
             "is_reset": self.is_reset,
             "is_moving": self.is_moving,
@@ -399,9 +415,10 @@ class RobotiqStatus:
             f"{self.axis_state(axis)}{milliampere(self.current_ma(axis))}"
             for axis in self._model.axes
         )
+        controller = f"kFLT=0x{self.controller_fault:02X} " if self.controller_fault else ""
         return (
             f"<RobotiqStatus #{self._sequence} {self.initialization.name} go={int(self.go_echo)} "
-            f"fault={self.fault.name} {axes}>"
+            f"fault={self.fault.name} {controller}{axes}>"
         )
 
     def _key(self) -> tuple[reg.Registers, float, int, Model, bool]:

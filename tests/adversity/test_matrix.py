@@ -77,7 +77,10 @@ POLL_S = 0.03 if HABITS else 0.1
 """Seconds between polls. A trouble lasts for some twenty of them: more reveal no more, but for a habit."""
 POLL_WHILE_KEEPING_S = min(POLL_S, 0.05)
 """A stop that keeps a grip has half a second to see that the rest has stopped, or it lets go."""
-TROUBLES_OF_A_JAW = (*LEFT_TO_A_JAW, "drop once", "silence for 60", "line pulled", "status-lag 0.2 for 60")
+TROUBLES_OF_A_JAW = (
+    *(*LEFT_TO_A_JAW, "controller-fault for 60"),
+    *("drop once", "silence for 60", "line pulled", "status-lag 0.2 for 60"),
+)
 """The troubles for a sibling here. ``MODEL=2f85`` in the environment tries the whole table."""
 OF_A_JAW = [cell for cell in EVERY if cell.link == "rtu" and cell.trouble in TROUBLES_OF_A_JAW]
 LETS_GO = ("power-cut", "foreign", "fault", "release", "e-stop")
@@ -184,6 +187,8 @@ def tried_in_turn(row: list[Cell], model: Model) -> dict[str, str]:
 def test_row(row: list[Cell]) -> None:
     if kind_of(row[0]) == "interference" and Finger.SCISSOR not in MODEL.all_axes:
         pytest.skip("there is no scissor")
+    if kind_of(row[0]) == "controller-fault" and MODEL.has_modes:
+        pytest.skip("there is no controller before it")
     if kind_of(row[0]) == "registers" and MODEL.rtu.count < REGISTER_COUNT:
         pytest.skip("it has no more")
     reads_with_3 = any(habit.kind == "function-3-only" for habit in HABITS) or MODEL.tcp.read_function == 3

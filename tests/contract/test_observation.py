@@ -119,7 +119,7 @@ async def test_timestamps_are_of_this_process_and_only_rise(here: Bench, hand: H
         await hand.move(value, A)
         assert 0 <= now() - hand.status.timestamp < 0.05
     stamps = [status.timestamp for status in stream.drain()]
-    assert len(stamps) > 50
+    assert len(stamps) > 30
     assert all(before < after for before, after in itertools.pairwise(stamps))
     for times in (
         [each.timestamp for each in transitions.drain()],

@@ -221,7 +221,7 @@ def with_ends(model: Model, low: int, high: int) -> Model:
 
 @pytest.mark.parametrize(
     ("model", "low", "high"),
-    [(TWO_FINGER_85, 13, 223), (HAND_E, 40, 180), (THREE_FINGER, 10, 215)],
+    [(TWO_FINGER_85, 20, 210), (HAND_E, 40, 180), (THREE_FINGER, 10, 215)],
     ids=["2f85", "hand-e", "3f"],
 )
 async def test_ends_that_read_otherwise_end_a_move_and_loosen_nothing(
@@ -235,7 +235,7 @@ async def test_ends_that_read_otherwise_end_a_move_and_loosen_nothing(
         async with RobotiqHand(wire, model=model.name, speed=255, poll_interval=0.02) as hand:
             for _ in range(2):
                 result = await hand.move(target, model.all_axes & ABC)
-                assert result.positions[Finger.A] == pytest.approx(end, abs=1)
+                assert result.positions[Finger.A] == pytest.approx(end, abs=3)
                 assert set(result.outcomes.values()) == {ObjectStatus.AT_POSITION}
                 assert not result.reached
             wire.pull()

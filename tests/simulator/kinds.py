@@ -70,6 +70,7 @@ EXPECTED: Final = {
     "slow-device": Expected(CONDITION, ANY, (0.2, 0, 10)),
     "interference": Expected(CONDITION, ANY),
     "fault": Expected(CONDITION, ANY, (9, 1, 15)),
+    "controller-fault": Expected(CONDITION, MODBUS, (12, 1, 15)),
     "release": Expected(EVENT, ANY),
     "e-stop": Expected(CONDITION, ANY, (1, 1, 9)),
     "status-lag": Expected(CONDITION, ANY, (0.05, 0, 1)),

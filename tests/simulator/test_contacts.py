@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from robotiq_async.simulator import Habits
-from robotiq_async.simulator.physics.axis import PRESSING
+from robotiq_async.values.calibration.motion_profile import PRESSING_S
 from robotiq_async.values.enums import NO_AXES, Fault, Finger, Initialization, Mode, ObjectStatus
 from robotiq_async.values.model import THREE_FINGER
 from tests.simulator.conftest import CYCLE
@@ -177,7 +177,7 @@ def test_a_second_try_at_something_rigid_is_a_motion_before_it_is_a_contact(hold
         again(holding, force=200)
     assert where(holding, Finger.A) == (150, MOVING)
     assert holding.status.is_moving
-    holding.wait(PRESSING)
+    holding.wait(PRESSING_S)
     assert where(holding, Finger.A) == (150, CLOSING)
     assert holding.gripper.travel(Finger.A) == before
 
@@ -192,7 +192,7 @@ def test_requests_in_every_cycle_do_not_put_off_the_contact(individual: Bench) -
         if touched is None and individual.gripper.position(Finger.A) == 50:
             touched = individual.now
     assert touched is not None
-    assert individual.now - touched == pytest.approx(PRESSING, abs=2 * CYCLE)
+    assert individual.now - touched == pytest.approx(PRESSING_S, abs=2 * CYCLE)
     assert where(individual, Finger.A) == (50, CLOSING)
 
 

@@ -20,6 +20,8 @@ from demo import grasp_loop
 from robotiq_async import Finger, ObjectStatus, RobotiqHand, RobotiqStatus
 from robotiq_async.simulator import Habits, Physics, SimulatedGripper
 from robotiq_async.simulator.mechanics.stepper import OrderedDrive
+from robotiq_async.simulator.physics.driven_axis import Way
+from robotiq_async.values.calibration.scales import SpeedCalibration
 from robotiq_async.values.enums import JAW
 from robotiq_async.values.model import HAND_E, MODELS, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
 from tests.patience import patience
@@ -83,11 +85,11 @@ def active(scene: str, model: Model = TWO_FINGER_85) -> Bench:
 
 @JAWS
 @pytest.mark.parametrize("speed", [0, 255])
-def test_a_jaw_closes_at_the_speed_of_its_table_and_reads_what_it_should(model: Model, speed: int) -> None:
+def test_a_jaw_closes_in_the_time_of_its_profile_and_reads_what_it_should(model: Model, speed: int) -> None:
     bench = active("table", model)
     bench.move(0)
     took = bench.move(255, speed=speed)
-    assert took == pytest.approx(model.stroke.mm / model.speeds_mm_s[speed // 255], rel=0.05, abs=0.05)
+    assert took == pytest.approx(SpeedCalibration.usual(model).closing_time(speed), rel=0.03)
     assert bench.status.finger_status(JAW) is ObjectStatus.AT_POSITION
     assert bench.status.position(JAW) == model.stroke.closed_reading
     assert bench.physics.opening_mm == pytest.approx(0, abs=0.3)
@@ -473,7 +475,7 @@ def test_what_a_motor_tells_before_it_has_its_order_is_not_the_end_of_the_new_mo
     motor = bench.physics.drive(JAW)
     told = OrderedDrive(motor, orders)
     assert told.outcome is motor.outcome is ObjectStatus.AT_POSITION
-    told.go(200.0, 100.0, 255, clears=False)
+    told.go(200.0, Way(100.0), 255, clears=False)
     assert motor.outcome is ObjectStatus.AT_POSITION
     assert told.outcome is ObjectStatus.IN_MOTION
     orders.popleft()()

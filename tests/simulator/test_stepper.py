@@ -18,6 +18,7 @@ pytest.importorskip("mujoco", reason="needs the extra physics")
 
 from robotiq_async import RobotiqHand, sync
 from robotiq_async.simulator import Physics, PhysicsError, SimulatedGripper, SimulatorServer
+from robotiq_async.simulator.physics.driven_axis import Way
 from robotiq_async.values.enums import JAW
 from robotiq_async.values.errors import RobotiqConnectionError
 from robotiq_async.values.model import TWO_FINGER_85
@@ -138,7 +139,7 @@ def test_an_order_that_cannot_be_carried_out_is_raised_by_the_next_call() -> Non
     physics, gripper = threaded()
     with physics:
         gripper.status_registers()
-        physics.drive(JAW).go(cast("Any", "far away"), 100.0, 255, clears=False)
+        physics.drive(JAW).go(cast("Any", "far away"), Way(100.0), 255, clears=False)
         until(lambda: not threads())
         for call in (
             gripper.status_registers,

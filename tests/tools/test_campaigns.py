@@ -11,7 +11,7 @@ import pytest
 
 from robotiq_async import HAND_E, TWO_FINGER_85, Finger, RobotiqHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.simulator.physics.axis import PRESSING, peak
+from robotiq_async.simulator.physics.axis import peak
 from robotiq_async.simulator.physics.scale import SimulatedScale
 from robotiq_async.tools.measure.campaigns import (
     GRASP_S,
@@ -28,6 +28,7 @@ from robotiq_async.tools.measure.campaigns import (
 )
 from robotiq_async.values.calibration import SpeedCalibration
 from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, TableError, read_table, thesis_table
+from robotiq_async.values.calibration.motion_profile import PRESSING_S
 from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.errors import MeasuringError
 from tests.grippers import activate_beforehand
@@ -141,7 +142,7 @@ async def test_the_currents_of_a_grasp() -> None:
         assert times == sorted(times)
         assert times[0] < 50
         moving = 1000 * closing_time(255) * (150 - 6) / 235
-        assert times[-1] == pytest.approx(moving + 1000 * (PRESSING + GRASP_S), abs=50)
+        assert times[-1] == pytest.approx(moving + 1000 * (PRESSING_S + GRASP_S), abs=50)
         assert len(samples) == pytest.approx(times[-1] / 1000 / POLL_S, rel=0.02)  # every poll
         assert peak_currents([samples]) == (10 * round(peak(200)),) * 3
         assert samples[-1][1:] == (0, 0, 0), "what is held draws nothing"

@@ -27,6 +27,8 @@ def print_status(hand: Hand) -> None:
     print(f"{hand.state.name}: {_activation(last)}, {'moving' if last.is_moving else 'not moving'}")
     if last.fault is not Fault.NONE:
         print(f"{last.fault.severity.value} fault 0x{int(last.fault):02X}: {last.fault.description}")
+    if last.controller_fault:
+        print(last.controller_fault_text)
     if last.part is not None:
         width = last.part.width_mm
         print(f"a part is held{'' if width is None else f', {width:.1f} mm wide ({last.stroke.source})'}")

@@ -168,6 +168,8 @@ def state_text(address: str, state: State, status: RobotiqStatus, age: float) ->
     else:
         severe = "dim" if lost else "bold red" if fault.severity is Severity.MAJOR else "yellow"
         text.append(f"{fault.severity.value} fault 0x{int(fault):02X}: {fault.description}", severe)
+    if status.controller_fault:
+        text.append(f"; {status.controller_fault_text}", "dim" if lost else "bold red")
     return text
 
 

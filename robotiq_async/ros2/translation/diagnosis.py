@@ -71,15 +71,18 @@ def _gripper(hand: Hand) -> Diagnosis:
     if status is None or not is_connected(hand):
         return Diagnosis("gripper", Level.STALE, "unknown: the link is down")
     values = {"state": hand.state.name, "fault": f"0x{int(status.fault):02X}"}
+    if not status.model.has_modes:
+        values["controller fault"] = f"0x{status.controller_fault:02X}"
     for axis in status.model.axes:
         values[f"{axis.name} position"] = str(status.position(axis))
         values[f"{axis.name} state"] = status.axis_state(axis)
         if (current := status.current_ma(axis)) is not None:
             values[f"{axis.name} current [mA]"] = str(current)
     level = _LEVELS[status.fault.severity]
-    return Diagnosis(
-        "gripper", level, hand.state.name if level is Level.OK else status.fault.description, values
-    )
+    words = hand.state.name if level is Level.OK else status.fault.description
+    if text := status.controller_fault_text:
+        level, words = Level.ERROR, f"{words}; {text}"
+    return Diagnosis("gripper", level, words, values)
 
 
 def status_text(hand: Hand, *, takes_commands: bool) -> str:

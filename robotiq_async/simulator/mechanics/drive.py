@@ -4,9 +4,9 @@ A motor is a position servo whose reference moves at the speed of the request, n
 than its force reaches. So a blocked axis pushes with its force and no more, and does not jump when the part
 goes. Its gears lock themselves: what pushes an axis back meets more than the force of the request.
 
-It reports a contact when it has rested for 50 ms before its target (``axis.PRESSING``). A jaw that moves on
-after that, because the part slips or is taken away, is in motion again: by the manual of the 2F its object
-status reports a lost part. A finger of the 3-Finger locks where it met the part, and its status stays.
+It reports a contact when it has rested before its target for as long as its motion profile says. A jaw that
+moves on after that, because the part slips or is taken away, is in motion again: by the manual of the 2F its
+object status reports a lost part. A finger of the 3-Finger locks where it met the part, and its status stays.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 from robotiq_async.values.enums import Finger, ObjectStatus
+
+from ..physics.driven_axis import Way
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,8 +32,6 @@ _RESTING: Final = 0.4
 """Counts within which an axis rests: the slowest moves by more than one while a contact is awaited."""
 _TREMBLING: Final = 0.1
 """Counts that are no travel: bodies in contact never rest entirely."""
-_CONTACT_S: Final = 0.05
-_ARRIVED_S: Final = 0.01
 _STILL_S: Final = 0.3
 _NEAR: Final = 0.6
 """Counts from the target at which an axis has arrived."""
@@ -86,7 +86,9 @@ class MotorDrive:
         self.clears = False
         self._target = self._aim = self._reference = self._farthest = self.position
         self._sign = 1.0
-        self._rate = 0.0
+        self._way = Way(0.0)
+        self._waits_s = 0.0
+        """Seconds until it begins to move."""
         self._newtons = 0.0
         self._has_goal = False
         self._is_locked = True
@@ -122,12 +124,14 @@ class MotorDrive:
     def _is_near(self) -> bool:
         return abs(self._target - self.position) <= _NEAR
 
-    def go(self, target: float, rate: float, force: int, *, clears: bool) -> None:
+    def go(self, target: float, way: Way, force: int, *, clears: bool) -> None:
         low, high = self._ends
         self._target = min(max(target, low), high)
         self._aim = min(max(target, low - 1), high + 1)  # pressed against a stop, it reads the stop
         least, most = self._forces
-        self._rate, self._newtons = rate, least + (most - least) * force / 255
+        if not self._is_going:
+            self._waits_s = way.start_s
+        self._way, self._newtons = way, least + (most - least) * force / 255
         before, self._sign = self._sign, 1.0 if self._target > self.position else -1.0
         turns = before != self._sign
         if turns or not (self._is_going or self._presses):
@@ -151,7 +155,7 @@ class MotorDrive:
         """The servo's reference and the limit of its force for a step, in the units of the actuator."""
         if self._is_locked:
             return self._value(self._reference), _LOCK * (self._forces[1] * self._lever())
-        position, sign, most = self.position, self._sign, self._rate * step_s
+        position, sign, most = self.position, self._sign, self._rate() * step_s
         limit, back = self._limit(), self._pushed_back()
         # However near the target is: what is in the way is pressed with the force of the request.
         way = self._aim + sign * _BEYOND * self._is_blocked - self._reference
@@ -161,6 +165,14 @@ class MotorDrive:
         # Makes up for the speed that damping costs.
         ahead = self._damping * self._scale * moved / step_s / self._gain
         return self._value(self._reference) + ahead, limit + self._stiffness * back
+
+    def _rate(self) -> float:
+        """Counts a second of the reference now."""
+        way = self._way
+        if self._waits_s > 0:
+            return 0.0
+        lands = way.landing and abs(self._aim - self._reference) <= way.landing
+        return way.landing_rate if lands else way.rate
 
     @property
     def _has_its_force(self) -> bool:
@@ -214,14 +226,15 @@ class MotorDrive:
             self._counted_at = position
         if self._is_blocked or self._rested >= _BLOCKED_S:
             self._see_blocked()
-        if abs(position - self._rests_at) <= _RESTING:
+        self._waits_s -= step_s
+        if self._waits_s <= 0 and abs(position - self._rests_at) <= _RESTING:
             self._rested += step_s
         else:
             self._rested, self._rests_at = 0.0, position
         if not self._has_goal:
             return
         if self.outcome is ObjectStatus.IN_MOTION:
-            if self._rested >= _ARRIVED_S:
+            if self._rested >= min(self._way.arrival_s, self._way.pressing_s):
                 self._judge()
             # Parts come back to open fingers; between closed ones there is no room for them.
             self.clears = self.clears and (self._is_going or self._sign > 0)
@@ -245,10 +258,10 @@ class MotorDrive:
 
     def _judge(self) -> None:
         is_all = self._is_blocked or self._reference == self._aim
-        if self._is_near and is_all:
+        if self._is_near and is_all and self._rested >= self._way.arrival_s:
             self.outcome = ObjectStatus.AT_POSITION
             self._ended_at = self.position
-        elif self._rested >= _CONTACT_S and not self._is_near and self._has_its_force:
+        elif self._rested >= self._way.pressing_s and not self._is_near and self._has_its_force:
             closing = self._target > self.position
             self.outcome = ObjectStatus.CONTACT_CLOSING if closing else ObjectStatus.CONTACT_OPENING
             self._ended_at = self.position

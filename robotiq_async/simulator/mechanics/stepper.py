@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Final
 from robotiq_async.values.enums import ObjectStatus
 
 if TYPE_CHECKING:
-    from ..physics.driven_axis import Drive
+    from ..physics.driven_axis import Drive, Way
     from .world import World
 
 _WAKES_S: Final = 0.004
@@ -125,8 +125,8 @@ class OrderedDrive:
     def is_pressing(self) -> bool:
         return self.taken == self._given and self._drive.is_pressing
 
-    def go(self, target: float, rate: float, force: int, *, clears: bool) -> None:
-        self._order(partial(self._drive.go, target, rate, force, clears=clears))
+    def go(self, target: float, way: Way, force: int, *, clears: bool) -> None:
+        self._order(partial(self._drive.go, target, way, force, clears=clears))
 
     def hold(self) -> None:
         self._order(self._drive.hold)

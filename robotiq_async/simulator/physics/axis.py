@@ -1,7 +1,7 @@
-"""One motorised axis: straight lines in time, mechanical stops and obstacles.
+"""One motorised axis: its course in time, mechanical stops and obstacles.
 
-An axis never integrates in steps. It keeps the place and time at which its present motion began, its speed
-and its end; everything else is computed. So the result does not depend on how often it is read.
+An axis never integrates in steps. A motion is planned once, as a :class:`~.course.Course` of straight lines;
+everything else is computed from it. So the result does not depend on how often it is read.
 """
 
 from __future__ import annotations
@@ -11,14 +11,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from robotiq_async.values.enums import SPEED_MAX, ObjectStatus
 
+from .course import Course, of_a_jaw, rest, straight
+
 if TYPE_CHECKING:
-    from robotiq_async.values.calibration.scales import SpeedCalibration
+    from robotiq_async.values.calibration.motion_profile import MotionProfile
 
     from .spread import Spread
-
-PRESSING: Final = 0.05
-"""Seconds for which an axis presses, still reported as motion, before it reports the contact. No source gives
-this time; it is ten polls."""
 
 # The current of an axis's motor, in counts of 10 mA.
 #
@@ -71,7 +69,7 @@ class Goal(NamedTuple):
         speed: 0..255.
         force: 0..255.
         is_reading: the axis ends exactly at the position, without the spread of a request.
-        stroke_time: seconds of a full stroke, if not those of the speed.
+        rate: counts a second, if not those of the speed.
         clears: obstacles that are not fixed do not count.
     """
 
@@ -79,12 +77,12 @@ class Goal(NamedTuple):
     speed: int
     force: int
     is_reading: bool = False
-    stroke_time: float = 0.0
+    rate: float = 0.0
     clears: bool = False
 
-    def rate(self, speeds: SpeedCalibration) -> float:
-        """Counts a second."""
-        return speeds.stroke.counts / (self.stroke_time or speeds.closing_time(self.speed))
+    def rate_of(self, motion: MotionProfile) -> float:
+        """Counts a second on the way."""
+        return self.rate or motion.rates[self.speed]
 
 
 class Obstacle(NamedTuple):
@@ -117,7 +115,7 @@ class Axis:
 
     Attributes:
         low: the end of the opening motion, in counts.
-        high: the end of the closing motion, in counts; :meth:`confine` changes it.
+        high: the end of the closing motion at the greatest force, in counts; :meth:`confine` changes it.
         status: gDT of the axis while gGTO = 1.
         ends_at: the time at which the present motion ends; infinite at rest.
         in_closing: the obstacle met while closing, if there is one.
@@ -125,7 +123,7 @@ class Axis:
     """
 
     def __init__(
-        self, position: int, low: int, high: int, motor: Motor, spread: Spread, speeds: SpeedCalibration
+        self, position: int, low: int, high: int, motor: Motor, spread: Spread, motion: MotionProfile
     ) -> None:
         self.low = low
         self.high = high
@@ -135,17 +133,18 @@ class Axis:
         self.in_opening: Obstacle | None = None
         self._motor = motor
         self._spread = spread
-        self._speeds = speeds
-        self._full_rate = speeds.stroke.counts / speeds.closing_time(SPEED_MAX)
+        self._motion = motion
+        self._most_give = motion.give_at(SPEED_MAX, motion.fastest)
         self._closed = high
         self._goal: Goal | None = None
         self._is_locked = False
         """Whether it was stopped in a grip and still holds, without a goal."""
-        self._origin = float(position)
-        self._since = 0.0
-        self._path = _Path(self._origin, ObjectStatus.IN_MOTION)
-        self._rate = self._running = self._peak = 0.0
+        self._course = rest(0.0, float(position))
+        self._path = _Path(float(position), ObjectStatus.IN_MOTION)
+        self._running = self._peak = 0.0
         self._travelled = 0.0
+        self._contacts = 0
+        """Contacts so far: no two of them read the same."""
 
     @property
     def is_moving(self) -> bool:
@@ -164,17 +163,16 @@ class Axis:
     @property
     def target(self) -> int:
         """The target of the axis in counts, within its stops; at rest without a goal, its position."""
-        return round(self._origin) if self._goal is None else self.within_stops(self._goal.position)
+        if self._goal is None:
+            return round(self._course.end)
+        return self._target(self._course.end, self._goal)
 
     def position(self, time: float) -> float:
-        if not self.is_moving:
-            return self._origin
-        distance = self._path.end - self._origin
-        return self._origin + math.copysign(min(self._rate * (time - self._since), abs(distance)), distance)
+        return self._course.position(time)
 
     def travel(self, time: float) -> float:
         """The distance travelled so far, in counts, in both directions."""
-        return self._travelled + abs(self.position(time) - self._origin)
+        return self._travelled + abs(self._course.position(time) - self._course.origin)
 
     def within_stops(self, position: int) -> int:
         """The count nearest to a position that the axis can be at."""
@@ -202,7 +200,7 @@ class Axis:
     def hold(self, time: float, *, locks: bool) -> None:
         """Stop at the present count and forget the goal. An axis that ``locks`` keeps its grip."""
         self._is_locked = locks and self.holds
-        self._rest(time, float(round(self.position(time))))
+        self._follow(rest(time, float(round(self.position(time)))))
         self._goal = None
 
     def clear(self, time: float) -> None:
@@ -210,9 +208,10 @@ class Axis:
         self.status = ObjectStatus.IN_MOTION
 
     def arrive(self) -> None:
-        """End the present motion; to be called at :attr:`ends_at`."""
-        self._rest(self.ends_at, self._path.end)
+        """Report the end of the present motion; to be called at :attr:`ends_at`."""
+        self.ends_at = math.inf
         self.status = self._path.outcome
+        self._contacts += self.status.is_contact
 
     def confine(self, time: float, high: int | None) -> None:
         """Let the closing motion end at a software limit, or with None at the mechanical stop."""
@@ -227,36 +226,56 @@ class Axis:
 
     def _plan(self, time: float) -> None:
         assert self._goal is not None, "only a motion with a goal is planned"
-        here, before, due = self.position(time), self._path, self.ends_at
-        self._path = self._path_to(here, self._goal)
-        reached = self._has_reached(here, self._goal)
-        self._rest(time, here)
-        if reached:
+        goal, here, before = self._goal, self.position(time), self._path
+        self._path = self._path_to(here, goal)
+        if self._has_reached(here, goal):
+            self._follow(rest(time, here))
             self.status = ObjectStatus.AT_POSITION
             return
         self.status = ObjectStatus.IN_MOTION
-        self._rate = self._goal.rate(self._speeds)
-        self._running = self._motor.running(self._rate / self._full_rate, closing=self._path.end > here)
-        self._peak = peak(self._goal.force)
-        self.ends_at = time + abs(self._path.end - here) / self._rate
-        if self._path.outcome.is_contact:
-            # A new request does not restart the pressing.
-            presses = due < math.inf and here == before.end and self._path == before
-            self.ends_at = due if presses else self.ends_at + PRESSING
+        share = goal.rate_of(self._motion) / self._motion.fastest
+        self._running = self._motor.running(share, closing=self._path.end > here)
+        self._peak = peak(goal.force)
+        # A new request does not restart the pressing.
+        if not (self.is_moving and time >= self._course.presses_at and self._path == before):
+            self._follow(self._course_to(time, here, goal))
+
+    def _course_to(self, time: float, here: float, goal: Goal) -> Course:
+        motion, (end, outcome, _) = self._motion, self._path
+        rate, closing = goal.rate_of(motion), end > here
+        if motion.is_straight or goal.rate:
+            pressing = motion.pressing_time(rate) if outcome.is_contact else 0.0
+            return straight(time, here, end, rate, pressing)
+        # An axis on its way takes a new request at once; one that is about to move does not begin again.
+        begin = max(time, self._course.moves_at) if self.is_moving else time + motion.start_s(closing=closing)
+        is_stop = not outcome.is_contact and (end <= self.low or end >= self._closed_stop(goal))
+        presses = outcome.is_contact or (is_stop and closing)
+        early = self._spread.early(self._contacts) if outcome.is_contact else 0.0
+        return of_a_jaw(begin, here, end, rate, motion, lands=is_stop, presses=presses, early=early)
+
+    def _closed_stop(self, goal: Goal) -> int:
+        """The count at which the closing motion ends: the stop of a jaw gives with the force."""
+        return self.high - self._most_give + self._motion.give_at(goal.force, goal.rate_of(self._motion))
+
+    def _target(self, here: float, goal: Goal) -> int:
+        """The target within the stops. A jaw that has pressed its stop further does not go back from it."""
+        return max(self.low, min(goal.position, max(self._closed_stop(goal), min(self.high, int(here)))))
 
     def _path_to(self, here: float, goal: Goal) -> _Path:
         # Multiplied by the sign, both directions compare like a closing motion.
-        target = self.within_stops(goal.position)
+        target = self._target(here, goal)
         sign = 1 if target > here else -1
         end = self.within_stops(target + sign * self._overshoot(goal))
         obstacle = self.in_closing if sign > 0 else self.in_opening
         if obstacle is None or (goal.clears and not obstacle.fixed):
             return _Path(end, ObjectStatus.AT_POSITION)
         surface = obstacle.position + self._spread.contact(obstacle.position)
+        overrun, most_overrun = self._overruns(goal)
         far_side = max(sign * obstacle.position, sign * surface) + obstacle.soft + self._spread.tolerance
+        far_side += most_overrun
         if sign * here > far_side:  # the axis has passed the obstacle
             return _Path(end, ObjectStatus.AT_POSITION)
-        dent = round(obstacle.soft * goal.force / 255)
+        dent = round(obstacle.soft * goal.force / 255) + overrun
         stopped = sign * max(sign * here, sign * surface + dent)
         if sign * stopped < sign * target:
             contact = ObjectStatus.CONTACT_CLOSING if sign > 0 else ObjectStatus.CONTACT_OPENING
@@ -265,9 +284,19 @@ class Axis:
 
     def _overshoot(self, goal: Goal) -> int:
         """Counts by which the axis will overshoot: none at a stop, or if the goal is a reading."""
-        if goal.is_reading or not self.low < goal.position < self.high:
+        if goal.is_reading or not self.low < goal.position < self._closed_stop(goal):
             return 0
         return self._spread.overshoot(goal.position)
+
+    def _overruns(self, goal: Goal) -> tuple[int, int]:
+        """Counts by which the next contact reads further for its speed, and the most that any does."""
+        motion = self._motion
+        if not motion.overrun or goal.rate:
+            return 0, 0
+        rate = goal.rate_of(motion)
+        usual = round(motion.overrun_at(rate))
+        this = self._spread.overrun(self._contacts, rate / motion.fastest)
+        return max(0, usual + this), round(motion.overrun) + self._spread.most_overrun
 
     def _has_reached(self, here: float, goal: Goal) -> bool:
         """Whether the axis need not move: an axis at rest within its tolerance has arrived."""
@@ -280,23 +309,21 @@ class Axis:
         """Whether the axis is in a contact, and the goal lies beyond it with no more force."""
         if self._goal is None or self.is_moving or goal.force > self._goal.force:
             return False
-        beyond = self.within_stops(goal.position) - self._origin
+        beyond = self.within_stops(goal.position) - self._course.end
         return (self.status is ObjectStatus.CONTACT_CLOSING and beyond > 0) or (
             self.status is ObjectStatus.CONTACT_OPENING and beyond < 0
         )
 
     def _pressed(self, time: float) -> float:
         """The share of its way into the obstacle that the axis has been pressed, 0..1."""
-        _, outcome, surface = path = self._path
+        end, outcome, surface = self._path
         if not outcome.is_contact:
             return 0.0
-        position = self.position(time)
-        if position == path.end:
+        if time >= self._course.presses_at:
             return 1.0
-        return 0.0 if path.end == surface else max(0.0, (position - surface) / (path.end - surface))
+        return 0.0 if end == surface else max(0.0, (self.position(time) - surface) / (end - surface))
 
-    def _rest(self, time: float, position: float) -> None:
-        self._travelled += abs(position - self._origin)
-        self._origin = position
-        self._since = time
-        self.ends_at = math.inf
+    def _follow(self, course: Course) -> None:
+        self._travelled += abs(course.origin - self._course.origin)
+        self._course = course
+        self.ends_at = course.ends_at

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from robotiq_async.values.checks import check_int
+from robotiq_async.values.checks import check_byte, check_int
 from robotiq_async.values.enums import (
     CLOSED,
     OPEN,
@@ -23,7 +23,6 @@ from .axis import Goal
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from robotiq_async.values.calibration.scales import SpeedCalibration
     from robotiq_async.values.request import Request
 
 
@@ -49,6 +48,12 @@ def check_scissor_limit(limit: tuple[int, int]) -> tuple[int, int]:
     """The range that a software limit leaves the scissor: it must lie within 6..232."""
     low = check_int("scissor_limit", limit[0], THREE_FINGER.stroke.open_reading, SCISSOR_HIGH)
     return low, check_int("scissor_limit", limit[1], low, SCISSOR_HIGH)
+
+
+def check_ends(ends: tuple[int, int]) -> tuple[int, int]:
+    """The readings of an open and a closed finger."""
+    opened = check_byte("the open reading of ends", ends[0])
+    return opened, check_int("the closed reading of ends", ends[1], opened + 1, 255)
 
 
 def finger_limit(mode: Mode | None) -> int | None:
@@ -78,14 +83,14 @@ def requested(request: Request, readings: Sequence[int]) -> Goals:
     return *fingers, grip if scissor_grips else _on_its_own(MODE_POSITION[request.mode])
 
 
-def activation(mode: Mode | None, seconds: float, speeds: SpeedCalibration) -> tuple[Goals, ...]:
+def activation(mode: Mode | None, seconds: float, counts: int, fastest: float) -> tuple[Goals, ...]:
     """Fingers close, then open, each in half the seconds; the scissor goes to the mode's (None: basic).
 
-    It is never faster than the gripper.
+    A full stroke has so many counts. It is never faster than the gripper, in counts a second.
     """
-    stroke_time = max(seconds / 2, speeds.closing_time(_SEQUENCE_SPEED))
+    rate = fastest if seconds == 0 else min(fastest, counts / (seconds / 2))
     close, open_, scissor = (
-        _on_its_own(position)._replace(stroke_time=stroke_time, clears=True)
+        _on_its_own(position)._replace(rate=rate, clears=True)
         for position in (CLOSED, OPEN, MODE_POSITION[Mode.BASIC if mode is None else mode])
     )
     return (close, close, close, scissor), (open_, open_, open_, None)

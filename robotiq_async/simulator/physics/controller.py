@@ -28,11 +28,14 @@ import math
 import struct
 from collections import deque
 from dataclasses import replace
+from functools import cache
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from robotiq_async.values import registers as reg
+from robotiq_async.values.calibration.motion_profile import SHORT_OF_CLOSED, MotionProfile
 from robotiq_async.values.calibration.scales import SpeedCalibration
 from robotiq_async.values.enums import (
+    SPEED_MAX,
     Fault,
     Finger,
     Initialization,
@@ -103,6 +106,7 @@ class Controller:
         progress: gIMC.
         faults: the faults that are present, apart from those that follow from the request and the progress.
         fail_activation: the next activation ends in fault 0x0D; reset to False when it does.
+        controller_fault: kFLT, of the controller before a jaw.
         is_asleep: the next image with rACT = 1 wakes the gripper, and moves nothing.
     """
 
@@ -113,9 +117,12 @@ class Controller:
         seed: int | None,
         habits: Habits,
         mechanism: Mechanism | None = None,
+        motion: MotionProfile | None = None,
+        ends: tuple[int, int] | None = None,
     ) -> None:
         self.model = model
-        self._speeds = SpeedCalibration.usual(model)
+        self._motion = motion or usual_motion(model)
+        self._ends = ends
         named = zip(model.axes, MOTORS, strict=False)
         if mechanism is None:
             self.driven: tuple[DrivenAxis, ...] = ()
@@ -145,6 +152,7 @@ class Controller:
         self.progress = Initialization.RESET
         self.faults = PresentFaults()
         self.fail_activation = False
+        self.controller_fault = 0
         self.is_asleep = False
         self._is_stopped = False
         """Whether the emergency stop is pressed."""
@@ -181,7 +189,9 @@ class Controller:
             self.reset(time)
         elif request.activate and not was_active:
             self._set_mode(time, self._requested_mode)
-            steps = control.activation(self._mode, self.habits.activation_time, self._speeds)
+            steps = control.activation(
+                self._mode, self.habits.activation_time, self.model.stroke.counts, self._motion.fastest
+            )
             self._begin(time, Initialization.ACTIVATING, steps)
         if request.release:
             self.release(time)
@@ -253,7 +263,7 @@ class Controller:
         content[0] |= self.progress << reg.gIMC.shift
         if model.has_modes:
             content[0] |= request.mode << reg.gMOD.shift | _summary(statuses[:3]) << reg.gSTA.shift
-        content[reg.gFLT.byte] = fault
+        content[reg.gFLT.byte] = fault | self.controller_fault << reg.kFLT.shift
         for axis, status, echo, (shown, shift, echo_byte, position_byte, current_byte) in zip(
             self.axes, statuses, self.echoes, self._places, strict=True
         ):
@@ -405,17 +415,33 @@ class Controller:
 
     def _finger(self, motor: Motor, axis: Finger, seed: int | None) -> Axis:
         spread, stroke = Spread(seed, axis), self.model.stroke
-        low, high = stroke.open_reading + spread.open_reading, stroke.closed_reading + spread.closed_reading
-        return Axis(low, low, high, motor, spread, self._speeds)
+        if self._ends is not None:
+            low, closed = self._ends
+        elif self.model.has_modes:
+            low = stroke.open_reading + spread.open_reading
+            closed = stroke.closed_reading + spread.closed_reading
+        else:
+            low = stroke.open_reading - spread.open_reading
+            closed = stroke.closed_reading - SHORT_OF_CLOSED
+        high = closed + self._motion.give_at(SPEED_MAX, self._motion.fastest)
+        return Axis(low, low, high, motor, spread, self._motion)
 
     def _driven(self, mechanism: Mechanism, axis: Finger, motor: Motor, limit: tuple[int, int]) -> DrivenAxis:
         stroke = self.model.stroke
         low, high = limit if axis is Finger.SCISSOR else (stroke.open_reading, stroke.closed_reading)
-        return DrivenAxis(mechanism.drive(axis), axis, low, high, motor, self._speeds)
+        return DrivenAxis(mechanism.drive(axis), axis, low, high, motor, self._motion)
 
     def _scissor(self, limit: tuple[int, int], seed: int | None) -> Axis:
         spread = Spread(seed, Finger.SCISSOR)
-        return Axis(control.MODE_POSITION[Mode.BASIC], *limit, MOTORS[3], spread, self._speeds)
+        return Axis(control.MODE_POSITION[Mode.BASIC], *limit, MOTORS[3], spread, self._motion)
+
+
+@cache
+def usual_motion(model: Model) -> MotionProfile:
+    """The motion of a model by the figures that the driver expects of it."""
+    speeds = SpeedCalibration.usual(model)
+    times = (speeds.closing_time(speed) for speed in range(256))
+    return speeds.profile or MotionProfile.of_closings(speeds.source, 3, model.stroke.counts, times)
 
 
 def _summary(fingers: Sequence[ObjectStatus]) -> int:

@@ -7,25 +7,50 @@ drive goals, and reports their outcomes.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
+from robotiq_async.values.calibration.motion_profile import PRESSING_S
 from robotiq_async.values.enums import ObjectStatus
 
-from .axis import Axis, Motor, peak
+from .axis import Axis, Goal, Motor, peak
+from .course import rest
 from .spread import Spread
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from robotiq_async.values.calibration.scales import SpeedCalibration
+    from robotiq_async.values.calibration.motion_profile import MotionProfile
     from robotiq_async.values.enums import Finger
     from robotiq_async.values.model import Model
 
     from .bodies import Bodies
 
 
+_ARRIVED_S: Final = 0.01
+
+
 class PhysicsError(RuntimeError):
     """The bodies of a simulated gripper cannot be moved any more; the error before is its cause."""
+
+
+class Way(NamedTuple):
+    """The motion to a goal in time.
+
+    Attributes:
+        rate: counts a second.
+        start_s: seconds until an axis at rest begins to move.
+        pressing_s: seconds for which it presses before a contact is reported.
+        arrival_s: seconds for which it rests before its arrival is reported.
+        landing: counts before an end stop that it travels at another rate.
+        landing_rate: that rate.
+    """
+
+    rate: float
+    start_s: float = 0.0
+    pressing_s: float = PRESSING_S
+    arrival_s: float = _ARRIVED_S
+    landing: float = 0.0
+    landing_rate: float = math.inf
 
 
 class Drive(Protocol):
@@ -50,12 +75,12 @@ class Drive(Protocol):
     @property
     def is_pressing(self) -> bool: ...
 
-    def go(self, target: float, rate: float, force: int, *, clears: bool) -> None:
-        """Go to a position in counts, at a rate in counts a second.
+    def go(self, target: float, way: Way, force: int, *, clears: bool) -> None:
+        """Go to a position in counts.
 
         Args:
             target: the position.
-            rate: the speed.
+            way: the speed, and what a motion takes besides.
             force: of the register, 0..255.
             clears: parts are out of the way until it has opened, or has another order.
         """
@@ -110,9 +135,9 @@ class DrivenAxis(Axis):
     """
 
     def __init__(
-        self, drive: Drive, axis: Finger, low: int, high: int, motor: Motor, speeds: SpeedCalibration
+        self, drive: Drive, axis: Finger, low: int, high: int, motor: Motor, motion: MotionProfile
     ) -> None:
-        super().__init__(round(drive.position), low, high, motor, Spread(None, axis), speeds)
+        super().__init__(round(drive.position), low, high, motor, Spread(None, axis), motion)
         self._drive = drive
         self._stays = False
         """Whether the last command to the drive was to stay."""
@@ -141,13 +166,11 @@ class DrivenAxis(Axis):
                 self._drive.release()
             else:
                 self._drive.hold()
-        self._origin = float(round(self.position(time)))
-        self.ends_at = math.inf
+        self._follow(rest(time, float(round(self.position(time)))))
         self._goal = None
 
     def arrive(self) -> None:
-        self.ends_at = math.inf
-        self._origin = self._drive.position
+        self._follow(rest(self.ends_at, self._drive.position))
         self.status = self._drive.outcome
 
     def observe(self, time: float) -> bool:
@@ -165,7 +188,23 @@ class DrivenAxis(Axis):
         self.ends_at = math.inf
         self.status = ObjectStatus.IN_MOTION
         self._stays = False
-        rate = goal.rate(self._speeds)
         target = self.within_stops(goal.position)
-        self._running = self._motor.running(rate / self._full_rate, closing=target > self.position(time))
-        self._drive.go(target, rate, goal.force, clears=goal.clears)
+        way = self._way(goal, target, closing=target > self.position(time))
+        share = way.rate / self._motion.fastest
+        self._running = self._motor.running(share, closing=target > self.position(time))
+        self._drive.go(target, way, goal.force, clears=goal.clears)
+
+    def _way(self, goal: Goal, target: int, *, closing: bool) -> Way:
+        motion, rate = self._motion, goal.rate_of(self._motion)
+        pressing = motion.pressing_time(rate)
+        if goal.rate or motion.is_straight:
+            return Way(rate, pressing_s=pressing)
+        at_stop = target in (self.low, self.high)
+        return Way(
+            rate,
+            motion.start_s(closing=closing),
+            max(pressing, PRESSING_S),  # bodies take that long to come to rest
+            pressing if at_stop and closing else _ARRIVED_S,
+            motion.landing if at_stop else 0.0,
+            min(motion.slowest, rate),
+        )

@@ -16,7 +16,7 @@ from robotiq_async.values.enums import NO_AXES, Fault, Finger
 from robotiq_async.values.model import Model, model_of
 from robotiq_async.values.request import Request
 
-from .control_modes import SCISSOR_HIGH, SCISSOR_LOW, check_scissor_limit
+from .control_modes import SCISSOR_HIGH, SCISSOR_LOW, check_ends, check_scissor_limit
 from .controller import ZEROS, Controller
 from .driven_axis import PhysicsError
 from .habits import Habits
@@ -26,6 +26,8 @@ from .surroundings import Surroundings
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from robotiq_async.values.calibration.motion_profile import MotionProfile
+
     from .axis import Axis
     from .bodies import Bodies
     from .driven_axis import Mechanism
@@ -33,6 +35,8 @@ if TYPE_CHECKING:
 _LONGEST: Final = 1e9
 _HISTORY: Final = 10_000
 _ROUNDING: Final = 1e-9
+_CYCLE: Final = 0.005
+"""Device cycle of a 3-Finger: its registers are renewed at 200 Hz (manual)."""
 
 
 class SimulatedGripper(Surroundings):
@@ -42,28 +46,30 @@ class SimulatedGripper(Surroundings):
     changed. Motions, contacts, faults and delayed requests happen at their exact times, so a result does not
     depend on how often it is read. Use one from one thread only.
 
-    A write takes effect one device cycle later, as on the device. Speeds are the measured ones of
-    :func:`robotiq_async.values.calibration.scales.closing_time`; the scissor moves the same counts a second,
-    as none are published. Motor currents are in :mod:`.axis`; how far axes miss their requests, in
+    A write takes effect one device cycle later, as on the device. Motions take the time of
+    :mod:`robotiq_async.values.calibration.motion_profile`: measured closings of a 3-Finger, whose scissor
+    moves the same counts a second, as none are published; recorded motions of a 2F-85; and for the other
+    siblings an estimate. Motor currents are in :mod:`.axis`; how far axes miss their requests, in
     :mod:`.spread`: as with a real gripper, a program that waits for gPO = rPR may wait for ever.
 
     Choices where no source settles the behaviour; those that can be changed are in :class:`Habits`:
 
-    * An axis that meets something, or tries again, presses for 50 ms with gDT 0 before it reports a contact.
+    * A finger that meets something, or tries again, presses for 50 ms with gDT 0 before it reports a contact.
+    * A jaw begins a motion late only from rest: on its way it takes a new request at once, and turns at once.
     * An axis within 2 counts of a new request has reached it, and does not move.
     * A failed activation stays at gIMC = 1 with fault 0x0D.
     * gMOD, gGTO and the position echoes follow the request also while reset.
     * A minor or major fault stops the axes where they are, with gDT 0; interference below 20 s stops the
       scissor only. When a minor fault ends, a request with rGTO = 1 resumes.
     * The scissor takes its requests as counts, within 15..232.
-    * A sibling moves with the nominal speeds of its manual; its motor draws what finger A of a 3-Finger does.
+    * The motor of a sibling draws what finger A of a 3-Finger does.
     """
 
     def __init__(
         self,
         clock: Callable[[], float] = time.monotonic,
         *,
-        device_cycle: float = 0.005,
+        device_cycle: float | None = None,
         speedup: float = 1.0,
         scissor_limit: tuple[int, int] = (SCISSOR_LOW, SCISSOR_HIGH),
         powered: bool = True,
@@ -72,12 +78,15 @@ class SimulatedGripper(Surroundings):
         habits: Habits | None = None,
         model: Model | str | None = None,
         physics: Mechanism | None = None,
+        motion: MotionProfile | None = None,
+        ends: tuple[int, int] | None = None,
     ) -> None:
         """A gripper that was just switched on: open, reset, all registers 0.
 
         Args:
             clock: gives the time in seconds; must not go backwards.
-            device_cycle: simulated seconds between a write and its effect, 0 for none.
+            device_cycle: simulated seconds between a write and its effect, 0 for none; None for 5 ms on a
+                3-Finger and none on a sibling, whose next status has the echo (recorded of a 2F-85).
             speedup: simulated seconds in one second of the clock. All motions and sequences become faster.
             scissor_limit: a software limit of the scissor in counts. A request beyond it is replaced by the
                 limit and reported as reached while the echo keeps the request.
@@ -89,23 +98,28 @@ class SimulatedGripper(Surroundings):
             model: of the gripper, a :class:`Model` or its name; None for a 3-Finger.
             physics: a :class:`Physics` of its own, which moves the axes and has the parts they meet; None for
                 straight lines in time and the obstacles of :meth:`place_object`. There is no spread with it.
+            motion: its motion in time; None for the usual one of its model.
+            ends: counts that a finger, or the jaw, reads when it is open, and closed with the least force;
+                None for the usual ones. With physics the bodies have theirs.
 
         Raises:
             TypeError: an argument is of the wrong type.
             ValueError: device_cycle or seed is negative, speedup is not above 0, scissor_limit is not a range
-                within 6..232, or no model has this name.
+                within 6..232, ends are not two counts in order, or no model has this name.
         """
-        self._cycle = check_seconds("device_cycle", device_cycle, 0, _LONGEST)
         number = check_int("seed", seed, 0, sys.maxsize)
         limit, seed_or_none = check_scissor_limit(scissor_limit), number if spread else None
         self._speedup = check_number("speedup", speedup, 0, _LONGEST)
         if self._speedup == 0:
             raise ValueError(f"speedup must be above 0, got {speedup!r}")
         kind = model_of(model)
+        cycle = (_CYCLE if kind.has_modes else 0.0) if device_cycle is None else device_cycle
+        self._cycle = check_seconds("device_cycle", cycle, 0, _LONGEST)
         self._physics = physics
         if physics is not None:
             physics.attach(kind, clock, self._speedup)
-        super().__init__(Controller(kind, limit, seed_or_none, habits or Habits(), physics))
+        ends = None if ends is None else check_ends(ends)
+        super().__init__(Controller(kind, limit, seed_or_none, habits or Habits(), physics, motion, ends))
         self._clock = clock
         self._began = clock()
         self._off_until = -math.inf if powered else math.inf

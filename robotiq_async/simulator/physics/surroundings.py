@@ -115,6 +115,23 @@ class Surroundings(ABC):
         self._controller.model.index(Finger.SCISSOR)
         self.inject_fault(Fault.SCISSOR_INTERFERENCE, duration)
 
+    @property
+    def controller_fault(self) -> int:
+        """kFLT, 0..15: the fault that the Universal Controller before a jaw reports; 0 for none.
+
+        Raises:
+            TypeError: not an int.
+            ValueError: outside 0..15, or the model is a 3-Finger.
+        """
+        return self._controller.controller_fault
+
+    @controller_fault.setter
+    def controller_fault(self, code: int) -> None:
+        if self._controller.model.has_modes:
+            raise ValueError(f"a {self._controller.model.title} has no controller fault (kFLT)")
+        self._catch_up()
+        self._controller.controller_fault = check_int("controller_fault", code, 0, 15)
+
     def emergency_stop(self, resets: int = 1) -> None:
         """Press the emergency stop: an active gripper stops, reports fault 0x05, and stays at gIMC = 1.
 

@@ -122,6 +122,8 @@ class FaultInjector:
             model = self._target.gripper.model
             if trouble.kind == "interference" and Finger.SCISSOR not in model.all_axes:
                 raise ValueError(f"interference does not fit a {model}: it has no scissor")
+            if trouble.kind == "controller-fault" and model.has_modes:
+                raise ValueError(f"controller-fault does not fit a {model}: it has no kFLT")
 
     async def begin(self, trouble: Trouble) -> Ongoing:
         """Let a trouble begin now, whenever its plan would. :meth:`end` ends it.
@@ -285,6 +287,8 @@ class FaultInjector:
                 gripper.inject_fault(int(amount))
             case "release":
                 gripper.emergency_release()
+            case "controller-fault":
+                gripper.controller_fault = int(amount)
             case "e-stop":
                 gripper.emergency_stop(int(amount))
         if KINDS[trouble.kind].habit is not None:
@@ -310,6 +314,9 @@ class FaultInjector:
                 gripper.clear_faults()
                 for each in self._lasting("interference", "fault"):
                     self._do(each)
+            case "controller-fault":
+                lasting = self._lasting(trouble.kind)
+                gripper.controller_fault = int(lasting[-1].amount) if lasting else 0
             case "e-stop":
                 if not self._lasting("e-stop"):
                     gripper.end_emergency_stop()

@@ -170,6 +170,9 @@ KINDS: Final[dict[str, Kind]] = {
     "slow-device": Kind("requests take effect VALUE seconds after they came", _CONDITION, 0.2, 0, 10),
     "interference": Kind("the scissor is blocked: fault 0x0A, after 20 s 0x0E", _CONDITION),
     "fault": Kind("the gripper reports fault VALUE", _CONDITION, 9, 1, 15),
+    "controller-fault": Kind(
+        "the controller before a jaw reports fault VALUE (kFLT)", *(_CONDITION, 12, 1, 15), is_modbus=True
+    ),
     "release": Kind("the gripper releases automatically"),
     "e-stop": Kind(
         "the emergency stop is pressed: fault 0x05; after its end VALUE resets are needed",

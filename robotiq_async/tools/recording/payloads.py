@@ -52,6 +52,7 @@ SCHEMAS: Final = {
         sequence=INTEGER,
         fault=STRING,
         fault_code=INTEGER,
+        controller_fault=INTEGER,
         is_activated=_BOOLEAN,
         is_reset=_BOOLEAN,
         is_moving=_BOOLEAN,

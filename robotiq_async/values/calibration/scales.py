@@ -1,8 +1,8 @@
 """Scales of the values 0..255: millimetres, millimetres a second, seconds, newtons.
 
-Three sources, named by :attr:`SpeedCalibration.source`: the manual's nominal figures, the thesis's
-measurements (the default), and your own tables from ``robotiq-async measure``. Moves and statuses use counts;
-these helpers convert.
+Sources, named by :attr:`SpeedCalibration.source`: the thesis's measurements of a 3-Finger, recordings of a
+2F-85, an estimate for the other siblings, the manual's nominal figures, and your own tables from
+``robotiq-async measure``. Moves and statuses use counts; these helpers convert.
 
 A force value is a label, not a measured force: the manual gives 15 N at 0 and 60 N at 255 (2014, p. 47) and
 calls the curve between them not linear. Scale readings (thesis, chapter 6) depend more on the object than on
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from math import ceil, floor
 from pathlib import Path
@@ -23,6 +23,7 @@ from ..checks import check_byte, check_number
 from ..model import THREE_FINGER, Model
 from ..stroke import Stroke
 from .csv_tables import FORCE, SPEED, Layout, Table, TableError, read_measured, thesis_table
+from .motion_profile import MotionProfile, profile_of
 
 GRAVITY: Final = 9.81  # m/s2, the thesis's value
 
@@ -40,11 +41,14 @@ class SpeedCalibration:
         source: of the figures, for people.
         points: rising speed values, each with the seconds of a full closing.
         model: of the gripper; None where it is not known. Hands of another model refuse it.
+        profile: the motion behind the figures, which tells the way from its start and end; None for closing
+            times alone.
     """
 
     source: str
     points: Points
     model: Model | None = None
+    profile: MotionProfile | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         """Check the points.
@@ -68,8 +72,17 @@ class SpeedCalibration:
 
     @classmethod
     def usual(cls, model: Model) -> SpeedCalibration:
-        """The figures that time moves: the thesis's for a 3-Finger, the manual's for another model."""
-        return cls.thesis() if model is THREE_FINGER else cls.nominal(model)
+        """The figures that time moves: the thesis's for a 3-Finger, those of its motion profile for a jaw."""
+        profile = profile_of(model)
+        return cls.thesis() if profile is None else cls._of_profile(model, profile)
+
+    @classmethod
+    @cache
+    def _of_profile(cls, model: Model, profile: MotionProfile) -> SpeedCalibration:
+        counts = model.stroke.counts
+        times = tuple((value, profile.closing_s(counts, value)) for value in range(256))
+        runs = f" ({profile.runs} motions)" if profile.runs else ""
+        return cls(profile.source + runs, times, model, profile)
 
     @classmethod
     @cache
@@ -115,26 +128,45 @@ class SpeedCalibration:
             TypeError: an argument is not an int.
             ValueError: an argument is outside 0..255, or the speed outside what was measured.
         """
-        return check_byte("counts", counts) / self.stroke.counts * self.closing_time(speed)
+        if self.profile is None:
+            return check_byte("counts", counts) / self.stroke.counts * self.closing_time(speed)
+        check_byte("speed", speed)
+        return self.profile.closing_s(counts, speed) if check_byte("counts", counts) else 0.0
 
     def mm_per_s(self, speed: int) -> float:
-        """Millimetres of opening a second.
+        """Millimetres of opening a second: on the way if the figures tell it, else on average.
 
         Raises:
             TypeError: speed is not an int.
             ValueError: speed is outside 0..255, or outside what was measured.
         """
-        return self.stroke.mm / self.closing_time(speed)
+        return self.counts_per_s(speed) * self.stroke.mm / self.stroke.counts
+
+    def counts_per_s(self, speed: int) -> float:
+        """Counts a second, as :meth:`mm_per_s`.
+
+        Raises:
+            TypeError: speed is not an int.
+            ValueError: speed is outside 0..255, or outside what was measured.
+        """
+        if self.profile is None:
+            return self.stroke.counts / self.closing_time(speed)
+        return self.profile.rates[check_byte("speed", speed)]
 
     def speed_value(self, mm_per_s: float) -> int:
         """The speed value closest to a speed.
 
         Raises:
             TypeError: not a number.
-            ValueError: slower or faster than any value.
+            ValueError: slower or faster than any value, and than the manual's range for this model.
         """
-        figures = Figures({value: self.mm_per_s(value) for value in covered(self.points)})
-        return figures.nearest(check_number("mm_per_s", mm_per_s, figures.low, figures.high))
+        figures = self.rates()
+        return figures.nearest(check_number("mm_per_s", mm_per_s, *figures.limits))
+
+    def rates(self) -> Figures:
+        """The millimetres a second of each value; a gripper's own need not reach the ends of its manual's."""
+        nominal = () if self.profile is None or self.model is None else self.model.speeds_mm_s
+        return Figures({value: self.mm_per_s(value) for value in covered(self.points)}, nominal)
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,25 +302,31 @@ def interpolated(name: str, value: int, points: Sequence[tuple[int, float]]) -> 
     return at_left + (at_right - at_left) * (value - left) / (right - left)
 
 
+def outwards(low: float, high: float) -> tuple[float, float]:
+    """A range to two digits, none of which it loses."""
+    return floor(low * 100) / 100, ceil(high * 100) / 100
+
+
 class Figures:
     """The figures of values, in order: control loops ask in every cycle which value is closest.
 
     Attributes:
         low: the lowest figure.
         high: the highest figure.
-        limits: both, rounded outwards to two digits: a limit copied from a message is accepted.
+        limits: the lowest and highest that are accepted, rounded outwards to two digits: a limit copied from
+            a message is accepted.
     """
 
     __slots__ = ("_figures", "_values", "high", "limits", "low")
 
-    def __init__(self, figures: Mapping[int, float]) -> None:
+    def __init__(self, figures: Mapping[int, float], accepted: Sequence[float] = ()) -> None:
         lowest: dict[float, int] = {}  # the lowest value of each figure
         for value in sorted(figures):
             lowest.setdefault(figures[value], value)
         self._figures = sorted(lowest)
         self._values = [lowest[figure] for figure in self._figures]
         self.low, self.high = self._figures[0], self._figures[-1]
-        self.limits = floor(self.low * 100) / 100, ceil(self.high * 100) / 100
+        self.limits = outwards(min((self.low, *accepted)), max((self.high, *accepted)))
 
     def nearest(self, wanted: float) -> int:
         """The value with the closest figure, the lowest of several."""

@@ -9,7 +9,7 @@ from typing import overload
 from ..checks import check_number
 from ..model import THREE_FINGER
 from ..stroke import Stroke
-from .scales import Figures, ForceCalibration, SpeedCalibration, covered
+from .scales import Figures, ForceCalibration, SpeedCalibration, covered, outwards
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -99,7 +99,9 @@ class Units:
         """The speed value, 0..255, closest to a speed or to the time of a full closing.
 
         Args:
-            mm_per_s: millimetres of opening a second.
+            mm_per_s: millimetres of opening a second. Of a 2F or a Hand-E its manual's range is accepted:
+                where the gripper does not reach it, the closest value is taken. The only recorded 2F-85
+                moved with 20.6 to 138 mm/s, where the manual says 20 to 150.
             closing_s: seconds from open to closed, instead of a speed.
 
         Raises:
@@ -195,7 +197,7 @@ def _closing_s(speeds: SpeedCalibration) -> Figures:
 
 @lru_cache(maxsize=8)
 def _mm_per_s(speeds: SpeedCalibration) -> Figures:
-    return Figures({value: speeds.mm_per_s(value) for value in covered(speeds.points)})
+    return speeds.rates()
 
 
 @lru_cache(maxsize=8)
@@ -208,5 +210,5 @@ def _closest(name: str, wanted: object, figures: Figures, unit: str) -> int:
 
 
 def _words(figures: Figures) -> str:
-    low, high = figures.limits
+    low, high = outwards(figures.low, figures.high)
     return f"{low:g}..{high:g}"

@@ -53,6 +53,8 @@ def fault_words(hand: HandMirror) -> tuple[str, bool]:
         return f"no connection to the gripper{seconds}: what is shown is old", True
     assert hand.status is not None
     fault = hand.status.fault
+    if hand.status.controller_fault:
+        return hand.status.controller_fault_text, True
     if fault is Fault.NONE:
         return "no fault", False
     return (
