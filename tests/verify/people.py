@@ -103,6 +103,8 @@ class Helper:
         answer = self.before(question)
         if isinstance(answer, str):
             return answer
+        if question == soft_part.AGAIN:
+            self._server.gripper.place_object(Finger.ABC, FOAM)
         if question == soft_part.STAYS:
             return "y" if self._server.gripper.holds else "n"
         if question == loss.CABLE:

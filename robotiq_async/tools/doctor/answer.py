@@ -21,8 +21,8 @@ from ...values.errors import (
     ResponseTimeoutError,
     RobotiqConnectionError,
 )
-from ...values.model import model_of
-from ...values.registers import RTU_REGISTERS, STATUS_RESERVED, TCP_REGISTERS, RegisterMap
+from ...values.model import Model, model_of
+from ...values.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap, status_reserved
 from ...values.status import RobotiqStatus
 from .findings import Finding, GiveUpError, Level, Report
 
@@ -49,6 +49,10 @@ class Answering(NamedTuple):
     registers: RegisterMap  # addresses of its registers, and its unit id
 
 
+STRANGER: Final = "gripper"
+"""What a finding is about if a device answers that is no gripper."""
+
+
 async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> Answering:
     """Find the unit id and the registers under which a gripper answers; returns an open link to it.
 
@@ -73,7 +77,7 @@ async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> 
             continue
         if number == 0:
             _report_port(address, report)
-        if _has_reserved_bits(status):
+        if _has_reserved_bits(status, model_of(address.model)):
             await link.close()
             stranger = stranger or status
             continue
@@ -112,7 +116,7 @@ async def _ask_again(
             status, seconds = await _first_reading(link)
         except RobotiqConnectionError:
             continue
-        if _has_reserved_bits(status):
+        if _has_reserved_bits(status, model_of(address.model)):
             await link.close()
             break
         return link, status, seconds
@@ -326,9 +330,9 @@ def report_silence(status: RobotiqStatus, report: Report) -> None:
         report(Finding(Level.DOUBT, "gripper", found, advice))
 
 
-def _has_reserved_bits(status: RobotiqStatus) -> bool:
+def _has_reserved_bits(status: RobotiqStatus, model: Model) -> bool:
     # Random memory passes this check once in 4096 times.
-    return any(field.read(status.registers) for field in STATUS_RESERVED)
+    return any(field.read(status.registers) for field in status_reserved(model.has_modes))
 
 
 def _report_stranger(status: RobotiqStatus, report: Report) -> None:
@@ -336,4 +340,4 @@ def _report_stranger(status: RobotiqStatus, report: Report) -> None:
     words = " ".join(f"{word:04X}" for word in status.registers)
     found = f"another device answers: its registers {words} have bits set that are 0 in a gripper"
     advice = "Send it no commands: another machine may move. Are address, unit id and registers right?"
-    report(Finding(Level.BAD, "gripper", found, advice))
+    report(Finding(Level.BAD, STRANGER, found, advice))

@@ -148,6 +148,9 @@ def report_state(status: RobotiqStatus, report: Report) -> None:
     else:
         advice = "activate() or start() activates it; the fingers MOVE then."
         report(Finding(Level.GOOD, "activation", "not active", advice))
+    if status.controller_fault:
+        advice = "Look at the controller first: emergency stop, 24 V, the cable to the gripper."
+        report(Finding(Level.BAD, "controller", status.controller_fault_text, advice))
     fault = status.fault
     found = f"0x{int(fault):02X} {fault.name}: {fault.description}"
     match fault.severity:

@@ -19,6 +19,7 @@ class Assumption(NamedTuple):
     is_safety: bool = False  # whether the run ends when it does not hold
     of_several: bool = False  # whether it is about several axes, and so not about a jaw
     of_lines: bool = False  # whether it is about serial lines alone
+    of_jaws: bool = False  # whether it is about a jaw alone
 
 
 CATALOGUE: Final[dict[str, Assumption]] = {
@@ -44,19 +45,28 @@ CATALOGUE: Final[dict[str, Assumption]] = {
     "axis.alone": Assumption(4, "An axis that is commanded alone moves alone.", True, of_several=True),
     "axis.lag": Assumption(4, "gDT shows a motion as soon as its request is echoed."),
     "axis.accuracy": Assumption(4, "An axis stops within 2 counts of its request."),
-    "stop.halt": Assumption(5, "rGTO = 0 stops a motion within 10 counts.", True),
+    "stop.halt": Assumption(5, "rGTO = 0 stops a motion within 10 counts and those of an exchange.", True),
     "stop.resume": Assumption(5, "Setting rGTO again continues to the same target."),
     "stop.target": Assumption(5, "A new request in the middle of a motion is followed at once."),
-    "stop.hold": Assumption(5, "Requesting the present position stops within 10 counts.", True),
+    "stop.hold": Assumption(5, "A request for the present position stops as soon.", True),
     "stroke.time": Assumption(
-        6, "A full stroke takes the time of the thesis, or of a sibling's manual, within 20 %."
+        6, "A full closing takes the time of the thesis, or of a sibling's motion profile, within 20 %."
     ),
     "stroke.readings": Assumption(6, "Open and closed fingers show the usual positions of the model."),
+    "stroke.opening": Assumption(
+        6, "A full opening takes the time of the motion profile, within 20 %.", of_jaws=True
+    ),
+    "stroke.force": Assumption(
+        6, "The closed stop reads at most 7 counts more at the greatest force.", of_jaws=True
+    ),
     "stroke.scissor": Assumption(
         6, "The scissor echoes each request, even beyond its limits.", of_several=True
     ),
     "soft.contact": Assumption(7, "A contact while closing is gDT = 2."),
     "soft.current": Assumption(7, "A finger at rest draws no current."),
+    "soft.speed": Assumption(
+        7, "A part reads at most 10 counts further at full speed than at the slowest.", of_jaws=True
+    ),
     "soft.halt": Assumption(7, "rGTO = 0 leaves the part held."),
     "loss.client": Assumption(8, "A gripper that loses its client continues to its target."),
     "loss.first_motion": Assumption(8, "The gripper follows the first motion on a new connection."),
@@ -79,6 +89,7 @@ def checks_of(model: Model, link: str) -> dict[str, Assumption]:
         name: each
         for name, each in CATALOGUE.items()
         if (several or not each.of_several) and (is_line or not each.of_lines)
+        if not (several and each.of_jaws)
     }
 
 
@@ -128,7 +139,7 @@ ENDINGS: Final = {
     "declined": "the answer was not Enter",
     "stopped": "a key was pressed, or the terminal closed",
     "interrupted": "Ctrl-C, or a signal",
-    "refused": "the stage moved nothing: the state of the gripper forbids it",
+    "refused": "the stage moved nothing: what answers, or its state, forbids it",
     "link": "the link failed",
     "fault": "the gripper reports a fault",
     "envelope": "an axis left the range that its stage allows",

@@ -8,10 +8,10 @@ from typing import Final
 from ...link.registers import registers_of
 from ...session.options import POLL_INTERVAL_S
 from ...values.enums import Fault
-from ...values.model import THREE_FINGER, names_that_fit
-from ...values.registers import STATUS_RESERVED
+from ...values.model import names_that_fit
+from ...values.registers import status_reserved
 from ...values.status import RobotiqStatus
-from ..doctor.answer import find_gripper
+from ..doctor.answer import STRANGER, find_gripper
 from ..doctor.findings import Finding, GiveUpError
 from .bench import Bench
 from .catalogue import EndError
@@ -29,7 +29,9 @@ async def find(bench: Bench) -> None:
     except GiveUpError:
         last = findings[-1]
         end = "" if last.found.endswith("?") else "."
-        raise EndError("refused", f"{last.what}: {last.found}{end} {last.advice}") from None
+        # A stranger answers; in all other cases nothing does.
+        why = "refused" if last.what == STRANGER else "link"
+        raise EndError(why, f"{last.what}: {last.found}{end} {last.advice}") from None
     await answering.link.close()
     bench.registers = answering.registers
     bench.link = bench.another_link(answering.registers)
@@ -50,9 +52,7 @@ def why_no_gripper(status: RobotiqStatus) -> str:
     if shown := status.model.contradiction(status.registers):
         how = names_that_fit(status.registers)
         return f"this is no {status.model.title}: its registers show {shown}; {how}"
-    # The old controller of the siblings has faults of its own in byte 2 (kFLT).
-    reserved = STATUS_RESERVED if status.model is THREE_FINGER else STATUS_RESERVED[1:]
-    if any(field.read(status.registers) for field in reserved):
+    if any(field.read(status.registers) for field in status_reserved(status.model.has_modes)):
         return f"bits are set that are always 0 in a gripper: {words}"
     if status.fault.name.startswith("UNKNOWN"):
         return f"a fault code that is not in the manual: {words}"

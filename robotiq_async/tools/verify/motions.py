@@ -20,9 +20,9 @@ ASIDE: Final = 3  # counts by which the position of a resting axis may change
 ACTIVATION_S: Final = 60.0  # a longer activation is taken back: drivers wait for 25 to 30 s
 
 
-def in_place(status: RobotiqStatus, *, speed: int = 0) -> Request:
-    """The image that requests the present position of every axis, with the least force."""
-    axes = tuple(AxisRequest(status.position(axis), speed) for axis in status.model.axes)
+def in_place(status: RobotiqStatus, *, speed: int = 0, force: int = 0) -> Request:
+    """The image that requests the present position of every axis, usually with the least force."""
+    axes = tuple(AxisRequest(status.position(axis), speed, force) for axis in status.model.axes)
     return Request(activate=True, mode=status.mode, axes=axes, model=status.model)
 
 

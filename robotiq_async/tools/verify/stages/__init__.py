@@ -90,14 +90,14 @@ STAGES: Final = (
         "the whole way",
         "slowest, speed 64, and last the FASTEST (2 s, a jaw under 1 s), the weakest force",
         *("everything; nothing may be between the fingers", "1 minute"),
-        jaw_moves="the jaw, closed and open three times",
+        jaw_moves="the jaw, closed and open three times, and once more at speed 64 with the STRONGEST FORCE",
     ),
     Stage(
         *(7, "something soft", soft_part.soft_part),
         "A, B and C close on a block of foam that you put there, and open again",
         "until they touch it",
         *(_SLOWEST, "your hands, once the foam lies there", "2 minutes"),
-        jaw_moves="the jaw closes on a block of foam that you put there, and opens again",
+        jaw_moves="the jaw closes on a block of foam that you put there, and opens again; once more FAST",
     ),
     Stage(
         *(8, "loss of client, cable and power; emergency stop", loss.loss),

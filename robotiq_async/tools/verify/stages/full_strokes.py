@@ -6,7 +6,8 @@ from dataclasses import replace
 from typing import Final
 
 from ....session.options import units_of
-from ....values.enums import CLOSED, OPEN, Finger, ObjectStatus
+from ....values.calibration.motion_profile import profile_of
+from ....values.enums import CLOSED, FORCE_MAX, OPEN, Finger, ObjectStatus
 from ....values.request import Request
 from ....values.status import RobotiqStatus
 from ..bench import Bench
@@ -19,6 +20,8 @@ SPEEDS: Final = (0, 64, 255)
 STROKE_S: Final = 20.0  # twice the time of the slowest one
 SCISSOR_SPEED: Final = 64
 SHARE: Final = 0.2
+PRESSING_SPEED: Final = 64
+GIVE: Final = 7  # counts: one 2F-85 reads 225 or 226 at the least force, and 230 from 80 on
 PART_OF_STROKE: Final = 0.9
 
 
@@ -31,24 +34,40 @@ async def full_strokes(bench: Bench) -> None:
     if Finger.SCISSOR in bench.model.all_axes:
         await _scissor(bench, watch, start.position(Finger.SCISSOR))
     times: dict[int, float] = {}
+    openings: dict[int, float] = {}
     readings: list[list[int]] = []
     for speed in SPEEDS:
         before = await watch.look()
         closed, took = await _fingers_to(bench, watch, before, CLOSED, speed)
-        opened, _ = await _fingers_to(bench, watch, closed, OPEN, speed)
-        times[speed] = took
+        opened, back = await _fingers_to(bench, watch, closed, OPEN, speed)
+        times[speed], openings[speed] = took, back
         readings.append([each.position(finger) for each in (opened, closed) for finger in bench.fingers])
     _judge_times(bench, times)
     _judge_readings(bench, readings)
+    if len(bench.fingers) == 1:
+        _judge_openings(bench, openings)
+        await _press(bench, watch, readings[1][-1])
 
 
 async def _fingers_to(
-    bench: Bench, watch: Watch, start: RobotiqStatus, goal: int, speed: int
+    bench: Bench, watch: Watch, start: RobotiqStatus, goal: int, speed: int, force: int = 0
 ) -> tuple[RobotiqStatus, float]:
-    """Move fingers; return the status at the end, and the seconds for which one was seen to move."""
+    """Move fingers; return the status at the end, and the seconds until the last was seen to move."""
     watch.envelope = resting_envelope(start, bench.fingers)
-    image = replace(in_place(start, speed=speed), go=True).with_positions(dict.fromkeys(bench.fingers, goal))
+    image = in_place(start, speed=speed, force=force)
+    image = replace(image, go=True).with_positions(dict.fromkeys(bench.fingers, goal))
     return await _stroke(watch, image, bench.fingers)
+
+
+async def _press(bench: Bench, watch: Watch, least: int) -> None:
+    """Close once with the greatest force: the closed stop of a jaw gives."""
+    before = await watch.look()
+    closed, _ = await _fingers_to(bench, watch, before, CLOSED, PRESSING_SPEED, FORCE_MAX)
+    most = closed.position(bench.fingers[0])
+    await _fingers_to(bench, watch, closed, OPEN, PRESSING_SPEED)
+    found = f"closed at {least} with the least force, and at {most} with the greatest"
+    follows = "Its closed stop is softer than any known: please report this."
+    bench.judge("stroke.force", 0 <= most - least <= GIVE, found, follows, least=least, greatest=most)
 
 
 async def _stroke(watch: Watch, image: Request, axes: tuple[Finger, ...]) -> tuple[RobotiqStatus, float]:
@@ -95,13 +114,25 @@ def _judge_times(bench: Bench, times: dict[int, float]) -> None:
     bench.judge("stroke.time", share <= SHARE, words, follows, **figures)
 
 
+def _judge_openings(bench: Bench, times: dict[int, float]) -> None:
+    profile, counts = profile_of(bench.model), bench.model.stroke.counts
+    assert profile is not None, "a jaw has one"
+    share = max(abs(took / profile.opening_s(counts, speed) - 1) for speed, took in times.items())
+    words = ", ".join(f"{took:.2f} s at speed {speed}" for speed, took in times.items())
+    if share > SHARE:
+        words += f"; up to {100 * share:.0f} % off what is assumed"
+    follows = "No option is needed: no time limit is that short. Please report this."
+    figures: dict[str, Figure] = {f"speed_{speed}_s": took for speed, took in times.items()}
+    bench.judge("stroke.opening", share <= SHARE, words, follows, **figures)
+
+
 def _judge_readings(bench: Bench, readings: list[list[int]]) -> None:
     model = bench.model
     opened = sorted({each for row in readings for each in row[: len(bench.fingers)]})
     closed = sorted({each for row in readings for each in row[len(bench.fingers) :]})
     words = f"open {opened[0]} to {opened[-1]}, closed {closed[0]} to {closed[-1]}"
     figures: dict[str, Figure] = {"open": list(opened), "closed": list(closed)}
-    is_usual = opened[0] >= model.stroke.open_reading and opened[-1] <= model.open_reading_max
+    is_usual = model.open_reading_min <= opened[0] and opened[-1] <= model.open_reading_max
     is_usual = is_usual and closed[0] >= model.closed_reading_min
     if is_usual:
         bench.as_assumed("stroke.readings", words, **figures)

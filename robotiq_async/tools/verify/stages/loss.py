@@ -71,6 +71,10 @@ async def _client(bench: Bench) -> None:
     await bench.link.close()
     await watch.pause(GONE_S)
     await bench.link.open()
+    if not (status := await bench.link.read()).is_activated:
+        bench.inconclusive("loss.client", "the activation was lost: there is no motion to judge")
+        report_lost_activation(bench, f"after {GONE_S:g} s without a client", GONE_S)
+        raise EndError("inactive", f"the activation was lost after {GONE_S:g} s without a client")
     status = await watch.look()
     where = status.position(Finger.A)
     went_on = are_near(status, far, MARGIN)
@@ -117,15 +121,15 @@ async def _alone(bench: Bench) -> None:
         statuses = [await bench.link.read() for _ in range(3)]
         status, alone = statuses[-1], seconds
         if not status.is_activated:
-            report_lost_activation(bench, f"after {seconds:g} s without a client")
+            report_lost_activation(bench, f"after {seconds:g} s without a client", seconds)
             raise EndError("inactive", f"the activation was lost after {seconds:g} s without a client")
-    bench.as_assumed("loss.idle", f"still active after {alone:g} s without a client")
+    bench.as_assumed("loss.idle", f"still active after {alone:g} s without a client", seconds=alone)
 
 
-def report_lost_activation(bench: Bench, when: str) -> None:
-    """Note that the gripper is no longer active although it was not reset."""
+def report_lost_activation(bench: Bench, when: str, seconds: float | None = None) -> None:
+    """Note that the gripper is no longer active although it was not reset; the seconds, if they are known."""
     follows = "Keep one program polling. A start after a pause activates the gripper: it MOVES and lets go."
-    bench.differs("loss.idle", f"the activation was lost {when}", follows)
+    bench.differs("loss.idle", f"the activation was lost {when}", follows, seconds=seconds)
 
 
 async def _back(bench: Bench) -> tuple[list[RobotiqStatus], float]:

@@ -69,6 +69,7 @@ LET_GO_S: Final = 0.5  # for a gateway that serves one client to notice that it 
 GONE_S: Final = 0.05  # for a gripper to notice a closed connection
 LONGEST_INTERVAL_S: Final = 0.1
 OTHERS: Final = 2
+QUANTILES: Final = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99, 1.0)
 
 
 async def reading(bench: Bench) -> None:
@@ -186,6 +187,7 @@ async def _round_trip(bench: Bench) -> None:
         p50, p99 = percentile(times, 0.5), percentile(times, 0.99)
         name = f"at_{1000 * period:g}_ms"
         figures |= {f"{name}_p50_ms": 1000 * p50, f"{name}_p99_ms": 1000 * p99}
+        figures[f"{name}_quantiles_ms"] = [1000 * percentile(times, share) for share in QUANTILES]
         figures[f"{name}_histogram"] = _histogram(times)
         worst = max(worst, p99)
     found = f"99 of 100 reads take at most {1000 * worst:.1f} ms"
@@ -266,11 +268,10 @@ async def _silence(bench: Bench) -> None:
             break
     if lost:
         follows = "Keep a program polling: after a pause the next start activates the gripper, and it MOVES."
-        bench.differs("read.idle", f"the activation was lost {lost} of silence", follows)
+        bench.differs("read.idle", f"the activation was lost {lost} of silence", follows, seconds=seconds)
     else:
-        bench.as_assumed(
-            "read.idle", f"answers after each of {sum(bench.lengths.idle):g} s of silence in all"
-        )
+        words = f"answers after each of {sum(bench.lengths.idle):g} s of silence in all"
+        bench.as_assumed("read.idle", words, seconds=max(bench.lengths.idle, default=0.0))
     passing = [each for each in shown if isinstance(each, list) and each[1] == Fault.COMMUNICATION_NOT_READY]
     if lasting:
         follows = "A hand takes that for a fault: poll without pauses, and please report this."

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from ....values.enums import CLOSED, ObjectStatus
+from ....values.enums import CLOSED, SPEED_MAX, Finger, ObjectStatus
 from ....values.status import RobotiqStatus
 from ..bench import Bench
-from ..catalogue import EndError
+from ..catalogue import EndError, Figure
 from ..motions import MARGIN, are_near, in_place, resting_envelope
-from ..watch import Watch
+from ..watch import ENTER, Watch
 
 SECONDS: Final = 60.0
 CLOSE_S: Final = 15.0
@@ -21,6 +21,10 @@ PLACE: Final = (
     "Take your hand away. Then press Enter: the fingers close on it."
 )
 RELEASE: Final = "The fingers open now, and the foam falls. Keep your hands away. Enter opens them."
+AGAIN: Final = "Put the foam back as it lay. Take your hand away. Enter closes the jaw on it AT FULL SPEED."
+GO_OR_SKIP: Final = {ENTER: "done, go on", "s": "skip this"}
+OVERRUN: Final = 10
+"""Counts: one 2F-85 read a part at 91 at the slowest speed, and at 96 to 99 at full speed."""
 STAYS: Final = "rGTO has been 0 for some seconds. Is the foam still held?"
 ANSWERS: Final = {"y": "yes, it is held", "n": "no, it is loose or has fallen"}
 
@@ -42,6 +46,12 @@ async def soft_part(bench: Bench) -> None:
     if answer is None or not await person.consents(RELEASE):
         raise EndError("declined", "the fingers were not opened: they are still closed, with rGTO = 0")
     _judge_halt(bench, answer, held, left)
+    await _open(bench, home)
+    if len(bench.fingers) == 1:
+        await _at_speed(bench, home, held)
+
+
+async def _open(bench: Bench, home: dict[Finger, int]) -> None:
     watch = bench.watch(SECONDS)
     now = await watch.look()
     await watch.write(replace(in_place(now), go=True).with_positions(home))
@@ -50,10 +60,37 @@ async def soft_part(bench: Bench) -> None:
     await watch.until_still(2.0)
 
 
-async def _close(bench: Bench, watch: Watch, start: RobotiqStatus) -> RobotiqStatus:
+async def _at_speed(bench: Bench, home: dict[Finger, int], slowly: RobotiqStatus) -> None:
+    """Close a jaw on the part at full speed, if the person puts it back: it runs on a little."""
+    answer = await bench.person.chooses(AGAIN, GO_OR_SKIP)
+    if answer == "s" or not slowly.contacts:
+        bench.inconclusive("soft.speed", "skipped" if answer == "s" else "nothing was held before")
+        return
+    if answer is None:
+        raise EndError("declined", "the question about the foam was not answered")
+    watch = bench.watch(SECONDS)
+    start = await watch.look()
+    watch.envelope = resting_envelope(start, bench.fingers)
+    held = await _close(bench, watch, start, SPEED_MAX)
+    if not await bench.person.consents(RELEASE):
+        raise EndError("declined", "the jaw was not opened: it is still closed, with rGTO = 0")
+    jaw = bench.fingers[0]
+    slow, fast = slowly.position(jaw), held.position(jaw)
+    figures: dict[str, Figure] = {"speed_0": slow, "speed_255": fast}
+    if not held.contacts:
+        bench.inconclusive("soft.speed", "nothing was held at full speed", **figures)
+    else:
+        words = f"it is read at {slow} at the slowest speed, and at {fast} at full speed"
+        follows = "A width by a reading is that much too small: grip slowly to measure. Please report this."
+        bench.judge("soft.speed", 0 <= fast - slow <= OVERRUN, words, follows, **figures)
+    await _open(bench, home)
+
+
+async def _close(bench: Bench, watch: Watch, start: RobotiqStatus, speed: int = 0) -> RobotiqStatus:
     """Close, and wait until every finger rests; the status in which all of them have for a while."""
-    await watch.write(in_place(start))
-    await watch.write(replace(in_place(start), go=True).with_positions(dict.fromkeys(bench.fingers, CLOSED)))
+    image = in_place(start, speed=speed)
+    await watch.write(image)
+    await watch.write(replace(image, go=True).with_positions(dict.fromkeys(bench.fingers, CLOSED)))
     # gDT just after a write may be from before it.
     await watch.watch_for(0.3)
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
+from ....values.calibration.scales import SpeedCalibration
 from ....values.enums import Finger
 from ....values.request import Request
 from ....values.status import RobotiqStatus
 from ..bench import Bench
-from ..catalogue import EndError
+from ..catalogue import EndError, Figure
 from ..motions import MARGIN, are_near, go, in_place, motion_envelope
 from ..watch import Rest, Watch
 
@@ -19,6 +20,7 @@ SPEED: Final = 64
 STROKE: Final = 80
 LEG_S: Final = 12.0
 COUNTS: Final = 10
+"""Counts of a stop over a quick link. A slow one adds the way of its exchanges: 11 counts in 80 ms."""
 
 
 async def stopping(bench: Bench) -> None:
@@ -54,21 +56,55 @@ async def _halt(bench: Bench, watch: Watch, away: Request, home: dict[Finger, in
     status = await _until_past(
         watch, lambda s: all(s.position(f) >= home[f] + STROKE // 2 for f in bench.fingers)
     )
-    counts, seconds = await _stop(bench, watch, replace(away, go=False), status)
-    words = f"{counts} counts and {1000 * seconds:.0f} ms at speed {SPEED}"
+    stop = await _stop(bench, watch, replace(away, go=False), status)
+    words = f"{stop.counts} counts and {1000 * stop.seconds:.0f} ms at speed {SPEED}{stop.on_the_way}"
     follows = "Do not rely on a software stop; report this."
-    bench.judge("stop.halt", counts <= COUNTS, words, follows, counts=counts, seconds=seconds)
+    bench.judge("stop.halt", stop.is_quick, words, follows, **stop.figures)
 
 
-async def _stop(bench: Bench, watch: Watch, image: Request, status: RobotiqStatus) -> tuple[int, float]:
-    """Write an image that stops; return the counts that a finger still moves, and the seconds until rest."""
+class _Stop(NamedTuple):
+    """A stop: the counts that a finger still moved, and the time that the link took of it."""
+
+    counts: int
+    seconds: float  # until rest
+    exchange_s: float  # from asking for the last status before it to its acknowledgement
+    rate: float  # counts a second before it
+
+    @property
+    def allowed(self) -> float:
+        """Counts: those of a quick stop, and of the time in which the gripper could not know of it."""
+        return COUNTS + self.rate * self.exchange_s
+
+    @property
+    def is_quick(self) -> bool:
+        return self.counts <= self.allowed
+
+    @property
+    def on_the_way(self) -> str:
+        if self.counts <= COUNTS:
+            return ""
+        return f", of which {self.rate * self.exchange_s:.0f} may be those of exchanges on this link"
+
+    @property
+    def figures(self) -> dict[str, Figure]:
+        return {
+            "counts": self.counts,
+            "allowed_counts": round(self.allowed, 1),
+            "seconds": self.seconds,
+            "exchange_s": self.exchange_s,
+        }
+
+
+async def _stop(bench: Bench, watch: Watch, image: Request, status: RobotiqStatus) -> _Stop:
+    """Write an image that stops, and watch the fingers until they rest."""
     rest = Rest(bench.fingers)
     rest.lasts(status, 0.3)  # from here on
-    began, before = rest.moved_at, rest.positions
-    await watch.write(image)
+    began, before, asked = rest.moved_at, rest.positions, bench.link.asked
+    acknowledged = await watch.write(image)
     await watch.until(lambda now: rest.lasts(now, 0.3), 4.0)
     counts = max(abs(at - was) for at, was in zip(rest.positions, before, strict=True))
-    return counts, rest.moved_at - began
+    rate = SpeedCalibration.usual(bench.model).counts_per_s(SPEED)
+    return _Stop(counts, rest.moved_at - began, acknowledged - asked, rate)
 
 
 async def _resume(bench: Bench, watch: Watch, away: Request, far: dict[Finger, int]) -> None:
@@ -105,7 +141,7 @@ async def _new_target(bench: Bench, watch: Watch, image: Request, home: dict[Fin
 async def _hold(bench: Bench, watch: Watch, image: Request, home: dict[Finger, int]) -> None:
     status = await _half_way_home(bench, watch, image, home)
     here = {finger: status.position(finger) for finger in bench.fingers}
-    counts, seconds = await _stop(bench, watch, replace(image, go=True).with_positions(here), status)
-    words = f"within {counts} counts, {1000 * seconds:.0f} ms"
+    stop = await _stop(bench, watch, replace(image, go=True).with_positions(here), status)
+    words = f"within {stop.counts} counts, {1000 * stop.seconds:.0f} ms{stop.on_the_way}"
     follows = "hold() stops too late: use halt(). Please report this."
-    bench.judge("stop.hold", counts <= COUNTS, words, follows, counts=counts, seconds=seconds)
+    bench.judge("stop.hold", stop.is_quick, words, follows, **stop.figures)
