@@ -267,6 +267,18 @@ async def test_a_reset_is_in_the_line_although_the_gripper_shows_it() -> None:
             await link.open()
 
 
+async def test_a_status_after_a_reset_has_no_old_activation() -> None:
+    """One that was thought lost acts before the reset does."""
+    async with linked() as (link, served):
+        served.values |= {"ACT": 0, "STA": 0}
+        for _ in range(2):  # the next read would ask for STA, and not for ACT
+            await link.read()
+        served.answer = takes_nothing(served)
+        await link.write(image(7, go=False, activate=False))
+        served.values |= {"ACT": 1, "STA": 1}
+        assert (await status(link)).activation_echo
+
+
 async def test_what_was_not_read_yet_is_set() -> None:
     async with linked() as (link, served):
         await link.write(image(255))

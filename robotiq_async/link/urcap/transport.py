@@ -137,7 +137,7 @@ class UrcapTransport:
             ResponseTimeoutError: the connection is open, but no answer comes.
         """
         await self.close()
-        self._changes, self._written = True, NOTHING
+        self._changes = True  # what was written last may still show
         self._values.clear()
         await self._line.open(self, self._connect_timeout)
         await self._line.talk(self, self._opening())
@@ -193,7 +193,8 @@ class UrcapTransport:
             return False
         act, go, position = (field.read(image) for field in (reg.rACT, reg.rGTO, reg.rPR[0]))
         self._sent.append((act, go, position))
-        if self._changes or (act, go) != (self._values["ACT"], self._values["GTO"]):
+        # Before an image with rACT = 0 an activation may act that was thought lost: ACT is read again.
+        if self._changes or not act or (act, go) != (self._values["ACT"], self._values["GTO"]):
             self._changes, self._shows_by = True, self._line.now() + SHOWS_S
             self._written = self._sent[-1]
         shown = None if self._releases else self._values.get("ACT")
