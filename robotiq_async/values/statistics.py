@@ -152,7 +152,9 @@ class Counters:
         periods, round_trips = sorted(self.periods), sorted(self.round_trips)
         ages = sorted(self.status_ages)
         time = sum(periods)
-        busy = sum(min(each) for each in zip(self.periods, self._busy_times, strict=False))
+        # Copies: a blocking hand is read in one thread while it polls in another.
+        spent = zip(tuple(self.periods), tuple(self._busy_times), strict=False)
+        busy = sum(min(each) for each in spent)
         return Statistics(
             polls=self.polls,
             writes=self.writes,

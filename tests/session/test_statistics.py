@@ -100,3 +100,18 @@ def test_only_the_last_samples_count_and_a_snapshot_does_not_change_with_later_o
     counters.periods.append(1.0)
     assert (figures.polls, figures.period_p99, figures.round_trip_p99) == (5, 0.005, 0.001)
     assert len(counters.periods) == len(counters.round_trips) == SAMPLES
+
+
+def test_a_snapshot_is_taken_while_the_polling_counts_on() -> None:
+    """As that of a blocking hand, which polls in another thread."""
+
+    class Counting(float):
+        def __lt__(self, other: object) -> bool:
+            counters.note_poll(0.0, 0.001, 0.005)
+            return False
+
+    counters = Counters()
+    counters.periods.extend([Counting(0.005), Counting(0.005)])
+    counters._busy_times.extend([0.001, 0.001])
+    assert counters.snapshot(0).link_use > 0
+    assert counters.polls > 0
