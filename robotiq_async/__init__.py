@@ -10,6 +10,7 @@ Programs import from here. The packages below it::
     sync        blocking hands, for scripts and notebooks
     fleet       hands on other hosts: agents that serve them, remote hands
     tools       recordings, viewer, web page, measurements, diagnosis of a hand
+    dropins     the interfaces that labs copy: robotiq_gripper.py, DROID's server, LeRobot's robot
     ros2        a lifecycle node of ROS 2 around a hand
     simulator   a simulated gripper with its servers
     cli         the command line
@@ -24,6 +25,7 @@ from .runtime.version import __version__ as __version__
 from .session.options import ReconnectPolicy
 from .session.streams import Stream
 from .values.calibration import Units
+from .values.conventions import Convention
 from .values.enums import (
     CLOSED,
     FORCE_MAX,
@@ -87,6 +89,7 @@ __all__ = [
     "ActivationTimeoutError",
     "ConnectFailedError",
     "ConnectionLostError",
+    "Convention",
     "Fault",
     "Finger",
     "GraspResult",

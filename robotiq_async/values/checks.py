@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import operator
 import sys
+from contextlib import suppress
 from numbers import Real
 from typing import Final
 
@@ -124,6 +125,15 @@ def as_float(value: object) -> float | None:
         return math.inf
     except TypeError:  # numpy's timedelta has __index__ and is not a number
         return None
+
+
+def single(value: object) -> object:
+    """The number in an array or a tensor of one; anything else as it is."""
+    item = getattr(value, "item", None)
+    if as_float(value) is None and callable(item):
+        with suppress(ValueError, RuntimeError):  # numpy's and torch's, of several
+            return item()
+    return value
 
 
 def check_timeout(name: str, value: object) -> float | None:
