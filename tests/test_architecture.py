@@ -14,7 +14,7 @@ from docs import make_tables
 
 PACKAGE = Path(robotiq_async.__file__).parent
 ROOT = Path(__file__).parents[1]
-AROUND = re.compile(r"robotiq_async\.(cli|fleet|ros2|tools)\b|pytest_robotiq_async\b")
+AROUND = re.compile(r"robotiq_async\.(cli|dropins|fleet|ros2|tools)\b|pytest_robotiq_async\b")
 OUTSIDE = {"__init__", "__main__", "__pycache__", "_demo", "data", "py", "version"}
 """Modules that no contract needs to name."""
 
@@ -29,7 +29,9 @@ def test_every_room_has_its_layer_and_says_what_it_is_for() -> None:
 
 def test_what_stands_around_the_core_uses_no_private_names_of_it() -> None:
     """Lint finds each use (SLF001); here none may be allowed. import-linter keeps the modules."""
-    around = [PACKAGE / room for room in ("cli", "fleet", "ros2", "tools")] + [ROOT / "pytest_robotiq_async"]
+    around = [PACKAGE / room for room in ("cli", "dropins", "fleet", "ros2", "tools")] + [
+        ROOT / "pytest_robotiq_async"
+    ]
     files = [path for folder in around for path in folder.rglob("*.py")]
     assert [str(path) for path in files if "SLF001" in path.read_text(encoding="utf-8")] == []
 

@@ -94,7 +94,7 @@ class HoldWatch:
             self._collected += time.perf_counter() - self._collection_began
 
 
-class _Selector(selectors.DefaultSelector):
+class VirtualClock(selectors.DefaultSelector):
     """Does not wait: it moves the clock."""
 
     def __init__(self) -> None:
@@ -136,8 +136,8 @@ class _Selector(selectors.DefaultSelector):
 class VirtualLoop(asyncio.SelectorEventLoop):
     """The loop; :meth:`time` is virtual, and connections stay inside."""
 
-    def __init__(self) -> None:
-        self._virtual = _Selector()
+    def __init__(self, clock: VirtualClock | None = None) -> None:
+        self._virtual = clock or VirtualClock()
         super().__init__(self._virtual)
         self._listeners: dict[int, _Listener] = {}
         self._next_port = 20000

@@ -17,10 +17,9 @@ import pytest_asyncio
 from lerobot.robots import make_robot_from_config
 
 from robotiq_async import JAW, TWO_FINGER_85
+from robotiq_async.dropins.lerobot.robot import RobotiqGripper, RobotiqGripperConfig
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.simulator.troubles.trouble import Trouble
-from robotiq_async.tools.lerobot import GripperPart
-from robotiq_async.tools.lerobot.robot import RobotiqGripper, RobotiqGripperConfig
 from robotiq_async.values.request import Request
 from tests.docs.pages import ROOT
 from tests.grippers import active_gripper, until
@@ -45,7 +44,7 @@ class Commands:
     async def begin(self, name: str, *arguments: str) -> asyncio.subprocess.Process:
         return await asyncio.create_subprocess_exec(
             *(str(Path(sys.executable).with_name(name)), "--robot.type=robotiq_gripper"),
-            "--robot.discover_packages_path=robotiq_async.tools.lerobot",
+            "--robot.discover_packages_path=robotiq_async.dropins.lerobot",
             f"--robot.address={self.server.address}",
             *arguments,
             env={
@@ -121,7 +120,11 @@ async def test_what_is_recorded_is_replayed(commands: Commands) -> None:
     await commands.run("lerobot-record", *LEADER, *DATASET, root, *EPISODE)
     about = json.loads((commands.folder / "data" / "meta" / "info.json").read_text())
     assert about["features"]["action"]["names"] == ["gripper.pos", "gripper.force"]
-    assert about["features"]["observation.state"]["names"] == [*GripperPart.OBSERVATIONS]
+    assert about["features"]["observation.state"]["names"] == [
+        "gripper.pos",
+        "gripper.current",
+        "gripper.contact",
+    ]
     assert about["total_frames"] > 30
     recorded = len(commands.targets())
     await commands.run("lerobot-replay", *DATASET, root, "--dataset.episode=0")

@@ -6,12 +6,14 @@ import asyncio
 import importlib.metadata
 import importlib.util
 from types import ModuleType
+from typing import Any
 
 import pytest
 from airo_robots.grippers.hardware.robotiq_2f85_urcap import Robotiq2F85
 
 from robotiq_async import JAW, TWO_FINGER_85
 from robotiq_async.simulator import SimulatedGripper, UrcapSimulatorServer
+from tests.docs.pages import blocks, read
 from tests.link.test_urcap_clients import gripper, server
 
 __all__ = ["gripper", "server"]
@@ -66,3 +68,25 @@ async def test_the_example_of_ur_rtde(gripper: SimulatedGripper, server: UrcapSi
     assert low <= TWO_FINGER_85.open_reading_max
     assert high >= TWO_FINGER_85.closed_reading_min
     assert ends == [(80, "AT_DEST"), (120, "STOPPED_INNER_OBJECT"), (3, "AT_DEST")]
+
+
+async def test_the_recipe_for_airo_robots(gripper: SimulatedGripper, server: UrcapSimulatorServer) -> None:
+    """As the page has it, at the same port."""
+    (recipe,) = blocks(read("how-to/coming-from.md"), "py")
+    names: dict[str, Any] = {}
+    exec(compile(recipe.text, "coming-from.md", "exec"), names)
+
+    def use() -> tuple[float, bool, float]:
+        driver = names["Robotiq"](server.address)
+        driver.move(0.04).wait()
+        width = driver.get_current_width()
+        gripper.place_object(JAW, 200)
+        driver.close().wait()
+        held = driver.is_an_object_grasped(), driver.get_current_width()
+        driver._hand.stop()
+        return width, *held
+
+    width, is_held, held = await asyncio.to_thread(use)
+    assert width == pytest.approx(0.04, abs=0.002)
+    assert is_held
+    assert held == pytest.approx(0.085 * 28 / 225, abs=0.002)

@@ -1,10 +1,10 @@
-"""A gripper in LeRobot's units: the part that an arm's robot class embeds, and the robot around it.
+"""LeRobot: the part that an arm's robot class embeds, and the robot around it.
 
 ================  =================================================================================
 module            contents
 ================  =================================================================================
 ``gripper_part``  the part: connect, observe, act, disconnect; imports nothing of LeRobot
-``robot``         the robot, which ``--robot.discover_packages_path=robotiq_async.tools.lerobot`` finds
+``robot``         the robot, which the distribution ``lerobot_robot_robotiq`` lets LeRobot find
 ================  =================================================================================
 """
 
