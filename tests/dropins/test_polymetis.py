@@ -11,6 +11,7 @@ import time
 from asyncio.subprocess import DEVNULL, PIPE, STDOUT
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager
+from functools import partial
 from typing import Any, NamedTuple
 
 import pytest
@@ -148,7 +149,7 @@ def test_a_3_finger_has_its_own_width() -> None:
 
 def test_the_stamp_is_the_time_of_the_status() -> None:
     with line("tcp") as here, served(here) as service:
-        stamp = decoded(seen(service)[1])
+        stamp: Mapping[int, Any] = decoded(seen(service)[1])
         assert abs(stamp[1] + stamp[2] / 1e9 - time.time()) < 5
 
 
@@ -174,7 +175,7 @@ def droid(service: GripperService, gripper: Watched, exchanges: int) -> Tally:
             gripper.has_shown,
         )
         width = 0.085 * (1 - next(targets) / 255)
-        tally.call(lambda width=width: service.goto(command(width), CONTEXT), lambda *_: True)
+        tally.call(partial(service.goto, command(width), CONTEXT), lambda answer, _: answer == b"")
         rest(1 / 15)
     return tally
 
@@ -183,7 +184,11 @@ def test_a_dead_line_is_unavailable_after_two_seconds_and_never_the_last_value()
     with line("tcp") as here, served(here) as service:
         here.server.policy = lambda _: ()
         rest(0.1)
-        for call in (lambda: service.state(b"", CONTEXT), lambda: service.goto(command(0), CONTEXT)):
+        calls: list[Callable[[], bytes]] = [
+            lambda: service.state(b"", CONTEXT),
+            lambda: service.goto(command(0), CONTEXT),
+        ]
+        for call in calls:
             began = time.monotonic()
             with pytest.raises(Aborted) as caught:
                 call()
