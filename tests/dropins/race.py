@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from itertools import cycle
 from typing import Any, Final
 
-from robotiq_async import JAW
+from robotiq_async import JAW, TWO_FINGER_85
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.registers import Registers
 
@@ -99,7 +99,7 @@ class Loop:
         return self._gripper.exchanges < self._exchanges
 
     def _is_at(self, target: int) -> bool:
-        return abs(max(min(target, 228), 3) - self._gripper.position(JAW)) <= COUNTS
+        return TWO_FINGER_85.has_reached(target, round(self._gripper.position(JAW)))
 
     def follow(self) -> Tally:
         """GELLO's loop: read the position, wait for 10 ms, move."""
