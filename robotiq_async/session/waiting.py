@@ -19,8 +19,9 @@ from ..values.status import RobotiqStatus
 from .streams import Listeners
 
 STALLED_S: Final = 5.0
-"""A gripper that waits for its activation (gFLT 0x05 to 0x07) or releases, and shows nothing new for this
-time, makes no progress. While it moves, its currents and positions change. No figure is published."""
+"""A gripper that waits for its activation (gFLT 0x05 to 0x07), has not begun it (gIMC = 0) or releases, and
+shows nothing new for this time, makes no progress. While it moves, its currents and positions change. No
+figure is published."""
 TOLD_EVERY_S: Final = 4.0  # an activation may take half a minute on a real gripper
 ACTIVATING: Final = frozenset({State.DO_ACTIVATION, State.WF_ACTIVATION})
 _Waiter = tuple[Collection[State], Mapping[State, Callable[[], RobotiqError]], asyncio.Future[State]]
@@ -74,8 +75,9 @@ class StateWaiters:
 class StallWatch:
     """A context manager that follows the statuses, and cancels a wait when they stop changing.
 
-    During an activation this needs a priority fault, with which the gripper waits for the activation;
-    without one a gripper may activate and show nothing new. A release always shows: it opens the fingers.
+    During an activation this needs a priority fault, with which the gripper waits for the activation, or
+    gIMC = 0; without them a gripper may activate and show nothing new. A release always shows: it opens the
+    fingers.
     """
 
     def __init__(self, listeners: Listeners, machine: StateMachine) -> None:
@@ -103,8 +105,9 @@ class StallWatch:
     def _see(self, item: object) -> None:
         if not isinstance(item, RobotiqStatus):
             return
-        state, is_priority = self._machine.state, item.fault.severity is Severity.PRIORITY
-        waits = state is State.WF_ATR or (state is State.WF_ACTIVATION and is_priority)
+        state, has_begun = self._machine.state, not item.is_reset
+        is_at_work = has_begun and item.fault.severity is not Severity.PRIORITY
+        waits = state is State.WF_ATR or (state is State.WF_ACTIVATION and not is_at_work)
         first, fault, *middle, last = item.registers
         shown = (first, fault & 0x0FFF, *middle, last >> 8)  # without the reserved bits
         if not waits or shown != self._shown:

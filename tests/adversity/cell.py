@@ -33,8 +33,10 @@ ESCALATION_S = 5.0
 STOP_S = 2.0
 """Seconds that a stop takes at most, as promised: the phases that end so are stops."""
 STUCK = (State.WF_ACTIVATION, State.WF_ATR)
-"""States in which an emergency stop leaves the hand: its sequence does not continue until a reset."""
+"""States in which a sequence that does not continue until a reset leaves the hand."""
 MOVES_EVERYTHING = ("foreign", "release")
+FORGETS = ("power-cut", "stranded")
+"""Troubles with which the gripper has no request any more."""
 SETTLED = (*RUNNING, State.RESET, State.FAULT, State.ATR_DONE, State.SHUTDOWN)
 
 
@@ -60,7 +62,7 @@ async def outcome(world: World, phase: Phase, words: str) -> str:
         if kind == "e-stop" and phase.name == "connecting":
             bound += STALLED_S  # connected in time, start() waits for an activation that makes no progress
         ending = _noticed(world) if task is None else await _ending_of(task, before.time + bound)
-        await _rest(world, (*SETTLED, *STUCK) if kind == "e-stop" else SETTLED)
+        await _rest(world, (*SETTLED, *STUCK) if _stays_stuck(kind, phase) else SETTLED)
         state = world.hand.state
         if phase.name == "keeping a grip":
             ending += ", kept" if world.gripper.grips == world.holds else ", let go"
@@ -149,6 +151,11 @@ def _noticed(world: World) -> str:
     return "taken over" if world.hand.statistics.foreign_commands else "nothing"
 
 
+def _stays_stuck(kind: str, phase: Phase) -> bool:
+    """Whether the gripper may leave the hand in a sequence that does not continue."""
+    return kind == "e-stop" or (kind == "stranded" and phase.name in ("activating", "releasing"))
+
+
 async def _rest(world: World, settled: Collection[State]) -> None:
     """Wait until the hand stays in one state, long after whatever it moves has come to rest."""
     async with asyncio.timeout(40):
@@ -171,12 +178,12 @@ def _check_motions(world: World, before: Before, phase: Phase, kind: str, ending
         motions = [motion for motion, _ in groupby(motions)]  # each variable was a write of its own
     assert all(one != another for one, another in pairwise(motions)), motions
     assert sum(motion[0] == TARGET for motion in motions) <= 1, motions
-    if kind in MOVES_EVERYTHING:
-        return
+    if kind in MOVES_EVERYTHING or (kind == "stranded" and phase.name == "connecting"):
+        return  # such a gripper is activated by the start
     _check_travel(world, before.travels, phase.addressed)
     if phase.name == "moving" and ending in ("GripperFault", "NotActivated"):
         assert world.gripper.position(Finger.A) < TARGET - 2, "a motion resumed after a fault"
-    if phase.name == "holding" and kind != "power-cut":
+    if phase.name == "holding" and kind not in FORGETS:
         assert world.gripper.request_registers == before.requests, "the grip was relaxed"
 
 

@@ -83,7 +83,7 @@ TROUBLES_OF_A_JAW = (
 )
 """The troubles for a sibling here. ``MODEL=2f85`` in the environment tries the whole table."""
 OF_A_JAW = [cell for cell in EVERY if cell.link == "rtu" and cell.trouble in TROUBLES_OF_A_JAW]
-LETS_GO = ("power-cut", "foreign", "fault", "release", "e-stop")
+LETS_GO = ("power-cut", "foreign", "fault", "release", "stranded", "e-stop")
 """Troubles that end a grip if no other axis can move. Else a stop writes nothing that could fail."""
 CONNECTION_LOST = [("tcp", "silence once"), ("tcp", "reset"), ("tcp", "close"), ("rtu", "echo for 60")]
 """Troubles of links that do so too, as with a 3-Finger: the fate of the grip cannot be seen in time."""

@@ -304,6 +304,22 @@ async def test_a_gripper_that_waits_for_its_activation_is_reset_and_activated(re
     await hand.stop()
 
 
+@pytest.mark.parametrize("call", ["start", "activate", "recover"])
+async def test_a_gripper_that_keeps_ract_without_an_activation_is_reset_and_activated(call: str) -> None:
+    wire = Wire()
+    await activate_beforehand(wire.gripper)
+    wire.gripper.strand()
+    hand = RobotiqHand(wire, poll_interval=SELDOM_S)
+    if call != "start":
+        await hand.start(activate=False)
+        assert hand.state is State.RESET
+    await getattr(hand, call)()
+    assert hand.state is State.RUNNING_IDLE
+    assert [each.activate for each in wire.written] == [False, True]
+    assert (await hand.move(100)).positions[Finger.A] == 100
+    await hand.stop()
+
+
 class Deaf(Wire):
     """After an emergency stop, the first rACT = 0 clears gACT and leaves gIMC = 1 (activating)."""
 

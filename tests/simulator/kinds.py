@@ -72,6 +72,7 @@ EXPECTED: Final = {
     "fault": Expected(CONDITION, ANY, (9, 1, 15)),
     "controller-fault": Expected(CONDITION, MODBUS, (12, 1, 15)),
     "release": Expected(EVENT, ANY),
+    "stranded": Expected(EVENT, ANY),
     "e-stop": Expected(CONDITION, ANY, (1, 1, 9)),
     "status-lag": Expected(CONDITION, ANY, (0.05, 0, 1)),
     "silence-fault": Expected(CONDITION, ANY, (1.0, 0, 3600)),

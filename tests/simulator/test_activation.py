@@ -30,6 +30,36 @@ def test_activation_closes_and_opens_the_fingers(bench: Bench) -> None:
     assert 2 < bench.now - began < 20
 
 
+def test_a_gripper_that_has_lost_its_activation_and_keeps_ract(active: Bench) -> None:
+    active.reach(100)
+    active.gripper.strand()
+    assert active.words == (0x01, 0x00)
+    assert active.fault is Fault.NONE
+    assert active.gripper.request_registers[0] == 0x0100
+    active.go(200)
+    active.wait(5)
+    assert not active.gripper.is_moving, "only a rising rACT activates"
+    active.write(activate=False, go=False)
+    assert active.words == (0x00, 0x00)
+    active.activate()
+
+
+def test_a_gripper_is_stranded_in_the_middle_of_an_activation(bench: Bench) -> None:
+    bench.write(activate=True)
+    bench.wait(1)
+    bench.gripper.strand()
+    travel = bench.gripper.travel(Finger.A)
+    bench.wait(5)
+    assert bench.gripper.travel(Finger.A) == travel
+
+
+def test_without_power_nothing_is_stranded(bench: Bench) -> None:
+    bench.gripper.power_off()
+    bench.gripper.strand()
+    bench.gripper.power_on()
+    assert bench.words == (0, 0)
+
+
 def test_failed_activation(bench: Bench) -> None:
     bench.gripper.fail_activation = True
     bench.write_and_settle(activate=True)

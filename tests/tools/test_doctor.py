@@ -505,6 +505,16 @@ async def test_a_fault(code: int, level: Level, words: str) -> None:
     assert f"0x{code:02X}" in found["fault"].found
 
 
+async def test_a_gripper_that_has_lost_its_activation_and_keeps_ract() -> None:
+    gripper = SimulatedGripper()
+    gripper.strand()
+    async with SimulatorServer(gripper) as server:
+        found = (await findings(server.address))["activation"]
+    assert found.level is Level.DOUBT
+    assert "gACT is 1 and gIMC 0" in found.found
+    assert "only a reset helps" in found.advice
+
+
 async def test_another_client() -> None:
     gripper = SimulatedGripper()
 

@@ -205,6 +205,12 @@ class Controller:
         self._resets_needed = 0
         self.reset(time)
 
+    def strand(self, time: float, request: Request) -> None:
+        """Lose the activation under a request with rACT: nothing moves until that is cleared."""
+        self.reset(time)
+        self.request = self._obeyed = request
+        self._drive(time)
+
     def reset(self, time: float) -> None:
         """Stop at once; forget faults, sequences and contacts."""
         if not self._is_stopped and self._resets_needed:

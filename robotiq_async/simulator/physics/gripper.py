@@ -196,6 +196,21 @@ class SimulatedGripper(Surroundings):
         self.power_off()
         self._off_until = self._time + seconds
 
+    def strand(self) -> None:
+        """Lose the activation, and keep rACT: gACT is 1 and gIMC 0, and nothing moves until rACT is cleared.
+
+        A 2F-85 was found so, by a client that then reset and activated it. What had come before is not known.
+        A gripper without power stays as it is.
+        """
+        self._catch_up()
+        if self._is_on:
+            request = Request(
+                activate=True, individual_fingers=False, individual_scissor=False, model=self.model
+            )
+            self._inbox.clear()
+            self._inbox.image = request.registers
+            self._controller.strand(self._time, request)
+
     # Bodies.
 
     @property

@@ -289,6 +289,8 @@ class FaultInjector:
                 gripper.emergency_release()
             case "controller-fault":
                 gripper.controller_fault = int(amount)
+            case "stranded":
+                gripper.strand()
             case "e-stop":
                 gripper.emergency_stop(int(amount))
         if KINDS[trouble.kind].habit is not None:

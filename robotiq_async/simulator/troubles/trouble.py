@@ -174,6 +174,7 @@ KINDS: Final[dict[str, Kind]] = {
         "the controller before a jaw reports fault VALUE (kFLT)", *(_CONDITION, 12, 1, 15), is_modbus=True
     ),
     "release": Kind("the gripper releases automatically"),
+    "stranded": Kind("the gripper loses its activation and keeps rACT: nothing moves until a reset"),
     "e-stop": Kind(
         "the emergency stop is pressed: fault 0x05; after its end VALUE resets are needed",
         *(_CONDITION, 1, 1, 9),

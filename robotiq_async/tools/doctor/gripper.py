@@ -139,6 +139,13 @@ def report_state(status: RobotiqStatus, report: Report) -> None:
     """Report activation and fault."""
     if status.is_activated:
         report(Finding(Level.GOOD, "activation", "active"))
+    elif status.activation_echo and status.is_reset and not status.fault.is_serious:
+        found = "gACT is 1 and gIMC 0: it is about to activate, or has lost its activation"
+        advice = (
+            "Run doctor again. If it stays so, only a reset helps: start() and recover() reset and activate "
+            "it; the part DROPS and the fingers MOVE."
+        )
+        report(Finding(Level.DOUBT, "activation", found, advice))
     elif status.activation_echo:
         report(
             Finding(
