@@ -283,7 +283,8 @@ class Ledger:
             self.match = shown
         else:
             self.match = self._find(status)
-            if self.shown is not shown and self.shown.is_ours:
+            # One with the echo of the image before shows only once that is forgotten: that tells no delay.
+            if self.shown is not shown and self.shown.is_ours and self.shown.echo != shown.echo:
                 self._delay = max(0.0, before - self.shown.sent)
         if self._doubtful:  # drop those that did not show in time, now that this status was compared
             later = (each for each in self._doubtful if each.number > self.shown.number)

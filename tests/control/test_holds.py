@@ -239,6 +239,20 @@ def test_a_gripper_that_lost_its_activation_is_not_written_to(scan: Scan) -> Non
     assert len(scan.written) == written
 
 
+@pytest.mark.parametrize("device_cycle", [0.005, 0.2])
+def test_a_hold_is_not_late_after_a_write_that_no_echo_shows(device_cycle: float) -> None:
+    """A force has no echo. That it counts as shown half a second later is no delay of the gripper."""
+    scan = started(device_cycle)
+    scan.move(250, A, speed=0)
+    scan.run(1.0)
+    scan.command(A, force=9)
+    scan.run(0.8)
+    at = scan.positions()[A]
+    scan.hold(A)
+    scan.run(1.0)
+    assert scan.positions()[A] - at <= 2 + 60 * device_cycle
+
+
 @pytest.mark.parametrize("device_cycle", [0.005, 0.03, 0.1, 0.2])
 @pytest.mark.parametrize("speed", [0, 128, 255])
 @pytest.mark.parametrize("goal", [255, 0])
