@@ -1,15 +1,18 @@
 """Decides what to write: takes in statuses and requests, and gives the image that is due.
 
 No I/O, no clock and no event loop. The task that owns the link calls see() with each status that it has read;
-due() to learn whether there is something to write; decide() for the image, in the turn in which the link
-writes, and acknowledged(); and lost() if the link goes down at any point.
+next_write() to learn whether there is something to write; decide() for the image, in the turn in which the
+link writes, and acknowledged(); and lost() if the link goes down at any point.
+
+A request ends what others wait for: a halt the moves, a command that of its axes. Their callers wait until
+answer_ended(), which the task calls after the write: what they do then may hold up the loop.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from ..values.enums import NO_AXES, Fault, Finger, State, StopLevel, Trigger
 from ..values.errors import (
@@ -40,8 +43,8 @@ _OFF: Final = frozenset({State.DO_SHUTDOWN, State.SHUTDOWN})
 _CALLS: Final = frozenset({Trigger.ASK_COMMAND, Trigger.ASK_HOLD, Trigger.ASK_HALT})
 
 
-class Due(NamedTuple):
-    """The next write."""
+class NextWrite(NamedTuple):
+    """The next write, without its image: that is made in the turn in which it leaves."""
 
     wait: float  # seconds until it may leave, because of write_spacing
     is_urgent: bool  # a stop, which does not wait for a status that may never come
@@ -138,7 +141,7 @@ class Controller:
         if not self.machine.ask(Trigger.ASK_HALT, self.status):
             waiter.set_result(None)
             return
-        self._requests.supersede(Finger.ALL, MoveSupersededError("a halt stopped the fingers"))
+        self._requests.supersede(Finger.ALL, "a halt stopped the fingers")
         if self._stop is None or self._stop.is_delivered:  # a new halt is sent again
             self._stop = Stop(StopLevel.HALT, self._stop)
         self._stop.add(waiter)
@@ -160,16 +163,16 @@ class Controller:
         if self.machine.state is State.FAULT and self.status is not None and not self.status.activation_echo:
             raise NotActivatedError("the gripper is reset: there is nothing to release")
         self.machine.ask(Trigger.ASK_RELEASE, self.status)
-        self._fail_all(MoveSupersededError("a release took over"))
+        self._requests.end(self._drop_all(), MoveSupersededError("a release took over"))
         self._begin(Trigger.ASK_RELEASE)
 
     def drop_requests(self, error: RobotiqError) -> None:
-        """Fail every command and every move, sent or not. Halts, and holds with a caller, remain."""
-        self._requests.drop(error, holds=False)
+        """End every command and every move, sent or not. Halts, and holds with a caller, remain."""
+        self._requests.end(self._requests.drop(holds=False), error)
         self._update_state(Trigger.DELIVERED)
 
     def refuse_requests(self) -> None:
-        """The hand is to stop: refuse requests from here on, and fail all that are open, sent or not."""
+        """The hand is to stop: refuse requests from here on, and end all that are open, sent or not."""
         state, stop = self.machine.state, self._stop
         halts = stop is not None and stop.level is StopLevel.HALT and not stop.writes
         was_elsewhere = "" if state in RUNNING else f"the hand was in {state.name}"
@@ -178,7 +181,7 @@ class Controller:
             self.machine.log.info("stopped: requests that were not sent are dropped")
         if self.machine.ask(Trigger.ASK_STOP):
             self.machine.show(State.DO_SHUTDOWN, Trigger.ASK_STOP)
-        self._fail_all(NotStartedError("the hand was stopped"))
+        self._requests.end(self._drop_all(), NotStartedError("the hand was stopped"))
         self._procedure = None
 
     def close(self) -> None:
@@ -203,6 +206,15 @@ class Controller:
         elif status is not None:
             self._stop = Stop(StopLevel.SHUTDOWN)
 
+    @property
+    def has_ended_callers(self) -> bool:
+        """Whether callers whom a request has ended wait for :meth:`answer_ended`."""
+        return bool(self._requests.ended)
+
+    def answer_ended(self) -> None:
+        """Answer the callers whom a request has ended: its write has left, or there is none."""
+        self._requests.answer_ended()
+
     # -- what follows from that ------------------------------------------------------------------------
 
     def _begin(self, trigger: Trigger) -> None:
@@ -214,16 +226,14 @@ class Controller:
 
     def _begin_reset(self, trigger: Trigger, error: RobotiqError) -> None:
         """Reset; ``error`` is what the callers get whose requests end with it."""
-        self._fail_all(error)
+        self._requests.end(self._drop_all(), error)
         self._procedure, self._stop = None, Stop(StopLevel.RESET)
         self._update_state(trigger)
 
-    def _fail_all(self, error: RobotiqError) -> None:
-        """Fail everything asked so far, halts too. A write may be on the line all the same."""
-        self._requests.drop(error, holds=True)
-        if self._stop is not None:
-            fail(self._stop.callers, error)
-            self._stop = None
+    def _drop_all(self) -> list[Waiter[Any]]:
+        """Drop everything asked so far, halts too, and return its callers. A write may be on the line."""
+        stop, self._stop = self._stop, None
+        return [*self._requests.drop(holds=True), *(stop.callers if stop is not None else ())]
 
     # -- what is known ---------------------------------------------------------------------------------
 
@@ -367,11 +377,11 @@ class Controller:
         """The gripper has a fault, or does not follow requests any more."""
         match condition:
             case Trigger.SEEN_FAULT:
-                self._requests.drop(GripperFaultError(status.fault), holds=False)
+                fail(self._requests.drop(holds=False), GripperFaultError(status.fault))
             case Trigger.SEEN_RELEASED:
-                self._fail_all(GripperFaultError(status.fault))
+                fail(self._drop_all(), GripperFaultError(status.fault))
             case Trigger.SEEN_BUSY | Trigger.SEEN_RESET | Trigger.SEEN_STRANDED:
-                self._fail_all(NotActivatedError("the gripper lost its activation"))
+                fail(self._drop_all(), NotActivatedError("the gripper lost its activation"))
 
     def _advance_stop(self, stop: Stop, status: RobotiqStatus) -> None:
         log, judged = self.machine.log, self._evidence.status
@@ -420,12 +430,18 @@ class Controller:
 
     # -- what is written -------------------------------------------------------------------------------
 
-    def due(self, now: float) -> Due | None:
+    @property
+    def in_flight(self) -> Entry | None:
+        """The entry that is on the line: decided on, and neither acknowledged nor lost."""
+        return self._ledger.in_flight
+
+    def next_write(self, now: float) -> NextWrite | None:
+        """What there is to write; None if there is nothing. It changes nothing, and makes no image."""
         if not self.has_request:
-            return None
+            return None  # most cycles end here
         stop, status = self._stop, self._evidence.status
         urgent = stop is not None and status is not None and stop.is_urgent(self._ledger, status)
-        return Due(self._wait(now), urgent, stop is None and self._procedure is None)
+        return NextWrite(self._wait(now), urgent, stop is None and self._procedure is None)
 
     def _wait(self, now: float) -> float:
         stop = self._stop

@@ -100,6 +100,12 @@ class Ledger:
         return self._entries[-1]
 
     @property
+    def in_flight(self) -> Entry | None:
+        """The entry that is on the line: neither acknowledged nor lost."""
+        # One is written at a time, and no status is taken in meanwhile: only the last can be on the line.
+        return self.last if self.last.acknowledged is None else None
+
+    @property
     def _newest(self) -> Entry:
         """The one with the highest number: the last, or one in doubt."""
         last = self._entries[-1]
@@ -294,8 +300,7 @@ class Ledger:
             self._adoption.update(status, self.now)
 
     def _is_in_flight(self, entry: Entry) -> bool:
-        # One is written at a time, and no status is taken in meanwhile: only the last can be on the line.
-        return entry.acknowledged is None and entry is self.last
+        return entry is self.in_flight
 
     def _is_past(self, entry: Entry) -> bool:
         """Whether an entry in doubt would have acted by now."""

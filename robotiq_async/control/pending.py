@@ -7,9 +7,9 @@ a lost link, because it can only stop one. One without a caller goes if another 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Any, Final
 
 from ..runtime.log import Log, log
 from ..values.enums import NO_AXES, Finger, ObjectStatus
@@ -76,6 +76,8 @@ class OpenRequests:
         # well: a caller that gives up as its move fails does not see the error, and counts on a hold.
         self._followed: Final[dict[Finger, Move]] = {}
         self._log: Final = log
+        # Callers whom a request has ended, each with the error. What they do then may hold up the loop.
+        self.ended: list[tuple[Waiter[Any], RobotiqError]] = []
         self._has_warned = False
 
     @property
@@ -91,7 +93,7 @@ class OpenRequests:
 
     def command(self, command: Command, waiter: Waiter[None] | None = None) -> None:
         if command.position is not None and self._followed:  # few loops at 200 Hz have a move to end
-            self._take_over(command.axes, MoveSupersededError(f"another command moves {command.axes}"))
+            self._end(self._take_over(command.axes), f"another command moves {command.axes}")
         self.pending.merge(command)
         if waiter is not None:
             self.calls.append(Call(waiter, NO_AXES if command.position is None else command.axes))
@@ -103,7 +105,7 @@ class OpenRequests:
 
     def hold(self, axes: Finger, why: str, waiter: Waiter[None] | None = None) -> None:
         """Hold those axes that move. It supersedes what moves them."""
-        self.supersede(axes, MoveSupersededError(why))
+        self.supersede(axes, why)
         self.merge_hold(axes)
         if waiter is not None:
             self.calls.append(Call(waiter, held=axes))
@@ -117,18 +119,31 @@ class OpenRequests:
             axes |= call.held if call.entry is None else NO_AXES
         self.pending = replace(self.pending, hold=self.pending.hold & axes)
 
-    def supersede(self, axes: Finger, error: MoveSupersededError) -> None:
-        """Fail the moves of these axes, and the calls that would move one of them and are not sent."""
+    def supersede(self, axes: Finger, why: str) -> None:
+        """End the moves of these axes, and the calls that would move one of them and are not sent."""
         # Of a call for several axes the others are sent all the same.
-        self._take_over(axes, error)
+        self._end(self._take_over(axes), why)
         for axis in axes:
             self.pending.positions.pop(axis, None)
-        self._fail([call for call in self.calls if call.entry is None and call.axes & axes], error)
+        self._end([call for call in self.calls if call.entry is None and call.axes & axes], why)
 
-    def _take_over(self, axes: Finger, error: MoveSupersededError) -> None:
+    def _take_over(self, axes: Finger) -> list[Call]:
         # The other axes of these moves still follow them.
         taken = [self._followed.pop(axis) for axis in axes if axis in self._followed]
-        self._fail([call for call in self.calls if call in taken], error)
+        return [call for call in self.calls if call in taken]
+
+    def _end(self, calls: Sequence[Call], why: str) -> None:
+        self._remove(calls)
+        self.end((call.waiter for call in calls), MoveSupersededError(why))
+
+    def end(self, waiters: Iterable[Waiter[Any]], error: RobotiqError) -> None:
+        """A request has ended what these callers wait for: they are to be answered after its write."""
+        self.ended += [(waiter, error) for waiter in waiters]
+
+    def answer_ended(self) -> None:
+        ended, self.ended = self.ended, []
+        for waiter, error in ended:
+            fail([waiter], error)
 
     # -- what becomes of it ----------------------------------------------------------------------------
 
@@ -187,13 +202,19 @@ class OpenRequests:
         self._remove([move])
         return is_open, Finger(sum(axes))
 
-    def drop(self, error: RobotiqError, *, holds: bool) -> None:
-        """Fail all that would move an axis, sent or not, and with ``holds`` those that callers have named."""
+    def drop(self, *, holds: bool) -> list[Waiter[Any]]:
+        """Drop all that would move an axis, sent or not, and with ``holds`` those that callers have named.
+
+        Returns:
+            The callers that wait for it.
+        """
         # A write may be on the line all the same. Holds of our own making go in any case.
-        self._fail([call for call in self.calls if holds or not call.held], error)
+        dropped = [call for call in self.calls if holds or not call.held]
+        self._remove(dropped)
         self._followed.clear()
         self.pending = Pending(hold=self.pending.hold)
         self.hold_only(NO_AXES)
+        return [call.waiter for call in dropped]
 
     def fail_replaced(self, status: RobotiqStatus, limited: Mapping[Finger, int]) -> None:
         """Fail the moves whose request another client has replaced. Their axes still follow them."""

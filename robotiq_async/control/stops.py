@@ -79,20 +79,27 @@ class Stop:
         self.writes.append(Write(entry, is_early, status.is_activated))
 
     def is_urgent(self, ledger: Ledger, status: RobotiqStatus) -> bool:
-        return not self.writes and self.image(ledger, status) is not None
+        """Whether its first write leaves before the next read."""
+        return not self.writes and self.has_cause(ledger, status)
+
+    def has_cause(self, ledger: Ledger, status: RobotiqStatus) -> bool:
+        """Whether there is anything to stop."""
+        match self.level:
+            case StopLevel.RESET:
+                return True
+            case StopLevel.HALT:
+                return classify(status) in FOLLOWS
+        return status.go_echo or not ledger.is_settled  # what does not act yet may set rGTO, or activate
 
     def image(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
         """The image to write first; None if there is nothing to stop."""
+        if not self.has_cause(ledger, status):
+            return None
         base = ledger.base
-        match self.level:
-            case StopLevel.RESET:  # rACT = 0 clears faults and ends what runs [manual 2012, 4.6]
-                return replace(at_rest(base, status), activate=False)
-            case StopLevel.HALT:
-                is_due = classify(status) in FOLLOWS
-            case _:  # what does not act yet may set rGTO, or activate
-                is_due = status.go_echo or not ledger.is_settled
+        if self.level is StopLevel.RESET:  # rACT = 0 clears faults and ends what runs [manual 2012, 4.6]
+            return replace(at_rest(base, status), activate=False)
         # Positions and speeds stay as they were asked, and what is active stays so: the gate sees to rACT.
-        return replace(base, activate=True, go=False) if is_due else None
+        return replace(base, activate=True, go=False)
 
     def again(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
         """The image of its last write, if that is due again."""
@@ -192,7 +199,7 @@ class Keeping(Stop):
             stop = Stop(StopLevel.SHUTDOWN)
             if ledger.match is None and classify(status) is Trigger.SEEN_READY:
                 ledger.adopt(status)
-            if stop.image(ledger, status) is not None:
+            if stop.has_cause(ledger, status):
                 log.warning("rGTO is cleared, and no grip is kept: %s", why)
             return stop
         if ledger.now.time - self._since < REST_S:

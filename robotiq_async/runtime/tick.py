@@ -83,6 +83,11 @@ class Tick:
         """The timer that keeps the deadlines; empty before the start."""
         return "" if self._timer is None else self._timer.source
 
+    @property
+    def is_awaited(self) -> bool:
+        """Whether its reader waits, or was woken and has not run yet."""
+        return self._waiter is not None
+
     def hurry(self) -> None:
         """End the next wait at once; the ticks keep their deadlines."""
         self._hurried = True
@@ -96,6 +101,7 @@ class Tick:
         while not self._passed and not self._hurried:
             self._waiter = self._loop.create_future()
             await self._waiter
+            self._waiter = None
         passed, self._passed, self._hurried = self._passed, 0, False
         self.late, self._late = self._late, 0.0
         return passed

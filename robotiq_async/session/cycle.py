@@ -28,7 +28,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import Final
 
-from ..control.controller import Due
+from ..control.controller import NextWrite
 from .options import LONGEST_SPACING_S
 
 READS: Final = 3  # the most reads in a cycle that has something to write, while the loop is held up
@@ -37,6 +37,9 @@ FRESH_S: Final = 0.006
 interval and a bit. A read of three registers takes half of it."""
 SOON_S: Final = 0.0025
 """Longest wait of a cycle for write_spacing: half of a usual period, so that its status is still fresh."""
+
+
+STOP: Final = NextWrite(wait=0.0, is_urgent=True, is_command=False)  # the first write of a stop
 
 
 class Step(Enum):
@@ -48,7 +51,7 @@ class Step(Enum):
     WRITE_AND_READ = "write, and read in the same exchange where link and request allow that"
 
 
-def next_step(write: Due, reads: int, age: float, *, is_stale: bool, is_slow: bool) -> Step | None:
+def next_step(write: NextWrite, reads: int, age: float, *, is_stale: bool, is_slow: bool) -> Step | None:
     """The next step of a cycle that has something to write; None if that must wait for another cycle.
 
     Args:
@@ -76,6 +79,6 @@ def next_step(write: Due, reads: int, age: float, *, is_stale: bool, is_slow: bo
     return Step.READ
 
 
-def begins_at_once(write: Due, *, is_slow: bool) -> bool:
+def begins_at_once(write: NextWrite, *, is_slow: bool) -> bool:
     """Whether a cycle begins with this write, and so need not wait for the tick."""
     return write.is_urgent or (is_slow and write.wait <= SOON_S)

@@ -12,7 +12,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
 
-from ..control.controller import Controller, Due
+from ..control.controller import Controller, NextWrite
+from ..control.entry import Entry
 from ..link.transport import CyclicLink, Link, SharedLink
 from ..runtime.limit import HELD_S
 from ..runtime.tick import Tick
@@ -26,7 +27,7 @@ from ..values.status import RobotiqStatus
 from .cycle import Step, begins_at_once, next_step
 from .late_polls import LATE_S, LatePolls
 from .options import HandOptions
-from .streams import Channels
+from .publisher import Publisher
 
 
 class Poller:
@@ -37,14 +38,19 @@ class Poller:
     """
 
     def __init__(
-        self, link: Link, controller: Controller, counters: Counters, channels: Channels, options: HandOptions
+        self,
+        link: Link,
+        controller: Controller,
+        counters: Counters,
+        publisher: Publisher,
+        options: HandOptions,
     ) -> None:
         self._link: Final = link
         self._cyclic: Final = link if isinstance(link, CyclicLink) else None
         self._line: Final = link if isinstance(link, SharedLink) else None
         self._controller: Final = controller
         self._counters: Final = counters
-        self._channels: Final = channels
+        self._publisher: Final = publisher
         self._model: Final = options.model
         self._is_slow: Final = options.link.is_slow
         self._make_status: Final = functools.partial(
@@ -57,7 +63,6 @@ class Poller:
         self._late_polls: Final = LatePolls(self.tick.time, options.log)
         self._last_poll: float | None = None  # when the poll before was asked for; None: no period is counted
         self._asked = -math.inf  # when the newest status was asked for
-        self._decided: tuple[Request, float] | None = None  # the last image decided on, and when
 
     def break_period(self) -> None:
         """Do not count the time from the last poll to the next as a period."""
@@ -67,11 +72,23 @@ class Poller:
         self.tick.start()
         self._counters.note_tick(self.tick.source)
 
-    def hurry(self) -> None:
-        """Begin the next cycle at once, and not with the tick, if it may begin with a write."""
-        write = self._controller.due(self.tick.time())
+    def hurry(self) -> NextWrite | None:
+        """Begin the next cycle at once, and not with the tick, if it may begin with a write; return that."""
+        write = self._controller.next_write(self.tick.time())
         if write is not None and begins_at_once(write, is_slow=self._is_slow):
             self.tick.hurry()
+        return write
+
+    def delay_of(self, write: NextWrite) -> float:
+        """Seconds until a write leaves, if the link answers as it did at the last poll."""
+        tick, status = self.tick, self._controller.status
+        if tick.is_awaited:
+            at_once = begins_at_once(write, is_slow=self._is_slow)
+            return write.wait if at_once else max(write.wait, tick.due - tick.time())
+        # An exchange is in flight. The time of the last one tells nothing if the loop was held up in it.
+        if status is None or tick.held_up_at > self._asked:
+            return write.wait
+        return write.wait + status.timestamp - self._asked
 
     async def wait(self) -> bool:
         """Wait for the next tick, or until hurried; whether it was the tick. Missed ones are counted."""
@@ -100,7 +117,7 @@ class Poller:
         """Read, decide and write, in the order that cycle.py has for it."""
         reads, step = 0, Step.READ
         while True:
-            write = self._controller.due(self.tick.time())
+            write = self._controller.next_write(self.tick.time())
             if write is None or step is Step.WRITE:
                 if reads:
                     return  # most cycles end here
@@ -122,7 +139,7 @@ class Poller:
                 if reads:
                     return
 
-    def _plan(self, write: Due, reads: int) -> Step | None:
+    def _plan(self, write: NextWrite, reads: int) -> Step | None:
         age = self.tick.time() - self._asked
         return next_step(write, reads, age, is_stale=self._is_stale(), is_slow=self._is_slow)
 
@@ -138,38 +155,36 @@ class Poller:
     # -- a write ---------------------------------------------------------------------------------------
 
     async def _write(self) -> None:
-        self._decided = None
         began = self.tick.time()
         with self._noting_doubt():
             if await self._link.send(self._decide):
                 self._note_acknowledged(began)
 
-    async def _write_and_read(self, write: Due) -> bool:
+    async def _write_and_read(self, write: NextWrite) -> bool:
         """Write, and read in the same exchange if link and request allow that; whether a status was read."""
         link = self._cyclic
         if link is None or not link.reads_with_writes or not write.is_command:
             await self._write()
             return False
-        self._decided = None
         with self._noting_doubt():
             answer = await link.send_and_read(self._decide_or_repeat)
-            if self._decided is None:
+            entry = self._controller.in_flight
+            if entry is None:
                 return False
             answered = self.tick.time()
-            request, decided = self._decided
             if answer is None:
                 # Refused, and not repeated: what has been asked since replaces it, and is made from it.
                 self._controller.acknowledged(answered)
-                self._note_sent(acknowledged=False)
+                self._note_sent(entry, acknowledged=False)
                 return True
             status = self._status(answer.registers, answered)
-            if answer.doubt is not None and not self._shows(status, request):
+            if answer.doubt is not None and not self._shows(status, entry.image):
                 await link.close()
                 raise answer.doubt
-        self._counters.note_write(0.0, decided - self._asked)
-        self._controller.acknowledged(decided)
-        self._channels.requests.push(SentRequest(request, decided, acknowledged=True))
-        self._take(status, decided)
+        self._counters.note_write(0.0, entry.sent - self._asked)
+        self._controller.acknowledged(entry.sent)
+        self._note_sent(entry, acknowledged=True)
+        self._take(status, entry.sent)
         return True
 
     def _shows(self, status: RobotiqStatus, request: Request) -> bool:
@@ -183,44 +198,43 @@ class Poller:
         try:
             yield
         except RobotiqConnectionError:
-            self._note_sent(acknowledged=False)
+            if (entry := self._controller.in_flight) is not None:
+                self._note_sent(entry, acknowledged=False)
             raise
 
     def _note_acknowledged(self, began: float) -> None:
-        if self._decided is None:
+        entry, answered = self._controller.in_flight, self.tick.time()
+        if entry is None:
             return
-        answered = self.tick.time()
-        self._counters.note_write(answered - began, self._decided[1] - self._asked)
+        self._counters.note_write(answered - began, entry.sent - self._asked)
         self._controller.acknowledged(answered)
-        self._note_sent(acknowledged=True)
+        self._note_sent(entry, acknowledged=True)
 
-    def _note_sent(self, *, acknowledged: bool) -> None:
+    def _note_sent(self, entry: Entry, *, acknowledged: bool) -> None:
         # Listeners get the changes after the write: a request of theirs would come too late for this one.
-        self._channels.publish_changes()
-        if self._decided is not None:
-            self._channels.requests.push(SentRequest(*self._decided, acknowledged=acknowledged))
+        self._publisher.publish_request(SentRequest(entry.image, entry.sent, acknowledged=acknowledged))
 
     def _decide(self) -> Registers | None:
         """The image to write, decided in the same turn as the write, so that no stop can intervene."""
-        now = self.tick.time()
-        request = self._controller.decide(now)
+        request = self._controller.decide(self.tick.time())
         if request is None:
-            self._channels.publish_changes()  # no write follows to wait for
+            self._publisher.publish_changes()  # no write follows to wait for
             return None
         self._counters.note_begun_to_write()
-        self._decided = request, now
+        self._publisher.image_leaves()
         return request.registers
 
     def _decide_or_repeat(self) -> Registers | None:
         """The same; after a refusal once more what was refused, unless something has been asked since."""
-        if self._decided is None:
+        entry = self._controller.in_flight
+        if entry is None:
             return self._decide()
         controller = self._controller
-        return None if controller.is_off or controller.has_request else self._decided[0].registers
+        return None if controller.is_off or controller.has_request else entry.image.registers
 
     def _decide_stop(self) -> Registers | None:
         """The image to write, if it is that of a stop."""
-        write = self._controller.due(self.tick.time())
+        write = self._controller.next_write(self.tick.time())
         is_stop = write is not None and write.is_urgent and not write.wait
         return self._decide() if is_stop and not self._is_stale() else None
 
@@ -229,7 +243,6 @@ class Poller:
     async def _stop_or_read(self) -> None:
         """Read; before that write a stop that has come while others had the line."""
         if self._line is not None and self._line.is_shared:
-            self._decided = None
             asked = self.tick.time()
             with self._noting_doubt():
                 registers = await self._line.stop_or_read(self._decide_stop)
@@ -251,7 +264,7 @@ class Poller:
         self._take(self._status(registers, answered), asked)
 
     def _status(self, registers: Registers, answered: float) -> RobotiqStatus:
-        return self._make_status(registers, answered, next(self._channels.numbers))
+        return self._make_status(registers, answered, next(self._publisher.numbers))
 
     def _take(self, status: RobotiqStatus, asked: float) -> None:
         """Pass on a status that was asked for at ``asked``."""
@@ -259,5 +272,4 @@ class Poller:
         self._counters.note_poll(asked, status.timestamp, period)
         self._last_poll = self._asked = asked
         self._controller.see(status, asked)
-        self._channels.publish_changes()
-        self._channels.statuses.push(status)
+        self._publisher.publish_status(status)

@@ -34,7 +34,7 @@ from enum import Enum
 from time import strftime
 from typing import Final, NamedTuple
 
-from ..control.controller import Controller
+from ..control.controller import Controller, NextWrite
 from ..control.waiters import fail, resolve
 from ..link.transport import Link
 from ..runtime.limit import Limit
@@ -48,11 +48,12 @@ from ..values.errors import (
     RobotiqError,
 )
 from ..values.statistics import Counters
+from .cycle import STOP
 from .ending import IN_FLIGHT_S, Ending
 from .opening import Opener
 from .options import HandOptions
 from .poller import Poller
-from .streams import Channels
+from .publisher import Publisher
 
 # anyio loads its backend at its first use, which would hold up the loop for some 20 ms when a hand starts.
 # The name of the backend is not documented; if it changes, it only costs those 20 ms.
@@ -60,6 +61,8 @@ with contextlib.suppress(ImportError):
     importlib.import_module("anyio._backends._asyncio")
 
 STOP_PAUSE_S: Final = 0.05  # between two attempts to stop the fingers
+SOON_S: Final = 0.05
+"""Callers and listeners wait for a write that is expected within this time. A slow gateway takes longer."""
 
 
 class RunState(Enum):
@@ -103,7 +106,7 @@ class Run:
         link: Link,
         controller: Controller,
         counters: Counters,
-        channels: Channels,
+        publisher: Publisher,
         options: HandOptions,
         ended: Callable[[], None] = lambda: None,
     ) -> None:
@@ -116,10 +119,10 @@ class Run:
         self._link: Final = link
         self._controller: Final = controller
         self._counters: Final = counters
-        self._channels: Final = channels
+        self._publisher: Final = publisher
         self._options: Final = options
         self._loop: Final = asyncio.get_running_loop()
-        self._poller: Final = Poller(link, controller, counters, channels, options)
+        self._poller: Final = Poller(link, controller, counters, publisher, options)
         self._opener: Final = Opener(self._connect, options)
         self._in_flight: Final = Limit()  # of the exchange in flight when a stop comes
         self._ending: Ending | None = None
@@ -131,9 +134,20 @@ class Run:
 
     # -- what others ask -------------------------------------------------------------------------------
 
-    def hurry(self) -> None:
-        """Begin the next cycle at once, and not with the tick, if it may begin with a write."""
-        self._poller.hurry()
+    def asked(self) -> None:
+        """A request was made: begin the next cycle at once if it may begin with its write.
+
+        Who must not hear of it before the write waits for that, unless it is far.
+        """
+        publisher, controller, write = self._publisher, self._controller, self._poller.hurry()
+        if write is not None and (write.is_urgent or controller.has_ended_callers) and self._is_soon(write):
+            publisher.hold_back(publication=write.is_urgent)
+        elif not publisher.has_to_tell:
+            controller.answer_ended()
+        publisher.publish_changes()
+
+    def _is_soon(self, write: NextWrite) -> bool:
+        return self.state is RunState.POLLING and self._poller.delay_of(write) <= SOON_S
 
     def request_stop(self, *, halt: bool, keep_grip: bool = False) -> None:
         """End the task as a :class:`StopLevel` says; the strongest of several requests counts. Never blocks.
@@ -148,9 +162,13 @@ class Run:
             self._ending = Ending(level, self._options.log)
             if self.state is not RunState.CONNECTING:
                 self._in_flight.restart(IN_FLIGHT_S)
+            if level > StopLevel.LEAVE and self._is_soon(STOP):
+                self._publisher.hold_back(publication=True)
+                self._poller.tick.hurry()
             self._become(RunState.ENDING)
             self._controller.refuse_requests()
-            self._channels.publish_changes()
+            if not self._publisher.has_to_tell:
+                self._publisher.tell()
         elif self._ending.strengthen(level) and level is StopLevel.SHUTDOWN:
             self._controller.keep_no_grip()
         self._opener.end()
@@ -266,6 +284,8 @@ class Run:
                 return
             try:
                 await self._poller.cycle()
+                if self._publisher.has_to_tell and self.state is RunState.POLLING:
+                    self._publisher.tell()
                 if not is_regular:
                     self._poller.break_period()
             except RobotiqConnectionError as error:
@@ -302,7 +322,7 @@ class Run:
 
     def _lose(self, why: RobotiqConnectionError) -> None:
         self._controller.lost(why, self._poller.tick.time())
-        self._channels.publish_changes()
+        self._publisher.tell()
 
     # -- the end ---------------------------------------------------------------------------------------
 
@@ -321,6 +341,7 @@ class Run:
 
     async def _close(self) -> None:
         if not self._loop.is_closed():
+            self._publisher.tell()
             await self._link.close()
 
     async def _stop_fingers(self) -> None:
@@ -347,6 +368,8 @@ class Run:
         self._controller.stop_fingers(self._ending.level)
         while True:
             await self._poller.cycle()
+            if self._publisher.has_to_tell:
+                self._publisher.tell()  # if nothing had to be written in it
             if not self._controller.is_busy:
                 return
             await asyncio.sleep(self._options.poll_interval)

@@ -47,6 +47,7 @@ from ..values.statistics import Counters
 from ..values.status import RobotiqStatus
 from .gripper_link import Claims
 from .options import HandOptions
+from .publisher import Publisher
 from .run import Run, RunState
 from .streams import Channels
 from .waiting import STALLED_S, ActivationProgress, StallWatch, StateWaiters
@@ -96,16 +97,17 @@ class Session:
             left,
         )
         self.controller.allow_activation(activate)
+        self._publisher = Publisher(channels, self.controller)
         try:
             link = options.make_transport()
         except BaseException:
             self._claims.release(self)
             raise
-        self.run = Run(link, self.controller, self.counters, channels, options, self._end)
+        self.run = Run(link, self.controller, self.counters, self._publisher, options, self._end)
         channels.reopen(self._loop)
         machine.begin(self._on_transition)
         machine.show(State.DISCONNECTED, Trigger.ASK_START)
-        channels.publish_changes()
+        self._publisher.publish_changes()
         self._task = self._loop.create_task(self.run.run(wait), name="robotiq_async poller")
         self._task.add_done_callback(self._end_with)
 
@@ -144,7 +146,7 @@ class Session:
         self._channels.end()
         self.controller.refuse_requests()
         self.controller.close()
-        self._channels.publish_changes()
+        self._publisher.release()
 
     def _claim(self) -> Left | None:
         """Claim the gripper; return what the last run of any hand of it has left to act."""
@@ -170,7 +172,7 @@ class Session:
         # Before SHUTDOWN is published: a reader of it may start a hand.
         self._claims.release(self, self.controller.left())
         self.controller.close()
-        self._channels.publish_changes()
+        self._publisher.tell()
         self._waiters.fail(run.why_over)
         self._channels.end(None if run.failure is None else run.why_over)
 
@@ -207,12 +209,11 @@ class Session:
         return self._loop.create_future()
 
     def ask(self, request: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Make a request of the controller; listeners get its changes of state after it."""
+        """Make a request of the controller; who must hear of it does so after it, or after its write."""
         try:
             return request(*args, **kwargs)
         finally:
-            self._channels.publish_changes()
-            self.run.hurry()
+            self.run.asked()
 
     async def answered(self, request: Callable[[Waiter[None]], None]) -> None:
         """Make a request and wait for its acknowledgement; raises RobotiqError if there is none."""
@@ -348,6 +349,5 @@ class Session:
     def _on_transition(self, source: State, target: State, trigger: Trigger) -> None:
         if target is State.FAULT:
             self.counters.note_fault()
-        self._waiters.reached(target)
         self._progress.reached(target)
-        self._channels.changes.append(Transition(source, target, trigger, now()))
+        self._publisher.note(Transition(source, target, trigger, now()), self._waiters.woken_by(target))

@@ -362,7 +362,6 @@ class Channels:
 
     Attributes:
         numbers: the sequence numbers of the statuses, from the first start on.
-        changes: the changes of state during the present call, which are published after it.
     """
 
     def __init__(self, log: Log = log) -> None:
@@ -372,16 +371,6 @@ class Channels:
         self.transitions: Channel[Transition] = Channel(self.listeners)
         self.requests: Channel[SentRequest] = Channel(self.listeners)
         self._all: tuple[Channel[Any], ...] = (self.statuses, self.transitions, self.requests)
-        self.changes: deque[Transition] = deque()
-
-    def publish_changes(self) -> None:
-        """Publish the changes of state of a call after the call.
-
-        A listener may command the hand. If it got a change in the middle of a call, the rest of that
-        call would overwrite its request.
-        """
-        while self.changes:
-            self.transitions.push(self.changes.popleft())
 
     def reopen(self, loop: asyncio.AbstractEventLoop) -> None:
         for channel in self._all:

@@ -58,13 +58,26 @@ class StateWaiters:
                 reached.exception()  # retrieved: the caller may have been cancelled, and asyncio would log it
 
     def reached(self, state: State) -> None:
-        for states, failing, future in self._waiters:
-            if future.done():
-                continue
-            if state in states:
-                future.set_result(state)
-            elif state in failing:
-                future.set_exception(failing[state]())
+        """Wake those who wait for a state."""
+        if (wake := self.woken_by(state)) is not None:
+            wake()
+
+    def woken_by(self, state: State) -> Callable[[], None] | None:
+        """Make the function that wakes those who wait for a state by now; None if there are none."""
+        waiting = [each for each in self._waiters if state in each[0] or state in each[1]]
+        if not waiting:
+            return None  # a control loop goes to RUNNING_CC and back with every command
+
+        def wake() -> None:
+            for states, failing, future in waiting:
+                if future.done():
+                    continue
+                if state in states:
+                    future.set_result(state)
+                else:
+                    future.set_exception(failing[state]())
+
+        return wake
 
     def fail(self, failure: Callable[[], RobotiqError]) -> None:
         for _, _, future in self._waiters:

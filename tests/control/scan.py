@@ -152,12 +152,14 @@ class Scan:
         self.now += poll
         self.controller.see(self.status())
         self._write(answer=answer, arrives=arrives, lost=lost)
+        self.controller.answer_ended()
 
     def hurry(self) -> None:
         """Write what is urgent before the next read, as the poller does."""
-        due = self.controller.due(self.now)
-        if due is not None and due.is_urgent and not due.wait:
+        write = self.controller.next_write(self.now)
+        if write is not None and write.is_urgent and not write.wait:
             self._write(answer=True)
+            self.controller.answer_ended()
 
     def decide(self) -> Request | None:
         return self.controller.decide(self.now)
@@ -238,6 +240,7 @@ class Scan:
         outcome = Outcome()
         move = Move(position, axes, self.now, outcome)
         self.controller.move(move, speed, force)
+        self.controller.answer_ended()
         return move, outcome
 
     def moved(self, position: int, axes: Finger = Finger.ABC, **options: int) -> MoveResult:
@@ -255,16 +258,19 @@ class Scan:
     ) -> Outcome:
         outcome = Outcome()
         self.controller.command(Command(axes, position, speed, force), outcome)
+        self.controller.answer_ended()
         return outcome
 
     def hold(self, axes: Finger = Finger.ALL) -> Outcome:
         outcome = Outcome()
         self.controller.hold(axes, outcome)
+        self.controller.answer_ended()
         return outcome
 
     def halt(self) -> Outcome:
         outcome = Outcome()
         self.controller.halt(outcome)
+        self.controller.answer_ended()
         return outcome
 
     def halted(self) -> None:
@@ -274,6 +280,7 @@ class Scan:
 
     def stop(self, *, keep_grip: bool = False) -> None:
         self.controller.refuse_requests()
+        self.controller.answer_ended()
         self.controller.stop_fingers(StopLevel.KEEP if keep_grip else StopLevel.SHUTDOWN)
         self.until(lambda: not self.controller.is_busy, 1.0)
 

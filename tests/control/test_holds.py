@@ -225,6 +225,9 @@ def test_a_reset_takes_over(scan: Scan) -> None:
     scan.run(0.5)
     asked = scan.hold(A)
     scan.controller.reset()
+    assert not asked.is_answered, "what it does then may take long: the write comes first"
+    scan.hurry()
+    assert scan.last_image.activate is False
     assert isinstance(asked.error, MoveSupersededError)
 
 

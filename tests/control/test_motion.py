@@ -12,6 +12,7 @@ from robotiq_async.control.entry import Entry
 from robotiq_async.control.ledger import Ledger
 from robotiq_async.control.motion import Move
 from robotiq_async.control.pending import Command, OpenRequests
+from robotiq_async.control.waiters import fail
 from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.enums import Finger, ObjectStatus
 from robotiq_async.values.errors import MoveSupersededError
@@ -75,8 +76,9 @@ def test_a_move_has_arrived_when_every_addressed_axis_rests_under_its_request(
 def test_a_move_ends_once_with_the_first_outcome() -> None:
     each, outcome = move()
     moves = live(each)
-    moves.supersede(A, MoveSupersededError("first"))
-    moves.drop(MoveSupersededError("second"), holds=True)
+    moves.supersede(A, "first")
+    moves.answer_ended()
+    fail(moves.drop(holds=True), MoveSupersededError("second"))
     each.end(status_of(0xF9, 0xFF))
     assert [str(error) for error in outcome.answers] == ["first"]
 
@@ -85,7 +87,7 @@ def test_a_move_that_ended_well_does_not_fail_afterwards() -> None:
     each, outcome = move()
     moves = live(each)
     each.end(status_of(0xF9, 0xFF))
-    moves.drop(MoveSupersededError("late"), holds=True)
+    fail(moves.drop(holds=True), MoveSupersededError("late"))
     assert outcome.result.status == status_of(0xF9, 0xFF)
 
 
@@ -93,7 +95,8 @@ def test_it_is_known_which_axes_still_follow_a_move() -> None:
     (each, _), (failed, _), (arrived, _) = move(), move(), move()
     assert live(each).leave(each) == (True, ABC)
     moves = live(failed)
-    moves.supersede(A, MoveSupersededError("A"))
+    moves.supersede(A, "A")
+    moves.answer_ended()
     moves.command(Command(B, 0))
     assert moves.leave(failed) == (False, C)
     moves = live(arrived)
@@ -278,10 +281,11 @@ def test_every_move_that_has_arrived_ends_and_the_others_go_on() -> None:
 def test_an_error_fails_its_moves_and_the_others_go_on() -> None:
     (first, one), (second, other) = move(axes=A), move(axes=B)
     moves = live(first, second)
-    moves.supersede(A, MoveSupersededError("A"))
+    moves.supersede(A, "A")
+    moves.answer_ended()
     assert isinstance(one.error, MoveSupersededError)
     assert not other.answers
-    moves.drop(error := MoveSupersededError("all"), holds=False)
+    fail(moves.drop(holds=False), error := MoveSupersededError("all"))
     assert isinstance(other.error, MoveSupersededError)
     assert other.error is not error, "each caller has one of its own"
     assert not moves.calls
@@ -292,7 +296,7 @@ def test_a_move_leaves_once() -> None:
     moves = live(each)
     assert moves.leave(each) == (True, ABC)
     assert moves.leave(each) == (False, Finger(0))
-    moves.drop(MoveSupersededError("too late"), holds=True)
+    fail(moves.drop(holds=True), MoveSupersededError("too late"))
     assert not outcome.answers
 
 
@@ -313,5 +317,5 @@ def test_a_move_has_left_when_its_outcome_is_handed_over(how: str) -> None:
     if how == "end":
         moves.end_arrived(ARRIVED, LEDGER)
     else:
-        moves.drop(MoveSupersededError("now"), holds=True)
+        fail(moves.drop(holds=True), MoveSupersededError("now"))
     assert was_under_way == [False]

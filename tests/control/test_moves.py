@@ -258,6 +258,7 @@ def test_a_move_that_was_dropped_goes_on(scan: Scan) -> None:
     move, outcome = scan.move(255, A)
     scan.run(0.5)
     scan.controller.drop_requests(MoveSupersededError("its client is gone"))
+    scan.controller.answer_ended()
     assert isinstance(outcome.error, MoveSupersededError)
     scan.controller.abandon(move, unseen=True)
     scan.run(5)

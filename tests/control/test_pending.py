@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from robotiq_async.control.ledger import Ledger
 from robotiq_async.control.motion import Move
 from robotiq_async.control.pending import Command, OpenRequests, Pending
+from robotiq_async.control.waiters import fail
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.errors import ConnectionLostError, MoveSupersededError
 from robotiq_async.values.model import THREE_FINGER
@@ -18,7 +19,6 @@ from tests.control.scan import Outcome
 
 A, B, C, S = THREE_FINGER.axes
 ABC, NONE = Finger.ABC, Finger(0)
-SUPERSEDED = MoveSupersededError("halt")
 LOST = ConnectionLostError("gone")
 
 
@@ -64,7 +64,8 @@ def hold(axes: Finger) -> Step:
 
 
 def halt(requests: OpenRequests) -> None:
-    requests.supersede(Finger.ALL, SUPERSEDED)
+    requests.supersede(Finger.ALL, "halt")
+    requests.answer_ended()
 
 
 @pytest.mark.parametrize(
@@ -98,6 +99,8 @@ def test_a_hold_fails_only_the_callers_that_move_its_axes() -> None:
     requests.command(Command(B, 100), other)
     requests.command(Command(A, None, 50), setting)
     hold(A)(requests)
+    assert not held.answers, "they hear after the write"
+    requests.answer_ended()
     assert isinstance(held.error, MoveSupersededError)
     assert not other.answers
     assert not setting.answers
@@ -173,6 +176,7 @@ def test_moves_that_end_together_are_answered_in_the_order_of_their_calls() -> N
         requests.command(Command(axes, 100))
         requests.add(Move(100, axes, 0.0, caller))
     hold(Finger.ALL)(requests)
+    requests.answer_ended()
     assert answered == callers
 
 
@@ -181,10 +185,10 @@ def test_what_moves_is_dropped_alone_or_with_the_holds() -> None:
     requests.command(Command(A, 100, 50), mover)
     requests.hold(B, "hold", holder)
     requests.hold(C, "hold")
-    requests.drop(LOST, holds=False)
+    fail(requests.drop(holds=False), LOST)
     assert isinstance(mover.error, ConnectionLostError)
     assert (requests.pending, holder.is_answered) == (Pending(hold=B), False)
-    requests.drop(LOST, holds=True)
+    fail(requests.drop(holds=True), LOST)
     assert isinstance(holder.error, ConnectionLostError)
     assert requests.pending.is_empty
 
@@ -214,7 +218,7 @@ def test_a_failure_gives_every_caller_an_error_of_its_own() -> None:
     requests, callers = OpenRequests(), [Outcome(), Outcome()]
     requests.command(Command(A, 100), callers[0])
     requests.command(Command(A, None, 50), callers[1])
-    requests.drop(LOST, holds=True)
+    fail(requests.drop(holds=True), LOST)
     errors = [each.answers[0] for each in callers]
     assert all(isinstance(error, ConnectionLostError) for error in errors)
     assert len({id(error) for error in errors}) == 2

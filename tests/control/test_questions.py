@@ -29,7 +29,7 @@ def answers(hand: Controller, now: float) -> list[object]:
         hand.has_request,
         hand.has_open_stop,
         hand.is_busy,
-        hand.due(now),
+        hand.next_write(now),
     ]
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from robotiq_async.control.controller import Due
+from robotiq_async.control.controller import NextWrite
 from robotiq_async.session.cycle import FRESH_S, READS, SOON_S, Step, next_step
 from robotiq_async.session.options import LONGEST_SPACING_S
 
-STOP = Due(wait=0.0, is_urgent=True, is_command=False)
-COMMAND = Due(wait=0.0, is_urgent=False, is_command=True)
-PROCEDURE = Due(wait=0.0, is_urgent=False, is_command=False)
+STOP = NextWrite(wait=0.0, is_urgent=True, is_command=False)
+COMMAND = NextWrite(wait=0.0, is_urgent=False, is_command=True)
+PROCEDURE = NextWrite(wait=0.0, is_urgent=False, is_command=False)
 LONG_S = 1e-4  # more than that is too much
 
 
@@ -32,7 +32,7 @@ LONG_S = 1e-4  # more than that is too much
         (PROCEDURE, 0.0, False, True, Step.READ),
     ],
 )
-def test_the_first_step(write: Due, age: float, is_stale: bool, is_slow: bool, expected: Step) -> None:
+def test_the_first_step(write: NextWrite, age: float, is_stale: bool, is_slow: bool, expected: Step) -> None:
     assert next_step(write, 0, age, is_stale=is_stale, is_slow=is_slow) is expected
 
 
@@ -49,7 +49,7 @@ def test_the_first_step(write: Due, age: float, is_stale: bool, is_slow: bool, e
     ],
 )
 def test_a_step_after_a_read(
-    write: Due, wait: float, reads: int, is_stale: bool, expected: Step | None
+    write: NextWrite, wait: float, reads: int, is_stale: bool, expected: Step | None
 ) -> None:
     now = write._replace(wait=wait)
     assert next_step(now, reads, 0.0, is_stale=is_stale, is_slow=False) is expected

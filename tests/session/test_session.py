@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import gc
 import logging
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import pytest
@@ -16,7 +18,9 @@ from robotiq_async.values.errors import (
     ConnectFailedError,
     ConnectionLostError,
     InvalidStateError,
+    MoveSupersededError,
     NotStartedError,
+    RobotiqError,
 )
 from robotiq_async.values.events import Transition
 from tests.fake_transport import LOST, Wire
@@ -109,6 +113,120 @@ async def test_callers_that_wait_when_a_session_ends_get_the_reason(session: Ses
         with pytest.raises(NotStartedError, match="the hand was stopped"):
             await task
     assert [each.target async for each in stream][-2:] == [State.DO_SHUTDOWN, State.SHUTDOWN]
+
+
+# -- the write comes first -----------------------------------------------------------------------------------
+
+
+class Order:
+    """Who has heard of what, and whether the image had left by then."""
+
+    def __init__(self, session: Session, wire: Wire) -> None:
+        self._session, self._wire = session, wire
+        self.heard: dict[str, bool] = {}
+
+    def note(self, who: str) -> None:
+        self.heard[who] = "write" in self._wire.calls
+
+    async def move(self, axes: Finger = Finger.ABC) -> None:
+        with self._session.moving(255, axes, 0, None) as (ended, _):
+            with pytest.raises((MoveSupersededError, NotStartedError)):
+                await ended
+            self.note("move")
+
+    async def wait_for(self, state: State) -> None:
+        with contextlib.suppress(NotStartedError):
+            await self._session.reach({state}, None, what="", failing={})
+        self.note("state")
+
+    def listen(self, *states: State) -> Callable[[], None]:
+        def hear(item: object) -> None:
+            if isinstance(item, Transition) and item.target in states:
+                self.note("listener")
+
+        return self._session._channels.listeners.add(hear)
+
+
+@pytest.fixture(params=["tcp", "serial line"])
+def link(request: pytest.FixtureRequest, wire: Wire, monkeypatch: pytest.MonkeyPatch) -> str:
+    """A serial line is silent between two frames, and there a poll takes most of its interval."""
+    name: str = request.param
+    if name == "serial line":
+
+        async def send(decide: Callable[[], Sequence[int] | None]) -> bool:
+            await asyncio.sleep(0.002)
+            return await Wire.send(wire, decide)
+
+        monkeypatch.setattr(wire, "send", send)
+        monkeypatch.setattr(wire, "exchange_s", 0.007)
+    return name
+
+
+@pytest.mark.usefixtures("link")
+@pytest.mark.parametrize("how", ["stop", "keep", "halt", "reset", "hold", "command"])
+@pytest.mark.parametrize("moment", [0.0, 0.0012, 0.0034, 0.0056, 0.0078])
+async def test_a_write_that_is_due_leaves_before_anybody_hears_of_it(
+    session: Session, wire: Wire, how: str, moment: float
+) -> None:
+    """Callers and listeners may hold up the loop, and the fingers moved on meanwhile."""
+    order = Order(session, wire)
+    remove = order.listen(State.DO_SHUTDOWN, State.DO_RESET)
+    tasks = [asyncio.create_task(order.move())]
+    await asyncio.sleep(0.1)
+    if how in ("stop", "keep", "reset"):
+        tasks.append(asyncio.create_task(order.wait_for(State.DO_RESET)))
+    await asyncio.sleep(0.02 + moment)
+    del wire.calls[:]
+    controller = session.controller
+    match how:
+        case "halt":
+            await session.answered(controller.halt)
+        case "hold":
+            await session.answered(lambda waiter: controller.hold(Finger.ABC, waiter))
+        case "command":
+            await session.answered(lambda waiter: controller.command(Command(Finger.A, 0), waiter))
+        case "reset":
+            await session.reach({State.RESET}, 5.0, what="", ask=controller.reset, failing={})
+        case _:
+            await session.stop(halt=True, keep_grip=how == "keep")
+    await asyncio.gather(*tasks)
+    remove()
+    assert all(order.heard.values()), order.heard
+    assert len(order.heard) == {"stop": 3, "keep": 3, "reset": 3}.get(how, 1)
+
+
+async def test_behind_a_slow_gateway_nobody_waits_for_the_write(
+    session: Session, wire: Wire, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    order = Order(session, wire)
+    moving = asyncio.create_task(order.move())
+    monkeypatch.setattr(wire, "exchange_s", 0.3)
+    await asyncio.sleep(2.0)
+    halting = asyncio.create_task(session.answered(session.controller.halt))
+    await asyncio.sleep(0.001)
+    assert moving.done()
+    await halting
+
+
+async def test_who_waits_for_a_write_hears_when_the_link_fails(session: Session, wire: Wire) -> None:
+    order = Order(session, wire)
+    moving = asyncio.create_task(order.move())
+    await asyncio.sleep(0.1)
+    wire.silent.add("write")
+    with pytest.raises(RobotiqError):
+        await session.answered(session.controller.halt)
+    await moving
+    wire.silent.clear()
+
+
+async def test_what_nothing_is_written_for_is_heard_at_once(session: Session, wire: Wire) -> None:
+    order = Order(session, wire)
+    moving = asyncio.create_task(order.move())
+    await asyncio.sleep(0.1)
+    session.ask(session.controller.drop_requests, MoveSupersededError("its client is gone"))
+    await asyncio.sleep(0)
+    await asyncio.sleep(0)
+    assert moving.done()
 
 
 async def test_callers_that_wait_when_the_link_is_given_up_get_the_reason(
