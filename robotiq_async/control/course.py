@@ -22,22 +22,25 @@ class Course:
     """The statuses in a row in which an axis moves."""
 
     def __init__(self) -> None:
-        self._statuses: Final[deque[RobotiqStatus]] = deque(maxlen=MOST_STATUSES)
+        # Each with the time at which it was asked for: a loop that is held up reads a reply late, and a speed
+        # by the times of the replies would drive a held axis on to its request.
+        self._statuses: Final[deque[tuple[float, RobotiqStatus]]] = deque(maxlen=MOST_STATUSES)
 
-    def update(self, status: RobotiqStatus) -> None:
+    def update(self, status: RobotiqStatus, asked: float) -> None:
         if status.moving:
-            self._statuses.append(status)
+            self._statuses.append((asked, status))
         elif self._statuses:
             self._statuses.clear()
 
     def after(self, axis: Finger, status: RobotiqStatus, seconds: float) -> int:
         """Its position so long after a status; that of the status if it is not known to move."""
-        at, first = status.position(axis), status
-        if not self._statuses or self._statuses[-1] is not status:
+        at = status.position(axis)
+        if not self._statuses or self._statuses[-1][1] is not status:
             return at
-        for each in reversed(self._statuses):
-            if axis not in each.moving or status.timestamp - each.timestamp > BASELINE_S:
+        last, _ = since, first = self._statuses[-1]
+        for asked, each in reversed(self._statuses):
+            if axis not in each.moving or last - asked > BASELINE_S:
                 break
-            first = each
-        time = status.timestamp - first.timestamp
+            since, first = asked, each
+        time = last - since
         return at if time == 0 else at + int((at - first.position(axis)) * seconds / time)

@@ -404,7 +404,7 @@ class Ledger:
 
     def update_rest(self, status: RobotiqStatus) -> None:
         """Find out which axes have come to rest. Not in a fault: it keeps axes from starting."""
-        self._course.update(status)
+        self._course.update(status, self.now.time)
         if self._unproven:
             self._note_acting()
             # gDT has no meaning without rGTO [manual]. While an adopted request is a guess, no rest follows

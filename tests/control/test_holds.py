@@ -15,6 +15,7 @@ from robotiq_async import (
     ObjectStatus,
     State,
 )
+from robotiq_async.values.status import RobotiqStatus
 from tests.control.other_client import going_to, moved_by_another
 from tests.control.scan import Scan, started
 
@@ -276,3 +277,20 @@ def test_a_hold_drives_an_axis_hardly_back(device_cycle: float, speed: int, goal
     back = way - abs(scan.positions()[A] - at)
     assert back <= 2 * 3
     assert way <= 1 + 130 * (device_cycle + 0.02)
+
+
+def test_a_reply_that_was_read_late_tells_no_speed(scan: Scan) -> None:
+    """A loop that was held up reads two statuses in a row: a held axis was driven on to its request."""
+    scan.move(255, A, speed=0)
+    scan.run(0.5)
+    waited = scan.status()  # asked for, and answered: it waits in the socket
+    asked, blocked = scan.now, 1.5
+    scan.now += blocked
+    scan.controller.see(RobotiqStatus(waited.registers, scan.now, waited.sequence), asked)
+    scan.now += 0.001
+    scan.controller.see(scan.status(), scan.now)
+    at = scan.latest.position(A)
+    assert at - waited.position(A) > 20
+    scan.hold(A)
+    scan.step(poll=0.0)
+    assert abs(scan.last_image.position(A) - at) <= 2
