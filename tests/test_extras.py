@@ -37,7 +37,7 @@ def test_the_library_itself_is_not_asked_for() -> None:
 def test_the_versions_are_those_that_the_library_needs() -> None:
     requirements = ["anyio>=4.5", "nicegui<4,>=3.18; extra == 'web'", 'robotiq-async[web]; extra == "all"']
     for extra in ("web", "all"):
-        assert pip_command(extra, requirements) == f"pip install 'nicegui<4,>=3.18' (the extra {extra})"
+        assert pip_command(extra, requirements) == f'pip install "nicegui<4,>=3.18" (the extra {extra})'
 
 
 def test_an_extra_that_there_is_not() -> None:

@@ -177,8 +177,8 @@ def answered(answer, *arguments, code):
     run(*arguments, code=code)
     sys.stdin, sys.stdout = streams
 
-def interrupted(*arguments):
-    threading.Timer(1.0, signal.raise_signal, [signal.SIGINT]).start()
+def interrupted(*arguments, by=signal.SIGINT):
+    threading.Timer(1.0, signal.raise_signal, [by]).start()
     run(*arguments)
 
 run("--help")
@@ -193,7 +193,7 @@ run("ports")
 run("doctor", address)
 run("verify", address, code=2)  # nobody to ask
 interrupted("monitor", "--watch", address)
-interrupted("simulate", "--port", "0")
+interrupted("simulate", "--port", "0", by=signal.SIGBREAK)
 
 file, table = f"{folder}/grasp.mcap", f"{folder}/grasp.csv"
 run("record", file, "--seconds", "0.5", address)

@@ -90,6 +90,7 @@ def become(*, coarse: bool = False) -> None:
     socket.socketpair = partial(socket.socketpair, socket.AF_UNIX)
     for name in MODULES:
         sys.modules[name] = None  # type: ignore[assignment]
+    signal.SIGBREAK = signal.SIGUSR1  # type: ignore[attr-defined]
     for module, names in NAMES.items():
         for name in names.split():
             vars(module).pop(name, None)

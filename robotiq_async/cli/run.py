@@ -115,7 +115,7 @@ def _check_units(arguments: Sequence[str]) -> None:
 
 
 class _Signals:
-    """The first SIGINT, SIGTERM or SIGHUP (a closed terminal) ends the command.
+    """The first SIGINT, SIGTERM, SIGHUP (a closed terminal) or SIGBREAK (Windows) ends the command.
 
     Further ones are ignored: closing a terminal sends several, a person may press Ctrl-C again and again, and
     none of them may prevent the first from stopping the fingers. Only a SIGINT that comes more than

@@ -1,15 +1,16 @@
 """The command that installs an extra, however the library was installed.
 
-``pip install 'robotiq-async[web]'`` works only where a package index has the library. Installing the packages
+``pip install "robotiq-async[web]"`` works only where a package index has the library. Installing the packages
 of the extra works everywhere: from a clone, a wheel or an index.
 """
 
 from __future__ import annotations
 
 import re
-import shlex
 from collections.abc import Iterator, Sequence
 from typing import Final
+
+from .shell import quoted
 
 NAME: Final = "robotiq-async"
 _NESTED: Final = re.compile(rf"{NAME}\[(.+)\]$")
@@ -22,13 +23,13 @@ def install(extra: str) -> str:
     try:
         requirements = metadata.requires(NAME) or []
     except metadata.PackageNotFoundError:  # runs from a clone that is not installed
-        return f"pip install '.[{extra}]' in the clone"
+        return f"pip install {quoted(f'.[{extra}]')} in the clone"
     return pip_command(extra, requirements)
 
 
 def pip_command(extra: str, requirements: Sequence[str]) -> str:
     """The command, from the requirements in a distribution's metadata."""
-    packages = [shlex.quote(each) for each in dict.fromkeys(_packages(extra, requirements))]
+    packages = [quoted(each) for each in dict.fromkeys(_packages(extra, requirements))]
     if not packages:
         raise ValueError(f"there is no extra {extra!r}")
     return f"pip install {' '.join(packages)} (the extra {extra})"

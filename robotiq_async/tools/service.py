@@ -143,13 +143,13 @@ class Signals:
 
 @asynccontextmanager
 async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator[Signals]:
-    """Stop hands on SIGINT, SIGTERM and SIGHUP, and leave the block after that.
+    """Stop hands on SIGINT, SIGTERM, SIGHUP and Windows' SIGBREAK, and leave the block after that.
 
     All stops begin at once, in the next turn of the event loop. When they have ended, the
     block is cancelled, and the program continues after it. The NotStartedError of a call that a stop has
     ended does not leave the block, neither alone nor in the exception group of tasks. Further signals are
     ignored for 3 s; later ones act as before the block. An ignored signal stays ignored. SIGKILL stops
-    nothing.
+    nothing, and neither does closing a console on Windows.
 
     Args:
         hands: to stop; one that does not run is left alone.

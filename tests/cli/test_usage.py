@@ -206,7 +206,7 @@ def test_wrong_usage_is_one_line_and_opens_nothing(
 
 async def test_without_the_extra_one_line_names_it(shell: Shell) -> None:
     outcome = await shell.finish(await shell.forked("-c", FORGETTING + WITHOUT.format("cyclopts", [])))
-    outcome.assert_failed(1, "cyclopts", "pip install 'cyclopts")
+    outcome.assert_failed(1, "cyclopts", 'pip install "cyclopts')
 
 
 @pytest.mark.parametrize("command", ["status", "doctor", "agent"])
@@ -218,7 +218,7 @@ async def test_a_simulation_with_physics_names_the_extra_that_it_needs(
     file.write_text(f'site = "lab"\n[grippers.left]\naddress = "{address}"\n', encoding="utf-8")
     arguments = ["agent", "--check", str(file)] if command == "agent" else [command, address]
     outcome = await shell.finish(await shell.forked("-c", WITHOUT.format("mujoco", arguments)))
-    outcome.assert_failed(2 if command == "agent" else 1, "pip install 'mujoco")
+    outcome.assert_failed(2 if command == "agent" else 1, 'pip install "mujoco')
 
 
 async def test_another_missing_module_is_not_taken_for_the_extra(shell: Shell) -> None:
@@ -230,14 +230,14 @@ async def test_another_missing_module_is_not_taken_for_the_extra(shell: Shell) -
 @pytest.mark.parametrize(
     ("module", "arguments", "words"),
     [
-        ("cryptography", "fleet keys keys", "pip install 'cryptography"),
-        ("foxglove", "view", "pip install 'foxglove-sdk"),
+        ("cryptography", "fleet keys keys", 'pip install "cryptography'),
+        ("foxglove", "view", 'pip install "foxglove-sdk'),
         ("matplotlib", "measure speed sim://", "or pass --no-plot"),
         ("matplotlib", "plot x", "(the extra plot)"),
         ("mcap", "record x.mcap", "(the extra record), or record a table, .csv"),
         ("mcap", "replay x", "(the extra record)"),
-        ("nicegui", "demo --show", "pip install 'nicegui"),
-        ("nicegui", "web", "pip install 'nicegui"),
+        ("nicegui", "demo --show", 'pip install "nicegui'),
+        ("nicegui", "web", 'pip install "nicegui'),
     ],
 )
 def test_a_missing_module_is_one_line_that_names_the_extra(

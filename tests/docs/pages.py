@@ -73,7 +73,7 @@ def prose(text: str) -> str:
 
 def requirements(text: str) -> str:
     """The requirements on a page, as typed behind ``pip install``."""
-    return " ".join(re.findall(r"\bpip install (?!'robotiq-async|\.\.\. )([^`\n]+)", text))
+    return " ".join(re.findall(r'\bpip install (?!"robotiq-async|\.\.\. )([^`\n]+)', text))
 
 
 # -- code that awaits at the top, as ``python -m asyncio`` and notebooks run it --

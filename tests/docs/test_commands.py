@@ -10,13 +10,16 @@ from __future__ import annotations
 import re
 import shlex
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from robotiq_async.cli.app import build
+from robotiq_async.runtime.extras import install
+from robotiq_async.runtime.shell import quoted
 from tests.docs.pages import PAGES, ROOT, blocks, named, read
+from tests.docs.prompts import NotForThisPromptError, command_prompt, powershell
 
 READ = [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
 COMMAND_LINE = build()
@@ -94,3 +97,58 @@ def test_a_command_that_is_not_there_is_found() -> None:
         check("robotiq-async move 255 --turbo")
     with pytest.raises(AssertionError):
         check("make coffee")
+
+
+# -- Windows: what its prompts make of a line --------------------------------------------------------------
+
+NOT_FOR_WINDOWS = ("chmod", "export", "ls", "make", "python3", "ros2", "socat", "source", "sudo", "lerobot-")
+"""Programs that there are not. On Windows python3 is py (README, Install)."""
+ALIKE = [*PAGES, ROOT / "README.md"]
+
+
+@pytest.mark.parametrize("page", ALIKE, ids=named)
+def test_windows_prompts_read_a_line_as_the_shell_does(page: Path) -> None:
+    """PowerShell with the comment behind it, the command prompt without."""
+    for number, line in lines(page):
+        words = shlex.split(line, comments=True)
+        if words[0].startswith(NOT_FOR_WINDOWS) or re.search(r"[|&$>;~]|^[A-Z_]+=|/bin/", line):
+            continue
+        where = f"{page.name}, line {number}: {line}"
+        assert powershell(line) == words, where
+        assert command_prompt(re.sub(r"\s+#\s.*", "", line)) == words, where
+
+
+def test_the_lines_for_windows_are_read_by_both_prompts() -> None:
+    (block,) = blocks(read(ROOT / "README.md"), "bat")
+    assert [command_prompt(line) for line in block.text.splitlines()] == [
+        ["py", "-m", "venv", "gripper"],
+        ["gripper\\Scripts\\activate"],
+        ["pip", "install", ".[cli]"],
+    ]
+    assert all(powershell(line) == command_prompt(line) for line in block.text.splitlines())
+
+
+@pytest.mark.parametrize("extra", sorted(EXTRAS))
+def test_advice_on_an_extra_can_be_typed_in_every_shell(extra: str) -> None:
+    advice, _, _ = install(extra).partition(" (")
+    assert shlex.split(advice) == powershell(advice) == command_prompt(advice)
+
+
+def test_a_list_in_powershell_is_found() -> None:
+    with pytest.raises(NotForThisPromptError, match=r"^, outside"):
+        powershell("robotiq-async move 255 --fingers A,B")
+
+
+def test_an_address_in_advice_can_be_typed_in_every_shell() -> None:
+    for address in ("tcp://192.168.1.11:502", "rtu:///dev/ttyUSB0?baud=9600&parity=E", "tcp://[fe80::1]:502"):
+        advice = f"robotiq-async doctor {quoted(address)}"
+        assert shlex.split(advice) == powershell(advice) == command_prompt(advice)
+        assert shlex.split(advice)[-1] == address
+
+
+@pytest.mark.parametrize("prompt", [powershell, command_prompt])
+@pytest.mark.parametrize("line", ["pip install '.[cli]'", "status rtu://COM3?baud=9600&parity=E", "a > b"])
+def test_a_line_that_windows_reads_otherwise_is_found(prompt: Callable[[str], list[str]], line: str) -> None:
+    with pytest.raises(NotForThisPromptError):
+        prompt(line)
+    assert command_prompt('a "b c"d ""') == powershell('a "b c"d ""') == ["a", "b cd", ""]

@@ -64,7 +64,7 @@ def test_a_page_says_where_code_runs_that_awaits_at_the_top() -> None:
 
 def test_a_page_with_code_names_its_environment() -> None:
     for page in {*(page for page, _ in CODE), FIXTURES}:
-        assert requirements(read(page)).startswith((".", "'.[")), page
+        assert requirements(read(page)).startswith((".", '".[')), page
         is_for_the_prompt = any(map(awaits_at_the_top, blocks(read(page), "python")))
         assert ("`python -m asyncio`" in read(page)) == is_for_the_prompt, page
 

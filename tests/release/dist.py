@@ -99,7 +99,7 @@ def try_base(artifact: Path, folder: Path) -> list[str]:
         raise FailedError(f"{artifact.name} installed {said}")
     _demo(str(python), "-m", "robotiq_async._demo", folder=folder)
     said = run(str(python), "-m", "robotiq_async", "demo", folder=folder, code=1)
-    if "pip install 'cyclopts" not in said or said.count("\n") != 1:
+    if 'pip install "cyclopts' not in said or said.count("\n") != 1:
         raise FailedError(f"{artifact.name} without cli says {said}")
     return installed(python)
 

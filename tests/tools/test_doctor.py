@@ -487,7 +487,7 @@ async def test_a_gateway_for_one_client_is_no_bad_cable_unless_another_client_ha
 
 
 def test_an_extra_that_is_missing_is_no_question_of_cables() -> None:
-    why = "pip install 'pyserial>=3.5' (the extra serial)"
+    why = 'pip install "pyserial>=3.5" (the extra serial)'
     assert _advice_for_opening(parse_address("rtu:///dev/x"), why) == "Install it, and run doctor again."
 
 

@@ -55,7 +55,7 @@ def move(
     For example:
 
         robotiq-async move 255
-        robotiq-async move 40mm 'rtu:///dev/ttyUSB0?model=2f85' --speed 80mm/s
+        robotiq-async move 40mm "rtu:///dev/ttyUSB0?model=2f85" --speed 80mm/s
         robotiq-async move 100 tcp://192.168.1.11 --fingers A,B --speed 64
         robotiq-async move 255 192.168.1.11 --fingers scissor --force 0 --yes
         robotiq-async move 255 192.168.1.11 --keep

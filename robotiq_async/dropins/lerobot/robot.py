@@ -19,7 +19,7 @@ try:
     from lerobot.utils.decorators import check_if_already_connected, check_if_not_connected
 except ImportError as error:
     raise ImportError(
-        "the robot needs LeRobot 0.6 and Python 3.12 or newer: pip install 'lerobot[core_scripts]==0.6.*' "
+        'the robot needs LeRobot 0.6 and Python 3.12 or newer: pip install "lerobot[core_scripts]==0.6.*" '
         "(the part, robotiq_async.dropins.lerobot.GripperPart, needs neither)"
     ) from error
 

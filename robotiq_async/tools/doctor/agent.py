@@ -15,6 +15,7 @@ from ...fleet.wire.names import GripperName
 from ...fleet.wire.status_message import StatusMessage, unpack
 from ...fleet.wire.values import Fields
 from ...runtime.clock import now
+from ...runtime.shell import quoted
 from ...runtime.version import __version__
 from ...values.enums import State
 from ...values.errors import AgentError, NotAllowedError, ProtocolError, RobotiqError
@@ -193,7 +194,9 @@ def _report_gripper(listener: _Listener, info: Fields, report: Report) -> None:
     problem, state = info["problem"], str(info["state"])
     if problem or state == State.DISCONNECTED.name:
         found = f"its agent cannot reach it: {problem or 'the link is down'}"
-        advice = f"On that host: robotiq-async doctor {info['address']}, while the agent is stopped."
+        advice = (
+            f"On that host: robotiq-async doctor {quoted(str(info['address']))}, while the agent is stopped."
+        )
         report(Finding(Level.BAD, "gripper", found, advice))
         return
     report(Finding(Level.GOOD, "gripper", f"{info['address']} in {state}"))

@@ -17,7 +17,7 @@ from .pipes import Pipes
 def main() -> int:
     """Serve until standard input ends; returns the exit code."""
     # Ctrl-C in a terminal is for the process that has the hands: it stops them, and then ends this one.
-    for name in ("SIGINT", "SIGHUP"):
+    for name in ("SIGINT", "SIGHUP", "SIGBREAK"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
     if hasattr(os, "nice"):
