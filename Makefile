@@ -112,6 +112,8 @@ constraints: $(STAMP)  ## Take the newest versions of all dependencies into cons
 		pyproject.toml --output-file constraints.txt
 	$(BIN)/python -m uv pip compile --quiet --universal --upgrade --python-version 3.11 --no-header --no-annotate \
 		docs/site/requirements.in --output-file docs/site/requirements.txt
+	$(BIN)/python -m uv pip compile --quiet --universal --upgrade --python-version 3.11 --generate-hashes --no-header \
+		--no-annotate tests/release/requirements.in --output-file tests/release/requirements.txt
 
 clean:  ## Remove what the other commands made
 	rm -rf $(VENV) $(SITE) $(RELEASE) .venv-ros2 .venv-lerobot .venv-lerobot-uv .venv-urcap .venv-urdf build dist site .cache .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
@@ -145,7 +147,8 @@ $(SITE)/.complete: docs/site/requirements.txt constraints.txt
 	@$(SITE)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -c constraints.txt nicegui
 	@touch $@
 
-$(RELEASE)/.complete: Makefile
+$(RELEASE)/.complete: tests/release/requirements.txt
 	@$(PYTHON) -m venv --clear $(RELEASE)
-	@$(RELEASE)/bin/python -m pip install --quiet --disable-pip-version-check twine uv
+	@$(RELEASE)/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes \
+		--requirement tests/release/requirements.txt
 	@touch $@

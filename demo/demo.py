@@ -14,6 +14,7 @@ import argparse
 import asyncio
 import signal
 import sys
+import textwrap
 from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
 from contextlib import AbstractAsyncContextManager, aclosing, asynccontextmanager, nullcontext, suppress
 from functools import partial
@@ -42,12 +43,16 @@ from robotiq_async.link.address import is_remote, parse_address
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.model import model_of
 
-WARNING = """ALL its fingers MOVE. It is activated (they open and close to their stops), then
-fingers and scissor, or the jaw, open and close for about half a minute, at full speed and at full force too.
-What the hand holds will drop. Keep hands and cables away; Ctrl-C stops the fingers."""
+WARNING = """ALL its fingers MOVE.
+It is activated (they open and close to their stops), then fingers and scissor,
+or the jaw, open and close for about half a minute, at full speed and at full
+force too. What the hand holds will drop. Keep hands and cables away; Ctrl-C
+stops the fingers."""
 
-COLUMN = 54
+COLUMN = 50
 """The column at which results begin."""
+WIDTH = 80
+"""Columns of a line at most: of the narrowest terminal that is usual."""
 
 T = TypeVar("T")
 
@@ -69,7 +74,7 @@ async def run(
         kind: type[RemoteHand | RobotiqHand] = RemoteHand if is_remote(where) else RobotiqHand
         hand: Hand = kind(where)
         transitions = hand.transitions()  # Opened before start(), it misses nothing.
-        print(f"async with {kind.__name__}({where!r}) as hand:  # connects and activates", flush=True)
+        print(f"# connects and activates\nasync with {kind.__name__}({where!r}) as hand:", flush=True)
         async with shown(hand), hand:
             await movements(hand)
             await speeds(hand)
@@ -156,7 +161,7 @@ async def status(hand: Hand) -> None:
     read("hand.status.fault", hand.status.fault.name)
     for axis in hand.model.axes:
         read(f"hand.status.position({literal(axis)})", hand.status.position(axis))
-    note("async for status in hand.statuses():  # every poll; two a second of them here")
+    note("async for status in hand.statuses():  # every poll; here two a second")
     await asyncio.gather(hand.move(150), watch(hand))
     await call(hand.open)
     read("hand.statistics.polls, .overruns", (hand.statistics.polls, hand.statistics.overruns))
@@ -187,7 +192,7 @@ async def faults(hand: Hand, simulated: SimulatedGripper | None) -> None:
         simulated.inject_fault(blocked)
         await call(hand.wait_for_state, State.FAULT)
         read("hand.status.fault.description", hand.status.fault.description)
-        note("recover() resets and activates again; a gripper that holds something drops it")
+        note("recover() resets and activates again; what the gripper holds drops")
         await call(hand.recover)
         read("hand.state", hand.state)
 
@@ -203,18 +208,19 @@ async def print_life(transitions: AsyncIterator[Transition]) -> None:
             commands += 1
         elif change.source is not State.RUNNING_CC:
             print(f"  {change.source.name:>13} -> {change.target.name:<15}{change.trigger.value}")
-    print(f"  and {commands} times RUNNING_IDLE -> RUNNING_CC -> RUNNING_IDLE, once for each command")
+    print(f"  and {commands} times RUNNING_IDLE -> RUNNING_CC -> RUNNING_IDLE: once a command")
 
 
 async def call(function: Callable[..., Awaitable[T]], *args: object, **options: object) -> T:
     """Await a call; print it as the code that makes it, then what came back."""
-    print(f"  {'await ' + code(function, args, options):<{COLUMN}}", end="", flush=True)
+    call = f"  await {code(function, args, options)}"
+    print(call, end="", flush=True)
     try:
         result = await function(*args, **options)
     except RobotiqError as error:
-        print(f"{type(error).__name__}: {error}")
+        print(beside(call, f"{type(error).__name__}: {error}"))
         raise
-    print(words(result), flush=True)
+    print(beside(call, words(result)), flush=True)
     return result
 
 
@@ -222,7 +228,8 @@ async def together(*moves: partial[Coroutine[None, None, MoveResult]]) -> None:
     """The same for several moves at once."""
     print("  await asyncio.gather(", flush=True)
     for move, result in zip(moves, await asyncio.gather(*(move() for move in moves)), strict=True):
-        print(f"      {code(move.func, move.args, move.keywords) + ',':<{COLUMN - 4}}{words(result)}")
+        call = f"      {code(move.func, move.args, move.keywords)},"
+        print(call + beside(call, words(result)))
     print("  )", flush=True)
 
 
@@ -263,7 +270,15 @@ def note(text: str) -> None:
 
 def read(expression: str, value: object) -> None:
     """An expression and its value."""
-    print(f"  {expression:<{COLUMN}}{value}", flush=True)
+    left = f"  {expression}"
+    print(left + beside(left, str(value)), flush=True)
+
+
+def beside(left: str, right: str) -> str:
+    """The right part of a line, printed behind the left one; on lines of its own if it is too long."""
+    if COLUMN + len(right) <= WIDTH:
+        return f"{'':<{max(1, COLUMN - len(left))}}{right}"
+    return "\n" + textwrap.fill(right, WIDTH, initial_indent=" " * 8, subsequent_indent=" " * 8)
 
 
 def main() -> int:

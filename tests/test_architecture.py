@@ -15,7 +15,7 @@ from docs import make_tables
 PACKAGE = Path(robotiq_async.__file__).parent
 ROOT = Path(__file__).parents[1]
 AROUND = re.compile(r"robotiq_async\.(cli|dropins|fleet|ros2|tools)\b|pytest_robotiq_async\b")
-OUTSIDE = {"__init__", "__main__", "__pycache__", "_demo", "data", "py", "version"}
+OUTSIDE = {"__init__", "__main__", "__pycache__", "__pyinstaller", "_demo", "data", "py", "version"}
 """Modules that no contract needs to name."""
 
 

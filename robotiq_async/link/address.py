@@ -21,16 +21,12 @@ TCP_PORT: Final = 502  # the port of Modbus TCP, and the gripper's
 URCAP_PORT: Final = 63352  # the text port of Robotiq's URCap on a UR controller
 
 REMOTE_SCHEME: Final = "zenoh://"  # of a gripper on another host, for a remote hand
-FORMS: Final = (
-    "tcp://HOST[:PORT] (or bare HOST or HOST:PORT), "
-    "rtu:///dev/ttyUSB0 (a serial port; rtu://COM3 on Windows), "
-    "rtu+tcp://HOST:PORT (a serial line behind a TCP socket), "
-    "urcap://HOST[:PORT] (a UR with Robotiq's URCap; it needs a model), "
-    "sim:// (or sim://?speedup=10&object=150), "
-    "zenoh://SITE/HOST/GRIPPER (on another host: for robotiq_async.fleet.RemoteHand and for commands); "
-    "?model=2f85, 2f140 or hand-e at the end for a sibling of the 3-Finger, ?stroke=/FOLDER/FILE.csv for its "
-    "measured openings, ?baud=500000 for a serial port with another rate than 115200"
-)
+FORMS: Final = "tcp://HOST, rtu://DEVICE, rtu+tcp://HOST:PORT, urcap://HOST, sim://, zenoh://..."
+"""For messages; docs/how-to/which-wire.md and the help of the command line explain them."""
+LONGEST: Final = 200
+"""Characters of a message about a malformed address: it is one line of a terminal, or two."""
+SHOWN: Final = 70
+"""Characters of a malformed address in it."""
 
 BAUD: Final = 115200  # the rate of a serial line, 8N1, as a gripper is shipped (manual 2014, p. 59)
 SLOWEST_BAUD: Final = 9600
@@ -164,27 +160,27 @@ def is_remote(address: object) -> bool:
 def parse_address(address: object) -> Address:
     """The address in a string."""
     if not isinstance(address, str):
-        raise TypeError(f"address must be a string, got {repr_of(address)}; accepted: {FORMS}")
+        raise TypeError(_within(f"address must be a string, such as {FORMS}; got {repr_of(address)}"))
     scheme, separator, rest = address.partition("://")
     scheme = scheme.lower()
     if not separator:
         if meant := _meant(address):
-            raise ValueError(f"malformed address {address!r}: {meant}; accepted: {FORMS}")
+            raise malformed(address, meant)
         scheme, rest = "tcp", address
     try:
         rest, model, stroke = _without_options_of_a_gripper(rest)
         if scheme == "sim" and rest[:1] in ("", "?"):
             return Address("sim", simulation=parse_simulation(rest), model=model, stroke=stroke)
     except ValueError as error:
-        raise ValueError(f"malformed address {address!r}: {error}; accepted: {FORMS}") from None
+        raise malformed(address, str(error)) from None
     if scheme == "rtu" and rest.strip("/") and rest == rest.strip() and rest.isprintable():
         if "://" in rest:  # pyserial would open it, and block the event loop for seconds
             what = f"{rest} is no serial port; for one behind a TCP socket use rtu+tcp://HOST:PORT"
-            raise ValueError(f"malformed address {address!r}: {what}; accepted: {FORMS}")
+            raise malformed(address, what)
         try:
             device, line = _device_and_line(rest)
         except ValueError as error:
-            raise ValueError(f"malformed address {address!r}: {error}; accepted: {FORMS}") from None
+            raise malformed(address, str(error)) from None
         return Address("rtu", device, line=line, model=model, stroke=stroke)
     if scheme in _SOCKETS:
         if "?" in rest:  # model and stroke have been taken out
@@ -192,20 +188,33 @@ def parse_address(address: object) -> Address:
             what = f"no option {_guess(names[0], GRIPPER_OPTIONS)}; known are: {', '.join(GRIPPER_OPTIONS)}"
             if not set(names).isdisjoint(LINE_OPTIONS):
                 what = "baud, parity and stopbits are options of a serial port; a serial server has its own"
-            raise ValueError(f"malformed address {address!r}: {what}; accepted: {FORMS}")
+            raise malformed(address, what)
         kind, usual_port = _SOCKETS[scheme]
         host, port = _host_and_port(rest, usual_port)
         if ":" not in host and _ends_in_a_number(host) and not _is_ipv4(host):
             what = f"{host} is not an IPv4 address: four numbers in 0..255, without leading zeros"
-            raise ValueError(f"malformed address {address!r}: {what}; accepted: {FORMS}")
+            raise malformed(address, what)
         if host and port is not None:
             return Address(kind, host, port, model=model, stroke=stroke)
     if scheme == "zenoh":
-        raise ValueError(
-            f"{address!r} is a gripper on another host: use robotiq_async.fleet.RemoteHand; accepted: {FORMS}"
-        )
-    meant = f": {guess}" if scheme == "sim" and (guess := _meant(rest)) else ""
-    raise ValueError(f"malformed address {address!r}{meant}; accepted: {FORMS}")
+        what = "is a gripper on another host: use robotiq_async.fleet.RemoteHand, or an address here"
+        raise ValueError(_within(f"{_shown(address)} {what}: {FORMS}"))
+    raise malformed(address, _meant(rest) if scheme == "sim" else "")
+
+
+def malformed(address: str, why: str, forms: str = FORMS) -> ValueError:
+    """The error about an address: why it is malformed, else the forms that there are."""
+    rest = f": {why}" if why else f"; accepted: {forms}"
+    return ValueError(_within(f"malformed address {_shown(address)}{rest}"))
+
+
+def _shown(address: str) -> str:
+    """An address in a message: its beginning and its end if it is long."""
+    return repr(address if len(address) <= SHOWN else f"{address[: SHOWN - 13]}...{address[-10:]}")
+
+
+def _within(message: str) -> str:
+    return message if len(message) <= LONGEST else f"{message[: LONGEST - 3]}..."
 
 
 def _meant(address: str) -> str:

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import errno
 import os
+import sys
 import threading
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -78,6 +79,17 @@ def write_all(descriptor: int, data: bytes) -> None:
     left = memoryview(data)
     while left:
         left = left[os.write(descriptor, left) :]
+
+
+def green_threads() -> str:
+    """The library that has replaced Python's threads, gevent or eventlet; empty if none has.
+
+    A thread is then a part of the thread that starts it: an event loop in it would not run while that waits.
+    """
+    gevent, eventlet = sys.modules.get("gevent.monkey"), sys.modules.get("eventlet.patcher")
+    if gevent is not None and gevent.is_module_patched("threading"):
+        return "gevent"
+    return "eventlet" if eventlet is not None and eventlet.is_monkey_patched("thread") else ""
 
 
 def running_loop() -> asyncio.AbstractEventLoop:

@@ -7,6 +7,7 @@ of the extra works everywhere: from a clone, a wheel or an index.
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterator, Sequence
 from typing import Final
 
@@ -21,10 +22,18 @@ def install(extra: str) -> str:
     from importlib import metadata  # noqa: PLC0415  # a tenth of the time that a command needs to begin
 
     try:
-        requirements = metadata.requires(NAME) or []
+        command = pip_command(extra, metadata.requires(NAME) or [])
     except metadata.PackageNotFoundError:  # runs from a clone that is not installed
-        return f"pip install {quoted(f'.[{extra}]')} in the clone"
-    return pip_command(extra, requirements)
+        command = f"pip install {quoted(f'.[{extra}]')} in the clone"
+    return f"{command}, where this program is frozen, and freeze it again" if is_frozen() else command
+
+
+def is_frozen() -> bool:
+    """Whether the program was packed with its interpreter, by PyInstaller or the like.
+
+    ``sys.executable`` is then the program itself, and no Python to start another module with.
+    """
+    return bool(getattr(sys, "frozen", False))
 
 
 def pip_command(extra: str, requirements: Sequence[str]) -> str:

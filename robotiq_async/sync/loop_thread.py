@@ -29,7 +29,7 @@ from collections.abc import Callable, Coroutine
 from queue import Empty, SimpleQueue
 from typing import Any, Final, Generic, TypeVar
 
-from ..runtime.concurrency import LateError
+from ..runtime.concurrency import LateError, green_threads
 from ..runtime.log import log
 
 T = TypeVar("T")
@@ -134,6 +134,11 @@ class LoopThread:
     def _serving(self, call: _Call[Any]) -> _Server:
         """Start the loop thread with a call, unless another thread starts it at this moment."""
         self.check_open()
+        if patched := green_threads():
+            raise RuntimeError(
+                f"{patched} has replaced Python's threads, and a blocking hand needs a real one; nothing was "
+                "sent: use the hand in a process that is not patched, such as robotiq-async agent"
+            )
         answer: SimpleQueue[_Server | OSError] = SimpleQueue()
         threading.Thread(target=self._serve, args=(call, answer), name=NAME, daemon=True).start()
         server = answer.get()

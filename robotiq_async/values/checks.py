@@ -2,8 +2,9 @@
 
 A wrong type is a TypeError, a value outside its range a ValueError.
 
-An int is any object with ``__index__``, such as numpy's integers; a number is a real number or an int. The
-result is a plain int or float. A bool is refused: it hints at a misplaced argument.
+An int is any object with ``__index__``, such as numpy's integers; a number is a real number or an int. An
+array of numpy without dimensions is the number in it. The result is a plain int or float. A bool is refused:
+it hints at a misplaced argument.
 """
 
 from __future__ import annotations
@@ -50,6 +51,9 @@ def repr_of(value: object) -> str:
 
 def as_int(value: object) -> int | None:
     """Convert to a plain int; None if it is not an int, or is a bool."""
+    if type(value) is int:
+        return value
+    value = _element(value)
     if isinstance(value, bool):
         return None
     try:
@@ -118,12 +122,13 @@ def as_float(value: object) -> float | None:
 
     ``__float__`` alone is not enough: numpy's bool and its complex have it, too.
     """
+    value = _element(value)
     number = value if isinstance(value, float | Real) and not isinstance(value, bool) else as_int(value)
     try:
         return None if number is None else float(number)
     except OverflowError:
         return math.inf
-    except TypeError:  # numpy's timedelta has __index__ and is not a number
+    except TypeError:  # it has __index__ and is not a number
         return None
 
 
@@ -133,6 +138,18 @@ def single(value: object) -> object:
     if as_float(value) is None and callable(item):
         with suppress(ValueError, RuntimeError):  # numpy's and torch's, of several
             return item()
+    return value
+
+
+def _element(value: object) -> object:
+    """What an array of numpy without dimensions holds; everything else is itself.
+
+    None for numpy's timedelta, which counts as an integer there.
+    """
+    if getattr(getattr(value, "dtype", None), "kind", "") == "m":
+        return None
+    if hasattr(type(value), "__setitem__") and getattr(value, "shape", None) == ():
+        return value[()]  # type: ignore[index]
     return value
 
 

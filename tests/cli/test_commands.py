@@ -342,6 +342,21 @@ def test_a_machine_without_ports(call: Call, monkeypatch: pytest.MonkeyPatch) ->
     assert "no serial port: is the adapter plugged in?" in outcome.err
 
 
+@pytest.mark.parametrize("error", [OSError(5, "driver"), TypeError("NoneType"), RuntimeError()], ids=repr)
+def test_a_machine_that_cannot_list_its_ports(
+    call: Call, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    """It raises what its system's drivers make it raise."""
+
+    def fail() -> None:
+        raise error
+
+    monkeypatch.setattr("serial.tools.list_ports.comports", fail)
+    call("ports").assert_failed(1, f"the serial ports of this machine cannot be listed: {error!r}")
+    outcome = call("status", "rtu:///dev/ttyNOWHERE")
+    outcome.assert_failed(1, "there is no such device")
+
+
 # -- doctor ------------------------------------------------------------------------------------------------
 
 

@@ -28,6 +28,7 @@ async def test_on_a_simulated_gripper(
     out = capsys.readouterr().out
     for words in (*PARTS, "place_object", "contact", "inject_fault", "FAULT -> DO_RESET", "-> SHUTDOWN"):
         assert words in out
+    assert [line for line in out.splitlines() if len(line) > 80] == []
 
 
 @pytest.mark.parametrize("form", [["-m", "robotiq_async", "demo"], ["demo/demo.py"]])

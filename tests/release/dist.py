@@ -5,7 +5,7 @@
 
 Each goes into two new environments, outside the clone: the base install runs the demo as a module and says
 what the command line needs; with the extra ``cli`` the command runs it. twine looks at what the package index
-would show, strictly.
+would show, strictly. Then the wheel is frozen into a program, and used as a zip (frozen.py).
 """
 
 from __future__ import annotations
@@ -22,8 +22,12 @@ from typing import Final
 
 from docs.site.versions import version
 from tests.release.environments import CONSTRAINTS, ROOT, FailedError, exit_code, installed, make, run, uv
+from tests.release.frozen import try_frozen, try_zip
 
 DIST: Final = ROOT / "dist"
+BILL: Final = "sboms/robotiq_async.cdx.json"
+"""The bill of materials in the wheel's metadata; a copy lies in build/, for the release's page."""
+BACKEND: Final = ("--build-constraints", str(ROOT / "tests" / "release" / "requirements.txt"))
 IN_THE_SDIST: Final = (
     *("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "SECURITY.md"),
     *(
@@ -38,6 +42,7 @@ IN_THE_SDIST: Final = (
 )
 IN_THE_WHEEL: Final = (
     "robotiq_async/py.typed",
+    "robotiq_async/__pyinstaller/hook-robotiq_async.py",
     "robotiq_async/_demo.py",
     "robotiq_async/data/robotiq_3f.urdf",
     "robotiq_async/data/robotiq_2f85.xml",
@@ -51,7 +56,7 @@ LAST_PART: Final = "What the hand went through"
 def build() -> list[Path]:
     """Both, in a folder that is emptied before; they hold what they should."""
     shutil.rmtree(DIST, ignore_errors=True)
-    uv("build", "--quiet", "--out-dir", str(DIST), str(ROOT))
+    uv("build", "--quiet", "--require-hashes", *BACKEND, "--out-dir", str(DIST), str(ROOT))
     name = f"robotiq_async-{version()}"
     sdist, wheel = DIST / f"{name}.tar.gz", DIST / f"{name}-py3-none-any.whl"
     found = {path.name for path in DIST.iterdir() if path.suffix in (".gz", ".whl")}
@@ -62,7 +67,7 @@ def build() -> list[Path]:
     _need(sdist, files, IN_THE_SDIST)
     with zipfile.ZipFile(wheel) as archive:
         files = {*archive.namelist()}
-    _need(wheel, files, (*IN_THE_WHEEL, f"{name}.dist-info/licenses/LICENSE"))
+    _need(wheel, files, (*IN_THE_WHEEL, f"{name}.dist-info/licenses/LICENSE", f"{name}.dist-info/{BILL}"))
     strange = [
         each for each in files if not each.startswith(("robotiq_async/", "pytest_robotiq_async/", f"{name}."))
     ]
@@ -76,6 +81,10 @@ def build() -> list[Path]:
         )
     if dead := relative(described):
         raise FailedError(f"the description has links that lead nowhere on the package index: {dead}")
+    with zipfile.ZipFile(wheel) as archive:
+        copy = ROOT / "build" / f"{name}.cdx.json"
+        copy.parent.mkdir(exist_ok=True)
+        copy.write_bytes(archive.read(f"{name}.dist-info/{BILL}"))
     run(sys.executable, "-m", "twine", "check", "--strict", str(sdist), str(wheel))
     return [sdist, wheel]
 
@@ -131,6 +140,8 @@ def main() -> None:
             size = artifact.stat().st_size >> 10
             print(f"dist/{artifact.name}: {size} KiB; installs {', '.join(installs)}")
         list(commands)
+        for line in pool.map(lambda tries: tries(artifacts[1], folders[1]), (try_frozen, try_zip)):
+            print(line)
 
 
 if __name__ == "__main__":

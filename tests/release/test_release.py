@@ -121,6 +121,7 @@ def test_a_workflow_may_read_and_its_jobs_take_what_they_need(name: str) -> None
         sorted(writes)
         == {
             "ci.yml": [],
+            "scorecard.yml": ["security-events"],
             "release.yml": ["contents", "id-token", "id-token", "pages"],
             "site.yml": ["id-token", "pages"],
         }[name]
@@ -130,8 +131,36 @@ def test_a_workflow_may_read_and_its_jobs_take_what_they_need(name: str) -> None
 
 @pytest.mark.parametrize("name", WORKFLOWS)
 def test_actions_are_pinned(name: str) -> None:
-    for action in re.findall(r"uses: (\S+)$", WORKFLOWS[name], re.MULTILINE):
+    """By commit: a tag can be moved. The comment has the version, which dependabot keeps, too."""
+    for action in re.findall(r"uses: (.+)$", WORKFLOWS[name], re.MULTILINE):
         if action.startswith("./"):
             assert (ROOT / action).is_file()
         else:
-            assert re.fullmatch(r"[\w-]+/[\w-]+@(v\d+|release/v\d+|[0-9a-f]{40})", action)
+            assert re.fullmatch(r"[\w-]+/[\w/-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+", action)
+
+
+def test_an_action_has_one_commit_in_all_workflows() -> None:
+    used = {found for text in WORKFLOWS.values() for found in re.findall(r"uses: ([^.\s]\S+)@(\w+)", text)}
+    assert len(used) == len({name for name, _ in used})
+
+
+# -- what is pinned ------------------------------------------------------------------------------------------
+
+PINNED = (ROOT / "tests" / "release" / "requirements.txt").read_text(encoding="utf-8")
+
+
+def test_each_tool_of_the_release_has_a_hash_and_none_an_index() -> None:
+    tools = re.findall(
+        r"^(\w[\w.-]*)==(\S+).*((?:\n    --hash=sha256:[0-9a-f]{64}(?: \\\\)?)+)$", PINNED, re.MULTILINE
+    )
+    assert {"hatchling", "pyinstaller", "twine", "uv"} <= {name for name, _, _ in tools}
+    assert len(tools) == len(re.findall(r"^\w", PINNED, re.MULTILINE))
+    assert "http" not in PINNED
+
+
+def test_groups_are_what_the_files_ask_for() -> None:
+    groups = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["dependency-groups"]
+    for group, file in (("docs", "docs/site/requirements.in"), ("release", "tests/release/requirements.in")):
+        lines = (ROOT / file).read_text(encoding="utf-8").splitlines()
+        assert groups[group] == [line for line in lines if not line.startswith("#")]
+    assert groups["dev"] == ["robotiq-async[dev]"]

@@ -19,6 +19,7 @@ from robotiq_async.values.checks import (
     check_byte,
     check_int,
     check_mask,
+    check_number,
     check_seconds,
     check_timeout,
 )
@@ -107,6 +108,29 @@ def test_a_small_integer_of_numpy_does_not_wrap_in_the_comparison() -> None:
     with refused(ValueError, "n must be in 0..1000, got np.int8(-1)"):
         check_int("n", np.int8(-1), 0, 1000)
     assert check_int("n", np.uint8(255), 0, 1000) == 255
+
+
+def test_an_array_of_numpy_without_dimensions_is_the_number_in_it() -> None:
+    """What ``array.sum()`` or ``array[i]`` of some libraries gives."""
+    assert check_byte("force", np.array(7, np.uint8)) == 7
+    assert check_mask(np.array(7)) is Finger.ABC
+    assert check_axis(np.array(8)) is Finger.SCISSOR
+    for number in (
+        check_seconds("timeout", np.array(0.25), 0, 9),
+        check_number("mm", np.array(0.25, np.float32), 0, 9),
+        check_timeout("timeout", np.array(0.25)),
+    ):
+        assert (number, type(number)) == (0.25, float)
+
+
+@pytest.mark.parametrize(
+    "value", [[1], [[1]], [], "1", True, None, 1j, np.timedelta64(1), np.datetime64(1, "s"), np.ma.masked]
+)
+def test_an_array_of_anything_else_is_refused(value: object) -> None:
+    array = np.asarray(value) if value is not np.ma.masked else value
+    for refuses in (check_byte, check_timeout if value is not None else check_byte):
+        with pytest.raises(TypeError, match="must be"):
+            refuses("force", array)
 
 
 # -- masks and axes ----------------------------------------------------------------------------------------

@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager, nullcontext
-from importlib.util import module_from_spec, spec_from_file_location
+from importlib import import_module
+from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
 from typing import Final
@@ -14,6 +15,7 @@ from ...hand import Hand
 from ..arguments import Address, Flag, Yes, need
 from ..browser import opened
 from ..consent import consent
+from ..failures import CommandError
 
 PATIENCE_S: Final = 60.0
 """Seconds for which the demo waits for a browser."""
@@ -72,9 +74,13 @@ async def _shown(hand: Hand) -> AsyncIterator[None]:
 
 
 def _program() -> ModuleType:
-    package = Path(__file__).parents[2]
-    installed, source = package / "_demo.py", package.parent / "demo" / "demo.py"
-    spec = spec_from_file_location("robotiq_async._demo", installed if installed.exists() else source)
+    name = "robotiq_async._demo"
+    if find_spec(name) is not None:  # in a wheel; also in a zip or a frozen program, where it is no file
+        return import_module(name)
+    source = Path(__file__).parents[3] / "demo" / "demo.py"
+    if not source.is_file():
+        raise CommandError("this program was frozen without the demo: freeze it where the wheel is installed")
+    spec = spec_from_file_location(name, source)
     assert spec is not None
     assert spec.loader is not None
     program = module_from_spec(spec)

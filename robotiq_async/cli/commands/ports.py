@@ -44,7 +44,7 @@ def with_ports(error: RobotiqError) -> str:
     message = str(error)
     if not message.endswith(MISSING):  # it is about something else, or names the adapters
         return message
-    with suppress(ImportError, OSError):
+    with suppress(ImportError, CommandError):  # the error in hand is the news
         if found := _found():
             return f"{message} These are: {', '.join(port.device for port in found)}"
     return message
@@ -53,4 +53,7 @@ def with_ports(error: RobotiqError) -> str:
 def _found() -> list[ListPortInfo]:
     from serial.tools import list_ports
 
-    return sorted(list_ports.comports(), key=lambda port: port.device)
+    try:
+        return sorted(list_ports.comports(), key=lambda port: port.device)
+    except Exception as error:  # drivers answer with anything
+        raise CommandError(f"the serial ports of this machine cannot be listed: {error!r}") from error

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import parse_qsl
 
+from ...link.address import malformed
 from ..wire.names import GripperName
 from .configuration import LOOPBACK, LOOPBACK_TLS, client_configuration
 
@@ -66,10 +67,10 @@ def parse_remote_address(address: object) -> tuple[GripperName, Route]:
         name = GripperName.parse(plain)
         pairs = parse_qsl(query, strict_parsing=True) if query else []
     except ValueError as error:
-        raise ValueError(f"malformed address {address!r}: {error}; accepted: {FORM}") from None
+        raise malformed(address, "", f"{FORM}; {error}") from None
     unknown = [option for option, _ in pairs if option not in _OPTIONS]
     if unknown:
-        raise ValueError(f"malformed address {address!r}: no option {unknown[0]!r}; accepted: {FORM}")
+        raise malformed(address, "", f"{FORM}; no option {unknown[0]!r}")
     usual = default_route()
     connect = tuple(value for option, value in pairs if option == "connect")
     folders = [value for option, value in pairs if option == "keys"]

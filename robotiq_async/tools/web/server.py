@@ -23,6 +23,7 @@ from typing import Final, Self
 from ...hand import Hand
 from ...runtime.clock import now
 from ...runtime.concurrency import wait_shielded
+from ...runtime.extras import is_frozen
 from ...runtime.log import log
 from ...values.errors import NotStartedError, ViewerError
 from ...values.status import RobotiqStatus
@@ -277,6 +278,8 @@ def _patience() -> float:
 
 
 async def _start() -> Process:
+    if is_frozen():  # it would start itself, and move the fingers a second time
+        raise ViewerError("the page needs a Python of its own, and a frozen program has none")
     # This package, even if the working directory contains another of its name.
     package, here = __name__.partition(".")[0], str(Path(__file__).parents[3])
     paths = os.pathsep.join(filter(None, (here, os.environ.get("PYTHONPATH"))))

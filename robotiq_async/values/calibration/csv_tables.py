@@ -20,6 +20,7 @@ import secrets
 import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Final, TextIO
 
@@ -164,7 +165,8 @@ def write_stroke(path: Path | str, points: Points, model: Model | None = None) -
 
 def thesis_table(name: str, layout: Layout) -> Table:
     """A table of the thesis: closing_time_ms (A1.1), force_foam_grams or force_rigid_grams."""
-    return read_table(Path(__file__).parents[2] / "data" / f"{name}.csv", layout)
+    with as_file(files("robotiq_async") / "data" / f"{name}.csv") as path:  # the package may be in a zip
+        return read_table(path, layout)
 
 
 # -- the column of the model -------------------------------------------------------------------------------
