@@ -74,8 +74,8 @@ dist: $(RELEASE)/.complete  ## Build sdist and wheel in dist/, and try each in a
 pythons: $(RELEASE)/.complete  ## Test the core on other Pythons (PYTHONS="3.12 3.13 3.14"); one that cannot be had is named
 	@$(RELEASE)/bin/python -m tests.release.pythons $(PYTHONS)
 
-canary: $(RELEASE)/.complete  ## Test with the newest of all dependencies, in an environment that is thrown away
-	@$(RELEASE)/bin/python -m tests.release.canary
+canary: $(RELEASE)/.complete  ## Test with the newest of all dependencies, in an environment that is thrown away (PYMODBUS="pymodbus>=4.0.0.dev0")
+	@PYMODBUS="$(PYMODBUS)" $(RELEASE)/bin/python -m tests.release.canary
 
 soak: $(STAMP)  ## Move a MODEL=3f under random faults for MINUTES=30 over LINK=tcp (rtu, urcap), and print figures
 	@$(BIN)/python -m tests.adversity.soak --minutes $(MINUTES) --link $(LINK) --model $(MODEL) --hands $(HANDS)

@@ -128,7 +128,7 @@ async def test_the_notebook(tmp_path: Path) -> None:
 
 
 async def test_the_readme(tmp_path: Path) -> None:
-    (example,) = blocks(read(README), "python")
+    _, example = blocks(read(README), "python")
     program = tmp_path / "example.py"
     async with SimulatorServer(SimulatedGripper(speedup=20)) as server:
         server.gripper.place_object(7, position=150)

@@ -5,10 +5,14 @@ tests included. It is thrown away; packages newer than in constraints.txt are na
 the tests.
 
     make canary TESTS="tests/cli tests/tools"
+    make canary PYMODBUS="pymodbus>=4.0.0.dev0"
+
+The second leaves the limit of pymodbus out, and takes pre-releases of it: docs/dependencies.md.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 import tempfile
 from collections.abc import Iterable
@@ -37,10 +41,20 @@ def news(packages: Iterable[str]) -> list[str]:
     return found
 
 
+def unlimited(requirement: str, folder: Path) -> list[str]:
+    """The options that put a requirement in the place of the library's own; none without one."""
+    if not requirement:
+        return []
+    overrides = folder / "overrides.txt"
+    overrides.write_text(f"{requirement}\n", encoding="utf-8")
+    return ["--overrides", str(overrides), "--prerelease", "if-necessary-or-explicit"]
+
+
 def main() -> None:
     """Install, and test."""
     with tempfile.TemporaryDirectory(prefix="robotiq_async_canary") as folder:
-        python = make(Path(folder) / "venv", "--upgrade", "--editable", f"{ROOT}[all,dev]")
+        options = unlimited(os.environ.get("PYMODBUS", ""), Path(folder))
+        python = make(Path(folder) / "venv", "--upgrade", *options, "--editable", f"{ROOT}[all,dev]")
         print("not as in constraints.txt:", "; ".join(news(installed(python))) or "nothing", flush=True)
         print(run_suite(python))
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 import sys
 import tomllib
+from pathlib import Path
 
 import pytest
 
 from docs.site.absolute import absolute
 from docs.site.versions import version
-from tests.release.canary import news, pinned
+from tests.release.canary import news, pinned, unlimited
 from tests.release.dist import relative
 from tests.release.environments import ROOT, FailedError, run
 from tests.release.tag import check, notes, repositories
@@ -151,7 +152,7 @@ PINNED = (ROOT / "tests" / "release" / "requirements.txt").read_text(encoding="u
 
 def test_each_tool_of_the_release_has_a_hash_and_none_an_index() -> None:
     tools = re.findall(
-        r"^(\w[\w.-]*)==(\S+).*((?:\n    --hash=sha256:[0-9a-f]{64}(?: \\\\)?)+)$", PINNED, re.MULTILINE
+        r"^(\w[\w.-]*)==(\S+).*((?:\n    --hash=sha256:[0-9a-f]{64}(?: \\)?)+)$", PINNED, re.MULTILINE
     )
     assert {"hatchling", "pyinstaller", "twine", "uv"} <= {name for name, _, _ in tools}
     assert len(tools) == len(re.findall(r"^\w", PINNED, re.MULTILINE))
@@ -164,3 +165,30 @@ def test_groups_are_what_the_files_ask_for() -> None:
         lines = (ROOT / file).read_text(encoding="utf-8").splitlines()
         assert groups[group] == [line for line in lines if not line.startswith("#")]
     assert groups["dev"] == ["robotiq-async[dev]"]
+
+
+# -- what of pymodbus 3 is used ------------------------------------------------------------------------------
+
+
+def test_the_page_names_every_module_that_uses_pymodbus() -> None:
+    page = (ROOT / "docs" / "dependencies.md").read_text(encoding="utf-8")
+    package = ROOT / "robotiq_async"
+    using = [
+        path
+        for path in package.rglob("*.py")
+        if re.search(r"^(from|import) pymodbus", path.read_text(encoding="utf-8"), re.MULTILINE)
+    ]
+    assert using
+    assert [path.name for path in using if f"`{path.relative_to(package).as_posix()}`" not in page] == []
+
+
+def test_what_of_pymodbus_is_not_documented_is_in_one_module_of_the_link() -> None:
+    inside = re.compile(r"\bctx\b|call_create|sync_serial|intern_read_ready|pymodbus\.transport")
+    link = (ROOT / "robotiq_async" / "link").rglob("*.py")
+    assert [path.name for path in link if inside.search(path.read_text(encoding="utf-8"))] == ["wires.py"]
+
+
+def test_a_canary_may_leave_out_the_limit_of_pymodbus(tmp_path: Path) -> None:
+    assert unlimited("", tmp_path) == []
+    _, overrides, *_ = unlimited("pymodbus>=4.0.0.dev0", tmp_path)
+    assert Path(overrides).read_text() == "pymodbus>=4.0.0.dev0\n"

@@ -24,7 +24,7 @@ LIBRARIES = {
 def pretend(monkeypatch: pytest.MonkeyPatch, library: str, *, patched: bool) -> None:
     module, function, threads = LIBRARIES[library]
     asked = {function: lambda name: patched and name == threads}
-    monkeypatch.setitem(sys.modules, module, SimpleNamespace(**asked))  # type: ignore[misc]
+    monkeypatch.setitem(sys.modules, module, SimpleNamespace(**asked))
 
 
 @pytest.mark.parametrize("library", LIBRARIES)
