@@ -37,6 +37,7 @@ class Wire:
     """
 
     exchange_s = EXCHANGE_S
+    has_current = True
 
     def __init__(self, speedup: float = 1.0, **options: Any) -> None:
         time = asyncio.get_running_loop().time

@@ -27,6 +27,8 @@ T = TypeVar("T")
 class GuardedTransport:
     """Limits the time of every call, converts foreign exceptions, and closes after a failure."""
 
+    has_current = True
+
     def __init__(
         self, inner: Transport, name: str, *, connect_timeout: float, response_timeout: float, log: Log = log
     ) -> None:

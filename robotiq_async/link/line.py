@@ -348,6 +348,8 @@ class Line:
         if self._exchange is not None:
             if (answer := self._exchange.feed(data)) is not None:
                 self._end(answer)
+        elif self.state is LineState.HUSHING:
+            self.silence.heard = self._watchdog.clock()  # and dropped
         elif (self.state in _IS_NEWS or not self.forgives) and (news := self._stray(data)) is not None:
             self._note(news)
 

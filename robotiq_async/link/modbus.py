@@ -40,6 +40,8 @@ LAST_NUMBER: Final = 0xFFFF
 class ModbusTransport:
     """A gripper behind Modbus."""
 
+    has_current = True
+
     def __init__(
         self,
         address: Address,
@@ -92,7 +94,7 @@ class ModbusTransport:
 
     @property
     def reads_with_writes(self) -> bool:
-        return self._dialogues.serves_23
+        return self._dialogues.serves_23 is not False
 
     @property
     def has_read_with_write(self) -> bool:

@@ -59,6 +59,8 @@ def simulated(address: str) -> SimulatedGripper | None:
 class SimulatedTransport:
     """Starts a simulator on loopback when opened. The gripper outlives the connection, as a real one."""
 
+    has_current = True
+
     def __init__(
         self,
         gripper: SimulatedGripper,

@@ -62,6 +62,10 @@ class Link(Protocol):
     """A transport as the poller uses it: the image is decided in the moment of the write."""
 
     @property
+    def has_current(self) -> bool:
+        """Whether a status has the motor currents, as the last opening has found."""
+
+    @property
     def is_open(self) -> bool: ...
 
     async def open(self) -> None: ...

@@ -64,7 +64,6 @@ class GripperLink:
         make: makes a transport for one start of the hand, from ``connect_timeout`` and ``response_timeout``.
         is_slow: whether a status takes a good part of a poll interval: over a serial line, or in questions.
         model: of the gripper.
-        has_current: whether a status has the motor currents.
         stroke: path of a file with measured openings that the address names; None if it names none.
     """
 
@@ -73,7 +72,6 @@ class GripperLink:
     make: Callable[..., Link]
     is_slow: bool = False
     model: Model = THREE_FINGER
-    has_current: bool = True
     stroke: str | None = None
 
 
@@ -143,7 +141,6 @@ def _over_urcap(address: Address, registers: RegisterMap, names_unit: bool, name
         partial(UrcapTransport, address, chosen, log=Log(name or str(address))),
         is_slow=True,
         model=model_of(address.model),
-        has_current=False,
         stroke=address.stroke,
     )
 

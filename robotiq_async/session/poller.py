@@ -54,10 +54,7 @@ class Poller:
         self._model: Final = options.model
         self._is_slow: Final = options.link.is_slow
         self._make_status: Final = functools.partial(
-            RobotiqStatus,
-            model=options.model,
-            stroke=options.units.stroke,
-            has_current=options.link.has_current,
+            RobotiqStatus, model=options.model, stroke=options.units.stroke
         )
         self.tick: Final = Tick(options.poll_interval)
         self._late_polls: Final = LatePolls(self.tick.time, options.log)
@@ -264,7 +261,8 @@ class Poller:
         self._take(self._status(registers, answered), asked)
 
     def _status(self, registers: Registers, answered: float) -> RobotiqStatus:
-        return self._make_status(registers, answered, next(self._publisher.numbers))
+        number, has_current = next(self._publisher.numbers), self._link.has_current
+        return self._make_status(registers, answered, number, has_current=has_current)
 
     def _take(self, status: RobotiqStatus, asked: float) -> None:
         """Pass on a status that was asked for at ``asked``."""

@@ -95,7 +95,7 @@ async def test_a_slow_one() -> None:
     gripper = jaw()
     async with UrcapSimulatorServer(gripper) as server:
         await activate_beforehand(gripper)
-        await server.fault_injector.begin(Trouble("delay", 0.004))
+        await server.fault_injector.begin(Trouble("delay", 0.0174))
         found = await findings(server.address)
     assert found["round trip"].level is Level.DOUBT
     assert found["rate"].advice == "Pass poll_interval=0.02."

@@ -12,7 +12,7 @@ import pytest
 from robotiq_async import JAW, TWO_FINGER_85, RobotiqHand, RobotiqStatus
 from robotiq_async.cli.output.tables import print_outcomes, print_status
 from robotiq_async.ros2.translation.diagnosis import diagnose
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer, UrcapSimulatorServer
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.measure.plots import plot_recording
 from robotiq_async.tools.recording.payloads import efforts
 from robotiq_async.tools.recording.recorder import Recorder
@@ -21,7 +21,7 @@ from robotiq_async.tools.recording.table import COLUMNS, Table
 from robotiq_async.tools.web.page.mirror import HandMirror
 from robotiq_async.tools.web.server import HandUpdates
 from tests.fleet.lab import lab
-from tests.hand.test_urcap import at_a_ur
+from tests.hand.test_urcap import OldUrcapServer, at_a_ur
 
 pytestmark = pytest.mark.virtual_time
 
@@ -30,7 +30,7 @@ async def test_there_is_no_current_and_not_a_current_of_0(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "ur.mcap"
-    async with at_a_ur() as (_, hand):
+    async with at_a_ur(kind=OldUrcapServer) as (_, hand):
         async with Recorder(hand, path):
             result = await hand.close()
         status, updates = hand.status, HandUpdates(hand)
@@ -71,7 +71,7 @@ async def test_there_is_no_current_and_not_a_current_of_0(
 
 async def test_a_remote_hand_has_none_either() -> None:
     async with (
-        lab(model=TWO_FINGER_85, kind_of_server=UrcapSimulatorServer) as here,
+        lab(model=TWO_FINGER_85, kind_of_server=OldUrcapServer) as here,
         here.client() as hand,
     ):
         result = await hand.close()

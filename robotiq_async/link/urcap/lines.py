@@ -17,11 +17,14 @@ from ...values.errors import ProtocolError
 from ...values.registers import Echo, Registers
 from ..outcome import Stray
 
-HIGHEST: Final = {"ACT": 1, "GTO": 1, "PRE": 255, "OBJ": 3, "STA": 3, "FLT": 255, "POS": 255}
-"""The variables of a status, and the highest value of each."""
+HIGHEST: Final = {"ACT": 1, "GTO": 1, "PRE": 255, "OBJ": 3, "STA": 3, "FLT": 255, "POS": 255, "COU": 255}
+"""The variables of a status, and the highest value of each. COU is the current, 10 mA a count (aist)."""
 DIGITS: Final = 3
 """The most digits of a value; the URCap's own script reads PRE with leading zeros."""
 ACKNOWLEDGED: Final = b"ack"
+UNREADABLE: Final = "?"
+"""What the port says for a value that it cannot read from the gripper: in an emergency stop of the arm, or
+when the tool has no power (ur_rtde's client expects it)."""
 _END: Final = b"\r\n"
 _LONGEST: Final = 16
 """More bytes than this are no line of this port."""
@@ -85,25 +88,26 @@ def choice(gripper: int) -> bytes:
     return f"SET SID {gripper}\n".encode()
 
 
-def value_in(received: bytes, name: str) -> int | None:
-    """The value in the answer to the question for a variable; None while it is not whole.
+def value_in(received: bytes, name: str) -> int | str | None:
+    """The value in the answer to the question for a variable, or UNREADABLE; None while it is not whole.
 
     Raises:
         ProtocolError: the bytes cannot become the answer.
     """
     text = without_ends(received)
-    head, digits = f"{name} ".encode(), text[len(name) + 1 :]
+    head, value = f"{name} ".encode(), text[len(name) + 1 :].strip()
     if text[: len(head)] != head[: len(text)] or len(text) > _LONGEST:
         raise _misfit(received, name)
-    is_whole = digits.endswith(b"\n")
-    number = digits.strip()
-    if number and not number.isdigit():
+    is_unreadable = value == UNREADABLE.encode()
+    if not (value.isdigit() or is_unreadable or not value):
         raise _misfit(received, name)
-    if not is_whole:
+    if not text.endswith(b"\n"):
         return None
-    if not 1 <= len(number) <= DIGITS or int(number) > HIGHEST[name]:
+    if is_unreadable:
+        return UNREADABLE
+    if not 1 <= len(value) <= DIGITS or int(value) > HIGHEST[name]:
         raise _misfit(received, name)
-    return int(number)
+    return int(value)
 
 
 def is_acknowledged(received: bytes) -> bool:
@@ -130,9 +134,10 @@ def stray(received: bytes) -> Stray | None:
 
 
 def status_registers(values: Mapping[str, int]) -> Registers:
-    """The status registers of a jaw with these values of its variables; the current reads 0."""
+    """The status registers of a jaw with these values of its variables; without COU the current reads 0."""
     first = values["ACT"] | values["GTO"] << 3 | values["STA"] << 4 | values["OBJ"] << 6
-    return (first << 8, values["FLT"] << 8 | values["PRE"], values["POS"] << 8, 0, 0, 0, 0, 0)
+    echo, position = values["FLT"] << 8 | values["PRE"], values["POS"] << 8 | values.get("COU", 0)
+    return (first << 8, echo, position, 0, 0, 0, 0, 0)
 
 
 def _misfit(received: bytes, name: str) -> ProtocolError:

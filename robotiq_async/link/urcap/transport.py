@@ -1,20 +1,25 @@
-"""The link to a jaw behind Robotiq's URCap on a UR: the text port 63352, one variable a question.
+"""The link to a jaw behind Robotiq's URCap on a UR: the text port 63352.
 
 To the rest of the library it is a link like the others: registers in, registers out (lines.py has the
 translation). What the port makes different is decided here:
 
-* A status takes a question for each variable, so it is not of one moment. Each read asks for PRE first, then
-  for OBJ and POS, and for one of the slow variables in turn (GTO, STA, FLT, ACT). The echo of a request comes
-  before the object status: an old OBJ beside a new echo would look like an arrival.
+* A status takes a question for each variable. All of them leave in one write, so a status costs one round
+  trip; it is not of one moment. A short read asks for PRE first, then for OBJ and POS, for one of the slow
+  variables in turn (GTO, STA, FLT, ACT) and for the current. The echo of a request comes before the object
+  status: an old OBJ beside a new echo would look like an arrival.
 * Echo, activation and go belong together: a go that is newer than the echo beside it would look like the
   request of another client. So everything is read when a part of it changes, and after a write that changes
   activation or go until they show it; then PRE lies between two equal answers to ACT and GTO, and was true
   together with them. A new PRE that this link has written is no surprise: a stream of positions keeps
   the short read.
-* Answers carry no number. There is one question at a time, and after whatever is not the one whole answer, in
-  time, the connection is closed. A new connection begins with a silence, and with another question than the
-  one that was open before: what a proxy delivers late is noticed by that.
-* A write is one line and never repeated. Another client's SET shows in the echo, as it does over Modbus.
+* Answers carry no number, but the name of the variable. After whatever is not all of the answers, in time,
+  the connection is closed. A new connection begins with a silence, and with another question than the one
+  that was open before: what a proxy delivers late is noticed by that.
+* ``?`` for a value says that the controller cannot read its gripper. That is no fault of the connection,
+  which stays: opening the link again asks on it.
+* A write is one line and never repeated. Another client's SET shows in the echo, as it does over Modbus. The
+  acknowledgement is the URCap's, and the line may be lost on its way to the gripper: where the echo stays as
+  it was, the link is lost, and no other client is blamed.
 * No source says whether a URCap takes the variables of a line at once. An echo that is half that of a line
   just written and half that of the image before is not another client's: until the rest shows, for half a
   second at most, the status has the echo of the image before. OBJ, STA, FLT and POS are as they were read.
@@ -34,7 +39,7 @@ from typing import Any, Final
 
 from ...runtime.log import Log, log
 from ...values import registers as reg
-from ...values.errors import ConnectFailedError, ProtocolError, ResponseTimeoutError
+from ...values.errors import ConnectFailedError, ConnectionLostError, ProtocolError, ResponseTimeoutError
 from ...values.registers import Echo, Registers
 from ..address import Address
 from ..exchange import Answer, Exchange
@@ -52,37 +57,79 @@ NOTHING: Final = (-1, -1, -1)
 """The echo of no image."""
 TRIES: Final = 4
 """Of reading activation, go and echo of one moment. Both change at a stop or a start, not all the time."""
+LOST_S: Final = 0.4
+"""A SET that does not show for so long is lost. Half a second after a write control blames another client."""
+
+SHORT: Final = ("PRE", "OBJ", "POS")
+"""What changes in a motion."""
+ALL: Final = ("ACT", "GTO", "PRE", "ACT", "GTO", "OBJ", "STA", "FLT", "POS")
+"""Everything; activation and go before and after the echo."""
+CURRENT: Final = "COU"
+"""What a port says that does not know it is not known; perhaps nothing. So it is asked alone at first."""
 
 
-class _Question(Exchange):
-    """A line and the check of its answer."""
+class Questions(Exchange):
+    """Questions for variables, in one write.
 
-    def __init__(self, line: bytes, read: Callable[[bytes], int | None]) -> None:
-        super().__init__(line)
-        self._read = read
-        self.value = 0
-        """What the whole answer says."""
+    Attributes:
+        names: the variables.
+        values: those that were answered so far, in this order.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        super().__init__(b"".join(map(lines.question, names)))
+        self.names = names
+        self.values: list[int | str] = []
+
+    @property
+    def unanswered(self) -> str:
+        """The first variable without an answer; empty if each has one."""
+        return self.names[len(self.values)] if len(self.values) < len(self.names) else ""
+
+    def feed(self, data: bytes) -> Answer | None:
+        self._received = lines.without_ends(self._received + data)
+        try:
+            while name := self.unanswered:
+                end = self._received.find(b"\n") + 1 or len(self._received)
+                value = lines.value_in(self._received[:end], name)
+                if value is None:
+                    return None
+                self.values.append(value)
+                self._received = lines.without_ends(self._received[end:])
+        except ProtocolError as error:
+            return Noise(error)
+        return lines.stray(self._received) or b""
+
+    def late(self, place: object) -> Silent:
+        return _late(place, self._received, f"GET {self.unanswered}", self.seconds)
+
+
+class Setting(Exchange):
+    """A line that sets variables."""
 
     def feed(self, data: bytes) -> Answer | None:
         self._received += data
         try:
-            said = self._read(self._received)
+            return self._received if lines.is_acknowledged(self._received) else None
         except ProtocolError as error:
             return Noise(error)
-        if said is None:
-            return None
-        self.value = said
-        return self._received
 
     def late(self, place: object) -> Silent:
-        half = lines.without_ends(self._received)
-        what = f"half a line, {lines.show(half)}, answers" if half else "no answer to"
-        asked = self.frame.decode().strip()
-        return Silent(ResponseTimeoutError(f"{place}: {what} {asked} within {self.seconds:g} s"))
+        return _late(place, self._received, self.frame.decode().strip(), self.seconds)
+
+
+def _late(place: object, received: bytes, asked: str, seconds: float) -> Silent:
+    half = lines.without_ends(received)
+    what = f"half a line, {lines.show(half)}, answers" if half else "no answer to"
+    return Silent(ResponseTimeoutError(f"{place}: {what} {asked} within {seconds:g} s"))
 
 
 class UrcapTransport:
-    """A jaw behind the text port of Robotiq's URCap."""
+    """A jaw behind the text port of Robotiq's URCap.
+
+    Attributes:
+        has_current: whether the port knows the motor current, as the last opening has found.
+    """
 
     def __init__(
         self,
@@ -98,14 +145,17 @@ class UrcapTransport:
         ``gripper`` is the one of several that the connection is about (SID); with None the URCap chooses.
         Timeouts are in seconds; that of a response is the time for a whole status, and for a write.
         """
-        self._log = log
-        self._address = address
-        self._gripper = gripper
-        self._connect_timeout = connect_timeout
-        self._response_timeout = response_timeout
-        self._line = Line(address, stray=lines.stray)
-        self._asked = b""
-        """The question that has no answer; that of a connection that has ended, too."""
+        self.has_current = False
+        self._log: Final = log
+        self._address: Final = address
+        self._gripper: Final = gripper
+        self._connect_timeout: Final = connect_timeout
+        self._response_s: Final = response_timeout
+        self._line: Final = Line(address, stray=lines.stray)
+        self._unanswered = ""
+        """The first question that has no answer; that of a connection that has ended, too."""
+        self._unreadable = ""
+        """The variable that the controller could not read the last time; empty if it could read all."""
         self._values: dict[str, int] = {}
         """The newest value of each variable on this connection."""
         self._turn = 0
@@ -122,6 +172,8 @@ class UrcapTransport:
         """The echo of the last write, if it changes activation or go and does not show yet."""
         self._shows_by = -math.inf
         """Until when that is awaited."""
+        self._lost_by = math.inf
+        """Until when the oldest SET that was acknowledged and does not show yet must show."""
 
     @property
     def is_open(self) -> bool:
@@ -133,22 +185,28 @@ class UrcapTransport:
         Raises:
             ConnectFailedError: refused or unreachable, or the URCap does not choose the gripper.
             ProtocolError: the answer is none, or bytes arrive without a question.
-            ConnectionLostError: the connection was closed at once.
+            ConnectionLostError: the connection was closed at once, or the controller cannot read its gripper.
             ResponseTimeoutError: the connection is open, but no answer comes.
         """
-        await self.close()
-        self._changes = True  # what was written last may still show
+        if not (self._unreadable and self.is_open):
+            await self.close()
+            await self._line.open(self, self._connect_timeout)
+        self._changes, self._lost_by = True, math.inf  # what was written last may still show
         self._values.clear()
-        await self._line.open(self, self._connect_timeout)
-        await self._line.talk(self, self._opening())
+        if not await self._line.talk(self, self._opening()):
+            raise self._cannot_be_read()
 
-    def read(self) -> Coroutine[Any, Any, Registers]:
-        """The status registers of a jaw; the variables were asked for one after the other.
+    async def read(self) -> Registers:
+        """The status registers of a jaw.
 
         Raises:
+            ConnectionLostError: the controller cannot read its gripper; the transport may be open.
             RobotiqConnectionError: no clean answer in time; the transport is closed.
         """
-        return self._line.talk(self, self._reading())
+        registers = await self._line.talk(self, self._reading())
+        if registers is None:
+            raise self._cannot_be_read()
+        return registers
 
     def send(self, decide: Callable[[], Sequence[int] | None]) -> Coroutine[Any, Any, bool]:
         """Write what ``decide`` returns, if anything, with one SET, exactly once.
@@ -166,29 +224,51 @@ class UrcapTransport:
         """Disconnect; does nothing when closed."""
         self._line.leave(self)
 
+    def _cannot_be_read(self) -> ConnectionLostError:
+        why = "an emergency stop of the arm, or its tool has no power"
+        what = f"the gripper cannot be read ({self._unreadable} ?): {why}"
+        return ConnectionLostError(f"{self._address}: {what}")
+
     # -- dialogues ---------------------------------------------------------------------------------------
 
-    def _opening(self) -> Dialogue[None]:
-        yield from self._get("FLT" if self._asked == lines.question("STA") else "STA")
+    def _opening(self) -> Dialogue[bool]:
+        """Make the first exchanges; return whether the gripper can be read."""
+        if (yield from self._read("FLT" if self._unanswered == "STA" else "STA")) is None:
+            return False
         if self._gripper is not None:
-            outcome = yield self._ask(lines.choice(self._gripper), _acknowledged)
+            outcome = yield self._set(lines.choice(self._gripper))
             if isinstance(outcome, Noise | Silent):
                 why = f"the URCap does not choose gripper {self._gripper}: {outcome.error}"
                 raise ConnectFailedError(str(self._address), why) from outcome.error
-            self._end(outcome)
+            _check(outcome)
+        question = Questions([CURRENT])
+        question.seconds = self._response_s
+        outcome = yield question
+        if isinstance(outcome, Noise | Silent):
+            yield Step.HUSH
+        self.has_current = isinstance(outcome, bytes) and question.values != [lines.UNREADABLE]
+        return True
 
-    def _reading(self) -> Dialogue[Registers]:
-        by = self._line.now() + self._response_timeout
+    def _reading(self) -> Dialogue[Registers | None]:
+        """Read a status; None if the gripper cannot be read."""
+        by = self._line.now() + self._response_s
+        current = (CURRENT,) if self.has_current else ()
         if not self._changes:
-            yield from self._read_some(by)
-        if self._changes:
-            yield from self._read_all(by)
+            slow = SLOW[self._turn]
+            self._turn = (self._turn + 1) % len(SLOW)
+            before, echo = self._values[slow], self._values["PRE"]
+            if (yield from self._read(*SHORT, slow, *current, by=by)) is None:
+                return None
+            is_surprise = self._values["PRE"] != echo and self._shown not in self._sent
+            self._changes = is_surprise or self._values[slow] != before
+        if self._changes and not (yield from self._read_all(current, by)):
+            return None
         activation, go, position = self._echo()
         return lines.status_registers(self._values | {"ACT": activation, "GTO": go, "PRE": position})
 
     def _writing(self, decide: Callable[[], Sequence[int] | None]) -> Dialogue[bool]:
-        if isinstance(obstacle := (yield Step.READY), Outcome):
-            raise obstacle.error
+        """Write what is decided; return whether there was anything."""
+        _check((yield Step.READY))
         if (image := decide()) is None:
             return False
         act, go, position = (field.read(image) for field in (reg.rACT, reg.rGTO, reg.rPR[0]))
@@ -199,36 +279,26 @@ class UrcapTransport:
             self._written = self._sent[-1]
         shown = None if self._releases else self._values.get("ACT")
         self._releases = bool(reg.rATR.read(image))
-        self._end((yield self._ask(lines.command(image, shown), _acknowledged)))
+        _check((yield self._set(lines.command(image, shown))))
+        self._lost_by = min(self._lost_by, self._line.now() + LOST_S)
         return True
 
     # -- a status ----------------------------------------------------------------------------------------
 
-    def _read_some(self, by: float) -> Dialogue[None]:
-        """The variables that change in a motion, and one of the slow ones."""
-        if (yield from self._is_new("PRE", by)) and self._shown not in self._sent:
-            self._changes = True
-            return
-        yield from self._is_new("OBJ", by)
-        yield from self._is_new("POS", by)
-        slow = SLOW[self._turn]
-        self._turn = (self._turn + 1) % len(SLOW)
-        self._changes = yield from self._is_new(slow, by)
-
-    def _read_all(self, by: float) -> Dialogue[None]:
-        """Every variable; activation, go and echo as they were in one moment."""
-        yield from self._read_pair(by)
+    def _read_all(self, current: tuple[str, ...], by: float) -> Dialogue[bool]:
+        """Read every variable; activation, go and echo as they were in one moment."""
         for _ in range(TRIES):
-            yield from self._is_new("PRE", by)
-            if not (yield from self._read_pair(by)):
+            answers = yield from self._read(*ALL, *current, by=by)
+            if answers is None:
+                return False
+            if answers[:2] == answers[3:5]:
                 break
         else:
             raise ProtocolError(f"{self._address}: ACT and GTO change too often to be read")
-        for name in ("OBJ", "STA", "FLT", "POS"):
-            yield from self._is_new(name, by)
         if self._shown == self._written or self._line.now() >= self._shows_by:
             self._written = NOTHING
         self._changes = self._written is not NOTHING
+        return True
 
     @property
     def _shown(self) -> Echo:
@@ -236,47 +306,57 @@ class UrcapTransport:
         return self._values["ACT"], self._values["GTO"], self._values["PRE"]
 
     def _echo(self) -> Echo:
-        """The echo as it was read, or that of the image before if a command is taken half."""
-        shown, images = self._shown, (self._whole, *self._sent)
-        if shown not in images and self._line.now() < self._shows_by:
+        """The echo as it was read, or that of the image before if a command is taken half.
+
+        Raises:
+            ConnectionLostError: it does not show what was acknowledged, and nothing else either.
+        """
+        shown, images, now = self._shown, (self._whole, *self._sent), self._line.now()
+        if shown not in images and now < self._shows_by:
             for before, after in pairwise(images):
                 if shown == lines.midway(before, after):
                     return before
-        while shown in self._sent and self._sent.popleft() != shown:
-            pass  # what was written before the image that shows will not show any more
+        if shown not in self._sent and shown == self._whole and now >= self._lost_by:
+            what = f"a SET was acknowledged, and its gripper has not shown it within {LOST_S:g} s"
+            raise ConnectionLostError(f"{self._address}: {what}")
+        if shown in self._sent:
+            while self._sent.popleft() != shown:
+                pass  # what was written before the image that shows will not show any more
+            self._lost_by = now + LOST_S if self._sent else math.inf
+        elif shown != self._whole:
+            self._lost_by = math.inf  # another client's: control judges
         self._whole = shown
         return shown
 
-    def _read_pair(self, by: float) -> Dialogue[bool]:
-        """Read ACT and GTO; whether one of them has changed."""
-        is_new = yield from self._is_new("ACT", by)
-        return (yield from self._is_new("GTO", by)) or is_new
+    # -- questions ---------------------------------------------------------------------------------------
 
-    def _is_new(self, name: str, by: float) -> Dialogue[bool]:
-        """Read a variable; whether it has changed."""
-        before = self._values.get(name)
-        self._values[name] = yield from self._get(name, by)
-        return self._values[name] != before
+    def _read(self, *names: str, by: float = math.inf) -> Dialogue[list[int] | None]:
+        """Read variables; None if the gripper cannot be read.
 
-    # -- one question ------------------------------------------------------------------------------------
+        Raises:
+            RobotiqConnectionError: there are not all of the answers, in time.
+        """
+        questions = Questions(names)
+        questions.seconds, questions.by = self._response_s, by
+        self._unanswered = names[0]
+        outcome = yield questions
+        self._unanswered = questions.unanswered
+        _check(outcome)
+        found = dict(zip(names, questions.values, strict=True))
+        self._unreadable = next((name for name, value in found.items() if value == lines.UNREADABLE), "")
+        if self._unreadable:
+            return None
+        values = [int(value) for value in questions.values]
+        self._values.update(zip(names, values, strict=True))
+        return values
 
-    def _get(self, name: str, by: float = math.inf) -> Dialogue[int]:
-        question = self._ask(lines.question(name), lambda received: lines.value_in(received, name), by)
-        self._end((yield question))
-        return question.value
-
-    def _ask(self, line: bytes, read: Callable[[bytes], int | None], by: float = math.inf) -> _Question:
-        self._asked = line
-        question = _Question(line, read)
-        question.seconds, question.by = self._response_timeout, by
-        return question
-
-    def _end(self, came_to: Answer | None) -> None:
-        """Note that the question was answered; every other outcome closes the connection."""
-        if isinstance(came_to, Outcome):
-            raise came_to.error
-        self._asked = b""
+    def _set(self, line: bytes) -> Setting:
+        setting = Setting(line)
+        setting.seconds = self._response_s
+        return setting
 
 
-def _acknowledged(received: bytes) -> int | None:
-    return lines.is_acknowledged(received) or None
+def _check(came_to: Answer | None) -> None:
+    """Raise what a step came to, if that is no answer: it closes the connection."""
+    if isinstance(came_to, Outcome):
+        raise came_to.error

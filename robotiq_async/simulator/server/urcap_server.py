@@ -34,6 +34,7 @@ _STATUS: Final = {
     "FLT": reg.gFLT,
     "PRE": reg.gPR[0],
     "POS": reg.gPO[0],
+    "COU": reg.gCU[0],
 }
 """Names that a GET reads from the status; two are those of a request, too."""
 _REQUEST: Final = {

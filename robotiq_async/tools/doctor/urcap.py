@@ -64,6 +64,8 @@ def _advice(error: RobotiqConnectionError) -> str:
             "Connected, but no line comes back: the controller may be busy or booting, or another program "
             "listens there. Can the gripper be moved at the teach pendant?"
         )
+    if "cannot be read" in error.message:
+        return "Release the emergency stop, switch the arm on, and look at the gripper at the teach pendant."
     if isinstance(error, ConnectionLostError):
         return "It closes the connection when asked: another program listens there, or the URCap was stopped."
     return (
