@@ -9,6 +9,10 @@ carries it out, and a test can, too.
   answer arrives now, it has the wrong length and ends the connection. Only then the status is read.
 * **A write is never repeated.** Whether it was carried out is unknown, and the status that is read next
   tells.
+* **Function 23 is tried without a command.** A jaw answers no function that it does not serve. So until it
+  has answered this one, a command leaves with function 16, and the status is read after it. Before a command
+  that finds the jaw at rest, as this link has requested it, function 23 writes that image again. Nothing
+  moves by it, and a silence costs a read and a tenth of a second of rest.
 """
 
 from __future__ import annotations
@@ -19,6 +23,7 @@ from collections.abc import Callable, Generator, Sequence
 from typing import Final
 
 from ..runtime.log import Log
+from ..values import registers as reg
 from ..values.errors import ResponseTimeoutError, RobotiqConnectionError
 from ..values.registers import REGISTER_COUNT, RegisterMap, Registers
 from . import transport
@@ -29,8 +34,10 @@ from .outcome import Noise, Outcome, Refused, Silent
 
 REPEAT_S: Final = 0.15
 """Time for a repeated read, so that a write after it still fails within a second."""
+TRIAL_S: Final = 0.1
+"""Time for the first answer to function 23: twenty of the usual ones."""
 USUAL_RESPONSE_S: Final = 0.4
-"""A longer response timeout means a slow line: a repeated read then gets that timeout instead of REPEAT_S."""
+"""A longer response timeout means a slow line: a repeated read and a trial then get that timeout."""
 SHORT_READS: Final = 3
 """Reads after the short silence, at opening, before a line is trusted with it."""
 MOST_UNANSWERED: Final = 3
@@ -51,7 +58,7 @@ class Dialogues:
     Attributes:
         line: the line to it; another one may be set before an opening.
         repeats: number of reads repeated because an answer was missing or damaged.
-        serves_23: whether function 23 is used.
+        serves_23: whether function 23 is used; None while it has yet to be tried.
         has_served_23: whether it was answered once.
     """
 
@@ -66,12 +73,14 @@ class Dialogues:
         """``make`` makes the exchange of a request (unit and PDU) in the form of the line."""
         self.line = line
         self.repeats = 0
-        self.serves_23 = registers.write_function == 23
+        self.serves_23: bool | None = registers.write_function == 23 and (True if registers.is_sure else None)
         self.has_served_23 = False
         self._map: Final = registers
         self._make: Final = make
         self._response_s: Final = response_timeout
-        self._repeat_s: Final = response_timeout if response_timeout > USUAL_RESPONSE_S else REPEAT_S
+        is_slow = response_timeout > USUAL_RESPONSE_S
+        self._repeat_s: Final = response_timeout if is_slow else REPEAT_S
+        self._trial_s: Final = response_timeout if is_slow else min(response_timeout, TRIAL_S)
         self._log: Final = log
         self._poll: Final = read_request(registers, registers.count)
         self._has_probed = False
@@ -81,6 +90,10 @@ class Dialogues:
         """The registers after those that a poll reads, as the first opening found them, if any was not 0."""
         self._unanswered: Final[deque[float]] = deque(maxlen=MOST_UNANSWERED)
         """The times of the last reads that were repeated because there was no answer."""
+        self._image: Sequence[int] = ()
+        """The last image that was acknowledged; empty after one that was not."""
+        self._status: Registers = ()
+        """The newest status."""
         self._warned = -math.inf
         """The time of the last warning about a repeated read."""
 
@@ -120,39 +133,42 @@ class Dialogues:
         yield from self._ready()
         if (image := decide()) is None:
             return False
-        came_to = yield self._ask(write_request(self._map, image))
-        if isinstance(came_to, Outcome):
-            raise came_to.error
+        if (bad := (yield from self._written(image))) is not None:
+            raise bad.error
         return True
 
     def write_and_read(self, decide: Decide) -> Dialogue[transport.Answer | None]:
-        """Write what ``decide`` returns, and read the status, with function 23; None if nothing was written.
+        """Write what ``decide`` returns, and read the status; None if nothing new was written.
 
         After a reply that is missing or damaged the write is in doubt, and the status that is read tells. A
-        device that refuses the function, or does not answer the first of these, gets function 16 from then
-        on. Only what was refused, and so not carried out, is written with it at once: what ``decide`` returns
-        then, for a stop may have come since.
+        device that refuses function 23, or does not answer it at first, gets function 16 from then on. Only
+        what was refused, and so not carried out, is written with it at once: what ``decide`` returns then,
+        for a stop may have come since. After a trial of the function ``decide`` is not called: the status on
+        which it would decide is too old.
         """
         yield from self._ready()
+        if self.serves_23 is None and self._is_at_rest():
+            came_to = yield from self._tried(self._image, self._trial_s)
+            if isinstance(came_to, Outcome) and not isinstance(came_to, Refused):
+                yield from self._again(came_to)
+            return None
         if (image := decide()) is None:
             return None
-        came_to = yield self._ask(write_and_read_request(self._map, image))
-        if isinstance(came_to, bytes):
-            self.has_served_23 = True
-            return transport.Answer(self._status_in(came_to), None)
-        assert came_to is not None, "an exchange comes to something"
-        if not self.has_served_23 and isinstance(came_to, Refused | Silent):
-            self.serves_23 = False
-            what = "%s is written with function 16: %s"
-            self._log.warning(what, self.line.address, came_to.error)
-        if isinstance(came_to, Refused) and came_to.is_unknown_function:
-            if not (yield from self.write(decide)):
-                return None
-            yield Step.TURN
+        bad: bytes | Outcome | None
+        if self.serves_23:
+            bad = yield from self._tried(image, self._response_s)
+            if isinstance(bad, bytes):
+                return transport.Answer(self._status_in(bad), None)
+            if isinstance(bad, Refused) and bad.is_unknown_function:
+                if not (yield from self.write(decide)):
+                    return None
+                yield Step.TURN
+                return transport.Answer((yield from self.read()), None)
+        elif (bad := (yield from self._written(image))) is None:
             return transport.Answer((yield from self.read()), None)
-        if not (isinstance(came_to, Refused) or self._can_repeat(came_to)):
-            raise came_to.error
-        return transport.Answer(self._status_in((yield from self._second(came_to))), came_to.error)
+        if not (isinstance(bad, Refused) or self._can_repeat(bad)):
+            raise bad.error
+        return transport.Answer(self._status_in((yield from self._second(bad))), bad.error)
 
     def stop_or_read(self, decide: Decide) -> Dialogue[Registers | None]:
         """Write what ``decide`` returns when the turn has come; read the status if that is nothing.
@@ -160,9 +176,8 @@ class Dialogues:
         After a disturbance it reads, which brings the line in step before a write.
         """
         if (yield Step.READY) is None and (image := decide()) is not None:
-            came_to = yield self._ask(write_request(self._map, image))
-            if isinstance(came_to, Outcome):
-                raise came_to.error
+            if (bad := (yield from self._written(image))) is not None:
+                raise bad.error
             return None
         return (yield from self.read())
 
@@ -177,6 +192,40 @@ class Dialogues:
             obstacle = yield Step.READY  # once: some lines add a byte to every reply
         if isinstance(obstacle, Outcome):
             raise obstacle.error
+
+    def _written(self, image: Sequence[int]) -> Part:
+        """Write an image with function 16."""
+        self._image = ()
+        came_to = yield self._ask(write_request(self._map, image))
+        if isinstance(came_to, Outcome):
+            return came_to
+        self._image = image
+        return None
+
+    def _tried(self, image: Sequence[int], seconds: float) -> Dialogue[bytes | Outcome]:
+        """Write an image with function 23, and learn whether that is served."""
+        self._image = ()
+        exchange = self._ask(write_and_read_request(self._map, image))
+        exchange.seconds = seconds
+        came_to = yield exchange
+        assert came_to is not None, "an exchange comes to something"
+        if isinstance(came_to, bytes):
+            self.serves_23, self.has_served_23, self._image = True, True, image
+        elif not self.has_served_23 and isinstance(came_to, Refused | Silent):
+            self.serves_23 = False
+            what = "%s is written with function 16: %s"
+            self._log.warning(what, self.line.address, came_to.error)
+        return came_to
+
+    def _is_at_rest(self) -> bool:
+        """Whether a jaw shows the last image, and stands still."""
+        shown, image = self._status, self._image
+        if not (shown and image) or self._map.count == REGISTER_COUNT or reg.gFLT.read(shown):
+            return False
+        is_moving = reg.gGTO.read(shown) and not reg.gOBJ.read(shown)
+        pairs = (reg.gACT, reg.rACT), (reg.gGTO, reg.rGTO), (reg.gPR[0], reg.rPR[0])
+        shows = all(echo.read(shown) == field.read(image) for echo, field in pairs)
+        return shows and not is_moving and not reg.rATR.read(image)
 
     def _again(self, first: Answer | None) -> Dialogue[bytes]:
         assert isinstance(first, Outcome)
@@ -261,7 +310,8 @@ class Dialogues:
 
     def _status_in(self, answer: bytes) -> Registers:
         registers = registers_in(answer)
-        return registers[: self._map.count] + self._rest if self._rest else registers
+        self._status = registers[: self._map.count] + self._rest if self._rest else registers
+        return self._status
 
     def _note_repeat(self, why: RobotiqConnectionError) -> None:
         self.repeats += 1

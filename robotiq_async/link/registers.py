@@ -39,6 +39,7 @@ def registers_of(
         write_function=check_write_function(
             usual.write_function if write_function is None else write_function
         ),
+        is_sure=write_function is not None,
     )
 
 

@@ -107,6 +107,7 @@ class RegisterMap:
         device_id: the unit id the gripper is shipped with.
         count: registers of either block that are read and written, 1..8; the others are 0.
         write_function: Modbus function that writes the request block: 16, or 23, which also reads the status.
+        is_sure: whether function 23 is known to be served; if not, it is tried before it is used.
     """
 
     request: int
@@ -115,6 +116,7 @@ class RegisterMap:
     device_id: int
     count: int = REGISTER_COUNT
     write_function: int = 16
+    is_sure: bool = False
 
 
 TCP_REGISTERS: Final = RegisterMap(request=0x0000, status=0x0000, read_function=4, device_id=2)

@@ -63,6 +63,8 @@ async def at_a_line(
     async with device(cable.FAR, gripper) as server:
         await activate_beforehand(gripper)
         address = f"rtu://{cable.NEAR}?model={model}"
+        if model == "2f85" and write_function is None:
+            write_function = 23  # believed, and not tried
         async with RobotiqHand(address, poll_interval=poll_interval, write_function=write_function) as hand:
             replies = Replies(server)
             await asyncio.sleep(0.1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator
+from dataclasses import replace
 
 import pytest
 import serial
@@ -33,7 +34,7 @@ async def transport(device: Device) -> AsyncIterator[ModbusTransport]:
 
 @pytest.fixture
 async def jaw(device: Device) -> AsyncIterator[ModbusTransport]:
-    """A transport to a 2F-85 at the near end, not open."""
-    transport = unopened(VirtualLine.NEAR, TWO_FINGER_85.rtu)
+    """A transport to a 2F-85 at the near end, not open; function 23 is not tried before it is used."""
+    transport = unopened(VirtualLine.NEAR, replace(TWO_FINGER_85.rtu, is_sure=True))
     yield transport
     await transport.close()

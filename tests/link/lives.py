@@ -94,7 +94,7 @@ async def _life(kind: str, rng: random.Random) -> Life:
 
 
 def _maps(kind: str) -> list[RegisterMap]:
-    jaw = TWO_FINGER_85.rtu
+    jaw = replace(TWO_FINGER_85.rtu, is_sure=True)
     return {"16": [RTU_REGISTERS], "23": [jaw], "shared": [RTU_REGISTERS, replace(jaw, device_id=12)]}[kind]
 
 

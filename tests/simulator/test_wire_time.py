@@ -129,18 +129,19 @@ async def test_a_line_keeps_no_more_than_it_carries_for_a_while(monkeypatch: pyt
 
 @virtual
 @pytest.mark.parametrize(
-    ("model", "interval", "streaming", "polls", "writes"),
+    ("model", "options", "streaming", "polls", "writes"),
     [
         ("3f", {}, False, 200, 0),
         ("3f", {}, True, 131.6, 131.6),
         ("3f", {"poll_interval": 0.01}, False, 100, 0),
         ("2f85", {}, False, 200, 0),
-        ("2f85", {}, True, 269.4, 269.4),
+        ("2f85", {"write_function": 23}, True, 269.4, 269.4),
+        ("2f85", {}, True, 238, 238),  # it never rests, so function 23 is not tried
     ],
 )
 async def test_how_often_a_hand_polls(
     model: str,
-    interval: dict[str, float],
+    options: dict[str, float],
     streaming: bool,
     polls: float,
     writes: float,
@@ -155,7 +156,7 @@ async def test_how_often_a_hand_polls(
     async with SerialSimulatorServer(cable.FAR, gripper):
         await activate_beforehand(gripper)
         address = f"rtu://{cable.NEAR}?model={model}"
-        async with RobotiqHand(address, write_spacing=0.0, **interval) as hand:  # type: ignore[arg-type]
+        async with RobotiqHand(address, write_spacing=0.0, **options) as hand:  # type: ignore[arg-type]
             await asyncio.sleep(0.02)
             seconds, before = 2.0 if streaming else 1.0, hand.statistics
             until = loop.time() + seconds

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from ...link.address import Address
@@ -66,7 +66,10 @@ class Bench:
     ) -> RecordedLink:
         """Another link, not opened; its frames are kept with the others unless ``keep`` is given."""
         transport = ModbusTransport(
-            self.address, registers, connect_timeout=CONNECT_S, response_timeout=RESPONSE_TIMEOUT_S
+            self.address,
+            replace(registers, write_function=23, is_sure=True),  # function 23 is what is examined
+            connect_timeout=CONNECT_S,
+            response_timeout=RESPONSE_TIMEOUT_S,
         )
         return RecordedLink(transport, keep or self.keep, self.model)
 

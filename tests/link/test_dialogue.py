@@ -1,0 +1,177 @@
+"""Dialogues as they are: generators that are handed outcomes, without a line, a loop or a clock."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from robotiq_async import ConnectionLostError, ProtocolError, ResponseTimeoutError
+from robotiq_async.link.dialogue import Dialogues
+from robotiq_async.link.exchange import Exchange, PduExchange
+from robotiq_async.link.outcome import Lost, Noise, Refused, Silent, Stray
+from robotiq_async.link.silence import Silence
+from robotiq_async.runtime.log import log
+from robotiq_async.values.model import TWO_FINGER_85
+
+IMAGE = (0x0900, 0x00FF, 0x4060, 0, 0, 0, 0, 0)
+AT_REST = (0xF900, 0x00FF, 0xE300)
+"""Active, go, at 255: as IMAGE asked for it."""
+SILENT = Silent(ResponseTimeoutError("no answer"))
+NOISE = Noise(ProtocolError("noise"))
+LOST = Lost(ConnectionLostError("gone"))
+UNKNOWN = Refused(ProtocolError("illegal function"), 1)
+GOOD = "the right answer"
+
+
+class Place:
+    """What a dialogue knows of its line."""
+
+    address = "rtu://X"
+    silence = Silence(10 / 115200)
+    keeps_silence = False
+    forgives = True
+
+    def now(self) -> float:
+        return 1000.0
+
+
+def speaker(*, is_sure: bool = True) -> Dialogues:
+    registers = replace(TWO_FINGER_85.rtu, is_sure=is_sure)
+    place: Any = Place()
+    return Dialogues(place, registers, PduExchange, 0.4, log)
+
+
+def answer(exchange: Exchange, words: tuple[int, ...] = AT_REST) -> bytes:
+    """The right answer to a request."""
+    pdu = exchange.frame
+    if pdu[0] == 16:
+        return pdu[:5]
+    count = int.from_bytes(pdu[3:5], "big")
+    block = b"".join(word.to_bytes(2, "big") for word in (*words, *(0,) * 5)[:count])
+    return bytes((pdu[0], 2 * count)) + block
+
+
+def said(dialogue: Any, *outcomes: Any) -> tuple[list[str], Any]:
+    """The steps of a dialogue, functions and counts for requests, and how it ends.
+
+    ``outcomes`` are those of its requests, in order; after them each gets the right answer.
+    """
+    left, steps, outcome = list(outcomes), list[str](), None
+    try:
+        while True:
+            step = dialogue.send(outcome)
+            outcome = None
+            if isinstance(step, Exchange):
+                pdu = step.frame
+                steps.append(f"{pdu[0]}x{int.from_bytes(pdu[3:5], 'big')}")
+                given = left.pop(0) if left else GOOD
+                outcome = answer(step) if given is GOOD else given
+            else:
+                steps.append(step.name)
+    except StopIteration as end:
+        return steps, end.value
+    except Exception as error:  # noqa: BLE001  # it is what is looked at
+        return steps, error
+
+
+@pytest.mark.parametrize(
+    "first", [NOISE, SILENT, Stray(ProtocolError("stray")), Refused(ProtocolError("busy"), 6)]
+)
+def test_a_read_is_asked_once_more_after_silence_and_a_read_of_another_length(first: Any) -> None:
+    steps, status = said(speaker().read(), first)
+    assert steps[:3] == ["3x3", "TURN", "HUSH"]
+    assert steps[4] == "3x3"
+    assert status[:3] == AT_REST
+
+
+@pytest.mark.parametrize("first", [LOST, Refused(ProtocolError("no"), 2)])
+def test_what_a_lost_byte_cannot_explain_ends_a_read(first: Any) -> None:
+    assert said(speaker().read(), first) == (["3x3"], first.error)
+
+
+def test_a_second_failure_ends_it_with_the_first_reason() -> None:
+    dialogues = speaker()
+    said(dialogues.opening())
+    assert said(dialogues.read(), NOISE, SILENT) == (["3x3", "TURN", "HUSH", "3x1"], NOISE.error)
+    assert said(dialogues.read(), NOISE, GOOD, SILENT) == (
+        ["3x3", "TURN", "HUSH", "3x2", "3x3"],
+        NOISE.error,
+    )
+    assert dialogues.repeats == 0
+
+
+@pytest.mark.parametrize("bad", [NOISE, SILENT, LOST, UNKNOWN])
+def test_a_write_is_sent_once(bad: Any) -> None:
+    assert said(speaker().write(lambda: IMAGE), bad) == (["READY", "16x3"], bad.error)
+
+
+@pytest.mark.parametrize("bad", [NOISE, SILENT, Refused(ProtocolError("failure"), 4)])
+def test_a_write_with_23_is_in_doubt_and_the_status_tells(bad: Any) -> None:
+    dialogues = speaker()
+    said(dialogues.opening())
+    said(dialogues.write_and_read(lambda: IMAGE))
+    steps, written = said(dialogues.write_and_read(lambda: IMAGE), bad)
+    assert steps == ["READY", "23x3", "TURN", "HUSH", "3x1", "3x3"]
+    assert written.doubt is bad.error
+    assert written.registers[:3] == AT_REST
+
+
+def test_what_was_refused_is_decided_again_and_written_with_16() -> None:
+    images = [None, IMAGE]
+    assert said(speaker().write_and_read(images.pop), UNKNOWN) == (["READY", "23x3", "READY"], None)
+    steps, written = said(speaker().write_and_read(lambda: IMAGE), UNKNOWN)
+    assert steps == ["READY", "23x3", "READY", "16x3", "TURN", "3x3"]
+    assert written.doubt is None
+
+
+# -- the trial of function 23 ------------------------------------------------------------------------------
+
+
+def tried(*outcomes: Any) -> tuple[Dialogues, list[str], Any]:
+    dialogues = speaker(is_sure=False)
+    said(dialogues.opening())
+    assert said(dialogues.write_and_read(lambda: IMAGE))[0] == ["READY", "16x3", "3x3"], (
+        "nothing is known yet"
+    )
+    return dialogues, *said(
+        dialogues.write_and_read(lambda: pytest.fail("decided on an old status")), *outcomes
+    )
+
+
+def test_function_23_is_tried_with_the_image_in_force_and_used_from_then_on() -> None:
+    dialogues, steps, written = tried()
+    assert (steps, written) == (["READY", "23x3"], None)
+    assert said(dialogues.write_and_read(lambda: IMAGE))[0] == ["READY", "23x3"]
+
+
+def test_a_jaw_that_is_silent_on_function_23_costs_a_read_and_no_command() -> None:
+    dialogues, steps, written = tried(SILENT)
+    assert (steps, written) == (["READY", "23x3", "TURN", "HUSH", "3x1", "3x3"], None)
+    assert dialogues.serves_23 is False
+    assert said(dialogues.write_and_read(lambda: IMAGE))[0] == ["READY", "16x3", "3x3"]
+
+
+def test_a_jaw_that_refuses_function_23_costs_nothing_more() -> None:
+    dialogues, steps, _ = tried(UNKNOWN)
+    assert steps == ["READY", "23x3"]
+    assert dialogues.serves_23 is False
+
+
+def test_noise_decides_nothing() -> None:
+    dialogues, _, _ = tried(NOISE)
+    assert dialogues.serves_23 is None
+
+
+@pytest.mark.parametrize(
+    "status",
+    [(0x3900, 0x00FF, 0x7000), (0xF100, 0x00FF, 0xE300), (0xF900, 0x0080, 0x8000), (0xF900, 0x0BFF, 0xE300)],
+    ids=["moving", "stopped by another", "another's position", "a fault"],
+)
+def test_it_is_not_tried_unless_the_jaw_rests_as_it_was_told(status: tuple[int, ...]) -> None:
+    dialogues = speaker(is_sure=False)
+    said(dialogues.opening())
+    said(dialogues.write(lambda: IMAGE))
+    said(dialogues.read(), answer(PduExchange(bytes.fromhex("09 03 07d0 0003")), status))
+    assert said(dialogues.write_and_read(lambda: IMAGE))[0] == ["READY", "16x3", "3x3"]
