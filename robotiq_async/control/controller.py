@@ -28,10 +28,10 @@ from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .entry import Entry
 from .evidence import FOLLOWS, Evidence, is_activating
-from .gate import NO_PLACES, gate, merged
+from .gate import gate, merged
 from .ledger import NEVER, Ledger
 from .motion import Move
-from .pending import Command, OpenRequests
+from .pending import Command, OpenRequests, Pending
 from .procedures import Begun, Procedure, activation, automatic_release, reset_and_activation
 from .state_machine import RUNNING, SEEN, StateMachine
 from .stops import Keeping, Stop
@@ -119,7 +119,7 @@ class Controller:
         requests = self._requests
         is_open, left = requests.leave(move)
         if is_open or unseen:
-            requests.hold(left, "a move took over and was given up")
+            requests.hold(left, "a move was given up")
             # Its other axes follow it until what has taken them over is written, and that may be lost.
             requests.merge_hold(move.axes & requests.pending.moved)
         if unseen and not is_open and self._evidence.condition is not None:
@@ -128,9 +128,10 @@ class Controller:
 
     def hold(self, axes: Finger, waiter: Waiter[None]) -> None:
         """Hold those axes that move, whichever client moves them. It ends no activation and no release."""
+        is_due = self.machine.ask(Trigger.ASK_HOLD, self.status)
         if self.is_driven:
             self.machine.log.warning("a hold ends no activation and no release: halt() does, by a reset")
-        if self.machine.ask(Trigger.ASK_HOLD, self.status):
+        if is_due:
             self._requests.hold(axes, "a hold took over", waiter)
             self._update_state(Trigger.ASK_HOLD)
         else:
@@ -367,7 +368,7 @@ class Controller:
             if condition is Trigger.SEEN_FAULT and status.activation_echo:
                 # When it clears [manual 2012, 4.7: if it is minor], no motion may resume, and none begin that
                 # was sent just before and does not act yet. Which axes need it is decided when it is written.
-                requests.merge_hold(ledger.ours)
+                requests.merge_hold(ledger.ours, f"the gripper reports {status.fault.description}")
             elif condition not in FOLLOWS:
                 requests.hold_only(NO_AXES)
         if ledger.match is None:
@@ -475,7 +476,9 @@ class Controller:
             return None
         is_early = now < self._free_at
         # A halt also stops the axes to be held, so the callers of hold() have their answer with it.
-        entry = self._send(image, status, now, holds=stop.level is StopLevel.HALT)
+        left = self._requests.pending
+        left = replace(left, hold=NO_AXES) if stop.level is StopLevel.HALT else left
+        entry = self._send(image, status, now, left)
         stop.written(entry, status, is_early=is_early)
         return entry.image
 
@@ -501,7 +504,7 @@ class Controller:
             return None
         if image is None:
             return None
-        entry = self._send(image, status, now, of=procedure)
+        entry = self._send(image, status, now, self._requests.pending, procedure)
         procedure.written(entry)
         if not procedure.releases:
             self._activation = Begun(entry)
@@ -515,40 +518,33 @@ class Controller:
             return None  # if the fault lasts, no motion is sent at all
         base = ledger.base
         gripping = ledger.gripping(status) if pending.positions else NO_AXES
-        may_move = later = NO_AXES
+        held, left = {}, Pending()
         if pending.hold:
-            may_move, (pressing, is_open) = ledger.may_move(status), ledger.pressing_again(status)
-            pending = replace(pending, hold=pending.hold & ~pressing)
-            later = pressing & self._requests.pending.hold & ~pending.moved if is_open else NO_AXES
-        places = ledger.places(status, now - ledger.now.time) if pending.hold & status.moving else NO_PLACES
-        image = merged(base, pending, status, gripping=gripping, may_move=may_move, places=places)
+            held = ledger.held(pending.hold, status, now - ledger.now.time)
+            # What may press on its part is not held before that is known.
+            left = Pending(hold=pending.hold & ~pending.moved & ledger.may_press(status))
+        image = merged(base, pending, status, gripping=gripping, held=held)
         if not pending.has_changes and gate(image, status, may_reset=ledger.may_reset) == base:
             # No axis moves, so there is nothing to write, and what the gripper has answers the callers. If an
             # earlier write does not act yet, an axis may begin to move: ask again then.
             if ledger.is_settled:
-                self._requests.sending(ledger.last, everything=True, later=later)
+                self._requests.sending(ledger.last, left)
                 self._requests.acknowledged()
                 self._update_state(Trigger.DELIVERED)
             return None
-        return self._send(image, status, now, everything=True, later=later).image
+        return self._send(image, status, now, left).image
 
     def _send(
-        self,
-        image: Request,
-        status: RobotiqStatus,
-        now: float,
-        *,
-        everything: bool = False,
-        holds: bool = False,
-        later: Finger = NO_AXES,
-        of: Procedure | None = None,
+        self, image: Request, status: RobotiqStatus, now: float, left: Pending, of: Procedure | None = None
     ) -> Entry:
         """Put an image through the gate and into the ledger; decide() returns it to be sent."""
+        # ``left`` is what it has not of all that is pending.
         releases = of is not None and of.releases
         activates, may_reset = of is not None and not releases, self._ledger.may_reset
         image = gate(image, status, may_reset=may_reset, activates=activates, releases=releases)
-        entry = self._ledger.write(image, self._requests.pending.moved if everything else NO_AXES, now)
-        self._requests.sending(entry, everything=everything, holds=holds, later=later)
+        moved = NO_AXES if left.positions else self._requests.pending.moved
+        entry = self._ledger.write(image, moved, now)
+        self._requests.sending(entry, left)
         self._free_at = now + self._spacing
         return entry
 
@@ -566,7 +562,7 @@ class Controller:
             fail(self._stop.callers, error)
             # A halt and a reset are not sent again: once the link is back, what we move is held instead.
             if self._stop.level in (StopLevel.HALT, StopLevel.RESET):
-                self._requests.merge_hold(Finger.ALL)
+                self._requests.merge_hold(Finger.ALL, "a stop was lost with the link: once it is back")
         self._requests.lost(error)
         self._procedure, self._stop = None, None
         self._evidence.lost()

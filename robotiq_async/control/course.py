@@ -7,6 +7,7 @@ as statuses tell.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import Final
 
@@ -15,32 +16,34 @@ from ..values.status import RobotiqStatus
 
 BASELINE_S: Final = 0.25
 """The statuses of this time give the speed. Positions are whole counts: it is right to 4 counts a second."""
-MOST_STATUSES: Final = 256  # as many as the shortest poll interval makes in that time
+SPACING_S: Final = 0.02
+"""Seconds between the statuses that are kept."""
 
 
 class Course:
-    """The statuses in a row in which an axis moves."""
+    """Some of the statuses in which an axis moves."""
 
     def __init__(self) -> None:
         # Each with the time at which it was asked for: a loop that is held up reads a reply late, and a speed
         # by the times of the replies would drive a held axis on to its request.
-        self._statuses: Final[deque[tuple[float, RobotiqStatus]]] = deque(maxlen=MOST_STATUSES)
+        self._kept: Final[deque[tuple[float, RobotiqStatus]]] = deque(
+            maxlen=math.ceil(BASELINE_S / SPACING_S)
+        )
+        self.due = -math.inf  # when the next status is to be kept
 
-    def update(self, status: RobotiqStatus, asked: float) -> None:
-        if status.moving:
-            self._statuses.append((asked, status))
-        elif self._statuses:
-            self._statuses.clear()
+    def keep(self, status: RobotiqStatus, asked: float) -> None:
+        self.due = asked + SPACING_S
+        self._kept.append((asked, status))
 
-    def after(self, axis: Finger, status: RobotiqStatus, seconds: float) -> int:
-        """Its position so long after a status; that of the status if it is not known to move."""
-        at = status.position(axis)
-        if not self._statuses or self._statuses[-1][1] is not status:
+    def after(self, axis: Finger, status: RobotiqStatus, asked: float, seconds: float) -> int:
+        """Its position so long after a status, which was asked for then; as it shows if it may stand."""
+        at, since, first = status.position(axis), asked, status
+        # A fault stops the axes, and gDT shows a motion.
+        if axis not in status.moving or status.fault.is_serious:
             return at
-        last, _ = since, first = self._statuses[-1]
-        for asked, each in reversed(self._statuses):
-            if axis not in each.moving or last - asked > BASELINE_S:
+        for kept, each in reversed(self._kept):
+            if axis not in each.moving or asked - kept > BASELINE_S:
                 break
-            since, first = asked, each
-        time = last - since
+            since, first = kept, each
+        time = asked - since
         return at if time == 0 else at + int((at - first.position(axis)) * seconds / time)

@@ -11,16 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from types import MappingProxyType
-from typing import Final
 
 from ..values.enums import NO_AXES, Finger
 from ..values.request import AxisRequest, Request
 from ..values.status import RobotiqStatus
 from .pending import Pending
-from .rest import drifts
-
-NO_PLACES: Final[Mapping[Finger, int]] = MappingProxyType({})
 
 
 def merged(
@@ -29,12 +24,11 @@ def merged(
     status: RobotiqStatus,
     *,
     gripping: Finger = NO_AXES,
-    may_move: Finger = NO_AXES,
-    places: Mapping[Finger, int] = NO_PLACES,
+    held: Mapping[Finger, int],
 ) -> Request:
     """Merge pending changes into ``base``. Other axes keep their requests, unless this sets rGTO."""
-    # ``gripping`` has the axes that were in contact when rGTO was last set, ``may_move`` those that show rest
-    # and may move all the same, ``places`` where those will be that move when this acts.
+    # ``gripping`` has the axes that were in contact when rGTO was last set, ``held`` the place of each axis
+    # that is to be stopped.
     if pending.positions and not base.go:
         # rGTO starts every axis [manual 2012, 4.6]: ask each for where it is. An axis that gripped keeps its
         # request, or it would lose its grip.
@@ -43,12 +37,7 @@ def merged(
         )
     # With rGTO set, an axis that is not addressed keeps its position request, and with it its motion or grip:
     # so speed and force alone start nothing.
-    held = {
-        axis: places.get(axis, status.position(axis))
-        for axis in status.model.axes
-        if axis in pending.hold and drifts(axis, base, status, may_move)
-    }
-    positions = held | pending.positions
+    positions = {**held, **pending.positions}
     return replace(
         base,
         go=base.go or bool(pending.positions),

@@ -38,7 +38,7 @@ from .adoption import Adoption
 from .course import Course
 from .entry import Entry, RecentRequests
 from .limits import Limits
-from .rest import LONG_AGO, Contacts, Moment, Rest, Target, may_move, rest_of
+from .rest import LONG_AGO, Contacts, Moment, Rest, Target, drifts, may_move, rest_of
 
 WINDOW_S: Final = 0.5
 """Time after its acknowledgement in which a write shows, if it acts: the slowest device cycle considered is
@@ -64,9 +64,8 @@ class Ledger:
         """``before`` is the ledger of the session before: what it has written may still act."""
         first = Request(axes=(AxisRequest(0, speed, force),) * len(model.axes), model=model)
         number: int = 0 if before is None else before.shown.number
-        self.shown: Entry = Entry(
-            number, first, first.echo, False, NEVER, NEVER, LONG_AGO
-        )  # the newest that showed
+        # The newest that showed.
+        self.shown: Entry = Entry(number, first, first.echo, False, NEVER, NEVER, LONG_AGO)
         self.match: Entry | None = None  # the one that the newest status shows
         # When that was asked for. It may show the state of that time, however late a busy loop reads the
         # reply; so the age of a write is measured by this.
@@ -82,6 +81,7 @@ class Ledger:
         # By number; each may act after those with a lower one.
         self._doubtful: list[Entry] = [] if before is None else before.waiting()
         for each in self._doubtful:
+            log.info("the last hand of this gripper has left a request on its way: %s", each.image)
             each.overtaken(each.number)
         # The entry that showed as a status was adopted. It is an entry no more; but if it is ours, it may
         # activate: after a reset our own image is taken for another client's.
@@ -166,13 +166,16 @@ class Ledger:
     def ahead(self) -> list[Entry]:
         """What may still act, in the order in which it would; an entry in doubt may also never act."""
         # Every question about what the gripper may get is one about these, whatever a status shows today.
-        waiting = self.waiting()
-        return [each for each in waiting if not (self.acts(each) or self._is_past(each))] if waiting else []
+        return [each for each in self.waiting() if self._is_ahead(each)]
+
+    def _is_ahead(self, entry: Entry) -> bool:
+        return not (self.acts(entry) or self._is_past(entry))
 
     @property
     def may_reset(self) -> bool:
         """Whether the gripper may be reset by the time at which the next image acts: its rACT would rise."""
-        return any(not each.image.activate for each in self.ahead)
+        # As ahead, but every write asks this, and nearly every image has rACT.
+        return any(not each.image.activate and self._is_ahead(each) for each in self.waiting())
 
     @property
     def may_set_go(self) -> bool:
@@ -191,22 +194,35 @@ class Ledger:
 
     def gripping(self, status: RobotiqStatus) -> Finger:
         """The axes that are known to press on a part, or did when rGTO was cleared."""
-        return self.contacts.pressing(status, self.base)[0]
+        return self.contacts.pressing(status, self.base) & ~self.contacts.open
 
-    def pressing_again(self, status: RobotiqStatus) -> tuple[Finger, bool]:
-        """The axes that show a motion where they were in contact, and whether it may be one after all."""
-        # To hold one that presses would end its grip. If it moves, it has moved off before long.
-        known, unknown = self.contacts.pressing(status, self.base) if self.contacts else (NO_AXES, NO_AXES)
-        return (known | unknown) & status.moving, self.now.time - self.last.time < WINDOW_S
+    def may_press(self, status: RobotiqStatus) -> Finger:
+        """The axes that show a motion where they were in contact: not known yet whether they press again."""
+        # An axis that moves has moved off before long. One that still shows a motion after that presses.
+        is_recent = self.now.time - self.last.time < WINDOW_S
+        return self._pressing_again(status) if is_recent else NO_AXES
 
-    def places(self, status: RobotiqStatus, age: float = 0.0) -> dict[Finger, int]:
-        """Where a hold finds the moving axes when it acts, if it is sent when the status is of that age."""
-        places, base = {}, self.base
-        for axis in status.moving:
-            at, request = status.position(axis), base.position(axis)  # it goes no further than to its request
-            low, high = min(at, request), max(at, request)
-            places[axis] = min(high, max(low, self._course.after(axis, status, age + self._delay)))
-        return places
+    def held(self, axes: Finger, status: RobotiqStatus, age: float = 0.0) -> dict[Finger, int]:
+        """The axes of these that a hold must stop, and where it finds each; ``age`` is that of the status."""
+        if not axes or not (base := self.base).go:
+            return {}
+        may_move, axes = self.may_move(status), axes & ~self._pressing_again(status)
+        return {
+            axis: self._place(axis, status, base.position(axis), age)
+            for axis in status.model.axes
+            if axis in axes and drifts(axis, base, status, may_move)
+        }
+
+    def _place(self, axis: Finger, status: RobotiqStatus, request: int, age: float) -> int:
+        """Where an axis will be, on its way to its request, when a write that leaves now acts."""
+        at = status.position(axis)
+        place = self._course.after(axis, status, self.now.time, age + self._delay)
+        return sorted((at, place, request))[1]
+
+    def _pressing_again(self, status: RobotiqStatus) -> Finger:
+        # To hold one that presses would end its grip.
+        pressing = self.contacts.pressing(status, self.base) if self.contacts else NO_AXES
+        return pressing & status.moving
 
     def may_move(self, status: RobotiqStatus) -> Finger:
         """The axes that may move, or be about to, although the status shows them at rest."""
@@ -341,8 +357,13 @@ class Ledger:
 
     def waiting(self) -> list[Entry]:
         """The entries after the one that shows, the oldest first."""
-        shown = self.shown.number
-        waiting = [*takewhile(lambda each: each.number > shown, reversed(self._entries))][::-1]
+        # Written out, because every write asks for it.
+        shown, waiting = self.shown.number, []
+        for each in reversed(self._entries):
+            if each.number <= shown:
+                break
+            waiting.append(each)
+        waiting.reverse()
         if not self._doubtful:
             return waiting
         doubtful = (each for each in self._doubtful if each.number > self._entries[0].number)
@@ -404,8 +425,9 @@ class Ledger:
 
     def update_rest(self, status: RobotiqStatus) -> None:
         """Find out which axes have come to rest. Not in a fault: it keeps axes from starting."""
-        self._course.update(status, self.now.time)
         if self._unproven:
+            if self.now.time >= self._course.due:
+                self._course.keep(status, self.now.time)
             self._note_acting()
             # gDT has no meaning without rGTO [manual]. While an adopted request is a guess, no rest follows
             # from it: a late gDT alone may make an axis look as if it was asked for where it is.

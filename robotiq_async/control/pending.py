@@ -106,11 +106,14 @@ class OpenRequests:
     def hold(self, axes: Finger, why: str, waiter: Waiter[None] | None = None) -> None:
         """Hold those axes that move. It supersedes what moves them."""
         self.supersede(axes, why)
-        self.merge_hold(axes)
+        self.merge_hold(axes, why if waiter is None else "")
         if waiter is not None:
             self.calls.append(Call(waiter, held=axes))
 
-    def merge_hold(self, axes: Finger) -> None:
+    def merge_hold(self, axes: Finger, why: str = "") -> None:
+        """Hold those axes that move; ``why`` is for the log, if no caller has asked for it."""
+        if axes and why:
+            self._log.info("%s: what moves of %s is held", why, axes)
         self.pending = replace(self.pending, hold=self.pending.hold | axes)
 
     def hold_only(self, axes: Finger) -> None:
@@ -147,17 +150,15 @@ class OpenRequests:
 
     # -- what becomes of it ----------------------------------------------------------------------------
 
-    def sending(
-        self, entry: Entry, *, everything: bool = False, holds: bool = False, later: Finger = NO_AXES
-    ) -> None:
-        """An entry has everything that is pending but the holds of some axes, the holds alone, or nothing."""
-        pending, self._sent = self.pending, Pending()
-        if everything:
-            self._sent, self.pending = replace(pending, hold=pending.hold & ~later), Pending(hold=later)
-        elif holds:
-            self._sent, self.pending = Pending(hold=pending.hold), replace(pending, hold=NO_AXES)
+    def sending(self, entry: Entry, left: Pending) -> None:
+        """An entry has what is pending, but for what is left."""
+        pending, self.pending = self.pending, left
+        keeps = left.has_changes
+        has_sent = pending.has_changes and not keeps
+        self._sent = pending if has_sent else Pending(hold=pending.hold & ~left.hold)
         for call in self.calls:
-            if call.entry is None and not call.held & later and (everything or (holds and call.held)):
+            is_left = call.held & left.hold if call.held else keeps
+            if call.entry is None and not is_left:
                 call.written(entry)
 
     def acknowledged(self) -> None:

@@ -148,37 +148,35 @@ class Contacts:
 
     def __init__(self) -> None:
         self._at: dict[Finger, tuple[ObjectStatus, int]] = {}
-        self._open = NO_AXES
+        self.open = NO_AXES
 
     def __bool__(self) -> bool:
         return bool(self._at)
 
     def see(self, status: RobotiqStatus, contacts: Finger) -> None:
         """Take in a status with gGTO = 1, and those of its contacts that can be believed."""
-        before, self._open = self._at, NO_AXES
+        before, self.open = self._at, NO_AXES
         self._at = {axis: (status.finger_status(axis), status.position(axis)) for axis in contacts}
         for axis in before.keys() - self._at.keys():  # usually none
             at = before[axis]
             if axis in status.moving and abs(status.position(axis) - at[1]) <= TOLERANCE:
                 self._at[axis] = at
-                self._open |= axis
+                self.open |= axis
 
     def ask(self, axes: Finger) -> None:
         """Axes are asked for a position, perhaps the same: what they do next is open."""
-        self._open |= axes
+        self.open |= axes
 
     def forget(self) -> None:
         """A reset and an activation end every grip."""
         self._at = {}
 
-    def pressing(self, status: RobotiqStatus, base: Request) -> tuple[Finger, Finger]:
-        """The axes that have not moved since and that ``base`` asks to press on: those that do, or may."""
-        pressing = Finger(
-            sum(
-                axis
-                for axis, (what, at) in self._at.items()
-                if abs(status.position(axis) - at) <= TOLERANCE
-                and agrees(status.model, base.position(axis), what, at, direction=0)
-            )
+    def pressing(self, status: RobotiqStatus, base: Request) -> Finger:
+        """The axes that have not moved since, and that ``base`` asks to press on."""
+        pressing = (
+            axis
+            for axis, (what, at) in self._at.items()
+            if abs(status.position(axis) - at) <= TOLERANCE
+            and agrees(status.model, base.position(axis), what, at, direction=0)
         )
-        return pressing & ~self._open, pressing & self._open
+        return Finger(sum(pressing))

@@ -33,9 +33,8 @@ from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .entry import Entry
 from .evidence import FOLLOWS, classify, is_activating
-from .gate import at_rest, merged
+from .gate import at_rest
 from .ledger import WINDOW_S, Ledger
-from .pending import Pending
 from .waiters import Waiter, fail, resolve
 
 KEEP_S: Final = 0.5
@@ -219,14 +218,8 @@ class Keeping(Stop):
         """The image that holds every axis that moves or is about to; None if no axis does."""
         if not ledger.is_certain:
             return None
-        base, (pressing, _) = ledger.base, ledger.pressing_again(status)
-        held = merged(
-            base,
-            Pending(hold=Finger.ALL & ~pressing),
-            status,
-            may_move=ledger.may_move(status),
-            places=ledger.places(status),
-        )
+        base = ledger.base
+        held = base.with_positions(ledger.held(Finger.ALL, status))
         return None if held == base else held
 
     def _trouble(self, ledger: Ledger, status: RobotiqStatus) -> str:

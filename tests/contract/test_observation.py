@@ -8,7 +8,7 @@ import logging
 
 import pytest
 
-from robotiq_async import ConnectionLostError, NotStartedError, RobotiqStatus, State
+from robotiq_async import ConnectionLostError, NotStartedError, RobotiqError, RobotiqStatus, State
 from robotiq_async.hand import Hand
 from tests.calls import COMMANDS, called
 from tests.contract.bench import A, Bench, at_rest, contract, ended, statuses
@@ -147,3 +147,53 @@ async def test_statistics(here: Bench, hand: Hand) -> None:
     assert 0 < statistics.round_trip_p50 <= statistics.round_trip_p99
     assert statistics.reconnects == statistics.foreign_commands == statistics.faults == 0
     assert len(await statuses(hand, 3)) == 3
+
+
+@contract(active=False)
+async def test_no_axis_moves_while_is_moving_is_false(here: Bench) -> None:
+    """In no state, and in no procedure; or it raises."""
+    axes, states, unseen = here.gripper.model.axes, set(), []
+
+    async def watch(hand: Hand) -> None:
+        is_moving, travels = False, [here.gripper.travel(axis) for axis in axes]
+        while True:
+            before, travels = travels, [here.gripper.travel(axis) for axis in axes]
+            states.add(hand.state)
+            if travels != before and not is_moving:
+                unseen.append(hand.state)
+            try:
+                is_moving = hand.is_moving
+            except RobotiqError:
+                is_moving = True
+            await asyncio.sleep(0.001)
+
+    hand = here.make()
+    watching = asyncio.create_task(watch(hand))
+    await hand.start()
+    await hand.move(200, A)
+    moving = asyncio.create_task(hand.move(20, A))
+    await asyncio.sleep(0.05)
+    await hand.hold()
+    await ended(moving)
+    hand.command(A, position=200)
+    await asyncio.sleep(0.05)
+    await hand.halt()
+    await hand.move(100, A)
+    here.gripper.inject_fault(0x0E)
+    await hand.wait_for_state(State.FAULT)
+    await hand.atr()
+    await hand.recover()
+    assert not unseen
+    here.gripper.emergency_release()
+    await hand.wait_for_state(State.FAULT)
+    await asyncio.sleep(0.002)
+    unseen.clear()  # until a status showed it, nothing could tell
+    await hand.halt()
+    activating = asyncio.create_task(hand.activate())
+    await hand.wait_for_state(State.WF_ACTIVATION)
+    await asyncio.sleep(0.05)
+    await hand.stop()
+    await ended(activating)
+    watching.cancel()
+    assert not unseen
+    assert states >= {State.RUNNING_IDLE, State.FAULT, State.WF_ATR, State.WF_ACTIVATION}

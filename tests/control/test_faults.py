@@ -250,3 +250,17 @@ def test_a_fault_that_clears_before_a_stop_is_sent_leads_to_where_the_table_says
     scan.run(0.1)
     assert outcome.answers == [None]
     assert scan.state is State.RUNNING_IDLE
+
+
+@pytest.mark.parametrize("device_cycle", [0.005, 0.2])
+def test_an_axis_that_a_fault_has_stopped_is_held_where_it_stands(device_cycle: float) -> None:
+    """And not where it would be without the fault: it would go there when that clears."""
+    scan = started(device_cycle)
+    scan.move(255, A, speed=255)
+    scan.run(1.0)
+    scan.gripper.inject_fault(0x09, 1.0)
+    scan.run(0.1)
+    travel = scan.gripper.travel(A)
+    scan.run(3.0)
+    assert scan.state is State.RUNNING_IDLE
+    assert scan.gripper.travel(A) - travel <= 2

@@ -40,7 +40,12 @@ def after(
     gripping: Finger = NO_AXES,
     may_move: Finger = NO_AXES,
 ) -> Request:
-    return merged(base, pending, status, gripping=gripping, may_move=may_move)
+    return merged(base, pending, status, gripping=gripping, held=places(base, pending, status, may_move))
+
+
+def places(base: Request, pending: Pending, status: RobotiqStatus, may_move: Finger) -> dict[Finger, int]:
+    axes = (axis for axis in THREE_FINGER.axes if axis in pending.hold)
+    return {axis: status.position(axis) for axis in axes if drifts(axis, base, status, may_move)}
 
 
 def command(
@@ -145,7 +150,8 @@ def test_an_axis_not_addressed_keeps_its_request_or_stays(
     pending = Pending(hold=held)
     for each in commands:
         pending.merge(Command(*each))
-    image = merged(base, pending, status, gripping=gripping, may_move=may_move)
+    stopped = places(base, pending, status, may_move)
+    image = merged(base, pending, status, gripping=gripping, held=stopped)
     assert (image.mode, image.individual_fingers, image.individual_scissor) == (base.mode, True, True)
     assert image.go == (base.go or bool(pending.positions))
     for axis, before, now in zip(THREE_FINGER.axes, base.axes, image.axes, strict=True):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from robotiq_async.control.entry import Entry
 from robotiq_async.control.ledger import Ledger
 from robotiq_async.control.motion import Move
-from robotiq_async.control.pending import Command, OpenRequests
+from robotiq_async.control.pending import Command, OpenRequests, Pending
 from robotiq_async.control.waiters import fail
 from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.enums import Finger, ObjectStatus
@@ -221,7 +221,7 @@ def ask(moves: OpenRequests, move: Move) -> None:
 
 
 def write(moves: OpenRequests, entry: Entry = ENTRY) -> None:
-    moves.sending(entry, everything=True)
+    moves.sending(entry, Pending())
 
 
 def test_a_move_that_was_not_written_yet_does_not_end() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -198,7 +199,7 @@ def test_a_halt_takes_the_holds_with_it() -> None:
     requests, setter, holder = OpenRequests(), Outcome(), Outcome()
     requests.command(Command(B, None, 50), setter)
     requests.hold(A, "hold", holder)
-    requests.sending(Ledger(128, 64).last, holds=True)
+    requests.sending(Ledger(128, 64).last, replace(requests.pending, hold=NONE))
     assert requests.pending == Pending(speeds={B: 50})
     requests.acknowledged()
     assert (holder.answers, waiting(requests)) == ([None], [setter])
@@ -208,7 +209,7 @@ def test_a_write_of_a_stop_or_a_procedure_takes_nothing_with_it() -> None:
     requests, setter, holder = OpenRequests(), Outcome(), Outcome()
     requests.command(Command(B, None, 50), setter)
     requests.hold(A, "hold", holder)
-    requests.sending(Ledger(128, 64).last)
+    requests.sending(Ledger(128, 64).last, requests.pending)
     requests.acknowledged()
     assert requests.pending == Pending(speeds={B: 50}, hold=A)
     assert waiting(requests) == [setter, holder]

@@ -87,10 +87,10 @@ def test_a_grip_is_not_loosened_while_its_axis_presses_again(
 ) -> None:
     """The motion that shows was held: 45 N became 3."""
     scan = holding(model, device_cycle)
-    move = presses(scan)
+    at, move = scan.latest.position(A), presses(scan)
     scan.until(lambda: A in scan.latest.moving)
     scan.step()
-    assert scan.latest.position(A) == PART
+    assert scan.latest.position(A) == at
     ends(scan, move)
     scan.run(1.5)
     assert scan.last_image.position(A) == 255
