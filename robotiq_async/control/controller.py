@@ -27,7 +27,7 @@ from ..values.model import THREE_FINGER, Model
 from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .entry import Entry
-from .evidence import FOLLOWS, Evidence, is_activating
+from .evidence import FOLLOWS, Evidence, classify, is_activating
 from .gate import gate, merged
 from .ledger import NEVER, Ledger
 from .motion import Move
@@ -423,8 +423,8 @@ class Controller:
 
     def _finish(self, status: RobotiqStatus, *, is_known: bool) -> None:
         """A procedure, a reset or a shutdown is over: the condition counts again."""
-        condition = self._evidence.condition
-        assert condition is not None, "it has ended by a status"
+        # On a new link a hand that ends stops the fingers before the condition is decided.
+        condition = self._evidence.condition or classify(status)
         self._update_state(condition)
         if condition in FOLLOWS and not is_known and self.machine.state not in _OFF:
             self._adopt_other_client(status)

@@ -24,8 +24,11 @@ class Stranded(SimulatedGripper):
     """It has rACT and does not activate, until it gets a reset."""
 
     is_stranded = True
+    goes = False
+    """Whether it shows rGTO."""
 
     def write(self, address_offset: int, registers: Sequence[int]) -> None:
+        self.goes = bool(reg.rGTO.read(registers))
         self.is_stranded = self.is_stranded and bool(reg.rACT.read(registers))
         if not self.is_stranded:
             super().write(address_offset, registers)
@@ -34,12 +37,14 @@ class Stranded(SimulatedGripper):
         block = list(super().status_registers())
         if self.is_stranded:
             reg.gACT.write(block, 1)
+            reg.gGTO.write(block, self.goes)
         return tuple(block)
 
 
-def found(model: Model = THREE_FINGER) -> Scan:
+def found(model: Model = THREE_FINGER, *, goes: bool = False) -> Scan:
     scan = Scan(model=model)
-    scan.gripper = Stranded(lambda: scan.now, spread=False, model=model)
+    scan.gripper = stranded = Stranded(lambda: scan.now, spread=False, model=model)
+    stranded.goes = goes
     return scan
 
 
@@ -92,6 +97,15 @@ def test_a_reset_and_a_stop_work_as_ever() -> None:
     assert activations(scan) == [False]
     scan.stop()
     assert activations(scan) == [False]
+
+
+def test_a_stop_before_it_is_decided_ends() -> None:
+    scan = found(goes=True)
+    scan.controller.see(scan.status())
+    assert scan.controller.is_undecided
+    scan.stop()
+    assert not scan.last_image.go
+    assert not scan.latest.go_echo
 
 
 def test_one_that_does_not_reset_gives_an_error(caplog: pytest.LogCaptureFixture) -> None:
