@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from robotiq_async import Finger, RobotiqError, RobotiqHand, State
+from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.simulator import Habits, Physics, SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.simulator.troubles.corruption import unchanged
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model, model_of
@@ -118,8 +119,8 @@ async def _happen(what: str, hand: RobotiqHand, server: SimulatorServer, chance:
     """One thing that happens; none of them lets go."""
     fingers = hand.model.mask(Finger.ABC)
     force, while_s = chance.randrange(30, 256), chance.choice(PAUSES_S)
-    if what in ("halt", "fault"):
-        await _until_gripped(server.gripper, fingers)
+    if what in ("halt", "fault", "keep"):
+        await _until_gripped(hand, server.gripper, fingers)
     match what:
         case "hold":
             await hand.hold(fingers)
@@ -151,12 +152,18 @@ async def _happen(what: str, hand: RobotiqHand, server: SimulatorServer, chance:
             await hand.start(activate=False)
 
 
-async def _until_gripped(gripper: SimulatedGripper, fingers: Finger) -> None:
-    """Wait for the contact: fingers that are halted while they press again let go, in this simulation."""
-    with contextlib.suppress(TimeoutError):
-        async with asyncio.timeout(1.0):
-            while gripper.grips & fingers != fingers:  # noqa: ASYNC110  # there is no event to wait for
-                await asyncio.sleep(0.005)
+async def _until_gripped(hand: RobotiqHand, gripper: SimulatedGripper, fingers: Finger) -> None:
+    """Wait for the contact: fingers that are halted while they press again let go, in this simulation.
+
+    What was written before must act first. A stop that is to keep the grip halts them where that is in doubt.
+    """
+    await hand.wait_for_state(*RUNNING, State.FAULT, timeout=5)
+    for _ in range(3):
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(1.0):
+                while gripper.grips & fingers != fingers:  # noqa: ASYNC110  # there is no event to wait for
+                    await asyncio.sleep(0.005)
+        await asyncio.sleep(max(CYCLES_S))
 
 
 def lived(seed: int, steps: int = 8, model: Model | None = None) -> Life:

@@ -229,7 +229,7 @@ class Soak:
                 self.everything_moved = True
                 await self.checked("recover", self.hand.recover)
             await asyncio.sleep(0.7)
-            if self.hand.state is State.RUNNING_IDLE and not self.hand.is_moving:
+            if self.hand.state is State.RUNNING_IDLE and not self.world.gripper.is_moving:
                 return
 
     async def restart(self) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Coroutine
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, suppress
 from typing import Any
 
 from hypothesis import settings
@@ -26,6 +26,7 @@ from tests.register_words import only_holds
 from tests.virtual import VirtualLoop
 
 ALL = Finger.ALL
+CLOSED = 255
 masks = st.integers(1, 15).map(Finger)
 values = st.integers(0, 255)
 LINK_TROUBLES = [
@@ -64,6 +65,8 @@ class LiveUse(RuleBasedStateMachine):
         self.calls: set[asyncio.Task[Any]] = set()
         self.may_move = ALL
         """Axes that a user has given a reason to move since everything was last at rest."""
+        self.gripping = NO_AXES
+        """Axes that a user has closed on something, and given no reason to let go."""
         self.foreign = 0
 
     def run(self, work: Coroutine[Any, Any, Any]) -> Any:
@@ -110,6 +113,11 @@ class LiveUse(RuleBasedStateMachine):
     def running(self) -> bool:
         return self.hand.state in RUNNING
 
+    def give_a_reason(self, axes: Finger) -> None:
+        """The user lets axes move, and let go."""
+        self.may_move |= axes
+        self.gripping &= ~axes
+
     def of_the_model(self, axes: Finger) -> Finger:
         return axes & self.gripper.model.all_axes or JAW
 
@@ -118,14 +126,42 @@ class LiveUse(RuleBasedStateMachine):
     @rule(axes=masks, position=values, speed=st.sampled_from([None, 0, 255]))
     def move(self, axes: Finger, position: int, speed: int | None) -> None:
         axes = self.of_the_model(axes)
-        self.may_move |= axes
+        self.give_a_reason(axes)
         self.call(self.hand.move(position, axes, speed=speed))
 
     @rule(axes=masks, position=values)
     def set_position(self, axes: Finger, position: int) -> None:
         axes = self.of_the_model(axes)
-        self.may_move |= axes
+        self.give_a_reason(axes)
         self.call(self.hand.set_position(position, axes))
+
+    @rule(axes=masks, at=st.integers(40, 200), force=values)
+    @precondition(lambda self: self.running)
+    def grip(self, axes: Finger, at: int, force: int) -> None:
+        """Close on something and wait for it; what the user asks next may be more force, a hold, a halt."""
+        axes = self.of_the_model(axes)
+        self.give_a_reason(axes)
+        self.gripper.place_object(axes, at)
+
+        async def close() -> None:
+            with suppress(RobotiqError):
+                self.gripping |= (await self.hand.close(axes, speed=255, force=force)).contacts
+
+        self.run(close())
+
+    @rule(axes=masks, force=values, seconds=st.sampled_from([0.0, 0.03, 0.06]))
+    @precondition(lambda self: self.running)
+    def press_and_give_up(self, axes: Finger, force: int, seconds: float) -> None:
+        axes = self.of_the_model(axes)
+        self.may_move |= axes
+
+        async def press() -> None:
+            pressing = asyncio.create_task(self.hand.close(axes, force=force))
+            await asyncio.sleep(seconds)
+            pressing.cancel()
+            await asyncio.gather(pressing, return_exceptions=True)
+
+        self.run(press())
 
     @rule(axes=masks, positions=st.lists(values, min_size=1, max_size=5), pause=st.sampled_from([0, 0.004]))
     @precondition(lambda self: self.running)
@@ -138,7 +174,7 @@ class LiveUse(RuleBasedStateMachine):
                     self.hand.command(axes, position=position)
                 await asyncio.sleep(pause)
 
-        self.may_move |= axes
+        self.give_a_reason(axes)
         self.run(loop())
 
     @rule(axes=masks, force=values)
@@ -157,18 +193,19 @@ class LiveUse(RuleBasedStateMachine):
 
     @rule()
     def reset(self) -> None:
+        self.gripping = NO_AXES
         self.call(self.hand.reset())
 
     @rule()
     def recover(self) -> None:
         if not self.running:
-            self.may_move = ALL
+            self.give_a_reason(ALL)
         self.call(self.hand.recover(timeout=30))
 
     @rule()
     @precondition(lambda self: self.hand.state is State.FAULT)
     def atr(self) -> None:
-        self.may_move = ALL
+        self.give_a_reason(ALL)
         self.call(self.hand.atr())
 
     @rule(which=st.integers(0, 100))
@@ -195,6 +232,7 @@ class LiveUse(RuleBasedStateMachine):
             except RobotiqError:
                 await self.hand.start(activate=False)
 
+        self.gripping = NO_AXES
         if activate:
             self.may_move = ALL
         self.run(again())
@@ -220,6 +258,7 @@ class LiveUse(RuleBasedStateMachine):
     @rule(axes=masks, position=st.integers(20, 230))
     def something_is_in_the_way(self, axes: Finger, position: int) -> None:
         axes = self.of_the_model(axes)
+        self.gripping &= ~axes
         self.gripper.place_object(axes, position)
 
     @rule(seconds=st.sampled_from([0.05, 0.3, 1.0]))
@@ -248,6 +287,8 @@ class LiveUse(RuleBasedStateMachine):
         if trouble.kind == "interference" and Finger.SCISSOR not in self.gripper.model.all_axes:
             return
 
+        self.gripping = NO_AXES
+
         async def go() -> None:
             async with self.world.server.fault_injector.making(trouble):
                 await asyncio.sleep(seconds)
@@ -258,7 +299,7 @@ class LiveUse(RuleBasedStateMachine):
     @rule(position=values)
     def another_client_writes(self, position: int) -> None:
         self.foreign += 1
-        self.may_move = ALL
+        self.give_a_reason(ALL)
         self.run(self.world.server.fault_injector.begin(Trouble("foreign", position)))
 
     # -- what must be so -------------------------------------------------------------------------------
@@ -311,6 +352,14 @@ class LiveUse(RuleBasedStateMachine):
             for axis in self.gripper.model.axes:
                 if axis not in self.may_move:
                     assert self.gripper.travel(axis) == self.travels[axis], f"{axis!r} moved"
+
+    @invariant()
+    def no_grip_is_loosened(self) -> None:
+        if hasattr(self, "world"):
+            model = self.gripper.model
+            image = Request.from_registers(self.gripper.request_registers, model)
+            loose = [axis for axis in model.axes if axis in self.gripping and image.position(axis) < CLOSED]
+            assert not loose, f"{loose} held something"
 
     @invariant()
     def every_write_is_a_full_image_under_individual_control(self) -> None:
