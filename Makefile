@@ -26,7 +26,7 @@ unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH PYTHONSTARTUP PIP_USER P
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo show smoke test-core test test-web test-ros2 test-lerobot test-urcap test-urdf pages docs dist pythons canary soak habits fuzz explore bench lint check format constraints clean
+.PHONY: help demo show smoke test-core test test-web test-ros2 test-lerobot test-urcap test-upstream race test-urdf pages docs dist pythons canary soak habits fuzz explore bench lint check format constraints clean
 
 help:  ## Show this list; times are those of two idle cores, without setting up the environment (once, a minute)
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -58,6 +58,12 @@ test-lerobot:  ## Test the robot with the commands of LeRobot, in an environment
 
 test-urcap:  ## Drive the simulated URCap with clients of others, in an environment of its own (30 s, 0.4 GB)
 	@PYTHON="$(PYTHON)" tests/urcap/run.sh
+
+race:  ## Programs of others and the drop-ins on the same bad lines, as a table (an hour; the environment of test-urcap)
+	@PYTHON="$(PYTHON)" RUN="tests.dropins.race $(ARGUMENTS)" tests/urcap/run.sh
+
+test-upstream:  ## Run GELLO, polymetis' client and DROID's robot, of SOURCES=FOLDER, at the drop-ins (1 minute, 0.2 GB)
+	@PYTHON="$(PYTHON)" SOURCES="$(SOURCES)" tests/upstream/run.sh
 
 test-urdf:  ## Load URDF and SRDF with Pinocchio and Tesseract, in an environment of its own (10 s, 0.7 GB)
 	@PYTHON="$(PYTHON)" tests/urdf/run.sh
@@ -116,7 +122,7 @@ constraints: $(STAMP)  ## Take the newest versions of all dependencies into cons
 		--no-annotate tests/release/requirements.in --output-file tests/release/requirements.txt
 
 clean:  ## Remove what the other commands made
-	rm -rf $(VENV) $(SITE) $(RELEASE) .venv-ros2 .venv-lerobot .venv-lerobot-uv .venv-urcap .venv-urdf build dist site .cache .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
+	rm -rf $(VENV) $(SITE) $(RELEASE) .venv-ros2 .venv-lerobot .venv-lerobot-uv .venv-urcap .venv-upstream .venv-urdf build dist site .cache .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
 	find robotiq_async tests demo -type d -name __pycache__ -prune -exec rm -rf {} +
 
 # uv is several times quicker than pip, but nothing depends on it. When it fails, whatever the reason, pip does

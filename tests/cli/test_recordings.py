@@ -26,6 +26,7 @@ from robotiq_async import RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.recording.recorder import Recorder
 from robotiq_async.tools.recording.recordings import read_recording
+from robotiq_async.tools.recording.table import COLUMNS
 from tests.grippers import until
 
 if TYPE_CHECKING:
@@ -183,6 +184,30 @@ def test_export_has_a_row_for_every_poll(grasp: Path, call: Call) -> None:
     assert {row["contacts"] for row in rows} >= {"", "A B C"}
     assert {row["state"] for row in rows} == {"RUNNING_IDLE", "RUNNING_CC", "FAULT"}
     assert len(rows[0]["registers"].split()) == 8
+
+
+def test_export_in_the_numbers_of_a_learning_stack(grasp: Path, call: Call) -> None:
+    """The name of the column has the sign: no reader guesses it."""
+    table = grasp.with_name("stack.csv")
+    call("export", str(grasp), str(table), "--convention", "droid").assert_succeeded()
+    rows, polls = rows_of(table), recorded(grasp, "/gripper/status")
+    for row, (_, fields) in zip(rows, polls, strict=True):
+        shares: list[float] = [fields[finger]["open_fraction"] for finger in "ABC"]  # type: ignore[index]
+        assert float(row["DROID"]) == pytest.approx(1 - sum(shares) / 3)
+    assert rows[0].keys() - {"DROID"} == {*COLUMNS["status"]}
+
+
+def test_a_scale_that_export_does_not_know_and_one_without_an_opening_are_wrong_usage(
+    grasp: Path, call: Call
+) -> None:
+    for arguments, words in (
+        (("--convention", "ROBOMIMIC"), "must be one of DROID, RLDS"),
+        (("--convention", "DROID", "--of", "events"), "events have no opening"),
+    ):
+        outcome = call("export", str(grasp), str(grasp.with_name("none.csv")), *arguments)
+        assert outcome.code == 2
+        assert words in outcome.err
+    assert not grasp.with_name("none.csv").exists()
 
 
 @pytest.mark.parametrize(("kind", "topic"), [("commands", "/gripper/command"), ("events", "/gripper/event")])

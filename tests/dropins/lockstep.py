@@ -114,6 +114,7 @@ class Line:
         self._wire = wire
         self._kind = kind
         self._options = {"model": TWO_FINGER_85, "spread": False, **options}
+        self._beside: list[asyncio.Task[None]] = []
 
     async def open(self, patch: pytest.MonkeyPatch, active: bool) -> None:
         self.gripper: Any = self._kind(asyncio.get_running_loop().time, **self._options)
@@ -132,7 +133,13 @@ class Line:
         if active:
             await activate_beforehand(self.gripper)
 
+    async def begin(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        """Let something happen beside the program, until this is closed."""
+        self._beside.append(asyncio.create_task(work()))
+
     async def close(self) -> None:
+        for task in self._beside:
+            task.cancel()
         await self.server.stop()
         self._closing.set()
 

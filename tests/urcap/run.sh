@@ -3,6 +3,7 @@
 # made once: 0.4 GB, for airo-robots brings scipy and more. Where that cannot be, it says so, and nothing fails.
 #
 # PYTHON: the interpreter that the environment is made with (python3)
+# RUN: a module that is run in place of the tests: make race
 # TESTS: what pytest is to run (tests/urcap/live.py and tests/link/test_urcap_clients.py)
 set -eu
 cd "$(dirname "$0")/../.."
@@ -23,5 +24,7 @@ if [ ! -f "$venv/.complete" ]; then
 fi
 echo "== $("$python" -c 'from importlib.metadata import version as v
 print(*(f"{name} {v(name)}" for name in ("airo-robots", "pyrobotiqur", "rcs-ur5e")))')"
+# shellcheck disable=SC2086
+[ -z "${RUN:-}" ] || exec "$python" -m $RUN
 # shellcheck disable=SC2086
 "$python" -m pytest -rs ${TESTS:-tests/urcap/live.py tests/link/test_urcap_clients.py}

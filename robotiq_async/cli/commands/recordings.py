@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 from cyclopts import Parameter
 
 from ...runtime.log import printable
+from ...values.conventions import CONVENTIONS, Convention
 from ..addresses import gripper_words
 from ..arguments import USUAL, Address, Flag, Link, need
 from ..failures import CommandError, UsageError, file_errors, normal_end
@@ -111,6 +112,7 @@ def export(
     /,
     *,
     of: Literal["statuses", "commands", "events"] = "statuses",
+    convention: str | None = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Write a recording as a table, CSV, for spreadsheets and pandas.
@@ -127,7 +129,9 @@ def export(
         file: The recording.
         target: The table, named .csv (default: named as the recording).
         of: What has a row.
+        convention: Add the opening in the numbers of a learning stack, such as DROID or LEROBOT.
     """
+    named = _convention(convention, of)
     entries = _entries(file)
     from ...tools.recording.table import export as write
 
@@ -138,10 +142,20 @@ def export(
         raise UsageError(f"{file} is the table itself: name the recording")
     _keep(table, overwrite=overwrite)
     with file_errors(table):
-        rows = write(entries, KINDS[of], table)
+        rows = write(entries, KINDS[of], table, named)
     if not rows:
         raise CommandError(f"{file}: it contains no {of}")
     print(f"{rows} {of} in {table}")
+
+
+def _convention(name: str | None, of: str) -> Convention | None:
+    if name is None:
+        return None
+    if name.upper() not in CONVENTIONS:
+        raise UsageError(f"--convention must be one of {', '.join(CONVENTIONS)}, got {name}")
+    if of != "statuses":
+        raise UsageError(f"--convention is for statuses: {of} have no opening")
+    return CONVENTIONS[name.upper()]
 
 
 def _keep(*files: Path, overwrite: bool) -> None:

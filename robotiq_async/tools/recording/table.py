@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from ...values.calibration.csv_tables import write_rows
+from ...values.conventions import Convention
 from .feed import EVENT, STATUS, Message
 from .payloads import SCHEMAS, Fields
 
@@ -60,10 +61,14 @@ COLUMNS: Final = {
 
 
 class Table:
-    """The rows of one table, made of messages in chronological order."""
+    """The rows of one table, made of messages in chronological order.
 
-    def __init__(self, kind: str) -> None:
+    With a convention the last column has its name, and the opening in its numbers: the mean of the fingers.
+    """
+
+    def __init__(self, kind: str, convention: Convention | None = None) -> None:
         self._kind = kind
+        self._convention = convention
         self._names = COLUMNS[kind]
         self._state = ""
         self._label = ""
@@ -81,7 +86,13 @@ class Table:
         given = {"time": wall_clock(nanoseconds)}
         if kind == "status":
             given |= {STATE: self._state, LABEL: self._label, VALUES: self._values}
-        return [_cell(given[name] if name in given else _value(fields, name, kind)) for name in self._names]
+        row = [_cell(given[name] if name in given else _value(fields, name, kind)) for name in self._names]
+        return row if self._convention is None else [*row, _opening(fields, self._convention)]
+
+    @property
+    def columns(self) -> list[str]:
+        """The names of the columns."""
+        return self._names if self._convention is None else [*self._names, self._convention.name]
 
 
 def wall_clock(nanoseconds: int) -> str:
@@ -99,6 +110,12 @@ def _value(fields: Fields, name: str, kind: str) -> Any:  # noqa: ANN401  # as J
     if key in _NEW or key == CURRENT:
         return fields[axis].get(key)
     return fields[axis][key] if axis else fields[name]
+
+
+def _opening(fields: Fields, convention: Convention) -> float | None:
+    """The opening by a convention; None in a recording of an earlier version, which has no share."""
+    shares = [fields[finger].get("open_fraction") for finger in ("A", "B", "C") if finger in fields]
+    return None if None in shares else convention.value(sum(shares) / len(shares))
 
 
 def _cell(value: object) -> object:
@@ -139,8 +156,13 @@ class CsvFile:
         self._write(line.getvalue().encode())
 
 
-def export(entries: Iterable[Entry], kind: str, target: Path | str) -> int:
+def export(
+    entries: Iterable[Entry], kind: str, target: Path | str, convention: Convention | None = None
+) -> int:
     """Write the messages of one kind into a CSV file, all or none; an existing file is replaced.
+
+    With a convention statuses have a last column of its name: the opening in its numbers, which need no
+    guess at their sign.
 
     Returns:
         The number of rows; 0 writes no file.
@@ -153,18 +175,18 @@ def export(entries: Iterable[Entry], kind: str, target: Path | str) -> int:
 
     def counted() -> Iterator[list[object]]:
         nonlocal count
-        for row in _rows(entries, kind):
+        for row in _rows(entries, kind, table):
             count += 1
             yield row
 
+    table = Table(kind, convention)
     rows = counted()
     if (first := next(rows, None)) is not None:
-        write_rows(target, chain([COLUMNS[kind], first], rows))
+        write_rows(target, chain([table.columns, first], rows))
     return count
 
 
-def _rows(entries: Iterable[Entry], kind: str) -> Iterator[list[object]]:
-    table = Table(kind)
+def _rows(entries: Iterable[Entry], kind: str, table: Table) -> Iterator[list[object]]:
     for entry in in_order(entries):
         of = entry.topic.removeprefix(PREFIX)
         if of in (kind, "event") and of != entry.topic:
