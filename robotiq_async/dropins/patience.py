@@ -40,7 +40,8 @@ class Patience:
             hand.is_moving  # noqa: B018  # raises while the link is down
             if time.monotonic() - (status := hand.status).timestamp < self._fresh:
                 return status
-        for status in hand.statuses(lost_after=max(seconds or self.seconds, SHORTEST_S)):
+        limit = self.seconds if seconds is None else max(seconds, SHORTEST_S)
+        for status in hand.statuses(lost_after=limit):
             return status
         raise NotStartedError("the hand was stopped meanwhile")
 

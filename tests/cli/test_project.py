@@ -87,6 +87,7 @@ def test_a_missing_module_names_the_extra_that_brings_it() -> None:
     assert {extra for _, extra in advised} == {
         "cli",
         "fleet",
+        "grpc",
         "metrics",
         "physics",
         "plot",

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from lerobot.robots import make_robot_from_config
+from lerobot.utils.errors import DeviceAlreadyConnectedError, DeviceNotConnectedError
 
 from robotiq_async import JAW, TWO_FINGER_85
 from robotiq_async.dropins.lerobot.robot import RobotiqGripper, RobotiqGripperConfig
@@ -23,6 +24,7 @@ from robotiq_async.simulator.troubles.trouble import Trouble
 from robotiq_async.values.request import Request
 from tests.docs.pages import ROOT
 from tests.grippers import active_gripper, until
+from tests.lerobot.leader.still import StillConfig
 
 PATIENCE = 120.0  # a command needs 12 s to import torch
 LEADER = ("--teleop.discover_packages_path=leader", "--teleop.type=sweep")
@@ -42,10 +44,13 @@ class Commands:
         self.folder = folder
 
     async def begin(self, name: str, *arguments: str) -> asyncio.subprocess.Process:
+        """A command with the robot, which it finds by its type alone."""
+        robot = ("--robot.type=robotiq_gripper", f"--robot.address={self.server.address}")
+        return await self.start(name, *robot, *arguments)
+
+    async def start(self, name: str, *arguments: str) -> asyncio.subprocess.Process:
         return await asyncio.create_subprocess_exec(
-            *(str(Path(sys.executable).with_name(name)), "--robot.type=robotiq_gripper"),
-            "--robot.discover_packages_path=robotiq_async.dropins.lerobot",
-            f"--robot.address={self.server.address}",
+            str(Path(sys.executable).with_name(name)),
             *arguments,
             env={
                 **os.environ,
@@ -177,10 +182,67 @@ def test_what_is_sent_is_returned(robot: Any) -> None:
     assert robot.send_action({"gripper.pos": 40.0}) == {"gripper.pos": 40.0}
 
 
-@pytest.mark.parametrize("pos", [-0.1, 100.7, 255.0, float("nan")])
-def test_another_scale_is_refused(robot: Any, pos: float) -> None:
-    with pytest.raises(ValueError, match="pos must be percent"):
-        robot.send_action({"gripper.pos": pos})
+def test_what_a_policy_overshoots_is_clamped_as_lerobots_own_motors_do_and_nan_is_refused(robot: Any) -> None:
+    assert robot.send_action({"gripper.pos": 103.0, "gripper.force": -2.0}) == {
+        "gripper.pos": 100.0,
+        "gripper.force": 0.0,
+    }
+    with pytest.raises(ValueError, match="must be a number of LEROBOT"):
+        robot.send_action({"gripper.pos": float("nan")})
+
+
+def test_without_clamping_another_scale_is_refused(tmp_path: Path) -> None:
+    config = RobotiqGripperConfig(
+        address="sim://?model=2f85&speedup=50", activate=True, clamp=False, calibration_dir=tmp_path
+    )
+    with (
+        make_robot_from_config(config) as robot,
+        pytest.raises(ValueError, match="must be a number of LEROBOT"),
+    ):
+        robot.send_action({"gripper.pos": 100.7})
+
+
+def test_its_state_is_told_by_lerobots_errors(robot: Any, tmp_path: Path) -> None:
+    with pytest.raises(DeviceAlreadyConnectedError):
+        robot.connect()
+    other = make_robot_from_config(
+        RobotiqGripperConfig(address="tcp://127.0.0.1:1", calibration_dir=tmp_path)
+    )
+    for call in (other.get_observation, lambda: other.send_action({"gripper.pos": 5.0}), other.disconnect):
+        with pytest.raises(DeviceNotConnectedError):
+            call()
+
+
+def test_nothing_moves_without_calibration_which_is_what_activates(tmp_path: Path) -> None:
+    config = RobotiqGripperConfig(
+        address="sim://?model=2f85&speedup=50", activate=True, calibration_dir=tmp_path
+    )
+    robot = make_robot_from_config(config)
+    robot.connect(calibrate=False)
+    assert not robot.is_calibrated
+    before = robot.get_observation()
+    robot.calibrate()
+    assert robot.is_calibrated
+    assert before["gripper.contact"] == 0
+    robot.disconnect()
+
+
+def test_over_a_urcap_the_key_of_the_current_is_left_out(tmp_path: Path) -> None:
+    config = RobotiqGripperConfig(address="urcap://127.0.0.1?model=2f85", calibration_dir=tmp_path)
+    assert make_robot_from_config(config).observation_features.keys() == {"gripper.pos", "gripper.contact"}
+
+
+def test_cameras_are_lerobots(tmp_path: Path) -> None:
+    config = RobotiqGripperConfig(
+        address="sim://?model=2f85&speedup=50",
+        activate=True,
+        cameras={"front": StillConfig()},
+        calibration_dir=tmp_path,
+    )
+    with make_robot_from_config(config) as robot:
+        assert robot.observation_features["front"] == (32, 32, 3)
+        assert robot.get_observation()["front"].shape == (32, 32, 3)
+    assert not robot.cameras["front"].is_connected
 
 
 def test_an_action_without_a_position_is_refused(robot: Any) -> None:
