@@ -21,6 +21,7 @@ from ..values.model import Model
 from ..values.move_result import MoveResult
 from ..values.statistics import Statistics
 from ..values.status import Part, RobotiqStatus
+from .arguments import describes_arguments
 from .grip_watch import SLIP_COUNTS, GripWatch
 from .kind import Kind
 from .run import refuse_with
@@ -35,20 +36,8 @@ class Hand(Kind):
     what holds up the loop lets no call time out. From another thread or another loop every call raises
     RuntimeError and sends nothing; the properties can be read from anywhere.
 
-    Many calls take the same arguments. Any other value raises TypeError or ValueError, and nothing is sent:
-
-    * ``fingers``: the axes, a :class:`Finger` mask or the same integer; the others stay as they are.
-      ``Finger.ABC`` are the fingers of the model, ``Finger.ALL`` its axes; others that it lacks are refused.
-    * ``position``: the target in counts, 0 (open) .. 255 (closed). Any object with ``__index__`` is an
-      integer, except a bool. In its place ``mm``, the opening in millimetres, or ``open_fraction``, the share
-      of the travel that is open, 1 (open) .. 0 (closed). Neither is for the scissor.
-    * ``speed``: 0 (the slowest) .. 255; None leaves the speed of these axes. In its place ``mm_per_s``,
-      millimetres of opening a second.
-    * ``force``: 0 (the least, not none) .. 255, not linear; None leaves the force of these axes. In its place
-      ``label_n``, newtons of a label: no measured force. A speed and a force stay with the axes, also those
-      of a call that was cancelled or superseded: give them where they matter.
-    * ``timeout``: seconds above 0; None for twice the expected time plus 2 s, by the speeds at the call. A
-      move that is slowed down afterwards needs one of its own.
+    Many calls take the same arguments, and each lists its own. Any other value raises TypeError or
+    ValueError, and nothing is sent. Any object with ``__index__`` is an integer, except a bool.
 
     Other amounts become the closest count by :attr:`units` (see there how far to trust them), and are
     refused outside their range. One amount is given once: counts and millimetres together are a TypeError.
@@ -147,6 +136,7 @@ class Hand(Kind):
 
     # -- commands --------------------------------------------------------------------------------------
 
+    @describes_arguments(value="position")
     async def set_position(
         self,
         value: int | None = None,
@@ -168,6 +158,7 @@ class Hand(Kind):
         with self._naming:
             await self._set("position", needed("set_position", target, "value", *OPENINGS), axes)
 
+    @describes_arguments(value="new_speed")
     async def set_speed(
         self,
         value: int | None = None,
@@ -181,6 +172,7 @@ class Hand(Kind):
         with self._naming:
             await self._set("speed", needed("set_speed", speed, "value", *RATES), axes)
 
+    @describes_arguments(value="new_force")
     async def set_force(
         self,
         value: int | None = None,
@@ -194,6 +186,7 @@ class Hand(Kind):
         with self._naming:
             await self._set("force", needed("set_force", force, "value", *LABELS), axes)
 
+    @describes_arguments()
     def command(
         self,
         fingers: Finger | int = Finger.ABC,
@@ -232,6 +225,7 @@ class Hand(Kind):
         with self._naming:
             self._command(axes, position, speed, force)
 
+    @describes_arguments()
     async def move(
         self,
         position: int | None = None,
@@ -269,6 +263,7 @@ class Hand(Kind):
         with self._naming:
             return await self._move(axes, target, speed, force, limit)
 
+    @describes_arguments()
     async def open(
         self,
         fingers: Finger | int = Finger.ABC,
@@ -284,6 +279,7 @@ class Hand(Kind):
             OPEN, fingers, speed=speed, mm_per_s=mm_per_s, force=force, label_n=label_n, timeout=timeout
         )
 
+    @describes_arguments()
     async def close(
         self,
         fingers: Finger | int = Finger.ABC,
@@ -299,6 +295,7 @@ class Hand(Kind):
             CLOSED, fingers, speed=speed, mm_per_s=mm_per_s, force=force, label_n=label_n, timeout=timeout
         )
 
+    @describes_arguments()
     async def grasp(
         self,
         fingers: Finger | int = Finger.ABC,
@@ -312,9 +309,8 @@ class Hand(Kind):
     ) -> GraspResult:
         """Close fingers until each has met something or is closed, and return which of them hold it.
 
-        A grasp takes ``at_least`` contacts, 1 .. the number of axes; None for all of them. Too few are a
-        result and not an error: the result is false, and the fingers stay as they are. For the rest it is a
-        :meth:`move`: what it raises, and what it does when cancelled or timed out.
+        Too few contacts are a result and not an error: the result is false, and the fingers stay as they are.
+        For the rest it is a :meth:`move`: what it raises, and what it does when cancelled or timed out.
 
         An axis holds if the gripper reports a contact while closing. It may never report one for a thin
         object between fingertips. A contact latches: a finger that was in contact before still counts when
@@ -327,6 +323,7 @@ class Hand(Kind):
         )
         return GraspResult(move, contacts)
 
+    @describes_arguments()
     async def hold(self, fingers: Finger | int = Finger.ALL) -> None:
         """Hold axes that move where they are; returns when the gripper has acknowledged it.
 

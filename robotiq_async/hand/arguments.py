@@ -1,0 +1,65 @@
+"""The arguments of motions, described once: each call's docstring gets an ``Args:`` section by its signature.
+
+A parameter that has no description here is a KeyError when the module of the call is imported.
+"""
+
+from __future__ import annotations
+
+import inspect
+import textwrap
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Final, TypeVar
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+WIDTH: Final = 96
+STAYS: Final = (
+    "It stays with the axes, also after a call that was cancelled or superseded: give it where it matters."
+)
+ARGUMENTS: Final = {
+    "fingers": "the axes, a :class:`Finger` mask or the same integer, 1..15; the others stay as they are. "
+    "``Finger.ABC`` are the fingers of the model, ``Finger.ALL`` its axes; others that it lacks are refused.",
+    "position": "the target in counts, 0 (open) .. 255 (closed).",
+    "mm": "in place of a position, the opening in millimetres, 0 .. the stroke of the model; not for the "
+    "scissor.",
+    "open_fraction": "in place of a position, the share of the travel that is open, 1 (open) .. 0 (closed); "
+    "not for the scissor.",
+    "speed": f"0 (the slowest) .. 255; None leaves the speed of these axes. {STAYS}",
+    "new_speed": "0 (the slowest) .. 255, for these axes from now on.",
+    "mm_per_s": "in place of a speed, millimetres of opening a second, in the range of the model's speeds.",
+    "force": f"0 (the least, not none) .. 255, not linear; None leaves the force of these axes. {STAYS}",
+    "new_force": "0 (the least, not none) .. 255, not linear, for these axes from now on.",
+    "label_n": "in place of a force, newtons of a label, in the range of the model's: no measured force.",
+    "timeout": "seconds above 0; None for twice the expected time plus 2 s, by the speeds at the call. A "
+    "move that is slowed down afterwards needs one of its own.",
+    "at_least": "the contacts that make a grasp, 1 .. the number of axes; None for all of them.",
+}
+
+
+def describes_arguments(**same: str) -> Callable[[F], F]:
+    """Add the section to a method. ``value="position"`` describes the parameter value as a position."""
+
+    def describe(call: F) -> F:
+        code = call.__code__
+        names = code.co_varnames[1 : code.co_argcount + code.co_kwonlyargcount]
+        if call.__doc__ is not None:  # python -OO has none
+            call.__doc__ = with_arguments(call.__doc__, names, same)
+        return call
+
+    return describe
+
+
+def with_arguments(text: str, names: Iterable[str], same: Mapping[str, str]) -> str:
+    """A docstring with the section, before that of what it raises."""
+    lines = [
+        textwrap.fill(
+            f"{name}: {ARGUMENTS[same.get(name, name)]}",
+            WIDTH,
+            initial_indent=" " * 4,
+            subsequent_indent=" " * 8,
+        )
+        for name in names
+    ]
+    section = "\n".join(("Args:", *lines))
+    before, raises, after = inspect.cleandoc(text).partition("\n\nRaises:")
+    return f"{before}\n\n{section}{raises}{after}"
