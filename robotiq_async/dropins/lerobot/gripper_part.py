@@ -65,9 +65,16 @@ class GripperPart:
 
     @property
     def observations(self) -> tuple[str, ...]:
-        """The keys of an observation, known before :meth:`connect`. A URCap carries no current."""
-        current = () if self._hand.address.startswith("urcap:") else ("gripper.current",)
+        """The keys of an observation, known before :meth:`connect`: over a URCap without a current.
+
+        Some URCaps tell it, but which only shows once it is asked, and features come before.
+        """
+        current = ("gripper.current",) if self._tells_current else ()
         return ("gripper.pos", *current, "gripper.contact")
+
+    @property
+    def _tells_current(self) -> bool:
+        return not self._hand.address.startswith("urcap:")
 
     @property
     def is_connected(self) -> bool:
@@ -148,7 +155,7 @@ class GripperPart:
         opening = sum(map(status.open_fraction, fingers)) / len(fingers)
         return {
             "gripper.pos": self._convention.value(opening),
-            **({"gripper.current": float(max(currents))} if currents else {}),
+            **({"gripper.current": float(max(currents))} if currents and self._tells_current else {}),
             "gripper.contact": sum(finger in held for finger in fingers) / len(fingers),
         }
 
