@@ -13,8 +13,7 @@ from ..values.errors import NotStartedError, RobotiqConnectionError
 from ..values.status import RobotiqStatus
 
 T = TypeVar("T")
-FRESH_S: Final = 0.03
-"""A status of this age answers a question at once. A jaw moves up to 12 counts in that time."""
+FRESH_S: Final = 0.03  # a status of this age answers at once: a jaw moves up to 12 counts in that time
 SHORTEST_S: Final = 0.01  # that a stream can be limited to
 
 
@@ -40,8 +39,7 @@ class Patience:
             hand.is_moving  # noqa: B018  # raises while the link is down
             if time.monotonic() - (status := hand.status).timestamp < self._fresh:
                 return status
-        limit = self.seconds if seconds is None else max(seconds, SHORTEST_S)
-        for status in hand.statuses(lost_after=limit):
+        for status in hand.statuses(lost_after=self.seconds if seconds is None else max(seconds, SHORTEST_S)):
             return status
         raise NotStartedError("the hand was stopped meanwhile")
 

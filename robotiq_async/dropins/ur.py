@@ -176,8 +176,7 @@ class RobotiqGripper:
             True, for the hand has accepted it, and the position after clipping to the calibrated range.
 
         Raises:
-            OSError: the link stayed down.
-            RobotiqError: the gripper takes no motion now: not activated, in fault.
+            OSError, RobotiqError: the link stayed down; the gripper takes no motion now, as in a fault.
         """
         target, rates = self._request(position, speed, force)
         before = self._patience.status()

@@ -61,8 +61,7 @@ class Convention:
             clamp: whether a number beyond the range counts as its end, as for policies, which overshoot.
 
         Raises:
-            TypeError: no number, a bool, or an array of several.
-            ValueError: beyond the range and not clamped; NaN and infinity always.
+            TypeError, ValueError: no number; beyond the range and not clamped; NaN and infinity always.
         """
         low, high = sorted((self.open, self.closed))
         number = as_float(value := single(value))
