@@ -49,7 +49,7 @@ def members(kind: type) -> dict[str, object]:
 def test_every_hand_has_the_public_members_of_hand() -> None:
     """Except for members of the process that owns the link, and those that need a lease."""
     shared = members(Hand).keys()
-    assert members(RobotiqHand).keys() - shared == {"add_listener", "drop_requests"}
+    assert members(RobotiqHand).keys() - shared == {"add_listener", "assume", "drop_requests", "options"}
     assert members(RemoteHand).keys() - shared == {"acquire", "take", "release", "is_in_control"}
 
 

@@ -10,7 +10,7 @@ answer_ended(), which the task calls after the write: what they do then may hold
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
@@ -73,12 +73,13 @@ class Controller:
         write_spacing: float = 0.0,
         model: Model = THREE_FINGER,
         left: Left | None = None,
+        assumed: Mapping[tuple[Finger, str], int] | None = None,
     ) -> None:
         self.machine: Final = machine
         self.status: RobotiqStatus | None = None  # the newest; None before the first
         self.activates = False  # whether a gripper that is found reset is activated
         self.foreign_commands = 0  # how often another client was seen to command the gripper
-        self._ledger: Final = Ledger(speed, force, model, machine.log, left and left.ledger)
+        self._ledger: Final = Ledger(speed, force, model, machine.log, left and left.ledger, assumed)
         self._closing_time: Final = closing_time  # seconds of a full closing at a speed
         # Seconds from sending a write to the next one: a gripper may acknowledge one that comes sooner and
         # forget it. A stop does not wait; it is repeated.

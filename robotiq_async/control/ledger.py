@@ -24,6 +24,7 @@ No I/O and no clock: callers give the time of a write, and questions are about t
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from itertools import takewhile
 from operator import attrgetter
 from typing import Final
@@ -60,9 +61,15 @@ class Ledger:
         model: Model = THREE_FINGER,
         log: Log = log,
         before: Ledger | None = None,
+        assumed: Mapping[tuple[Finger, str], int] | None = None,
     ) -> None:
         """``before`` is the ledger of the session before: what it has written may still act."""
-        first = Request(axes=(AxisRequest(0, speed, force),) * len(model.axes), model=model)
+        has = assumed or {}
+        axes = tuple(
+            AxisRequest(0, has.get((axis, "speed"), speed), has.get((axis, "force"), force))
+            for axis in model.axes
+        )
+        first = Request(axes=axes, model=model)
         number: int = 0 if before is None else before.shown.number
         # The newest that showed.
         self.shown: Entry = Entry(number, first, first.echo, False, NEVER, NEVER, LONG_AGO)

@@ -5,10 +5,8 @@ from __future__ import annotations
 import asyncio
 import json
 import math
-import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import count
 from types import TracebackType
 from typing import Any, Final, Self
 
@@ -16,17 +14,15 @@ from ..runtime.clock import now
 from ..runtime.concurrency import running_loop
 from ..session.streams import Channel, Listeners, Stream
 from ..values.enums import Fault, State
-from ..values.errors import AgentError, NotAllStoppedError, ProtocolError, RobotiqError
+from ..values.errors import NotAllStoppedError, ProtocolError, RobotiqError
 from ..values.model import model_of
 from .limited_log import LimitedLog
-from .network.bus import Bus, Reply, Undo, Urgency
+from .network.bus import Bus, Undo
 from .network.route import Route, default_route
-from .remote.mirror import AgentClock
-from .remote.pending_request import is_refusal
+from .remote.dialog import Dialog
+from .remote.errand import NoAnswerError
+from .remote.mirror import AgentClock, Mirror
 from .remote.remote_hand import RemoteHand
-from .remote.requests import NoAnswerError, label
-from .remote.stops import HALT_S, until_answered
-from .wire.envelope import Call, unpack_answer
 from .wire.names import ROOT, GripperName, check_name
 from .wire.values import reading, words
 
@@ -255,38 +251,15 @@ async def halt(bus: Bus, name: GripperName, agents: int) -> str:
 
     All ``agents`` that serve it must confirm that it has stopped.
     """
-    client, numbers = secrets.token_hex(8), count(1)
-
-    async def attempt(left: float) -> None:
-        call = Call(name.base, client, number=next(numbers), arguments={"label": label()})
-        confirmed: set[int] = set()
-
-        def decides(reply: Reply) -> bool:
-            if is_refusal(reply):
-                return True
-            answer = unpack_answer(reply.payload)
-            if (answer.to, answer.number) == (call.to, call.number):
-                confirmed.add(answer.epoch)
-            return False
-
-        reply = await bus.ask(
-            name.key("halt"), call.pack(), timeout=left, urgency=Urgency.STOP, decides=decides
-        )
-        if reply is None:
-            raise NoAnswerError("no answer")
-        answer = unpack_answer(reply.payload)
-        if answer.to != name.base or answer.number != call.number:
-            raise AgentError("the answer to another request")
-        answer.outcome(lambda stamp: stamp)
-        if len(confirmed) < agents:
-            raise NoAnswerError(f"no answer from {agents - len(confirmed)} of {agents} agents")
-
+    dialog = Dialog(name, bus, Mirror(name.mark))
     try:
-        await until_answered(attempt, HALT_S)
+        await dialog.halt(agents)
     except NoAnswerError as error:
-        return str(error)
+        return error.why
     except (RobotiqError, TypeError, ValueError) as error:
         return f"refused: {error}"
+    finally:
+        await dialog.close()
     return STOPPED
 
 

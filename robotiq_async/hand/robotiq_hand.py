@@ -20,7 +20,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Final, Literal
 
@@ -199,6 +199,7 @@ class RobotiqHand(Hand):
             model=options.model,
         )
         self._machine = StateMachine(log=options.log)
+        self._assumed: Mapping[tuple[Finger, str], int] = {}
 
     # -- lifetime --------------------------------------------------------------------------------------
 
@@ -208,7 +209,7 @@ class RobotiqHand(Hand):
         if self._session is None and isinstance(self._options.address, NoAddress):
             self._options.log.warning("no address was given: the gripper is simulated, nothing real moves")
         self._session = session = Session(
-            self._options, self._machine, self._channels, activate=activate, wait=wait
+            self._options, self._machine, self._channels, activate=activate, wait=wait, assumed=self._assumed
         )
         try:
             await session.connected()
@@ -263,6 +264,19 @@ class RobotiqHand(Hand):
             await self._reset_for(Trigger.HALT_RESETS)
         else:
             await session.answered(session.controller.halt)
+
+    @property
+    def options(self) -> HandOptions:
+        """The options of the hand, checked."""
+        return self._options
+
+    def assume(self, settings: Mapping[tuple[Finger, str], int]) -> None:
+        """Say which speeds and forces the gripper has at the next start: the status does not echo them.
+
+        Args:
+            settings: counts by axis, and "speed" or "force". Those left out are the ones of the options.
+        """
+        self._assumed = dict(settings)
 
     def drop_requests(self, why: str) -> None:
         """Drop the requests that were not sent, except holds and halts: for a client that has lost control.

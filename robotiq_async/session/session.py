@@ -78,6 +78,7 @@ class Session:
         *,
         activate: bool,
         wait: float = 0.0,
+        assumed: Mapping[tuple[Finger, str], int] | None = None,
     ) -> None:
         self.options = options
         self.machine = machine
@@ -95,6 +96,7 @@ class Session:
             options.write_spacing,
             options.model,
             left,
+            assumed,
         )
         self.controller.allow_activation(activate)
         self._publisher = Publisher(channels, self.controller)

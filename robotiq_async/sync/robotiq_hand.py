@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Generic, Self, TypeVar
 
@@ -17,6 +17,7 @@ from ..session.options import (
     POLL_INTERVAL_S,
     RESPONSE_TIMEOUT_S,
     WRITE_SPACING_S,
+    HandOptions,
     ReconnectPolicy,
 )
 from ..session.streams import Stream as AsyncStream
@@ -421,6 +422,13 @@ class RobotiqHand:
         slip: int = SLIP_COUNTS,
     ) -> Stream[GripEvent]:
         return self._opened(lambda: self._inner.grip_events(fingers, since=since, slip=slip))
+
+    @property
+    def options(self) -> HandOptions:
+        return self._inner.options
+
+    def assume(self, settings: Mapping[tuple[Finger, str], int]) -> None:
+        self._caller.tell(lambda: self._inner.assume(settings))
 
     def drop_requests(self, why: str) -> None:
         self._caller.tell(lambda: self._inner.drop_requests(why))

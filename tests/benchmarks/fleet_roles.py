@@ -231,7 +231,7 @@ async def generator(endpoint: str, count: str) -> None:
     bus = await open_bus(agent_configuration("bench", "generator", [endpoint]), endpoint)
     names = [name(n, "generator") for n in range(int(count))]
     publishers = [bus.publisher(each.key("feed"), Urgency.TELEMETRY) for each in names]
-    bus.serve(f"{names[0].base.rpartition('/')[0]}/*/info", describe)
+    bus.serve(f"{names[0].base.rpartition('/')[0]}/*/info/*", describe)
 
     async def run() -> None:
         due = time.monotonic()

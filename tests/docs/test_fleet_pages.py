@@ -85,10 +85,12 @@ EXAMPLES: Final = [
     json.loads(MOVE.pack()),
     json.loads(Answer(NAME.base, 7, EPOCH, result_fields(RESULT)).pack()),
     json.loads(
-        failure(MOVE, EPOCH, ControlLostError("the lease has ended (taken), ...", "taken")).pack(),
+        failure(
+            MOVE, EPOCH, ControlLostError("the lease has ended (taken), ...", "taken"), begun=True
+        ).pack(),
     ),
     json.loads(call(1, 0, what="acquire", label=LABEL).pack())["arguments"],
-    json.loads(Answer(NAME.base, 1, EPOCH, {"lease": 3, "window": 1.0}).pack())["value"],
+    json.loads(Answer(NAME.base, 1, EPOCH, {"lease": 3, "window": 1.0, "settings": True}).pack())["value"],
 ]
 """The objects in the order of the page."""
 
@@ -154,7 +156,7 @@ async def test_a_summary_and_an_info() -> None:
 def test_every_command_and_key_is_there() -> None:
     for name in (*COMMANDS, "command", "cancel"):
         assert f"`{name}`" in PROTOCOL, name
-    for key in ("feed", "summary", "info", "lease", "halt", "cmd/NAME", "alive/EPOCH"):
+    for key in ("feed", "summary", "info/WHO", "lease", "halt", "cmd/NAME", "alive/EPOCH"):
         assert f"| `{key}` |" in PROTOCOL, key
     assert ROOT in PROTOCOL
     assert f"{KEPT:,}" in PROTOCOL

@@ -98,7 +98,9 @@ async def curious() -> None:
         for _ in range(20):
             number += 1
             call = Call("robotiq/v1/lab/cell/left", "curious", number=number)
-            asked.append(bus.ask(f"{call.to}/info", call.pack(), timeout=0.2, urgency=Urgency.COMMAND))
+            asked.append(
+                bus.ask(f"{call.to}/info/{call.client}", call.pack(), timeout=0.2, urgency=Urgency.COMMAND)
+            )
         answers += sum(reply is not None for reply in await asyncio.gather(*asked))
     await bus.close()
     say(json.dumps({"asked": number, "answered": answers}))

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from robotiq_async.fleet.network.bus import PendingQuery, Query, Reply, Undo, Urgency, is_any, is_anything
+from robotiq_async.fleet.network.bus import PendingQuery, Query, Reply, Undo, Urgency, is_any, is_any_key
 from tests.fleet.hosts import Host
 
 T = TypeVar("T")
@@ -231,6 +231,8 @@ class _Reply:
 class MemoryBus:
     """One side's bus."""
 
+    who = ""
+
     def __init__(self, network: Network, name: str, loop: asyncio.AbstractEventLoop) -> None:
         self.name = name
         self.loop = loop
@@ -273,10 +275,10 @@ class MemoryBus:
         self,
         expression: str,
         handler: Callable[[Query], None],
-        allows: Callable[[bytes], bool] = is_anything,
+        allows: Callable[[str], bool] = is_any_key,
     ) -> Undo:
         return _entered(
-            self.queryables, (expression, lambda query: handler(query) if allows(query.payload) else None)
+            self.queryables, (expression, lambda query: handler(query) if allows(query.key) else None)
         )
 
     def ask(

@@ -46,7 +46,7 @@ class Client:
 
     async def may(self, *parts: str) -> bool:
         """Whether a request is answered."""
-        query = LEFT.key(*parts)
+        query = LEFT.question(self.bus.who or "nobody") if parts == ("info",) else LEFT.key(*parts)
         return await self.bus.ask(query, b"?", timeout=PATIENCE, urgency=Urgency.COMMAND) is not None
 
     def subscribe(self, expression: str) -> asyncio.Event:
@@ -95,7 +95,7 @@ class Line:
         def answer(query: Query) -> None:
             query.reply(b"!")
 
-        for verb in ("info", "lease", "halt", "cmd/*"):
+        for verb in ("info/*", "lease", "halt", "cmd/*"):
             self.stack.callback(bus.serve(f"robotiq/v1/lab/cell/*/{verb}", answer))
         self.stack.callback(bus.announce(LEFT.key("alive", "77")))
         publish = {

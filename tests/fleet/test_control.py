@@ -143,7 +143,7 @@ async def test_a_late_request_of_the_last_run_does_nothing_in_the_next(
     here: Lab, hand: RemoteHand, verb: str, arguments: dict[str, Any]
 ) -> None:
     assert hand._session is not None
-    late = hand._session.client.call(arguments)
+    late = hand._session.dialog.call(arguments)
     await hand.stop()
     await hand.start()
     lease = here.lease
@@ -274,7 +274,7 @@ async def test_an_agent_that_is_ending_refuses_and_says_so(here: Lab, reader: Re
 @inside(lab)
 async def test_the_secret_of_the_holder_is_not_sent(here: Lab, reader: RemoteHand) -> None:
     async with here.client("first"):
-        answer = await here.answer("info", Call(LEFT.base, "stranger").pack())
+        answer = await here.answer("info/stranger", Call(LEFT.base, "stranger").pack())
         assert b'"client"' not in answer.pack()
         assert reader.state is State.RUNNING_IDLE
 
@@ -351,7 +351,7 @@ async def test_without_a_record_no_client_comes_back_by_itself(
     if record is not None:
         here.records.records[LEFT] = record
     await here.start_agent("next agent")
-    assert ("the record of the lease cannot be read" in caplog.text) is (record is not None)
+    assert ("the record of the gripper cannot be read" in caplog.text) is (record is not None)
     await asyncio.sleep(3)
     assert not here.holder.hand.is_in_control
     assert await here.holder.do(ending(here.holder.hand.set_speed(9))) == "ControlLost restarted"

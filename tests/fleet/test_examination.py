@@ -193,7 +193,7 @@ async def examined_beside(said: Any) -> dict[str, Finding]:
         elif said is not None:
             question.reply(Answer(LEFT.base, number, 1, said).pack())
 
-    bus.serve(LEFT.key("info"), hear)
+    bus.serve(LEFT.key("info", "*"), hear)
     return await findings(str(LEFT), network.bus("doctor"))
 
 

@@ -210,7 +210,8 @@ def test_every_right_has_its_rule_and_what_is_not_allowed_is_denied() -> None:
     control = access_control("lab", "cell", AccessList(("a",), ("b",), ("c", "d")))
     rules = control["rules"]
     assert isinstance(rules, list)
-    assert {rule["id"] for rule in rules} == set(rights(Role.OPERATE))
+    own = {f"ask info {who}" for who in ("read:a", "halt:b", "operate:c", "operate:d")}
+    assert {rule["id"] for rule in rules} == set(rights(Role.OPERATE)) | own
     assert control["default_permission"] == "deny"
     assert not any("**" in key for rule in rules for key in rule["key_exprs"])
 
@@ -283,12 +284,12 @@ async def test_idle_connections_keep_no_client_out() -> None:
     """300 of them, by a client that only opens them, kept new clients out for 12 s."""
     async with line(protocol="tcp", patience=8) as here:
         agent = await here.agent_bus()
-        agent.serve(LEFT.key("info"), lambda query: query.reply(b"!"))
+        agent.serve(LEFT.key("info", "*"), lambda query: query.reply(b"!"))
         host, _, port = here.endpoint.removeprefix("tcp/").partition(":")
         for _ in range(300):
             here.stack.enter_context(socket.create_connection((host, int(port))))
         client = await here.client(None)
-        while await client.bus.ask(LEFT.key("info"), b"?", timeout=1.0, urgency=Urgency.COMMAND) is None:
+        while await client.bus.ask(LEFT.question("x"), b"?", timeout=1.0, urgency=Urgency.COMMAND) is None:
             pass
 
 

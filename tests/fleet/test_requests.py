@@ -14,7 +14,7 @@ import pytest
 from robotiq_async import Finger, MoveSupersededError, RobotiqHand, State
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.network.bus import Bus, Reply
-from robotiq_async.fleet.remote.outbox import UNDER_WAY
+from robotiq_async.fleet.remote.dialog import UNDER_WAY
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import Call
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
@@ -303,14 +303,14 @@ async def test_a_request_waits_for_the_one_that_was_asked_before_it(here: World)
     await client.do(client.hand.take())
     session = client.hand._session
     assert session is not None
-    made = session.client.call({"position": 50, "fingers": 1})
+    made = session.dialog.call({"position": 50, "fingers": 1})
 
     def call(number: int, after: int) -> Call:
         return Call(LEFT.base, made.client, made.epoch, made.lease, number, made.seen, {"fingers": 1}, after)
 
     early = await ask(client, "cmd/hold", call(1001, 1000))
     assert isinstance(early, ControlLostError)
-    assert str(early) == "request 1000 has not come yet; nothing was done"
+    assert str(early) == "request 1000 has not come yet; it may have been carried out"
     assert early.reason == "early"
     assert await ask(client, "cmd/hold", call(1000, 0)) is None
     assert await ask(client, "cmd/hold", call(1001, 1000)) is None

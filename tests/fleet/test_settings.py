@@ -8,10 +8,9 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger, State
+from robotiq_async.fleet.remote.dialog import Settings
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.fleet.remote.requests import Settings
-from robotiq_async.fleet.wire.envelope import Call
-from robotiq_async.fleet.wire.settings import read_settings, settings_fields, settings_of
+from robotiq_async.fleet.wire.settings import Setting, asked_of, read_settings, settings_fields, settings_of
 from robotiq_async.values.request import Request
 from tests.fleet.lab import Lab, instantly, lab
 from tests.fleet.world import World, world
@@ -116,8 +115,41 @@ async def test_settings_are_restored_after_another_client_changed_them(here: Lab
     await hand.acquire()
     await hand.set_position(30, A)
     image = Request.from_registers(here.gripper.request_registers)
-    assert [axis.force for axis in image.axes] == [5] * 4
-    assert [axis.speed for axis in image.axes] == [3] * 4, "of that it has asked for nothing"
+    assert [axis.force for axis in image.axes] == [5, 200, 200, 200], "it moves one axis"
+    assert [axis.speed for axis in image.axes] == [128, 3, 3, 3], "of the speed it has asked for nothing"
+
+
+@inside(lab)
+async def test_a_new_holder_changes_no_grip(here: Lab, hand: RemoteHand) -> None:
+    """Its first motion of an axis sets that axis alone, and uses FLEET.toml for what it did not ask for."""
+    await hand.move(100, A, speed=255, force=200)
+    await hand.release(keep_grip=True)
+    async with here.client("other") as other:
+        await other.set_speed(3, Finger.B)
+        await other.hold()
+        await other.move(20, Finger.B)
+        axes = Request.from_registers(here.gripper.request_registers).axes
+        assert [(axis.speed, axis.force) for axis in axes[:2]] == [(255, 200), (3, 64)]
+        await other.halt()
+        await other.move(110, A)
+        axes = Request.from_registers(here.gripper.request_registers).axes
+        assert (axes[0].speed, axes[0].force) == (128, 64)
+
+
+@inside(world)
+async def test_a_restarted_agent_knows_what_the_gripper_has(here: World) -> None:
+    """Of the last holder, and not of one before it that set something else."""
+    hand = here.holder.hand
+    await here.holder.do(hand.set_force(200, A))
+    await here.other.do(here.other.hand.take())
+    await here.other.do(here.other.hand.move(20, A))
+    await here.other.do(here.other.hand.release())
+    since = await next_agent(here)
+    await here.holder.do(hand.hold(A))
+    await here.holder.do(hand.set_speed(9, Finger.B))
+    assert {image.axes[0].force for image in images(here, since)} == {64}
+    await here.holder.do(hand.move(30, A))
+    assert images(here, since)[-1].axes[0].force == 200
 
 
 @pytest.mark.parametrize(
@@ -137,7 +169,7 @@ async def test_settings_are_restored_after_another_client_changed_them(here: Lab
 def test_which_settings_a_command_sets(
     name: str, arguments: dict[str, Any], settings: dict[Any, int]
 ) -> None:
-    assert settings_of(name, arguments) == settings
+    assert settings_of(asked_of(name, arguments)) == settings
     assert read_settings(settings_fields(settings)) == settings
 
 
@@ -153,11 +185,10 @@ def test_malformed_settings_are_refused(fields: object) -> None:
 @inside(lab)
 async def test_a_lease_with_settings_that_are_none_is_refused(here: Lab, reader: RemoteHand) -> None:
     assert reader._session is not None
-    settings = {"settings": {"1": {"speed": 999}}}
-    call = reader._session.client.call({"what": "acquire", "label": "", **settings})
+    await reader.acquire()
+    call = reader._session.dialog.call({"what": "settings", "settings": {"1": {"speed": 999}}})
     with pytest.raises(ValueError, match="speed"):
         (await here.answer("lease", call.pack())).outcome(instantly)
-    assert here.lease == 0
 
 
 # -- restarted agents --------------------------------------------------------------------------------------
@@ -175,11 +206,19 @@ async def test_new_settings_override_restored_ones(here: World) -> None:
     assert (found[-1].axes[1].speed, found[-1].axes[1].force) == GENTLE
 
 
-def test_settings_never_asked_for_are_not_sent() -> None:
+def forces(value: int) -> dict[Setting, int]:
+    return {(axis, "force"): value for axis in (A, Finger.B, Finger.C)}
+
+
+def test_only_what_was_carried_out_and_not_what_it_may_have_replaced_is_sent() -> None:
     settings = Settings()
     assert not settings.fields
-    settings.note("cmd/move", Call("", "", number=2, arguments={"position": 9, "fingers": 1, "speed": 3}))
+    settings.note(2, {(A, "position"): 9, (A, "speed"): 3}, begun=True)
     assert settings.fields == {"1": {"speed": 3}}
-    settings.note("cmd/set_force", Call("", "", number=4, arguments={"value": 7, "fingers": 7}))
-    settings.note("cmd/set_force", Call("", "", number=3, arguments={"value": 200, "fingers": 3}))
+    settings.note(4, forces(7), begun=True)
+    settings.note(3, forces(200), begun=True)
     assert settings.fields == {"1": {"speed": 3, "force": 7}, "2": {"force": 7}, "4": {"force": 7}}
+    settings.note(5, forces(9), begun=False)
+    assert settings.fields["2"] == {"force": 7}
+    settings.note(6, {(Finger.B, "force"): 9}, begun=None)
+    assert settings.fields == {"1": {"speed": 3, "force": 7}, "4": {"force": 7}}

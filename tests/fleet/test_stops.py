@@ -13,8 +13,7 @@ from typing import Any, cast
 import pytest
 
 from robotiq_async import ConnectionLostError, Finger, NotStartedError, RobotiqError, State
-from robotiq_async.fleet.agent.requests import Request as Served
-from robotiq_async.fleet.agent.requests import Requests
+from robotiq_async.fleet.agent.jobs import Job, Jobs
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import Call, unpack_answer
 from robotiq_async.runtime.log import Log
@@ -283,8 +282,8 @@ def every_motion(hand: RemoteHand) -> Iterator[Asked]:
         ("reset", {}),
         ("recover", {}),
     ):
-        yield Asked(f"cmd/{name}", session.client.call(arguments))
-    yield Asked("lease", session.client.call({"what": "take", "label": "stranger"}))
+        yield Asked(f"cmd/{name}", session.dialog.call(arguments))
+    yield Asked("lease", session.dialog.call({"what": "take", "label": "stranger"}))
 
 
 @inside(lab)
@@ -311,7 +310,7 @@ async def test_requests_admitted_just_before_the_end_are_not_written_after_it(
         if "lease" not in each.key:
             here.agent._receive(each)
     here.serving.cancel()
-    here.agent._receive(Asked("info", Call(LEFT.base, "stranger")))
+    here.agent._receive(Asked("info/stranger", Call(LEFT.base, "stranger")))
     await asyncio.wait({here.serving})
     assert not going(here, writes)
 
@@ -354,7 +353,7 @@ async def test_a_lease_that_comes_with_the_end_is_not_kept(here: Lab) -> None:
 async def test_a_request_that_outlasts_the_agent_is_cancelled_and_answered() -> None:
     asked = Asked("cmd/move", Call(LEFT.base, "client", number=1))
     publisher = SimpleNamespace(status_message=lambda: b"")
-    requests = Requests(cast("Any", publisher), 1, Log("left"), lambda _: None)
-    requests.start(Served("move", Call(LEFT.base, "client", number=1), asked), asyncio.sleep(60))
+    requests = Jobs(cast("Any", publisher), 1, Log("left"), lambda *_: None)
+    requests.start(Job("move", Call(LEFT.base, "client", number=1), asked), asyncio.sleep(60))
     await requests.end()
     assert asked.answers

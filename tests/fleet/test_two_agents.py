@@ -13,7 +13,7 @@ from robotiq_async import ConnectionLostError, Finger, RobotiqHand, State
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.fleet import Fleet
 from robotiq_async.fleet.network.bus import PendingQuery
-from robotiq_async.fleet.remote.pending_request import is_refusal, of_its_run
+from robotiq_async.fleet.remote.errand import is_refusal, of_its_run
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import Answer, Call, failure
 from robotiq_async.values.errors import AgentError, ControlLostError, NotAllStoppedError
@@ -165,8 +165,8 @@ CALL = Call(LEFT.base, "stranger", epoch=7, number=3)
     ("reply", "counts", "refuses"),
     [
         (Answer(LEFT.base, 3, 7, {}).pack(), True, False),
-        (failure(CALL, 7, AgentError("late")).pack(), True, True),
-        (failure(CALL, 8, AgentError("anew")).pack(), False, True),
+        (failure(CALL, 7, AgentError("late"), begun=False).pack(), True, True),
+        (failure(CALL, 8, AgentError("anew"), begun=False).pack(), False, True),
         (Answer(LEFT.base, 4, 7, {}).pack(), False, False),
         (Answer("robotiq/v1/lab/cell/right", 3, 7, {}).pack(), False, False),
         (b"?", False, True),

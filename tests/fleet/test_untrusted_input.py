@@ -54,7 +54,7 @@ OTHERS = StatusMessage(LEFT.mark + 1, 2, 3.0, State.RUNNING_IDLE, 4, False, 5, F
 async def test_from_the_holder_of_the_lease(here: Lab, hand: RemoteHand, verb: str, arguments: Any) -> None:
     assert hand._session is not None
     writes = len(here.gripper.writes)
-    call = hand._session.client.call(arguments)
+    call = hand._session.dialog.call(arguments)
     answer = await here.answer(verb, call.pack())
     assert answer.number == call.number
     with pytest.raises((RobotiqError, TypeError, ValueError)):
@@ -67,7 +67,7 @@ async def test_from_the_holder_of_the_lease(here: Lab, hand: RemoteHand, verb: s
 @pytest.mark.parametrize(
     "request_", [b"", b"{}", b"[1", b"null", b"\xff", json.dumps({"version": 9}).encode()]
 )
-@pytest.mark.parametrize("verb", ["info", "lease", "halt", "cmd/move"])
+@pytest.mark.parametrize("verb", ["info/x", "lease", "halt", "cmd/move"])
 async def test_malformed_requests(here: Lab, hand: RemoteHand, verb: str, request_: bytes) -> None:
     with pytest.raises((ProtocolError, AgentError)):
         (await here.answer(verb, request_)).outcome(instantly)
@@ -94,7 +94,7 @@ async def test_of_a_command_for_several_axes_all_is_carried_out_or_nothing(
     assert hand._session is not None
     axes = {"1": {"position": 90}, "2": {"position": 999}}
     with pytest.raises(ValueError, match="999"):
-        await hand._session.client.ask("cmd/command", {"axes": axes}, timeout=1.0)
+        await hand._session.dialog.ask("cmd/command", {"axes": axes}, timeout=1.0)
     await asyncio.sleep(1)
     assert here.gripper.position(Finger.A) < 10
 
@@ -107,7 +107,7 @@ async def test_arguments_that_do_not_fit_leave_nothing_behind(here: Lab, hand: R
     await here.local.set_position(250, Finger.B)
     for arguments in ({"position": 9, "fingers": 2, "more": 1}, {"position": 9, "fingers": INFINITE}):
         with pytest.raises((TypeError, ValueError, OverflowError, AgentError)):
-            await hand._session.client.ask("cmd/move", arguments, timeout=1.0)
+            await hand._session.dialog.ask("cmd/move", arguments, timeout=1.0)
     async with here.client("other", control=False) as other:
         await other.take()
         await asyncio.sleep(0.2)
@@ -148,7 +148,7 @@ async def test_labels_of_clients_are_made_printable(
     for verb, number in (("lease", 1), ("halt", 2), ("lease", 3)):
         call = Call(LEFT.base, "eve", 0, 0, number, seen, {"what": "acquire", "label": NAME})
         (await here.answer(verb, call.pack())).outcome(instantly)
-    info = await reader._session.client.ask("info", timeout=1.0)
+    info = await reader._session.dialog.ask("info", timeout=1.0)
     assert info["holder"].isprintable(), "who shows it elsewhere may not look at it first"
     with pytest.raises(ControlLostError) as refused:
         await reader.acquire()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import re
 import secrets
 import threading
 import time
@@ -19,9 +18,8 @@ from ..control.budget import Budget
 from ..control.lease import WINDOW_S
 from ..limited_log import EVERY_S, LimitedLog
 from ..network.bus import Bus, Query, Undo
-from ..wire.envelope import Answer
+from ..wire.envelope import Call, failure
 from ..wire.names import ROOT, GripperName
-from ..wire.values import error_fields
 from .records import NoRecords, Records
 from .served_hand import ServedHand
 
@@ -29,7 +27,6 @@ SUMMARY_S: Final = 1.0  # seconds from one summary to the next
 BEATS: Final = 5  # statuses per window that are sent even if nothing changes
 LOOK_S: Final = 0.3  # seconds to wait for the tokens of other agents: a router may forward them late
 EPOCH_BITS: Final = 53  # bits of an epoch: JSON readers that use doubles represent it exactly
-_CLIENT: Final = re.compile(rb'"client": ?"([^"\\]{1,64})"')
 
 
 class Agent:
@@ -108,7 +105,12 @@ class Agent:
             for each in self._all:
                 each.resume()
             undo.append(self._bus.watch(f"{self._prefix}/*/alive/*", self._report_conflict))
-            undo.append(self._bus.serve(f"{self._prefix}/*/info", self._receive, Questions(loop.time).allow))
+            questions = Questions(loop.time)
+            undo += [
+                self._bus.serve(f"{self._prefix}/*/{key}", self._receive, questions.allow)
+                # Clients of version 1 ask there: they are told that this is another one.
+                for key in ("info/*", "info")
+            ]
             undo += [
                 self._bus.serve(f"{self._prefix}/*/{verb}", self._receive)
                 for verb in ("lease", "halt", "cmd/*")
@@ -185,7 +187,7 @@ class Agent:
             name = GripperName.of_key(query.key)
         except ValueError as no_name:
             refused = AgentError(f"not a request for one gripper: {no_name}")
-            query.reply(Answer("", 0, self.epoch, error=error_fields(refused)).pack())
+            query.reply(failure(Call("", ""), self.epoch, refused, begun=False).pack())
             return
         served = self.hands.get(name.gripper)
         if served is not None:  # else the key is wrong, or there is no such gripper
@@ -233,10 +235,10 @@ class Questions:
         self._dropped = 0
         self._report_due = 0.0
 
-    def allow(self, payload: bytes) -> bool:
-        """Whether to read a question. Clients without an identification share one budget."""
-        found = _CLIENT.search(payload)
-        client, now = found[1].decode("ascii", "replace") if found else "", self._clock()
+    def allow(self, key: str) -> bool:
+        """Whether to read a question. Its key ends in the client's name: with keys, its certificate's."""
+        # Of each gripper, unless the key names several.
+        client, now = key.rpartition("/")[2] if "*" in key else key, self._clock()
         with self._lock:
             if self._budget.allows(client, now):
                 return True

@@ -22,8 +22,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 from inspect import signature
 from typing import Final
 
@@ -36,26 +36,26 @@ from ...values.amounts import UNITS
 from ...values.checks import check_byte, check_mask
 from ...values.enums import Finger
 from ...values.errors import AgentError, ControlLostError, RobotiqConnectionError, RobotiqError
-from ...values.events import SentRequest
 from ...values.move_result import MoveResult
 from ..control.admission import Admission
 from ..control.lease import Lease
 from ..network.bus import Bus, Query
 from ..wire.envelope import Answer, Call, failure, unpack_call
 from ..wire.names import GripperName
-from ..wire.settings import Setting, read_settings, settings_of
-from ..wire.values import Fields, error_fields
+from ..wire.settings import moved_by, read_settings, settings_of
+from ..wire.values import Fields
+from .jobs import Job, Jobs, Work, label_of
+from .kept_settings import KeptSettings
 from .publisher import HandPublisher
 from .records import Records
-from .requests import MOTIONS, Request, Requests, Work, axes_of, label_of
 
 RETRY_S: Final = 1.0  # seconds between two attempts to reach the gripper
 REST_S: Final = (
     0.5  # for a hand that keeps its grip to come to rest, as long as a stop that keeps one gives it
 )
-SEQUENCES: Final = frozenset({"activate", "reset", "atr", "recover"})
-"""Commands with a speed and a force of their own."""
-COMMANDS: Final = frozenset({"set_position", "set_speed", "set_force", "move", "hold"}) | SEQUENCES
+COMMANDS: Final = frozenset(
+    {"set_position", "set_speed", "set_force", "move", "hold", "activate", "reset", "atr", "recover"}
+)
 """Commands of a holder: the methods of a hand by that name. In addition there are command and cancel."""
 
 
@@ -70,12 +70,11 @@ class ServedHand:
         self._hand = hand
         self._epoch = epoch
         self._records = records
-        self._lease = Lease(window, epoch, lambda: records.keep(name, self._lease.record))
+        self._lease = Lease(window, epoch, self._keep_record)
+        self._settings = KeptSettings(hand, self._keep_record)
         self._admission = Admission(name.base, epoch, self._lease)
         self.publisher = HandPublisher(name, hand, bus, epoch, self._lease)
-        self._requests = Requests(self.publisher, epoch, self._log, self._carried_out)
-        self._settings = RestoredSettings(hand)
-        self._released: Request | None = None  # the last request that released the lease; it may be repeated
+        self._jobs = Jobs(self.publisher, epoch, self._log, self._job_ended)
         self._commanded = Finger(0)  # axes that the holder has commanded: they are held when its lease ends
         self._to_hold = Finger(0)
         """Axes to hold when the gripper is reached again: the link was down when they should have been."""
@@ -88,14 +87,21 @@ class ServedHand:
         if record is not None:
             try:
                 self._lease.resume(record)
-            except (KeyError, TypeError, ValueError) as error:
-                self._log.warning("the record of the lease cannot be read: %r", error)
-        self._records.keep(self.name, self._lease.record)
+                self._settings.resume(record["settings"])
+            except (AttributeError, KeyError, TypeError, ValueError) as error:
+                self._log.warning("the record of the gripper cannot be read: %r", error)
+        self._keep_record()
+
+    def _keep_record(self) -> None:
+        self._records.keep(self.name, {**self._lease.record, "settings": self._settings.record})
 
     async def run(self) -> None:
         """Keep the hand running, with or without its gripper, until cancelled; then stop the fingers."""
         loop = asyncio.get_running_loop()
-        removes = [self._hand.add_listener(each) for each in (self.publisher.observe, self._settings.observe)]
+        removes = [
+            self._hand.add_listener(each)
+            for each in (self.publisher.observe, self._settings.observe, self._jobs.observe)
+        ]
         try:
             while True:
                 await self._run_once()
@@ -108,7 +114,7 @@ class ServedHand:
                     remove()
                 if self._expiry is not None:
                     self._expiry.cancel()
-                await self._requests.end()
+                await self._jobs.end()
 
     def refuse_requests(self) -> None:
         """The agent ends: accept only halts, and drop requests that have not been sent."""
@@ -118,6 +124,7 @@ class ServedHand:
 
     async def _run_once(self) -> None:
         try:
+            self._hand.assume(self._settings.in_gripper)
             await self._hand.start(activate=False)
             self.publisher.problem = ""
             await self._hold_what_moves()
@@ -144,29 +151,35 @@ class ServedHand:
         try:
             call = unpack_call(query.payload)
         except RobotiqError as error:
-            call = Call(self.name.base, "")
-            query.reply(failure(call, self._epoch, error).pack())
+            query.reply(failure(Call(self.name.base, ""), self._epoch, error, begun=False).pack())
             return
+        is_free = verb.partition("/")[0] in ("info", "halt")  # of the lease, and of the run of the agent
         try:
-            self._admission.check_meant(call, in_any_run=verb in ("info", "halt"))
+            self._admission.check_meant(call, in_any_run=is_free)
             self._expire()
+            # First of all: what was begun gets its answer, whoever commands now.
+            if not is_free and (job := self._jobs.find(call)) is not None:
+                self._jobs.repeat(job, query)
+                return
             value = self._answer(verb, call, query)
         except (RobotiqError, TypeError, ValueError, OverflowError) as error:  # JSON may contain infinity
             self._log.info("%s refused: %s", verb, getattr(error, "message", error))
+            is_known = call.to == self.name.base and call.epoch in (0, self._epoch)
+            may_come = getattr(error, "reason", "") == "early"  # it is repeated
+            begun = False if is_known and not may_come and not self._jobs.may_have_been(call) else None
             # From this gripper, even if the request names another: the client then ignores the refusal,
             # since a copy of the request may have reached the right gripper.
-            refused = Answer(self.name.base, call.number, self._epoch, error=error_fields(error))
-            self._reply(query, refused)
+            self._reply(query, failure(replace(call, to=self.name.base), self._epoch, error, begun))
         else:
             if value is not None:
                 self._reply(query, Answer(call.to, call.number, self._epoch, value))
 
     def _answer(self, verb: str, call: Call, query: Query) -> Fields | None:
         # None: the answer follows later.
-        if self._is_ending and verb not in ("info", "halt"):
-            raise ControlLostError("the agent is ending; nothing was done", "closed")
+        if self._is_ending and verb.partition("/")[0] not in ("info", "halt"):
+            raise ControlLostError("the agent is ending", "closed")
         match verb.split("/"):
-            case ["info"]:
+            case ["info", *_]:
                 return self._info(call)
             case ["lease"]:
                 return self._change_lease(call, query)
@@ -195,22 +208,26 @@ class ServedHand:
 
     def _change_lease(self, call: Call, query: Query) -> Fields | None:
         what = call.arguments.get("what")
+        is_kept = True
         if what == "renew":
             self._admission.renew(call, now())
+        elif what == "settings":
+            self._admission.renew(call, now())
+            self._settings.receive(read_settings(call.arguments.get("settings")))
         elif what in ("acquire", "take"):
             self._admission.check_fresh(call, now())
-            self._grant(call, take=what == "take")
+            is_kept = self._grant(call, take=what == "take")
         elif what == "release":
             self._release(call, query)
             return None
         else:
             raise AgentError(f"unknown lease request {what!r}")
-        return {"lease": self._lease.number, "window": self._lease.window}
+        return {"lease": self._lease.number, "window": self._lease.window, "settings": is_kept}
 
-    def _grant(self, call: Call, *, take: bool) -> None:
+    def _grant(self, call: Call, *, take: bool) -> bool:
+        """Give the lease; returns whether the settings of the client are known."""
         if self._admission.is_repeated(call):
-            return
-        settings = read_settings(call.arguments.get("settings", {}))
+            return self._settings.grant(call.client)
         holder = self._lease.holder
         label = label_of(call)
         if take:
@@ -221,25 +238,22 @@ class ServedHand:
         elif take:
             self.end_lease("taken", label)
         number = self._admission.acquire(call, label)
-        self._settings.restore(settings)
         self._log.info("%s commands the gripper", label)
         self.publisher.add({"kind": "lease", "number": number, "holder": label, "reason": "granted"})
         self._watch_expiry()
+        is_kept = self._settings.grant(call.client)
+        self._keep_record()
+        return is_kept
 
     def _release(self, call: Call, query: Query) -> None:
         # A client may repeat its release, or strengthen it, as long as no other client has acquired the
         # lease.
-        known = self._released
-        if known is not None and (known.call.client, known.call.number) == (call.client, call.number):
-            self._requests.repeat(known, query)
-            return
         self._admission.release(call, now())
         leaves = call.arguments.get("halt") is False
         keeps = call.arguments.get("keep_grip") is True and self._hand.state in RUNNING
         if leaves:
             self._commanded = Finger(0)
-            self._requests.forget_moves()
-        self.end_lease("released")
+        self.end_lease("released", leaves=leaves)
 
         async def release() -> None:
             if keeps and not leaves:
@@ -247,12 +261,10 @@ class ServedHand:
             elif not leaves:
                 await self._hand.halt()
 
-        self._released = Request("release", call, query)
-        self._requests.start(self._released, release())
+        self._jobs.begin(Job("release", call, query), release())
 
     async def _come_to_rest(self) -> None:
         # After the time limit it halts, unless a client has acquired the lease since.
-        self._settings.merge({})
         await self._hand.hold(Finger.ALL)
         with suppress(TimeoutError):
             async with asyncio.timeout(REST_S):
@@ -262,9 +274,9 @@ class ServedHand:
         if self._lease.holder is None:
             await self._hand.halt()
 
-    def end_lease(self, reason: str, by: str = "") -> None:
+    def end_lease(self, reason: str, by: str = "", *, leaves: bool = False) -> None:
         """Take the lease from its holder. What it set in motion is held; contacts keep their grip."""
-        holder = self._lease.end(reason)
+        number, holder = self._lease.number, self._lease.end(reason)
         if holder is None:
             return
         self._log.log(
@@ -274,18 +286,17 @@ class ServedHand:
             reason,
             f" by {by}" if by else "",
         )
-        self._requests.cancel_all(reason)
+        self._jobs.cancel_all(number, reason, leaves=leaves)
         # A hold affects only what moves. A speed or a force that is not written yet would take effect under
         # the next holder, or, after a freeze of this process, seconds late.
         self._hand.drop_requests(f"the lease has ended: {reason}")
         axes, self._commanded = self._commanded, Finger(0)
         if axes and not self._is_ending:  # else stop() stops the fingers
-            self._requests.spawn(self._hold(axes))
+            self._jobs.spawn(self._hold(axes))
         self.publisher.add({"kind": "lease", "number": self._lease.number, "holder": None, "reason": reason})
 
     async def _hold(self, axes: Finger) -> None:
         self._to_hold &= ~axes
-        self._settings.merge({})
         try:
             await self._hand.hold(axes)
         except RobotiqConnectionError as error:
@@ -324,7 +335,7 @@ class ServedHand:
         else:
             # Otherwise a control loop of the holder would move the fingers again within 10 ms.
             self.end_lease("halted", label_of(call))
-        self._requests.start(Request("halt", call, query), self._stop_now())
+        self._jobs.start(Job("halt", call, query), self._stop_now())
 
     async def _stop_now(self) -> None:
         # While the agent ends, the hand is being stopped anyway: wait for that stop and check its outcome.
@@ -337,43 +348,43 @@ class ServedHand:
             raise AgentError("the agent ended, and the fingers were not seen to stop")
 
     def _command(self, name: str, call: Call, query: Query) -> None:
-        known = self._requests.find(call.number)
-        if known is not None and self._admission.is_of_holder(call):
-            self._requests.repeat(known, query)
-            return
         if name == "cancel":
             self._cancel(call, query)
             return
         if name != "command" and name not in COMMANDS:
             raise AgentError(f"unknown command {name!r}")
         self._admission.admit(call, now())
-        axes = axes_of(name, call.arguments)
-        work = self._work(name, call.arguments)  # raises for invalid arguments, before anything changes
-        self._commanded |= axes
-        self._requests.begin(Request(name, call, query), work)
+        job = Job(name, call, query)
+        work = self._work(job)  # raises for invalid arguments, before anything changes
+        self._commanded |= moved_by(job.asked)
+        self._jobs.begin(job, work)
 
-    def _carried_out(self, request: Request) -> None:
-        # A new command replaces the hold that its axes still wait for.
-        if request.name in MOTIONS:
-            self._to_hold &= ~axes_of(request.name, request.call.arguments)
+    def _job_ended(self, job: Job, is_done: bool) -> None:
+        self._settings.end(settings_of(job.asked), is_done=is_done)
+        if is_done:  # a new command replaces the hold that its axes still wait for
+            self._to_hold &= ~moved_by(job.asked)
 
-    def _work(self, name: str, arguments: Fields) -> Work:
+    def _work(self, job: Job) -> Work:
+        name, arguments = job.name, job.call.arguments
         # Clients convert units: the agent restores the counts that it saw.
         if own := sorted(UNITS & arguments.keys()):
             raise TypeError(f"requests are in counts, got {', '.join(own)}")
         if name == "command":
-            return self._set(**arguments)
+            if not isinstance(arguments.get("axes"), dict):
+                raise TypeError("axes must be an object")
+            return self._set(job, **arguments)
         # Checked here: a coroutine raises for wrong arguments only when it is awaited.
         signature(getattr(self._hand, name)).bind(**arguments)
-        return self._carry_out(name, arguments)
+        return self._carry_out(job)
 
-    async def _carry_out(self, name: str, arguments: Fields) -> MoveResult | None:
-        if name not in SEQUENCES:
-            self._settings.merge(settings_of(name, arguments))
-        result: MoveResult | None = await getattr(self._hand, name)(**arguments)
+    async def _carry_out(self, job: Job) -> MoveResult | None:
+        self._settings.ask(job.asked)
+        result: MoveResult | None = await getattr(self._hand, job.name)(**job.call.arguments)
+        if settings_of(job.asked):
+            await self._records.kept()
         return result
 
-    async def _set(self, axes: Fields) -> None:
+    async def _set(self, job: Job, axes: Fields) -> None:
         """Like :meth:`RobotiqHand.command`, for several axes at once."""
         asked = {check_mask(int(mask)): changes for mask, changes in axes.items()}
         for changes in asked.values():  # all of them before the first takes effect
@@ -381,53 +392,20 @@ class ServedHand:
                 if name in UNITS:
                     raise TypeError(f"requests are in counts, got {name}")
                 check_byte(name, value)
-        self._settings.merge(settings_of("command", {"axes": axes}))
+        self._settings.ask(job.asked)
         for mask, changes in asked.items():
             self._hand.command(mask, **changes)
+        self._to_hold &= ~moved_by(job.asked)
 
     def _cancel(self, call: Call, query: Query) -> None:
         self._admission.renew(call, now())
         number = call.arguments.get("number", -1)
-        request, left = self._requests.find(number), self._requests.left_of(number)
+        job, left = self._jobs.find(call, number), self._jobs.left_of(number)
         if left:  # the move has failed, and its client left before it could see that
-            self._requests.spawn(self._hold(left))
-        elif request is not None:
-            request.cancel()
+            self._jobs.spawn(self._hold(left))
+        elif job is not None:
+            job.cancel()
         else:
             # The cancellation may have overtaken the command: refuse it when it arrives.
             self._admission.bar(Call(call.to, call.client, number=int(call.arguments.get("number", 0))))
         self._reply(query, Answer(call.to, call.number, self._epoch, {}))
-
-
-class RestoredSettings:
-    """Speeds and forces merged into each command, to be written in one image, until one is acknowledged.
-
-    A restarted agent has its own speeds and forces: the next motion could be faster and stronger than the
-    client requested.
-    """
-
-    def __init__(self, hand: RobotiqHand) -> None:
-        self._hand = hand
-        self._missing: dict[Setting, int] = {}
-
-    def restore(self, settings: Mapping[Setting, int]) -> None:
-        has = self._hand.model.all_axes
-        self._missing.update({each: value for each, value in settings.items() if each[0] in has})
-
-    def merge(self, renewed: Mapping[Setting, int]) -> None:
-        """Merge them into the command of this turn, which sets the renewed ones itself."""
-        try:
-            for (axis, what), value in self._missing.items():
-                self._hand.command(axis, **{what: value})
-        except RobotiqError:
-            return  # the hand refuses the command, too
-        self._missing.update(
-            {setting: value for setting, value in renewed.items() if setting in self._missing}
-        )
-
-    def observe(self, what: object) -> None:
-        # An acknowledged image that contains all of them has restored them.
-        if self._missing and isinstance(what, SentRequest) and what.acknowledged:
-            axes = dict(what.request.by_axis)
-            if all(getattr(axes[axis], name) == value for (axis, name), value in self._missing.items()):
-                self._missing.clear()

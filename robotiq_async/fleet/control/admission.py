@@ -29,17 +29,17 @@ class Admission:
 
     def check_meant(self, call: Call, *, in_any_run: bool = False) -> None:
         if call.to != self._base:
-            raise AgentError(f"a request for {call.to} was carried to {self._base}; nothing was done")
+            raise AgentError(f"a request for {call.to} was carried to {self._base}")
         if not in_any_run and call.epoch not in (0, self._epoch):
-            raise AgentError("the agent was restarted since this request was made; nothing was done")
+            raise AgentError("the agent was restarted since this request was made")
 
     def admit(self, call: Call, now: float) -> None:
         """Accept a command and count it, or raise. The caller has ended an expired lease first."""
         self._check_holder(call, now)
         if call.number <= self._newest:
-            raise AgentError("a later request overtook this one; nothing was done")
+            raise AgentError("a later request overtook this one")
         if call.after > self._newest:
-            raise ControlLostError(f"request {call.after} has not come yet; nothing was done", "early")
+            raise ControlLostError(f"request {call.after} has not come yet", "early")
         self._newest = call.number
         self.lease.renew(call.seen)
 
@@ -57,7 +57,7 @@ class Admission:
             return False
         holder = self.lease.holder
         if holder is None or holder.client != call.client or call.number < before:
-            raise AgentError("the request for the lease was repeated; nothing was done")
+            raise AgentError("the request for the lease was repeated")
         return True
 
     def acquire(self, call: Call, label: str) -> int:
@@ -110,7 +110,7 @@ class Admission:
         if not self.lease.is_fresh(call.seen, now):
             raise ControlLostError(
                 f"the request was on its way for {now - call.seen:.1f} s, longer than the window of "
-                f"{self.lease.window:g} s; nothing was done",
+                f"{self.lease.window:g} s",
                 "late",
             )
 
@@ -118,7 +118,5 @@ class Admission:
         if not self.is_of_holder(call):
             holder, reason = self.lease.holder, self.lease.end_of(call.lease)
             who = holder.label if holder is not None and holder.client != call.client else "no client"
-            raise ControlLostError(
-                f"the lease has ended ({reason}), {who} commands the gripper now; nothing was done", reason
-            )
+            raise ControlLostError(f"the lease has ended ({reason}), {who} commands the gripper now", reason)
         self.check_fresh(call, now)

@@ -50,7 +50,15 @@ CLIENTS: Final = (Role.READ, Role.HALT, Role.OPERATE)
 _IN: Final = ("ingress",)  # from the client to the agent
 _OUT: Final = ("egress",)  # from the agent to the client
 _RIGHTS: Final = {
-    Role.READ: ("watch", "published", "presence", "present", "ask info", "answer info"),
+    Role.READ: (
+        "watch",
+        "published",
+        "presence",
+        "present",
+        "answer info",
+        "ask old info",
+        "answer old info",
+    ),
     Role.HALT: ("ask halt", "answer halt"),
     Role.OPERATE: ("ask lease", "answer lease", "ask cmd", "answer cmd"),
 }
@@ -111,23 +119,30 @@ def _check(table: Mapping[str, object]) -> dict[str, tuple[str, ...]]:
 def access_control(site: str, host: str, clients: AccessList) -> dict[str, object]:
     """The part of an agent's zenoh configuration that denies everything but the rights of its clients."""
     own = f"{ROOT}/{check_name('site', site)}/{check_name('host', host)}/*"
+    names = [role.common_name(each) for role in CLIENTS for each in clients.of(role)]
     return {
         "enabled": True,
         "default_permission": "deny",
         "rules": [
             *_reading(own),
+            *(_rule(f"ask info {name}", ("query",), _IN, (f"{own}/info/{name}",)) for name in names),
             *_asking("halt", own, "halt"),
             *_asking("lease", own, "lease"),
             *_asking("cmd", own, "cmd/*"),
         ],
-        "subjects": [
-            # Roles without clients are left out: zenoh treats an empty list like a missing one.
-            {"id": role.value, "cert_common_names": [role.common_name(name) for name in clients.of(role)]}
-            for role in CLIENTS
-            if clients.of(role)
-        ],
+        # Each client asks under its own name alone: that is what its budget of questions is counted by.
+        "subjects": [{"id": name, "cert_common_names": [name]} for name in names],
         "policies": [
-            {"rules": list(rights(role)), "subjects": [role.value]} for role in CLIENTS if clients.of(role)
+            # Roles without clients are left out: zenoh treats an empty list like a missing one.
+            *(
+                {
+                    "rules": list(rights(role)),
+                    "subjects": [role.common_name(each) for each in clients.of(role)],
+                }
+                for role in CLIENTS
+                if clients.of(role)
+            ),
+            *({"rules": [f"ask info {name}"], "subjects": [name]} for name in names),
         ],
     }
 
@@ -150,7 +165,9 @@ def _reading(own: str) -> list[Rule]:
             (f"{ROOT}/*/*/*/alive/*",),
         ),
         _rule("present", ("liveliness_token",), _OUT, (f"{own}/alive/*",)),
-        *_asking("info", own, "info"),
+        _asking("info", own, "info/*")[1],
+        # Clients of version 1 ask there, and get to know that this is another one.
+        *_asking("old info", own, "info"),
     ]
 
 

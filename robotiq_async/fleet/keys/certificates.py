@@ -156,12 +156,21 @@ def read_credentials(folder: Path) -> Credentials:
         own.verify_directly_issued_by(authority)
     except (InvalidSignature, TypeError, ValueError) as error:
         raise ValueError(f"{CERTIFICATE} was not issued by the authority of {AUTHORITY}") from error
-    names = own.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
     return Credentials(
-        str(names[0].value) if names else "",
+        _common_name(own),
         max(own.not_valid_before_utc, authority.not_valid_before_utc),
         min(own.not_valid_after_utc, authority.not_valid_after_utc),
     )
+
+
+def common_name(certificate: Path) -> str:
+    """The common name in a certificate, as zenoh compares it; empty if it has none."""
+    return _common_name(_certificate(certificate))
+
+
+def _common_name(certificate: x509.Certificate) -> str:
+    names = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
+    return str(names[0].value) if names else ""
 
 
 def _certificate(path: Path) -> x509.Certificate:

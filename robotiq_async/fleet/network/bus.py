@@ -18,6 +18,7 @@ class Urgency(Enum):
 
     STOP = "stop"  # halts: before everything else
     COMMAND = "command"  # commands, leases, their answers
+    QUESTION = "question"  # what anybody may ask, and the answers: behind telemetry
     TELEMETRY = "telemetry"  # statuses, events, summaries: dropped when the link is full
 
 
@@ -52,12 +53,16 @@ def is_any(_reply: Reply) -> bool:
     return True
 
 
-def is_anything(_payload: bytes) -> bool:
+def is_any_key(_key: str) -> bool:
     return True
 
 
 class Bus(Protocol):
     """One open session. Calls, and callbacks unless noted, belong to the event loop it was opened in."""
+
+    @property
+    def who(self) -> str:
+        """The name that this side has proven, with its certificate; empty without keys."""
 
     def publisher(self, key: str, urgency: Urgency) -> Callable[[bytes], None]:
         """Return a function that publishes a payload under a key. It never blocks."""
@@ -69,14 +74,14 @@ class Bus(Protocol):
         self,
         expression: str,
         handler: Callable[[Query], None],
-        allows: Callable[[bytes], bool] = is_anything,
+        allows: Callable[[str], bool] = is_any_key,
     ) -> Undo:
         """Call a handler with each request under matching keys. Returns what ends it.
 
         Args:
             expression: the keys.
             handler: called in the event loop.
-            allows: whether to accept a request with this payload; others are dropped. Called first, in any
+            allows: whether to accept a request under this key; others are dropped. Called first, in any
                 thread.
         """
 

@@ -19,6 +19,8 @@ GATHER_S: Final = 0.001
 """Seconds for which telemetry is collected under load, to wake the loop once for all of it."""
 TURN_S: Final = 0.002  # seconds of deliveries in one turn of the loop: the rest of the program must run, too
 MOST: Final = 2000  # Requests and telemetry that may wait. Beyond that they are dropped, as on a full network
+MOST_QUESTIONS: Final = 64  # questions that may wait. Beyond that they are dropped: their clients ask again
+SHARE: Final = 0.2  # of the loop's time, at most, goes to questions while they wait
 MOST_REPLIES: Final = 1000
 """Replies that may wait. Beyond that the query is dropped, also in this thread: zenoh notifies the client of
 it, which can block for as long. Clients repeat their requests."""
@@ -31,10 +33,11 @@ class Kind(Enum):
     ANSWER = "answer"  # to a request of this process: never dropped
     REQUEST = "request"
     TELEMETRY = "telemetry"  # may wait 1 ms
+    QUESTION = "question"  # of anybody: waits for all others, and gets a SHARE of the loop
 
 
 class Mailbox:
-    """Deliveries in the order of arrival, halts first.
+    """Deliveries in the order of arrival, halts first, questions last.
 
     Waking the loop costs more than handling a status. Under load, with telemetry from dozens of hands, the
     loop is woken once for all that arrives within a millisecond. Requests, answers and the telemetry of a
@@ -45,6 +48,8 @@ class Mailbox:
         self._loop = asyncio.get_running_loop()
         self._halts: deque[Callable[[], None]] = deque()
         self._deliveries: deque[Callable[[], None]] = deque()
+        self._questions: deque[Callable[[], None]] = deque()
+        self._question_due = 0.0  # when the next question may be delivered
         self._is_due = False
         self._gathering: asyncio.TimerHandle | None = None
         self._opened_at = 0.0
@@ -54,14 +59,16 @@ class Mailbox:
 
     def put(self, delivery: Callable[[], None], kind: Kind) -> bool:
         """Call a function in the loop; thread-safe. False if the mailbox is full: the call is dropped."""
-        deliveries = self._halts if kind is Kind.HALT else self._deliveries
-        if kind is Kind.ANSWER or len(deliveries) < MOST:
-            deliveries.append(delivery)
-        else:
-            self._dropped += 1
+        own = {Kind.HALT: self._halts, Kind.QUESTION: self._questions}
+        deliveries = own.get(kind, self._deliveries)
+        if kind is not Kind.ANSWER and len(deliveries) >= (MOST_QUESTIONS if kind is Kind.QUESTION else MOST):
+            self._dropped += kind is not Kind.QUESTION
             return False
-        # Telemetry waits for a timer that is already set. Anything else wakes the loop before that.
-        if not self._is_due or (kind is not Kind.TELEMETRY and self._gathering is not None):
+        deliveries.append(delivery)
+        # Telemetry, and a question, wait for a timer that is already set. Anything else wakes the loop
+        # before that.
+        waits = kind in (Kind.TELEMETRY, Kind.QUESTION)
+        if not self._is_due or (not waits and self._gathering is not None):
             self._is_due = True
             with contextlib.suppress(RuntimeError):  # the loop is closed
                 self._loop.call_soon_threadsafe(self._open)
@@ -75,22 +82,37 @@ class Mailbox:
         self._report_dropped()
         count, until = 0, time.perf_counter() + TURN_S
         while self._halts or self._deliveries:
-            delivery = (self._halts or self._deliveries).popleft()
+            self._deliver((self._halts or self._deliveries).popleft())
             count += 1
-            try:
-                delivery()
-            except Exception:  # noqa: BLE001  # must not stop the deliveries after it
-                self._failed.warn("handling a fleet message failed", exc_info=True)
             if time.perf_counter() > until:
                 break
+        else:
+            self._answer_a_question()
         # A delivery may have put another one, so _is_due may be set again.
         if (self._halts or self._deliveries) and not self._is_due:
             self._is_due = True
             self._loop.call_soon(self._open)
+        elif self._questions and not self._is_due:
+            self._is_due = True
+            wait = max(0.0, self._question_due - self._loop.time())
+            self._gathering = self._loop.call_later(wait, self._open)
         # Two openings in close succession mean load: collect, instead of waking the loop for each message.
         elif count and not self._is_due and self._opened_at - before < 2 * GATHER_S:
             self._is_due = True
             self._gathering = self._loop.call_later(GATHER_S, self._open)
+
+    def _answer_a_question(self) -> None:
+        # One, and then none for as long as its share demands. Nothing that moves fingers waits for it.
+        if self._questions and self._loop.time() >= self._question_due:
+            begun = time.perf_counter()
+            self._deliver(self._questions.popleft())
+            self._question_due = self._loop.time() + (time.perf_counter() - begun) * (1 / SHARE - 1)
+
+    def _deliver(self, delivery: Callable[[], None]) -> None:
+        try:
+            delivery()
+        except Exception:  # noqa: BLE001  # must not stop the deliveries after it
+            self._failed.warn("handling a fleet message failed", exc_info=True)
 
     def _report_dropped(self) -> None:
         if self._dropped and self._loop.time() >= self._report_due:

@@ -11,6 +11,7 @@ import contextlib
 import functools
 import json
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Final
 
 from ...runtime.host_names import addresses_of
@@ -26,7 +27,8 @@ except ModuleNotFoundError as error:
 
 from ...runtime.concurrency import in_a_thread
 from ...values.errors import ConnectFailedError
-from .bus import PendingQuery, Query, Reply, Undo, Urgency, is_any, is_anything
+from ..keys.certificates import common_name
+from .bus import PendingQuery, Query, Reply, Undo, Urgency, is_any, is_any_key
 from .mailbox import Kind, Mailbox, ReplySender
 
 CLOSE_S: Final = 1.0  # seconds for closing a session
@@ -36,6 +38,7 @@ _PRIORITY: Final = {
     Urgency.STOP: zenoh.Priority.REAL_TIME,
     Urgency.COMMAND: zenoh.Priority.INTERACTIVE_HIGH,
     Urgency.TELEMETRY: zenoh.Priority.DATA,
+    Urgency.QUESTION: zenoh.Priority.DATA_LOW,
 }
 _EXPRESS: Final = (Urgency.STOP, Urgency.COMMAND)  # sent at once, not batched
 RESOLVED_S: Final = 1.0  # seconds to resolve a host name; one that takes longer counts as unknown
@@ -55,7 +58,9 @@ async def open_bus(configuration: Mapping[str, Any], what: str) -> ZenohBus:
     except asyncio.CancelledError:
         opening.add_done_callback(_close_opened)
         raise
-    return ZenohBus(session, configuration["connect"]["endpoints"])
+    tls = configuration["transport"]["link"].get("tls")
+    who = common_name(Path(tls["connect_certificate"])) if tls else ""
+    return ZenohBus(session, configuration["connect"]["endpoints"], who)
 
 
 def _close_opened(opening: asyncio.Future[zenoh.Session]) -> None:
@@ -95,12 +100,13 @@ class _Reply:
 class ZenohBus:
     """An open session: :class:`~robotiq_async.fleet.network.bus.Bus` over zenoh."""
 
-    def __init__(self, session: zenoh.Session, endpoints: Sequence[str] = ()) -> None:
+    def __init__(self, session: zenoh.Session, endpoints: Sequence[str] = (), who: str = "") -> None:
+        self.who = who
         self._session = session
         self._endpoints = endpoints
         self._mailbox = Mailbox()
-        # Halts have a sender of their own: clients that do not read their answers must not delay these.
-        self._repliers = {True: ReplySender(), False: ReplySender()}
+        # A sender for each kind: clients that do not read their answers delay only those of that kind.
+        self._repliers = {kind: ReplySender() for kind in (Kind.HALT, Kind.REQUEST, Kind.QUESTION)}
         self._dropping = ReplySender()
         self._closing: asyncio.Future[None] | None = None
 
@@ -134,16 +140,18 @@ class ZenohBus:
         self,
         expression: str,
         handler: Callable[[Query], None],
-        allows: Callable[[bytes], bool] = is_anything,
+        allows: Callable[[str], bool] = is_any_key,
     ) -> Undo:
-        is_halt = expression.endswith("/halt")
-        reply_sender, kind = self._repliers[is_halt], Kind.HALT if is_halt else Kind.REQUEST
+        kind = Kind.HALT if expression.endswith("/halt") else Kind.REQUEST
+        if allows is not is_any_key:
+            kind = Kind.QUESTION
+        reply_sender = self._repliers[kind]
 
         def deliver(query: zenoh.Query) -> None:
             payload = query.payload
             if (
                 (payload is None or len(payload) <= LONGEST)
-                and allows(b"" if payload is None else payload.to_bytes())
+                and allows(str(query.key_expr))
                 and self._mailbox.put(lambda: handler(_Query(query, reply_sender)), kind)
             ):
                 return

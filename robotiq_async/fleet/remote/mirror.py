@@ -80,8 +80,8 @@ class Mirror:
     def __init__(
         self,
         mark: int,
-        channels: Channels,
-        entered: Callable[[State], None],
+        channels: Channels | None = None,
+        entered: Callable[[State], None] = lambda _: None,
         before: Mirror | None = None,
         log: Log = log,
     ) -> None:
@@ -98,7 +98,7 @@ class Mirror:
         self.points: Points = ()
         self._strokes: dict[Model, Stroke] = {}  # made of the points
         self._mark = mark
-        self._channels = channels
+        self._channels = channels or Channels()
         self._entered = entered
         self._is_over = False
         self._reported = State.DISCONNECTED if before is None else before.state

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Collection
-from contextlib import nullcontext
 from dataclasses import replace
 from functools import cache, partial
 from typing import Final, Literal
 
 from ...control.state_machine import RUNNING, refusal
 from ...hand import Hand
+from ...runtime.limit import Limit
 from ...session.options import units_of
 from ...values.calibration import ForceCalibration, SpeedCalibration
 from ...values.checks import check_flag, check_seconds
@@ -27,10 +27,10 @@ from ...values.move_result import MoveResult
 from ...values.statistics import Counters, Statistics
 from ...values.status import RobotiqStatus
 from ...values.stroke import Points
-from ..network.bus import Bus, Urgency
+from ..network.bus import Bus
 from ..network.route import parse_remote_address
 from ..wire.values import Fields, read_result, reading
-from .requests import no_answer_as_lost_connection
+from .dialog import no_answer_as_lost_connection
 from .session import CONNECT_S, RemoteSession
 
 COMMAND_S: Final = 5.0  # seconds for commands that end with the acknowledgment of the gripper
@@ -38,7 +38,6 @@ SEQUENCE_S: Final = 130.0
 """Seconds for an activation, a reset or a release; the agent's own limits are shorter."""
 MOVE_S: Final = 100.0  # seconds for a move without a timeout; the agent's own limit is shorter
 SLACK_S: Final = 5.0  # seconds beyond a timeout that the agent applies
-MOTIONS: Final = ("move", "set_position")
 
 
 class RemoteHand(Hand):
@@ -121,7 +120,7 @@ class RemoteHand(Hand):
 
     async def _start(self, activate: bool, wait: float) -> None:
         before = self._session
-        if self._opening is not None or (before is not None and not before.client.has_ended):
+        if self._opening is not None or (before is not None and not before.dialog.has_ended):
             raise InvalidStateError(
                 "this hand is started already: stop() it first",
                 self.state,
@@ -133,7 +132,7 @@ class RemoteHand(Hand):
             bus,
             self._channels,
             owns_bus=bus is not self._shared_bus,
-            before=None if before is None else before.client,
+            before=None if before is None else before.dialog,
         )
         try:
             with no_answer_as_lost_connection():
@@ -149,9 +148,9 @@ class RemoteHand(Hand):
     async def _stop(self, halt: bool, keep_grip: bool) -> None:
         self._opening = None
         session = self._session
-        if session is not None and not session.client.has_ended:
+        if session is not None and not session.dialog.has_ended:
             session.check_loop()
-            session.outbox.drop()
+            session.dialog.clear("stopped")
             await session.close(StopLevel.of(halt=halt, keep_grip=keep_grip))
 
     async def _open_bus(self) -> Bus:
@@ -176,7 +175,7 @@ class RemoteHand(Hand):
     def is_in_control(self) -> bool:
         """Whether this hand holds the lease, as far as it knows."""
         session = self._session
-        return session is not None and not session.is_over and session.client.lease.is_held
+        return session is not None and not session.is_over and session.dialog.lease.is_held
 
     async def acquire(self) -> None:
         """Get the lease, unless another client holds it.
@@ -225,7 +224,7 @@ class RemoteHand(Hand):
         if self.state not in RUNNING:
             raise refusal(Trigger.ASK_COMMAND, self.state, session.mirror.status)
         changes = {"position": position, "speed": speed, "force": force}
-        session.outbox.put(axes, {name: value for name, value in changes.items() if value is not None})
+        session.dialog.put(axes, {name: value for name, value in changes.items() if value is not None})
 
     async def _move(
         self, axes: Finger, target: int, speed: int | None, force: int | None, timeout: float | None
@@ -249,8 +248,8 @@ class RemoteHand(Hand):
 
     async def _halt(self) -> None:
         session = self._running_session()
-        session.outbox.clear()
-        halting = session.stops.halt()
+        session.dialog.clear()
+        halting = session.dialog.halt()
         try:
             with no_answer_as_lost_connection():
                 await asyncio.shield(halting)
@@ -277,24 +276,20 @@ class RemoteHand(Hand):
     async def _ask(self, name: str, arguments: Fields, timeout: float) -> Fields:
         """Have the agent carry out a command; if this call is cancelled, cancel the command there."""
         session = self._running_session()
-        outbox = session.outbox
-        if self._control is None and not session.client.lease.is_held and session.client.lease.lost is None:
+        dialog = session.dialog
+        if self._control is None and not dialog.lease.is_held and dialog.lease.lost is None:
             with no_answer_as_lost_connection():
                 await session.keeper.acquire()
         session.check_control()
         # Commands that were asked for before are sent first.
-        outbox.flush()
-        call = session.client.call(arguments)
+        dialog.flush()
+        call = dialog.call(arguments)
         try:
-            with no_answer_as_lost_connection(), outbox.motion() if name in MOTIONS else nullcontext():
-                value: Fields = await session.client.send(
-                    call, f"cmd/{name}", timeout=timeout, urgency=Urgency.COMMAND
-                )
+            with no_answer_as_lost_connection():
+                value: Fields = await dialog.send(call, f"cmd/{name}", timeout=timeout)
         except (asyncio.CancelledError, RobotiqConnectionError, NotAllowedError):
             # Also after an error that leaves open whether the request was carried out.
-            cancelling = session.stops.cancel_command(name, call)
-            if cancelling is not None and name in MOTIONS:
-                outbox.count_motion(cancelling)
+            dialog.cancel(name, call)
             raise
         return value
 
@@ -322,18 +317,14 @@ class RemoteHand(Hand):
     def _is_moving(self) -> bool:
         assert self._session is not None, "only asked of a hand that runs"
         newest = self._session.mirror.newest
-        return self._session.outbox.is_moving or (newest is not None and newest.is_moving)
+        return self._session.dialog.is_moving or (newest is not None and newest.is_moving)
 
     async def _wait_for_state(self, states: Collection[State], timeout: float | None) -> State:
         with self._running_session().waiters.watching(states, {}) as reached:
-            try:
-                async with asyncio.timeout(timeout):
-                    return await reached
-            except TimeoutError:
-                names = " or ".join(state.name for state in states)
-                raise StateTimeoutError(
-                    f"{names} was not reached within {timeout:g} s (now {self.state.name})"
-                ) from None
+            with Limit(timeout):
+                return await reached
+            names = " or ".join(state.name for state in states)
+            raise StateTimeoutError(f"{names} was not reached within {timeout:g} s (now {self.state.name})")
 
     def _running_session(self) -> RemoteSession:
         # Refuses before start(), after stop(), and from another loop.

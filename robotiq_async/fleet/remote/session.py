@@ -7,7 +7,7 @@
 # * the mirror: what the agent said last about the gripper (mirror.py). Every message names its gripper and
 #   the run of its agent. One about another gripper is dropped, and so is one that is older than the last.
 # * the lease: whether this client commands (lease_state.py). The keeper renews it several times in a window.
-# * requests without an answer: commands (outbox.py), halts and cancellations (stops.py).
+# * the dialog: requests without an answer (dialog.py), each an errand (errand.py).
 #
 # Silence ends control on both sides. Without renewals for a window the agent holds what moves; when nothing
 # was heard for a window the lease here is lost, and requests get no answer any more. If this loop was held
@@ -34,6 +34,7 @@ from ...session.streams import Channels
 from ...session.waiting import StateWaiters
 from ...values.enums import State, StopLevel, Trigger
 from ...values.errors import (
+    AgentError,
     ConnectFailedError,
     ConnectionLostError,
     NotAllowedError,
@@ -47,13 +48,10 @@ from ..wire.names import GripperName
 from ..wire.status_message import unpack
 from ..wire.values import read_statistics, reading
 from .agents import Agents
-from .client import Client
+from .dialog import Dialog
+from .errand import NoAnswerError
 from .lease_keeper import ANSWER_S, RENEWALS, LeaseKeeper
-from .lease_state import ClientLease
 from .mirror import Mirror
-from .outbox import Outbox
-from .requests import NoAnswerError, Requests
-from .stops import Stops
 
 PAUSE_S: Final = 0.02
 """Seconds between two questions for events: 50 a second, half of what an agent answers to one client."""
@@ -67,8 +65,8 @@ class RemoteSession:
 
     Attributes:
         waiters: calls that wait for a state.
-        client: the calls to the agent.
-        keeper, stops, outbox: of the lease, of halts, and of commands to be sent.
+        dialog: the requests to the agent.
+        keeper: of the lease.
     """
 
     def __init__(
@@ -78,29 +76,25 @@ class RemoteSession:
         channels: Channels,
         *,
         owns_bus: bool,
-        before: Client | None,
+        before: Dialog | None,
     ) -> None:
-        """Subscribe to the gripper. The channels outlive the run; ``before`` is the last one's client."""
+        """Subscribe to the gripper. The channels outlive the run; ``before`` is the last one's dialog."""
         self.waiters = StateWaiters()
-        mirror, requests = (None, None) if before is None else (before.mirror, before.requests)
+        mirror = None if before is None else before.mirror
         self.mirror = Mirror(name.mark, channels, self.waiters.reached, mirror, Log(str(name)))
-        lease = ClientLease(str(name))
-        self.client = Client(
-            name, Requests(name, bus, requests), self.mirror, lease, receive=self._receive_answer
-        )
-        self.agents = Agents(name, bus, lease.doubt)
-        self.keeper = LeaseKeeper(self.client, self.agents)
-        self.stops = Stops(self.client)
-        self.outbox = Outbox(self.client)
+        self.dialog = Dialog(name, bus, self.mirror, before, receive=self._receive_answer)
+        self.agents = Agents(name, bus, self.dialog.lease.doubt)
+        self.keeper = LeaseKeeper(self.dialog, self.agents)
         self.statistics: Statistics = Counters().snapshot(0)
         self._bus = bus
         self._channels = channels
         self._owns_bus = owns_bus
         self._closing: asyncio.Task[None] | None = None
         self._arrived_at = 0.0  # arrival of the last message, current or not
+        self._other_version: AgentError | None = None  # the error of the last message, if it was of another
         self._is_fetching = False
         self._querying: asyncio.Task[Any] | None = None
-        channels.reopen(self.client.loop)
+        channels.reopen(self.dialog.loop)
         self.mirror.begin(now())
         self._unreadable, self._misrouted = LimitedLog(self.mirror.log), LimitedLog(self.mirror.log)
         # One wildcard, not a subscription for each key: with those, zenoh has delivered samples under wrong
@@ -118,7 +112,7 @@ class RemoteSession:
             await asyncio.sleep(0.05)
         if acquires:
             await self.keeper.begin(deadline)
-        self.client.spawn(self._supervise())
+        self.dialog.spawn(self._supervise())
         await self._wait_for_gripper(deadline)
 
     async def _wait_for_gripper(self, deadline: float) -> None:
@@ -130,27 +124,29 @@ class RemoteSession:
                 async with asyncio.timeout(max(ANSWER_S, deadline - now())):
                     await reached
                 # An event arrives before the status that shows it; an answer brings the newest status.
-                await self.client.ask("info", timeout=ANSWER_S)
+                await self.dialog.ask("info", timeout=ANSWER_S)
             except TimeoutError:
-                problem = (await self.client.ask("info", timeout=ANSWER_S))["problem"]
+                problem = (await self.dialog.ask("info", timeout=ANSWER_S))["problem"]
                 raise ConnectFailedError(
-                    str(self.client.name),
+                    str(self.dialog.name),
                     f"its agent cannot reach the gripper: {problem or 'the link is down'}",
                 ) from None
 
     async def _ask_info(self, deadline: float) -> bool:
         try:
-            info = await self.client.ask("info", timeout=min(ANSWER_S, max(0.05, deadline - now())))
+            info = await self.dialog.ask("info", timeout=min(ANSWER_S, max(0.05, deadline - now())))
         except (NoAnswerError, NotAllowedError):
             return False
         with reading("its figures"):
-            self.client.set_window(info["window"])
+            self.dialog.set_window(info["window"])
             self.statistics = read_statistics(info["statistics"])
             self.mirror.receive_points(info)
         return True
 
     async def _give_up(self) -> None:
-        name = self.client.name
+        name = self.dialog.name
+        if self._other_version is not None:
+            raise AgentError(f"{name}: its agent sends {self._other_version.message}")
         if await self._bus.announced(name.key("alive", "*"), timeout=ANSWER_S):
             raise NotAllowedError(f"{name}: the agent is running, but does not answer: access denied")
         why = "no agent was found: none is running, or the network or a certificate prevents the connection"
@@ -163,11 +159,10 @@ class RemoteSession:
         applies. A hold or a halt that is not acknowledged yet makes a gentle level stronger.
         """
         if self._closing is None:
-            is_holding = self.client.requests.has_undelivered_hold
-            level = max(level, self.stops.undelivered, StopLevel.KEEP if is_holding else StopLevel.LEAVE)
-            self.client.end()
+            level = max(level, self.dialog.needed_level)
+            self.dialog.end()
             self.mirror.shut_down(State.DO_SHUTDOWN, Trigger.ASK_STOP, now())
-            self._closing = self.client.loop.create_task(self._close())
+            self._closing = self.dialog.loop.create_task(self._close())
         self.keeper.end(level)
         await wait_shielded(self._closing)
         self._closing.result()
@@ -175,23 +170,23 @@ class RemoteSession:
     async def _close(self) -> None:
         try:
             async with asyncio.timeout(END_S - BUS_S if self._owns_bus else END_S):
-                await self.stops.halted()
+                await self.dialog.halted()
                 await self.keeper.released()
         except (RobotiqError, TimeoutError) as error:
             why = str(error) or "no answer in time"
-            self.client.log.warning(
+            self.dialog.log.warning(
                 "the release was not acknowledged (%s): the agent is to hold what moves", why
             )
         finally:
             self._undo()
             self.agents.end()
-            await self.client.close()
+            await self.dialog.close()
             if self._owns_bus:
                 await self._bus.close()
             self._end()
 
     def _end(self) -> None:
-        self.client.finish()
+        self.dialog.finish()
         self.mirror.shut_down(State.SHUTDOWN, Trigger.STOPPED, now())
         self.waiters.fail(lambda: NotStartedError("the hand was stopped"))
         self._channels.end()
@@ -199,23 +194,23 @@ class RemoteSession:
     @property
     def is_over(self) -> bool:
         """Whether the run has ended, or is ending."""
-        return self.client.is_over
+        return self.dialog.is_over
 
     def check_running(self) -> None:
-        self.client.check_running()
+        self.dialog.check_running()
 
     def check_loop(self, what: str = "the hand") -> None:
-        check_loop(self.client.loop, what)
+        check_loop(self.dialog.loop, what)
 
     @property
     def lost_its_loop(self) -> bool:
         """Whether its event loop was closed: its tasks can never end then."""
-        return not self.client.has_ended and self.client.loop.is_closed()
+        return not self.dialog.has_ended and self.dialog.loop.is_closed()
 
     def abandon(self) -> None:
         """Give up a run whose event loop was closed. Without renewals the agent holds what moves."""
-        self.client.log.warning("the event loop was closed before stop()")
-        self.client.lease.end()
+        self.dialog.log.warning("the event loop was closed before stop()")
+        self.dialog.lease.end()
         self.waiters = StateWaiters()
         self._end()
 
@@ -229,17 +224,18 @@ class RemoteSession:
                 else:
                     self._receive_status(payload, in_turn=True)
         except RobotiqError as error:
+            self._other_version = error if isinstance(error, AgentError) else None
             self._unreadable.warn("a message was dropped: %s", error)
         if self.mirror.has_missed() and not self.is_over and not self._is_fetching:
             self._is_fetching = True
-            self.client.spawn(self._fetch_events())
+            self.dialog.spawn(self._fetch_events())
 
     async def _fetch_events(self) -> None:
         # The network dropped events; the agent keeps the last ones.
         mirror = self.mirror
         try:
             while mirror.has_missed():
-                info = await self.client.ask("info", {"since": mirror.events}, timeout=ANSWER_S)
+                info = await self.dialog.ask("info", {"since": mirror.events}, timeout=ANSWER_S)
                 with reading("events"):
                     events = info["events"]
                     if info["epoch"] == mirror.epoch and events:
@@ -247,7 +243,7 @@ class RemoteSession:
                         mirror.receive_events(events)
                 await asyncio.sleep(PAUSE_S)
         except RobotiqError as error:
-            self.client.log.info("missed events could not be fetched: %s", error)
+            self.dialog.log.info("missed events could not be fetched: %s", error)
         finally:
             self._is_fetching = False
 
@@ -265,15 +261,15 @@ class RemoteSession:
         message, arrival = unpack(payload), now()
         if self._is_about_another(message.mark):
             return False
-        if self.mirror.is_of_another_run(message, arrival, self.client.window):
+        if self.mirror.is_of_another_run(message, arrival, self.dialog.window):
             return False
         if self.mirror.epoch not in (0, message.epoch):
-            self.client.lose_lease("closed", "the agent was restarted")
-            self.client.requests.fall_silent()  # requests to the previous run will not be answered
+            self.dialog.lose_lease("closed", "the agent was restarted")
+            self.dialog.fall_silent()  # requests to the previous run will not be answered
         self._arrived_at = arrival
-        if not self.mirror.receive(message, arrival, in_turn=in_turn, window=self.client.window, asked=asked):
+        if not self.mirror.receive(message, arrival, in_turn=in_turn, window=self.dialog.window, asked=asked):
             return True  # about this gripper, but too old
-        self.client.requests.receive()
+        self.dialog.heard()
         if in_turn:
             self.keeper.receive(message.lease)
         return True
@@ -289,13 +285,13 @@ class RemoteSession:
             self.mirror.receive_events(fields["events"])
 
     async def _supervise(self) -> None:
-        interval = self.client.window / RENEWALS
+        interval = self.dialog.window / RENEWALS
         while True:
             due = now() + interval
             await asyncio.sleep(interval)
             woken = now()
             # After a delay of this loop, the messages that have arrived are handled first.
-            if woken - due < interval and woken - self.mirror.received_at > self.client.window:
+            if woken - due < interval and woken - self.mirror.received_at > self.dialog.window:
                 self._fall_silent(woken)
             if self.mirror.is_silent and woken - self._arrived_at < interval:
                 self._query_agent()
@@ -305,17 +301,17 @@ class RemoteSession:
         # All that arrives seems old: it is, or the clock of the agent stopped. The answer to a question
         # decides.
         if self._querying is None or self._querying.done():
-            self._querying = self.client.spawn(self.client.ask_quietly("info", {}, ANSWER_S))
+            self._querying = self.dialog.spawn(self.dialog.ask_quietly("info", {}, ANSWER_S))
 
     def _fall_silent(self, at: float) -> None:
         if self.mirror.is_silent:
             return
-        self.client.log.warning("the agent is silent")
+        self.dialog.log.warning("the agent is silent")
         self.mirror.fall_silent(at)
-        self.client.lose_lease("expired", "the agent is silent")
-        self.client.requests.fall_silent()
+        self.dialog.lose_lease("expired", "the agent is silent")
+        self.dialog.fall_silent()
 
     def check_control(self) -> None:
         if self.mirror.is_silent:
-            raise ConnectionLostError(f"{self.client.name}: the agent is silent: nothing was asked")
-        self.client.lease.check()
+            raise ConnectionLostError(f"{self.dialog.name}: the agent is silent: nothing was asked")
+        self.dialog.lease.check()

@@ -7,10 +7,10 @@ import sys
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from ...values.errors import AgentError, ProtocolError
+from ...values.errors import AgentError, ControlLostError, ProtocolError
+from .names import VERSION, other_version
 from .values import Clock, Fields, error_fields, read_error
 
-VERSION: Final = 1
 _LONGEST: Final = 64 * 1024
 _INTEGERS: Final = ("epoch", "lease", "number", "after")
 
@@ -81,6 +81,8 @@ class Answer:
         epoch: of the agent.
         value: the result of the request.
         error: the error of the request; None if it was carried out.
+        begun: True if it was carried out, also if it has ended in an error; False if it was not begun, and
+            never will be; None if nobody knows.
     """
 
     to: str
@@ -88,6 +90,7 @@ class Answer:
     epoch: int
     value: Any = None
     error: Fields | None = None
+    begun: bool | None = True
 
     def pack(self) -> bytes:
         return _pack(self)
@@ -103,13 +106,23 @@ def unpack_answer(data: bytes) -> Answer:
     """Parse an answer: ProtocolError if it is none, AgentError if it is of another version."""
     fields = _object("an answer", data)
     try:
-        return Answer(**{name: fields[name] for name in Answer.__slots__})
+        begun = fields.get("begun")
+        if begun is not None and not isinstance(begun, bool):
+            raise TypeError("begun")
+        return Answer(**{name: fields[name] for name in Answer.__slots__ if name != "begun"}, begun=begun)
     except (KeyError, TypeError) as error:
         raise ProtocolError(f"not an answer: {data[:200]!r}") from error
 
 
-def failure(call: Call, epoch: int, error: Exception) -> Answer:
-    return Answer(call.to, call.number, epoch, error=error_fields(error))
+_WORDS: Final = {False: "; nothing was done", None: "; it may have been carried out", True: "; it had begun"}
+
+
+def failure(call: Call, epoch: int, error: Exception, begun: bool | None) -> Answer:
+    """The answer with an error, which says what became of the request. No other place says that."""
+    fields = error_fields(error)
+    if isinstance(error, AgentError | ControlLostError):
+        fields["message"] += _WORDS[begun]
+    return Answer(call.to, call.number, epoch, error=fields, begun=begun)
 
 
 def _pack(message: Call | Answer) -> bytes:
@@ -127,8 +140,5 @@ def _object(what: str, data: bytes) -> Fields:
     if not isinstance(fields, dict):
         raise ProtocolError(f"not {what}: {data[:200]!r}")
     if fields.get("version") != VERSION:
-        raise AgentError(
-            f"{what} of version {fields.get('version')!r} of the protocol; here it is {VERSION}: "
-            "update the older side"
-        )
+        raise AgentError(other_version(what, fields.get("version")))
     return fields

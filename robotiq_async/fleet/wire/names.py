@@ -9,9 +9,14 @@ from zlib import crc32
 
 SCHEME: Final = "zenoh://"
 ROOT: Final = "robotiq/v1"
-"""Prefix of every key; the number is the version of the protocol (docs/fleet-protocol.md)."""
+"""Prefix of every key, the same in all versions of the protocol: so that each sees and refuses the others."""
+VERSION: Final = 2  # of the protocol (docs/fleet-protocol.md)
 FORM: Final = "zenoh://SITE/HOST/GRIPPER"
 _NAME: Final = re.compile(r"[A-Za-z0-9_.-]{1,64}")
+
+
+def other_version(what: str, version: object) -> str:
+    return f"{what} of version {version!r} of the protocol; here it is {VERSION}: update the older side"
 
 
 def check_name(what: str, name: object) -> str:
@@ -84,6 +89,10 @@ class GripperName:
     def key(self, *parts: str) -> str:
         """A key of the gripper: :attr:`base` and these parts."""
         return "/".join((self.base, *parts))
+
+    def question(self, who: str) -> str:
+        """The key under which a client asks about the gripper."""
+        return self.key("info", who)
 
     def __str__(self) -> str:
         return f"{SCHEME}{self.site}/{self.host}/{self.gripper}"

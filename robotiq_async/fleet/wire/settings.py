@@ -1,4 +1,4 @@
-"""Speeds and forces: those that a request sets, and those that a client sends to a restarted agent."""
+"""What commands ask for: a position, a speed or a force of an axis. Speeds and forces are its settings."""
 
 from __future__ import annotations
 
@@ -7,38 +7,55 @@ from typing import Any, Final
 
 from ...values.checks import check_byte, check_mask
 from ...values.enums import Finger
+from ...values.request import Request
 from .values import Fields
 
 SETTINGS: Final = ("speed", "force")
+_ALL: Final = ("position", *SETTINGS)
 Setting = tuple[Finger, str]
-"""One axis, and "speed" or "force"."""
-_SETTERS: Final = {"set_speed": "speed", "set_force": "force"}
+"""One axis, and "position", "speed" or "force"."""
+_USUAL: Final = {"move": 7}  # the axes of a command that names none; 15 of all others
 
 
-def settings_of(name: str, arguments: Mapping[str, Any]) -> dict[Setting, int]:
-    """Speeds and forces that a command sets, named without ``cmd/``; empty if its arguments are malformed."""
+def asked_of(name: str, arguments: Mapping[str, Any]) -> dict[Setting, int]:
+    """What a command asks for, named without ``cmd/``; empty if its arguments are malformed."""
+    if name == "command":
+        changes = arguments.get("axes", {})
+    else:
+        what = name.removeprefix("set_")
+        asked = arguments if name == "move" else {what: arguments.get("value")} if what in _ALL else {}
+        changes = {str(arguments.get("fingers", _USUAL.get(name, 15))): asked}
     try:
-        return dict(_settings(name, arguments))
+        return dict(_by_axis(changes, _ALL))
     except (AttributeError, TypeError, ValueError):
         return {}
 
 
-def _settings(name: str, arguments: Mapping[str, Any]) -> Iterator[tuple[Setting, int]]:
-    if name == "command":
-        changed: Mapping[str, Any] = arguments.get("axes", {})
-    elif name in _SETTERS:
-        changed = {str(arguments.get("fingers", 15)): {_SETTERS[name]: arguments.get("value")}}
-    elif name == "move":
-        changed = {str(arguments.get("fingers", 7)): arguments}
-    else:
-        return
-    yield from _by_axis(changed)
+def moved_by(asked: Mapping[Setting, int]) -> Finger:
+    """The axes that are sent to a position."""
+    return Finger(sum({axis for axis, what in asked if what == "position"}))
 
 
-def _by_axis(changed: Mapping[str, Any]) -> Iterator[tuple[Setting, int]]:
+def settings_of(asked: Mapping[Setting, int]) -> dict[Setting, int]:
+    return {each: value for each, value in asked.items() if each[1] in SETTINGS}
+
+
+def settings_in(image: Request) -> dict[Setting, int]:
+    return {(axis, what): getattr(request, what) for axis, request in image.by_axis for what in SETTINGS}
+
+
+def is_in(asked: Mapping[Setting, int], image: Request) -> bool:
+    """Whether a written image has all of it, for the axes that the gripper has."""
+    axes = dict(image.by_axis)
+    return all(
+        axis not in axes or getattr(axes[axis], what) == value for (axis, what), value in asked.items()
+    )
+
+
+def _by_axis(changed: Mapping[str, Any], which: tuple[str, ...]) -> Iterator[tuple[Setting, int]]:
     for mask, changes in changed.items():
         fingers = check_mask(int(mask))
-        for what in SETTINGS:
+        for what in which:
             if changes.get(what) is not None:
                 value = check_byte(what, changes[what])
                 yield from (((axis, what), value) for axis in fingers)
@@ -55,4 +72,4 @@ def read_settings(fields: object) -> dict[Setting, int]:
     """Parse settings: TypeError or ValueError if they are malformed."""
     if not isinstance(fields, dict) or not all(isinstance(each, dict) for each in fields.values()):
         raise TypeError(f"settings must be an object of objects, got {fields!r:.200}")
-    return dict(_by_axis(fields))
+    return dict(_by_axis(fields, SETTINGS))

@@ -10,12 +10,12 @@ from math import isfinite
 from typing import Final, NamedTuple
 
 from ...values.enums import State
-from ...values.errors import ProtocolError
+from ...values.errors import AgentError, ProtocolError
 from ...values.model import MODELS, THREE_FINGER, Model
 from ...values.registers import Registers
+from .names import VERSION, other_version
 
 _LAYOUT: Final = struct.Struct("<BBBBIIIQQdf8H")
-VERSION: Final = 1
 SIZE: Final = _LAYOUT.size
 _STATES: Final = tuple(State)
 _MODELS: Final = tuple(MODELS.values())
@@ -84,10 +84,13 @@ def unpack(data: bytes) -> StatusMessage:
     """Parse a status message.
 
     Raises:
-        ProtocolError: not a status message, or one of another version.
+        ProtocolError: not a status message.
+        AgentError: one of another version.
     """
-    if len(data) != SIZE or data[0] != VERSION:
-        raise ProtocolError(f"not a status of version {VERSION}: {data[:8].hex()} ({len(data)} bytes)")
+    if len(data) != SIZE:
+        raise ProtocolError(f"not a status: {data[:8].hex()} ({len(data)} bytes)")
+    if data[0] != VERSION:
+        raise AgentError(other_version("a status", data[0]))
     _, place, flags, model, mark, lease, events, epoch, sequence, stamp, age, *registers = _LAYOUT.unpack(
         data
     )

@@ -8,8 +8,7 @@ import secrets
 from typing import Final
 
 from ...fleet.network.bus import Bus, Urgency
-from ...fleet.remote.pending_request import of_its_run
-from ...fleet.remote.requests import NoAnswerError
+from ...fleet.remote.errand import of_its_run
 from ...fleet.wire.envelope import Call, unpack_answer
 from ...fleet.wire.names import GripperName
 from ...fleet.wire.status_message import StatusMessage, unpack
@@ -18,7 +17,7 @@ from ...runtime.clock import now
 from ...runtime.shell import quoted
 from ...runtime.version import __version__
 from ...values.enums import State
-from ...values.errors import AgentError, NotAllowedError, ProtocolError, RobotiqError
+from ...values.errors import AgentError, ConnectionLostError, NotAllowedError, ProtocolError, RobotiqError
 from ...values.statistics import percentile
 from ...values.status import RobotiqStatus
 from .findings import Finding, GiveUpError, Level, Report
@@ -67,14 +66,14 @@ class _Asker:
         """The agent's description of the gripper."""
         self._number += 1
         call = Call(self._name.base, self._client, number=self._number)
-        asked, key = now(), self._name.key("info")
+        asked, key = now(), self._name.question(self._bus.who or self._client)
         reply = await self._bus.ask(
-            key, call.pack(), timeout=ANSWER_S, urgency=Urgency.COMMAND, decides=of_its_run(call)
+            key, call.pack(), timeout=ANSWER_S, urgency=Urgency.QUESTION, decides=of_its_run(call)
         )
         if reply is None and now() - asked < ANSWER_S / 2:
             raise NotAllowedError("the agent is running, but does not answer info: access denied")
         if reply is None:
-            raise NoAnswerError(f"no answer to info within {ANSWER_S:g} s")
+            raise ConnectionLostError(f"no answer to info within {ANSWER_S:g} s")
         answer = unpack_answer(reply.payload)
         if answer.to != self._name.base or answer.number not in (0, call.number):
             raise AgentError("the answer to info belongs to another request")
@@ -113,7 +112,7 @@ async def _describe(asker: _Asker, report: Report) -> Fields:
     for _ in range(TRIES):
         try:
             return await asker.info()
-        except (NoAnswerError, NotAllowedError) as error:
+        except (ConnectionLostError, NotAllowedError) as error:
             why = error
             await asyncio.sleep(0.1)
         except RobotiqError as error:

@@ -1,0 +1,189 @@
+"""Jobs: what an agent does for its clients, and what became of it, also for repetitions."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable, Coroutine
+from typing import Any, Final, TypeVar
+
+from ...runtime.log import Log, printable
+from ...values.enums import Finger
+from ...values.errors import AgentError, ControlLostError, RobotiqError
+from ...values.events import SentRequest
+from ...values.move_result import MoveResult
+from ..network.bus import Query
+from ..wire.envelope import Answer, Call, failure
+from ..wire.settings import asked_of, is_in, moved_by
+from ..wire.values import result_fields
+from .publisher import HandPublisher
+
+KEPT: Final = 512
+"""Jobs that are kept for repetitions, also after the end of their lease: 2.5 s of a loop at 200 Hz."""
+END_S: Final = 0.5
+"""Seconds for jobs to end after the hand has been stopped, before they are cancelled."""
+LABEL_MAX: Final = 200  # characters of a label that are shown
+T = TypeVar("T")
+Work = Coroutine[Any, Any, MoveResult | None]
+Key = tuple[str, int, int]  # client, lease, number
+
+
+class Job:
+    """A request that is being carried out, or is answered.
+
+    Attributes:
+        reason: of its cancellation by the agent; empty if it was not cancelled, or by its client.
+        asked: the positions, speeds and forces that it asks for.
+        is_shown: whether the gripper has acknowledged an image with all of them.
+        was_refused: whether the hand raised at once, before anything could be written.
+    """
+
+    def __init__(self, name: str, call: Call, query: Query) -> None:
+        self.name = name
+        self.call = call
+        self.queries = [query]
+        self.answer: bytes | None = None
+        self.task: asyncio.Task[MoveResult | None] | None = None
+        self.reason = ""
+        self.asked = asked_of(name, call.arguments)
+        self.is_shown = False
+        self.was_refused = False
+
+    @property
+    def key(self) -> Key:
+        return self.call.client, self.call.lease, self.call.number
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether it has ended in an error, and was not cancelled."""
+        task = self.task
+        return task is not None and task.done() and not task.cancelled() and task.exception() is not None
+
+    def cancel(self, reason: str = "") -> None:
+        if self.task is not None and not self.task.done():
+            self.reason = reason
+            self.task.cancel()
+
+
+class Jobs:
+    """The jobs of one hand, found by client, lease and number.
+
+    What became of a job follows from what was seen. It was *carried out* if it has a result, or the gripper
+    acknowledged an image with all that it asks for. It was *not begun* if the hand refused it at once. In
+    between nobody knows: an image may be on the wire.
+    """
+
+    def __init__(
+        self, publisher: HandPublisher, epoch: int, log: Log, ended: Callable[[Job, bool], None]
+    ) -> None:
+        """``ended`` is called with each job, and whether it was carried out."""
+        self._publisher = publisher
+        self._epoch = epoch
+        self._log = log
+        self._ended = ended
+        self._kept: dict[Key, Job] = {}
+        self._open: dict[Key, Job] = {}  # those of them without an answer
+        self._forgotten = -math.inf
+        """The newest stamp that a request, which is no longer kept, had seen."""
+        self._followed: dict[Finger, Job] = {}  # by axis, the newest that sends it to a position
+        self._tasks: set[asyncio.Task[Any]] = set()
+
+    def find(self, call: Call, number: object = None) -> Job | None:
+        """The job of a request, or of another one of its sender's lease."""
+        return self._kept.get((call.client, call.lease, call.number if number is None else number))  # type: ignore[arg-type]
+
+    def may_have_been(self, call: Call) -> bool:
+        """Whether a request that is not found may have been a job. Repetitions keep their stamp."""
+        return call.seen <= self._forgotten
+
+    def begin(self, job: Job, work: Work) -> None:
+        """Carry out a request once, and keep it for repetitions."""
+        self._kept[job.key] = self._open[job.key] = job
+        self._followed.update(dict.fromkeys(moved_by(job.asked), job))
+        self.start(job, work)
+        if len(self._kept) > KEPT:
+            self._forget()
+
+    def start(self, job: Job, work: Work) -> None:
+        """Carry out a request without keeping it: each repetition is carried out, too."""
+        job.task = task = self.spawn(work)
+        # Not in the task itself: a task that is cancelled before its first turn never runs.
+        task.add_done_callback(lambda task: self._finish(job, task))
+        # Runs right after the first step of the task, before anything can be written.
+        asyncio.get_running_loop().call_soon(lambda: setattr(job, "was_refused", job.has_failed))
+
+    def repeat(self, job: Job, query: Query) -> None:
+        self._log.debug("request %d was repeated", job.call.number)
+        if job.answer is None:
+            job.queries.append(query)
+        else:
+            query.reply(job.answer, self._publisher.status_message())
+
+    def left_of(self, number: object) -> Finger:
+        """The axes that still follow a job that has failed, for example as another axis was superseded."""
+        jobs = self._followed.items()
+        return Finger(sum(axis for axis, job in jobs if job.call.number == number and job.has_failed))
+
+    def cancel_all(self, lease: int, reason: str, *, leaves: bool = False) -> None:
+        """A lease has ended. ``leaves`` says that its moves go on."""
+        for job in self._open.values():
+            is_of_it = job.call.lease == lease and job.name != "release"
+            if is_of_it and not (leaves and job.name == "move"):
+                job.cancel(reason)
+        self._followed.clear()
+
+    def observe(self, what: object) -> None:
+        if isinstance(what, SentRequest) and what.acknowledged:
+            for job in self._open.values():
+                job.is_shown = job.is_shown or (bool(job.asked) and is_in(job.asked, what.request))
+
+    def spawn(self, work: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
+
+    async def end(self) -> None:
+        """Wait until all jobs have been answered, END_S at most."""
+        if self._tasks:
+            await asyncio.wait(self._tasks, timeout=END_S)
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    def _finish(self, job: Job, task: asyncio.Task[MoveResult | None]) -> None:
+        if self._open.get(job.key) is job:  # not a halt with the number of a move
+            del self._open[job.key]
+        call, error = job.call, None if task.cancelled() else task.exception()
+        if task.cancelled():
+            error = ControlLostError(f"cancelled: {job.reason or 'by the caller'}", job.reason or "released")
+        elif error is not None and not isinstance(error, RobotiqError | TypeError | ValueError):
+            self._log.error("%s failed", job.name, exc_info=error)
+            error = AgentError(f"the agent failed: {error!r}")
+        # A command of a loop is answered before it is written.
+        is_done = error is None and job.name != "command"
+        begun = True if is_done or job.is_shown else False if job.was_refused else None
+        if isinstance(error, Exception):
+            answer = failure(call, self._epoch, error, begun)
+        else:
+            value = result_fields(task.result()) or {}
+            answer = Answer(call.to, call.number, self._epoch, value, begun=begun)
+        if error is not None or is_done:
+            self._ended(job, error is None)
+        job.answer = answer.pack()
+        for query in job.queries:
+            query.reply(job.answer, self._publisher.status_message())
+        job.queries.clear()
+
+    def _forget(self) -> None:
+        # The oldest that is answered: a repetition of one that runs must not be carried out twice.
+        for key, job in self._kept.items():
+            if job.answer is not None:
+                self._forgotten = max(self._forgotten, job.call.seen)
+                del self._kept[key]
+                return
+
+
+def label_of(call: Call) -> str:
+    """The label a client gives itself, made printable."""
+    return printable(str(call.arguments.get("label", "unknown client"))[:LABEL_MAX])
