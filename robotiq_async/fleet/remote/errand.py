@@ -182,17 +182,17 @@ class Errand:
     def _take_of_halt(self, reply: Reply | None) -> None:
         # Only an answer about the gripper ends it before its time: that all have stopped, or why not.
         answer = None if reply is None else _answer(reply)
-        if answer is not None and _is_about(self.call, answer):
-            if answer.error is None and len(self._confirmed) < self._agents:
-                missing = f"no answer from {self._agents - len(self._confirmed)} of {self._agents} agents"
-                self._in_doubt = NoAnswerError(self.call.to, self.verb, missing)
-            elif answer.error is None or answer.error.get("kind") not in _RETRIED:
-                self.answered.set_result(reply)
-                return
-        self._in_doubt = self._in_doubt if reply is None else reply
-        if not self._copies and self.left < RETRY_S:
-            self.answered.set_result(self._in_doubt)
-        elif not self._copies:
+        if answer is None or not _is_about(self.call, answer):
+            self._in_doubt = reply or self._in_doubt
+        elif answer.error is None and len(self._confirmed) < self._agents:
+            missing = f"no answer from {self._agents - len(self._confirmed)} of {self._agents} agents"
+            self._in_doubt = NoAnswerError(self.call.to, self.verb, missing)
+        elif answer.error is None or answer.error.get("kind") not in _RETRIED:
+            self.answered.set_result(reply)
+            return
+        else:
+            self._in_doubt = reply
+        if not self._copies:
             self._repeat(RETRY_S)
 
     def _repeat(self, pause: float = 0.0) -> None:
@@ -203,8 +203,10 @@ class Errand:
             self._timer = self._loop.call_later(min(pause, self.left), self._send_again)
 
     def _send_again(self) -> None:
-        if self.left > RETRY_S:  # else those on their way end in time
+        if self.left > RETRY_S:
             self._send()
+        elif self.is_halt and not self._copies and not self.answered.done():  # else those end in time
+            self.answered.set_result(self._in_doubt)
 
     def stop_repeating(self) -> None:
         if self._timer is not None:
