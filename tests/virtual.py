@@ -14,6 +14,7 @@ import functools
 import gc
 import heapq
 import inspect
+import itertools
 import math
 import os
 import selectors
@@ -133,6 +134,10 @@ class VirtualClock(selectors.DefaultSelector):
             self.hold.close()
 
 
+_PORTS = itertools.cycle(range(20001, 60000))
+"""A gripper of one test is none of the next: the session remembers what a hand has left on its way."""
+
+
 class VirtualLoop(asyncio.SelectorEventLoop):
     """The loop; :meth:`time` is virtual, and connections stay inside."""
 
@@ -140,7 +145,6 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         self._virtual = clock or VirtualClock()
         super().__init__(self._virtual)
         self._listeners: dict[int, _Listener] = {}
-        self._next_port = 20000
         self._files: dict[int, MemoryFile] = {}
         self.complaints: list[str] = []
         self.set_exception_handler(lambda _, context: self.complaints.append(repr(context)))
@@ -217,8 +221,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
     async def create_server(self, factory: Any, _host: Any = None, port: Any = None, **_: Any) -> Any:  # type: ignore[override]
         if not port:
-            self._next_port += 1
-            port = self._next_port
+            port = next(_PORTS)
         return _Listener(self._listeners, factory, port)
 
     async def create_connection(self, factory: Any, _host: Any = None, port: Any = None, **_: Any) -> Any:  # type: ignore[override]

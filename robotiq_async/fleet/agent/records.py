@@ -92,7 +92,11 @@ class FileRecords:
         error = None if done.cancelled() else done.exception()
         if error is not None and not self._has_failed:
             self._has_failed = True
-            log.warning("%s: after a restart no client reacquires the lease automatically", error)
+            log.warning(
+                "%s: after a restart no client reacquires the lease automatically, and FLEET.toml's "
+                "speeds and forces count",
+                error,
+            )
         if name in self._newest:
             self._begin(name)
 
