@@ -6,7 +6,7 @@ import pytest
 
 from tests.fleet.storm import WAYS, Image, Note, Storm, storm
 
-COMMANDS = 120
+COMMANDS = 250
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -15,7 +15,7 @@ def test_commands_under_faults(way: str) -> None:
     assert found["examples"] == []
     assert found["commands"] == COMMANDS
     assert found["outcomes"]["done"] > COMMANDS / 4
-    assert sum(found["faults"].values()) >= 2
+    assert sum(found["faults"].values()) >= 1
 
 
 def judge(notes: list[Note]) -> Storm:

@@ -173,7 +173,8 @@ class Errand:
             is_stray = bool(answer.number) and not _is_about(self.call, answer)
             if is_stray and self._strays < STRAYS:
                 self._strays += 1
-                return  # the copy, or its answer, was misrouted: the request is repeated
+                self._repeat(RETRY_S)  # the copy, or its answer, was misrouted
+                return
             if isinstance(answer.error, dict) and answer.error.get("reason") == "early":
                 came_early()
                 return
