@@ -12,7 +12,7 @@ carries it out, and a test can, too.
 * **Function 23 is tried without a command.** A jaw answers no function that it does not serve. So until it
   has answered this one, a command leaves with function 16, and the status is read after it. Before a command
   that finds the jaw at rest, as this link has requested it, function 23 writes that image again. Nothing
-  moves by it, and a silence costs a read and a tenth of a second of rest.
+  moves by it, and a silence costs a read and no command.
 """
 
 from __future__ import annotations
@@ -34,10 +34,8 @@ from .outcome import Noise, Outcome, Refused, Silent
 
 REPEAT_S: Final = 0.15
 """Time for a repeated read, so that a write after it still fails within a second."""
-TRIAL_S: Final = 0.1
-"""Time for the first answer to function 23: twenty of the usual ones."""
 USUAL_RESPONSE_S: Final = 0.4
-"""A longer response timeout means a slow line: a repeated read and a trial then get that timeout."""
+"""A longer response timeout means a slow line: a repeated read then gets that timeout instead of REPEAT_S."""
 SHORT_READS: Final = 3
 """Reads after the short silence, at opening, before a line is trusted with it."""
 MOST_UNANSWERED: Final = 3
@@ -78,9 +76,7 @@ class Dialogues:
         self._map: Final = registers
         self._make: Final = make
         self._response_s: Final = response_timeout
-        is_slow = response_timeout > USUAL_RESPONSE_S
-        self._repeat_s: Final = response_timeout if is_slow else REPEAT_S
-        self._trial_s: Final = response_timeout if is_slow else min(response_timeout, TRIAL_S)
+        self._repeat_s: Final = response_timeout if response_timeout > USUAL_RESPONSE_S else REPEAT_S
         self._log: Final = log
         self._poll: Final = read_request(registers, registers.count)
         self._has_probed = False
@@ -148,7 +144,7 @@ class Dialogues:
         """
         yield from self._ready()
         if self.serves_23 is None and self._is_at_rest():
-            came_to = yield from self._tried(self._image, self._trial_s)
+            came_to = yield from self._tried(self._image)
             if isinstance(came_to, Outcome) and not isinstance(came_to, Refused):
                 yield from self._again(came_to)
             return None
@@ -156,7 +152,7 @@ class Dialogues:
             return None
         bad: bytes | Outcome | None
         if self.serves_23:
-            bad = yield from self._tried(image, self._response_s)
+            bad = yield from self._tried(image)
             if isinstance(bad, bytes):
                 return transport.Answer(self._status_in(bad), None)
             if isinstance(bad, Refused) and bad.is_unknown_function:
@@ -202,12 +198,10 @@ class Dialogues:
         self._image = image
         return None
 
-    def _tried(self, image: Sequence[int], seconds: float) -> Dialogue[bytes | Outcome]:
+    def _tried(self, image: Sequence[int]) -> Dialogue[bytes | Outcome]:
         """Write an image with function 23, and learn whether that is served."""
         self._image = ()
-        exchange = self._ask(write_and_read_request(self._map, image))
-        exchange.seconds = seconds
-        came_to = yield exchange
+        came_to = yield self._ask(write_and_read_request(self._map, image))
         assert came_to is not None, "an exchange comes to something"
         if isinstance(came_to, bytes):
             self.serves_23, self.has_served_23, self._image = True, True, image

@@ -16,16 +16,7 @@ import math
 from abc import ABC, abstractmethod
 
 from ..values.errors import ProtocolError, ResponseTimeoutError
-from .frames import (
-    CHECKSUM,
-    expected_over_tcp,
-    expected_reply,
-    is_write,
-    serial_frame,
-    show,
-    stray,
-    tcp_frame,
-)
+from . import frames
 from .outcome import Noise, Outcome, Silent, Stray
 
 Answer = bytes | Outcome
@@ -64,8 +55,8 @@ class TcpExchange(Exchange):
     """A request over Modbus TCP."""
 
     def __init__(self, number: int, request: bytes) -> None:
-        super().__init__(tcp_frame(number, request))
-        self._expected = expected_over_tcp(request)
+        super().__init__(frames.tcp_frame(number, request))
+        self._expected = frames.expected_over_tcp(request)
 
     def feed(self, data: bytes) -> Answer | None:
         self._received = received = self._received + data
@@ -75,19 +66,6 @@ class TcpExchange(Exchange):
         if is_usual and received.startswith(header):
             return received[7:]
         return expected.after(header).verdict(received)
-
-
-class PduExchange(Exchange):
-    """A request in a tunnel, which carries whole PDUs."""
-
-    def __init__(self, request: bytes) -> None:
-        super().__init__(request[1:])
-        self._unit = request[:1]
-        self._expected = expected_reply(request)
-
-    def feed(self, data: bytes) -> Answer | None:
-        verdict = self._expected.verdict(self._unit + data)
-        return Noise(ProtocolError(f"not the whole answer: {show(data)}")) if verdict is None else verdict
 
 
 class Echo:
@@ -105,9 +83,9 @@ class SerialExchange(Exchange):
     """A request on a serial line; it notes in ``echo`` what it learns."""
 
     def __init__(self, request: bytes, echo: Echo) -> None:
-        super().__init__(serial_frame(request))
+        super().__init__(frames.serial_frame(request))
         self._echo = echo
-        self._expected = expected_reply(request, checksum=CHECKSUM)
+        self._expected = frames.expected_reply(request, checksum=frames.CHECKSUM)
 
     def feed(self, data: bytes) -> Answer | None:
         self._received += data
@@ -115,10 +93,10 @@ class SerialExchange(Exchange):
         if isinstance(reply, Noise):
             return reply
         size = self._expected.size
-        if len(reply) > size and is_write(self.frame):
+        if len(reply) > size and frames.is_write(self.frame):
             # A floating line makes up a byte when the device stops sending. The write is acknowledged
             # nonetheless, and reporting it as in doubt would end the motion. A read is cheap to repeat.
-            reply, self.extra = reply[:size], stray(reply[size:])
+            reply, self.extra = reply[:size], frames.stray(reply[size:])
         verdict = self._expected.verdict(reply)
         if type(verdict) is bytes:
             self._echo.is_on = bool(self._echo.is_on)
@@ -129,7 +107,7 @@ class SerialExchange(Exchange):
         size = len(self.frame)
         if received[:size] != self.frame[: len(received)]:
             if self._echo.is_on:
-                what = f"the line echoes what is sent, but not this time: {show(received)}"
+                what = f"the line echoes what is sent, but not this time: {frames.show(received)}"
                 return Noise(ProtocolError(what))
             return received
         if len(received) < size:

@@ -40,7 +40,7 @@ from .frames import stray
 from .outcome import Lost, Noise, Outcome, Refused, Stray
 from .silence import Silence
 from .watchdog import Watchdog
-from .wires import Send, Wire, wire_to
+from .wires import Send, wire_to
 
 SETTLE_S: Final = 0.02
 """From connecting to the first request over TCP: a few round trips of a network in a building."""
@@ -97,15 +97,14 @@ class Line:
     def __init__(
         self,
         address: Address,
-        wire: Wire | None = None,
         stray: Callable[[bytes], Stray | None] = stray,
         *,
         shares: bool = False,
     ) -> None:
         """Keep the settings; opens nothing.
 
-        ``wire`` is that of the address unless another is given. ``stray`` says what bytes without a request
-        mean. With ``shares`` the line may have several users at a time.
+        ``stray`` says what bytes without a request mean. With ``shares`` the line may have several users at a
+        time.
         """
         self.state, self.why = LineState.CLOSED, None
         self.forgives = address.is_rtu
@@ -113,7 +112,7 @@ class Line:
         self.silence = Silence(address.line.character_s)
         self.echo = Echo()
         self.address: Final = address
-        self._wire: Final = wire_to(address) if wire is None else wire
+        self._wire: Final = wire_to(address)
         self._stray: Final = stray
         self._shares: Final = shares
         self._turns: Final = asyncio.Lock()
@@ -182,7 +181,7 @@ class Line:
         is_open = False
         try:
             with Limit(seconds):
-                self._send = await self._wire.open(self._heard, self._ended, seconds)
+                self._send = await self._wire.open(self._heard, self._note, seconds)
                 is_open = True
             if not is_open:
                 raise ConnectFailedError(str(self.address), f"no connection within {seconds:g} s")
@@ -241,7 +240,6 @@ class Line:
     def _give_up(self, why: Outcome | None = None) -> None:
         """End the exchange in flight, if there is one."""
         if self._exchange is not None:
-            self._wire.give_up()
             self._end(why or Lost(self._not_connected()))
 
     def close_if_abandoned(self) -> None:
@@ -353,16 +351,8 @@ class Line:
         elif (self.state in _IS_NEWS or not self.forgives) and (news := self._stray(data)) is not None:
             self._note(news)
 
-    def _ended(self, outcome: Outcome) -> None:
-        """The wire has no answer, or has ended."""
-        if isinstance(outcome, Lost):
-            self._note(outcome)
-        elif self._exchange is not None:
-            self._end(outcome)
-
     def _on_timeout(self) -> None:
         assert self._exchange is not None, "only an exchange is watched"
-        self._wire.give_up()
         if self._shares:
             self._rests[self._speaker] = self.now() + REST_S
         self._end(self._exchange.late(self.address))
@@ -380,7 +370,7 @@ class Line:
             self._answer.set_result(answer)
 
     def _note(self, outcome: Outcome) -> None:
-        """Take news that no exchange waits for."""
+        """Take news that no exchange waits for, or the end of the wire."""
         if self.state is LineState.OPENING:
             self._become(LineState.OPENING, outcome)
         elif self.forgives and not isinstance(outcome, Lost):

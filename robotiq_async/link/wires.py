@@ -24,11 +24,12 @@ from typing import Any, Final, Protocol
 from pymodbus import FramerType
 from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
 
+from ..runtime.extras import install
 from ..runtime.host_names import addresses_of, why_no_socket, why_unreachable
 from ..runtime.limit import Limit
 from ..values.errors import ConnectFailedError, ConnectionLostError, RobotiqConnectionError
 from .address import Address
-from .outcome import Lost, Outcome
+from .outcome import Lost
 from .serial_ports import GONE, hasten, why_no_port
 
 Client = AsyncModbusTcpClient | AsyncModbusSerialClient
@@ -36,7 +37,7 @@ AsyncioTransport = Any
 """Of a connection: one of asyncio's, or pymodbus's for serial ports, which is not typed."""
 Send = Callable[[bytes], None]
 OnData = Callable[[bytes], None]
-OnEnd = Callable[[Outcome], None]
+OnEnd = Callable[[Lost], None]
 OnConnection = Callable[[bool], None]
 
 LARGEST_READ: Final = 4096  # bytes read at a time; the longest Modbus frame has 260
@@ -56,7 +57,11 @@ CONNECTING: Final[Table] = {
     OSError: lambda error: why_no_socket() or why_unreachable(error),
     Exception: lambda error: str(error) or repr(error),
 }
-OPENING: Final[Table] = {OSError: why_no_port, Exception: lambda error: str(error) or repr(error)}
+OPENING: Final[Table] = {
+    ImportError: lambda _: f"serial ports need pyserial: {install('serial')}",
+    OSError: why_no_port,
+    Exception: lambda error: str(error) or repr(error),
+}
 
 
 class Wire(Protocol):
@@ -71,21 +76,15 @@ class Wire(Protocol):
 
         Args:
             on_data: gets what arrives, from the first byte on.
-            on_end: gets Lost when the wire has ended, or what a request comes to that has no answer.
+            on_end: gets the reason when the wire has ended by itself.
             seconds: for how long the caller waits; it cancels the call then.
 
         Raises:
             ConnectFailedError: it cannot be opened, for whatever reason.
         """
 
-    def give_up(self) -> None:
-        """Wait no longer for what the last frame brings."""
-
     def close(self) -> None:
         """Close it at once; does nothing when closed."""
-
-    async def closed(self) -> None:
-        """Wait until it is closed; limits its own time."""
 
 
 def wire_to(address: Address) -> Wire:
@@ -116,14 +115,10 @@ class _ClientWire:
         self._address = address
         self.may_echo = address.is_rtu
 
-    def give_up(self) -> None: ...
-
     def close(self) -> None:
         client, self._client = self._client, None
         if client is not None:
             client.close()
-
-    async def closed(self) -> None: ...
 
     def _lost(self) -> Lost:
         return Lost(ConnectionLostError(f"{self._address}{self._ending}"))
@@ -222,13 +217,6 @@ class SerialWire(_ClientWire):
     async def open(self, on_data: OnData, on_end: OnEnd, seconds: float) -> Send:  # noqa: ARG002
         """Open the port with the settings of the address."""
         address, line = self._address, self._address.line
-        try:
-            import serial  # noqa: F401, PLC0415
-        except ImportError:
-            from ..runtime.extras import install  # noqa: PLC0415  # nothing else needs it
-
-            why = f"serial ports need pyserial: {install('serial')}"
-            raise ConnectFailedError(str(address), why) from None
 
         def make(on_connection: OnConnection) -> Client:
             form: dict[str, Any] = {"baudrate": line.baud, "parity": line.parity, "stopbits": line.stopbits}
@@ -236,6 +224,8 @@ class SerialWire(_ClientWire):
             return AsyncModbusSerialClient(address.host, framer=FramerType.RTU, **options)
 
         with failing_as(OPENING, address):
+            import serial  # noqa: F401, PLC0415
+
             transport = await self._connect(make, on_data, on_end)
         port = transport.sync_serial
         if not hasattr(port, "fd"):

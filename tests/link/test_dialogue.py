@@ -9,7 +9,7 @@ import pytest
 
 from robotiq_async import ConnectionLostError, ProtocolError, ResponseTimeoutError
 from robotiq_async.link.dialogue import Dialogues
-from robotiq_async.link.exchange import Exchange, PduExchange
+from robotiq_async.link.exchange import Answer, Exchange
 from robotiq_async.link.outcome import Lost, Noise, Refused, Silent, Stray
 from robotiq_async.link.silence import Silence
 from robotiq_async.runtime.log import log
@@ -23,6 +23,16 @@ NOISE = Noise(ProtocolError("noise"))
 LOST = Lost(ConnectionLostError("gone"))
 UNKNOWN = Refused(ProtocolError("illegal function"), 1)
 GOOD = "the right answer"
+
+
+class PduExchange(Exchange):
+    """A request without a form: what it comes to is given here."""
+
+    def __init__(self, request: bytes) -> None:
+        super().__init__(request[1:])
+
+    def feed(self, data: bytes) -> Answer | None:
+        raise NotImplementedError
 
 
 class Place:
