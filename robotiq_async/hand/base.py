@@ -42,6 +42,10 @@ class Hand(Kind):
     Other amounts become the closest count by :attr:`units` (see there how far to trust them), and are
     refused outside their range. One amount is given once: counts and millimetres together are a TypeError.
 
+    A stop, a halt, a hold, a reset or a command ends the calls that it supersedes. Their callers hear of it
+    when its write has left, or at once if that is not expected within 50 ms: what they do then may hold up
+    the loop.
+
     Timestamps are monotonic seconds of this process, wherever the gripper is. No motion is ever sent twice.
 
     To add a kind of hand, supply what is abstract, give ``_channels`` each status and transition, and set
@@ -110,10 +114,11 @@ class Hand(Kind):
         that starts or continues a motion is sent after the call. The state is SHUTDOWN when it returns.
 
         It ends within 2 s, even on a dead link and when cancelled: the cancellation is raised once
-        the hand has stopped. A link that is down is tried once more. Of several calls at a time the strongest
-        counts, whichever comes first: without ``keep_grip``, then with it, then ``halt=False``. A call
-        stronger than those before it has 2 s of its own. A halt or a reset that does not show yet, or a hold
-        that was not delivered, turns ``halt=False`` into a stop with ``keep_grip``.
+        the hand has stopped. They count while the event loop runs, and the stop is tried at least once. A
+        link that is down is tried once more. Of several calls at a time the strongest counts, whichever comes
+        first: without ``keep_grip``, then with it, then ``halt=False``. A call stronger than those before it
+        has 2 s of its own. A halt or a reset that does not show yet, or a hold that was not delivered, turns
+        ``halt=False`` into a stop with ``keep_grip``.
 
         With ``keep_grip`` axes that move are held where they are, and rGTO stays set, so that a grip stays
         while nothing is connected. This needs every axis seen at rest. In any doubt rGTO is cleared after

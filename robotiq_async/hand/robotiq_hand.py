@@ -432,7 +432,8 @@ class RobotiqHand(Hand):
         """Call a plain function with every status, change of state and request written, as it happens.
 
         It is called in the hand's event loop, in the turn in which it happens: before any reader of a stream
-        and any awaiting caller continues. Every poll waits for it, so it must be quick and must not block.
+        and any awaiting caller continues. What a stop, a halt or a reset changes comes when its write has
+        left, if that is expected within 50 ms. Every poll waits for it, so it must be quick and not block.
         Calls come in order: a change of state before the status or the request that leads to it, and what the
         callback itself causes after the present item.
 

@@ -16,6 +16,10 @@ import anyio
 T = TypeVar("T")
 
 
+class NoThreadError(OSError):
+    """No thread can be started now."""
+
+
 class LateError(Exception):
     """A call did not finish in time."""
 
@@ -40,7 +44,7 @@ def in_a_thread(work: Callable[[], T]) -> asyncio.Future[T]:
     """Start a call that may block for ever (a disk, a pipe) in a daemon thread of its own.
 
     Neither the end of the loop nor the end of the interpreter waits for it, and a full thread pool does not
-    delay it. If the system starts no thread, awaiting the result raises an OSError, as for other resources.
+    delay it. If the system starts no thread, awaiting the result raises a :class:`NoThreadError`.
     """
     loop = asyncio.get_running_loop()
     future: asyncio.Future[T] = loop.create_future()
@@ -64,7 +68,7 @@ def in_a_thread(work: Callable[[], T]) -> asyncio.Future[T]:
     try:
         threading.Thread(target=run, name="robotiq_async", daemon=True).start()
     except RuntimeError as error:
-        future.set_exception(OSError(errno.EAGAIN, str(error)))
+        future.set_exception(NoThreadError(errno.EAGAIN, str(error)))
     return future
 
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import signal
+from types import FrameType
 from typing import Final
 
+INSIST_S: Final = 3.0
+"""Seconds after a signal in which further ones are ignored. A stop takes 2 s at most."""
 ENDING: Final = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 """Ctrl-C, ``kill``, a closed terminal, and Ctrl-Break on Windows. There a closed console ends the process at
 once, whatever handles SIGBREAK, which it raises too."""
@@ -17,3 +20,12 @@ def ending_signals() -> list[signal.Signals]:
     """
     numbers = [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
     return [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
+
+
+def pass_on(handler: object, number: int, frame: FrameType | None) -> None:
+    """Let a signal act as it would with this handler."""
+    if callable(handler):
+        handler(number, frame)
+    else:
+        signal.signal(number, signal.SIG_DFL)
+        signal.raise_signal(number)

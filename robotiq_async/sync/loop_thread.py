@@ -140,7 +140,10 @@ class LoopThread:
                 "sent: use the hand in a process that is not patched, such as robotiq-async agent"
             )
         answer: SimpleQueue[_Server | OSError] = SimpleQueue()
-        threading.Thread(target=self._serve, args=(call, answer), name=NAME, daemon=True).start()
+        try:
+            threading.Thread(target=self._serve, args=(call, answer), name=NAME, daemon=True).start()
+        except RuntimeError as error:
+            raise RuntimeError(f"the event loop of the hand cannot be started: {error}") from error
         server = answer.get()
         if isinstance(server, OSError):
             raise RuntimeError(f"the event loop of the hand cannot be started: {server}") from server
@@ -171,10 +174,12 @@ class LoopThread:
         call.is_given_up = True
         server, settled = self._server, SimpleQueue[None]()
         if server is None:
+            call.forget()
             return
         try:
             server.loop.call_soon_threadsafe(server.give_up, call, interrupted, settled)
         except RuntimeError:
+            call.forget()
             return  # the loop has ended, and the call with it
         try:
             settled.get(timeout=GIVE_UP_S)
@@ -260,6 +265,11 @@ class _Call(Generic[T]):
     def cancel(self) -> None:
         if self._task is not None:
             self._task.cancel()
+
+    def forget(self) -> None:
+        """Drop its exception, if it has ended with one: asyncio would log that nobody looked at it."""
+        if self._task is not None and self._task.done() and not self._task.cancelled():
+            self._task.exception()
 
     async def ended(self, timeout: float | None = None) -> None:
         """Wait for its end; its exception is dropped."""

@@ -143,9 +143,14 @@ class _Server(ThreadingMixIn, TCPServer):
         self._free = threading.Semaphore(MOST)
 
     def process_request(self, request: Any, client_address: Any) -> None:  # noqa: ANN401  # as in the base
-        if self._free.acquire(blocking=False):
+        if not self._free.acquire(blocking=False):
+            self.shutdown_request(request)
+            return
+        try:
             super().process_request(request, client_address)
-        else:
+        except RuntimeError as error:
+            log.warning("a scrape was not answered: %s", error)
+            self._free.release()
             self.shutdown_request(request)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:  # noqa: ANN401

@@ -33,7 +33,7 @@ from ..control.state_machine import RUNNING
 from ..hand import Hand
 from ..runtime.clock import now
 from ..runtime.log import log
-from ..runtime.signals import ending_signals
+from ..runtime.signals import INSIST_S, ending_signals, pass_on
 from ..sync import RobotiqHand as BlockingHand
 from ..values.enums import Fault, Finger, State, names_of
 from ..values.errors import NotStartedError
@@ -41,8 +41,6 @@ from ..values.status import RobotiqStatus
 
 FRESH_S: Final = 1.0
 """A status that is older proves nothing about the gripper: two hundred polls have brought none."""
-INSIST_S: Final = 3.0
-"""Seconds after a signal in which further ones are ignored. A stop takes 2 s at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,8 +146,10 @@ async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator
     All stops begin at once, in the next turn of the event loop. When they have ended, the
     block is cancelled, and the program continues after it. The NotStartedError of a call that a stop has
     ended does not leave the block, neither alone nor in the exception group of tasks. Further signals are
-    ignored for 3 s; later ones act as before the block. An ignored signal stays ignored. SIGKILL stops
-    nothing, and neither does closing a console on Windows.
+    ignored for 3 s after the first, and for 3 s after the stops have begun, where something has held up the
+    event loop; later ones act as before the block. An ignored signal stays ignored. SIGKILL stops nothing,
+    and neither does closing a console on Windows. For blocking hands there is
+    :func:`robotiq_async.sync.stops_on_signals`.
 
     Args:
         hands: to stop; one that does not run is left alone.
@@ -166,7 +166,7 @@ async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator
     if threading.current_thread() is not threading.main_thread():
         raise RuntimeError("signals reach the main thread alone: enter stops_on_signals() there")
     loop, signals, stopping = asyncio.get_running_loop(), Signals(), list[asyncio.Task[None]]()
-    received_at = 0.0
+    insist_at = 0.0  # from when on a further signal acts
     scope = anyio.CancelScope()
 
     async def stop(number: int) -> None:
@@ -178,15 +178,20 @@ async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator
         else:
             scope.cancel()
 
+    def begin(number: int) -> None:
+        nonlocal insist_at
+        insist_at = time.monotonic() + INSIST_S
+        stopping.append(loop.create_task(stop(number)))
+
     def handle(number: int, frame: FrameType | None) -> None:
-        nonlocal received_at
+        nonlocal insist_at
         if not signals.received:
-            signals.received, received_at = number, time.monotonic()
+            signals.received, insist_at = number, time.monotonic() + INSIST_S
             # A signal interrupts the loop anywhere: a stop has to begin in a turn of its own.
             with suppress(RuntimeError):  # the loop was closed
-                loop.call_soon_threadsafe(lambda: stopping.append(loop.create_task(stop(number))))
-        elif time.monotonic() - received_at > INSIST_S:
-            _pass_on(previous[number], number, frame)
+                loop.call_soon_threadsafe(begin, number)
+        elif time.monotonic() > insist_at:
+            pass_on(previous[number], number, frame)
 
     previous: dict[int, Any] = {number: signal.signal(number, handle) for number in ending_signals()}
     try:
@@ -208,14 +213,6 @@ async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator
 def _without_stopped(error: NotStartedError | BaseExceptionGroup[BaseException]) -> BaseException | None:
     """What a stop does not explain; None for nothing. Each task of a group has an error of its own."""
     return error.split(NotStartedError)[1] if isinstance(error, BaseExceptionGroup) else None
-
-
-def _pass_on(handler: object, number: int, frame: FrameType | None) -> None:
-    if callable(handler):
-        handler(number, frame)
-    else:
-        signal.signal(number, signal.SIG_DFL)
-        signal.raise_signal(number)
 
 
 @asynccontextmanager

@@ -16,12 +16,14 @@ from robotiq_async.session.run import _NEXT, Run, RunState
 from robotiq_async.session.session import Session
 
 PACKAGE = Path(robotiq_async.__file__).parent
+TOLD = ("__cause__", "__doc__")
+"""What Python lets only be set from outside."""
 MODULES = sorted(path for room in ("session", "hand") for path in (PACKAGE / room).rglob("*.py"))
 
 
 def stored(node: ast.AST) -> Iterator[ast.Attribute]:
     for each in ast.walk(node):
-        if isinstance(each, ast.Attribute) and isinstance(each.ctx, ast.Store) and each.attr != "__cause__":
+        if isinstance(each, ast.Attribute) and isinstance(each.ctx, ast.Store) and each.attr not in TOLD:
             yield each
 
 

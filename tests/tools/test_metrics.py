@@ -114,6 +114,23 @@ async def test_no_name_server_is_asked_for_the_name_of_this_machine(
     assert not names
 
 
+async def test_a_want_of_threads_uses_up_nothing(hand: RobotiqHand, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each scrape in that time was counted as one that runs: the server then refused all for good."""
+    async with serve_metrics(hand, port=0) as where:
+
+        def start(_: threading.Thread) -> None:
+            raise RuntimeError("can't start new thread")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(threading.Thread, "start", start)
+            for _ in range(2 * MOST):
+                reader, writer = await asyncio.open_connection(*where)
+                with contextlib.suppress(ConnectionError):
+                    assert await reader.read() == b""
+                writer.close()
+        assert "robotiq_polls" in await page(where)
+
+
 async def test_it_ends_with_the_block(hand: RobotiqHand) -> None:
     async with serve_metrics(hand, port=0) as where:
         with pytest.raises(OSError, match="in use"):

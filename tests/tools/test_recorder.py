@@ -389,6 +389,46 @@ async def test_a_full_disk_ends_the_recording_and_nothing_else(
             raise ZeroDivisionError
 
 
+async def test_a_recording_outlasts_a_want_of_threads(
+    hand: RobotiqHand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Nothing more was saved, and has_failed was false."""
+
+    def start(_: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    async with Recorder(hand, tmp_path / "it.csv") as recorder:
+        await until(lambda: recorder.saved > 0)
+        with monkeypatch.context() as patch:
+            patch.setattr(threading.Thread, "start", start)
+            before, recorded = recorder.saved, recorder.recorded
+            await until(lambda: "waits for a thread" in caplog.text)
+            assert recorder.recorded > recorded
+            assert recorder.saved == before
+            assert not recorder.has_failed
+        await until(lambda: recorder.saved > before)
+    assert len((tmp_path / "it.csv").read_text(encoding="utf-8").splitlines()) > recorded
+    assert caplog.text.count("waits for a thread") == 1
+
+
+async def test_a_recording_that_never_gets_a_thread_has_failed(
+    hand: RobotiqHand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def start(_: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    async def record() -> None:
+        async with recorder:
+            await until(lambda: recorder.saved > 0)
+            monkeypatch.setattr(threading.Thread, "start", start)
+            await until(lambda: recorder.recorded > recorder.saved + 10)
+
+    recorder = Recorder(hand, tmp_path / "it.csv")
+    with pytest.raises(RecordingError, match="can't start new thread"):
+        await record()
+    assert recorder.has_failed
+
+
 async def test_a_file_that_is_deleted_meanwhile_is_a_failure(hand: RobotiqHand, file: Path) -> None:
     with pytest.raises(RecordingError, match="deleted"):  # noqa: PT012
         async with Recorder(hand, file) as recorder:

@@ -12,10 +12,11 @@ from pathlib import Path
 import pytest
 
 from robotiq_async import Fault, Finger, RobotiqHand, State
+from robotiq_async.runtime.signals import INSIST_S
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.sync import RobotiqHand as BlockingHand
 from robotiq_async.sync.robotiq_hand import caller_of
-from robotiq_async.tools.service import INSIST_S, health, stops_on_signals, watched_by_systemd
+from robotiq_async.tools.service import health, stops_on_signals, watched_by_systemd
 from tests.grippers import activate_beforehand
 from tests.virtual import until
 
@@ -120,6 +121,26 @@ async def test_further_signals_disturb_nothing_until_someone_insists(server: Sim
                 for _ in range(5):
                     signal.raise_signal(signal.SIGTERM)
                 assert not seen
+                await asyncio.sleep(60)
+            assert hand.state is State.SHUTDOWN
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert not seen
+
+
+async def test_a_further_signal_disturbs_nothing_after_something_held_up_the_loop(
+    server: SimulatorServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It ended the program before the stop was written."""
+    seen, clock = list[int](), [100.0]
+    monkeypatch.setattr("robotiq_async.tools.service.time.monotonic", lambda: clock[0])
+    before = signal.signal(signal.SIGTERM, lambda number, _: seen.append(number))
+    try:
+        async with server, RobotiqHand(server.address) as hand:
+            async with stops_on_signals(hand):
+                signal.raise_signal(signal.SIGTERM)
+                clock[0] += 5.0  # the loop does not run in it
+                asyncio.get_running_loop().call_later(0.0, signal.raise_signal, signal.SIGTERM)
                 await asyncio.sleep(60)
             assert hand.state is State.SHUTDOWN
     finally:

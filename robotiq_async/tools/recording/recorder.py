@@ -26,7 +26,7 @@ from types import TracebackType
 from typing import Final, Protocol, Self
 
 from ...hand import Hand
-from ...runtime.concurrency import in_a_thread, wait_shielded, write_all
+from ...runtime.concurrency import NoThreadError, in_a_thread, wait_shielded, write_all
 from ...runtime.log import Log
 from ...sync.robotiq_hand import RobotiqHand as BlockingHand
 from ...sync.robotiq_hand import caller_of
@@ -120,6 +120,8 @@ class Recorder:
         self._outbox = Outbox()
         self._joints_only = ros2
         self._is_open = False
+        self._unsaved = b""  # what could not be written for want of a thread
+        self._waits = 0.0  # the seconds for which that has lasted
         self._format = self._make_format(ros2=ros2)
         self._file: FileIO
         self._saving: asyncio.Task[None]
@@ -138,7 +140,7 @@ class Recorder:
 
     @property
     def has_failed(self) -> bool:
-        """Whether a write has failed; the recording ends then, and the log has an error."""
+        """Whether a write has failed, or had no thread for 10 s; the recording has ended then."""
         return self._failed.done()
 
     async def __aenter__(self) -> Self:
@@ -288,10 +290,17 @@ class Recorder:
             self._fail(error.strerror)
 
     async def _save(self) -> None:
-        data, polls = self._outbox.take(), self.recorded
+        self._unsaved += self._outbox.take()
+        data, polls = self._unsaved, self.recorded
         try:
             await in_a_thread(lambda: self._write(data))
-            self.saved = polls
+            self.saved, self._unsaved, self._waits = polls, b"", 0.0
+        except NoThreadError as error:  # the next flush tries again
+            if not self._waits:
+                Log(self._hand.name).warning("the recording waits for a thread: %s", error)
+            self._waits += FLUSH_S
+            if self._waits > DISK_S or self._over.is_set():
+                self._fail(str(error))
         except OSError as error:
             if isinstance(error, FileNotFoundError):
                 self.saved = 0

@@ -1,0 +1,88 @@
+"""Signals that end a program of blocking hands."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from types import FrameType
+from typing import Any, Final
+
+from ..runtime.concurrency import LateError
+from ..runtime.log import log
+from ..runtime.signals import INSIST_S, ending_signals, pass_on
+from ..values.errors import NotStartedError
+from .loop_thread import LOOP_THREAD
+from .robotiq_hand import RobotiqHand, caller_of
+
+STOP_S: Final = 4.0  # a stop takes 2 s at most
+
+
+class _SignalError(BaseException):
+    """Leaves the block of stops_on_signals(), as a KeyboardInterrupt would."""
+
+
+@contextmanager
+def stops_on_signals(*hands: RobotiqHand) -> Iterator[None]:
+    """Stop blocking hands on SIGINT, SIGTERM and SIGHUP, and leave the block after that.
+
+    Without it SIGTERM ends a program at once, and the fingers move on; and the first process of a container
+    (PID 1) does not get it at all. The stops run in the thread of the hands, whatever the program does. Then
+    the call that it waits for, if any, is cancelled, and the program continues after the block. Further
+    signals are ignored for 3 s after the stops; later ones act as before the block. An ignored signal stays
+    ignored. SIGKILL stops nothing.
+
+    Args:
+        hands: to stop; one that does not run is left alone.
+
+    Raises:
+        TypeError: a hand is one for asyncio, or none.
+        RuntimeError: not in the main thread.
+    """
+    for each in hands:
+        if not isinstance(each, RobotiqHand):
+            raise TypeError(f"hands must be blocking hands, got {each!r}")
+    if threading.current_thread() is not threading.main_thread():
+        raise RuntimeError("signals reach the main thread alone: enter stops_on_signals() there")
+    is_received, stopped_at = False, float("inf")
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        nonlocal is_received, stopped_at
+        if is_received:
+            if time.monotonic() - stopped_at > INSIST_S:
+                pass_on(previous[number], number, frame)
+            return
+        is_received = True
+        _stop(hands)
+        stopped_at = time.monotonic()
+        raise _SignalError
+
+    previous: dict[int, Any] = {number: signal.signal(number, handle) for number in ending_signals()}
+    try:
+        yield
+    except _SignalError:
+        pass
+    except NotStartedError:
+        if not is_received:
+            raise
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+
+
+def _stop(hands: tuple[RobotiqHand, ...]) -> None:
+    """Stop all hands that run, at once; without the thread of the hands there is none."""
+    running = [caller for caller in map(caller_of, hands) if caller.is_in_use]
+    if not running or not LOOP_THREAD.is_running:
+        return
+
+    async def stop() -> None:
+        for stopped in await asyncio.gather(*(each.hand.stop() for each in running), return_exceptions=True):
+            if isinstance(stopped, BaseException):
+                log.error("a hand could not be stopped: %r", stopped)
+
+    with suppress(LateError):
+        LOOP_THREAD.call(stop, limit=STOP_S)
