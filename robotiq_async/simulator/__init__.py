@@ -29,6 +29,7 @@ from .server.tcp_server import SimulatorServer
 from .server.urcap_server import UrcapSimulatorServer
 from .troubles.fault_injector import FaultInjector
 from .troubles.like_hardware import like_hardware, own_habits
+from .troubles.likeness import Likeness
 from .troubles.trouble import KINDS, Trouble, parse_troubles
 
 __all__ = [
@@ -37,6 +38,7 @@ __all__ = [
     "Body",
     "FaultInjector",
     "Habits",
+    "Likeness",
     "Physics",
     "PhysicsError",
     "RtuOverTcpSimulatorServer",

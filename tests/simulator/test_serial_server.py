@@ -81,7 +81,7 @@ def test_a_request_in_single_bytes(request_: str) -> None:
     frames = []
     for byte in whole:
         inbox.append(byte)
-        frames.append(take_rtu(inbox))
+        frames.append(take_rtu(inbox, 9))
     assert frames[:-1] == [None] * (len(whole) - 1)
     assert frames[-1] == (9, 0, whole[1:-2])
     assert not inbox

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from cyclopts import Parameter
@@ -21,6 +24,7 @@ from ..output.messages import tell
 
 if TYPE_CHECKING:
     from ...simulator import (
+        Likeness,
         Physics,
         SerialSimulatorServer,
         SimulatedGripper,
@@ -36,7 +40,9 @@ async def simulate(
     *,
     port: Port = 5020,
     host: Host = "127.0.0.1",
-    model: Literal["3f", "2f85", "2f140", "hand-e"] = "3f",
+    model: Annotated[
+        list[Literal["3f", "2f85", "2f140", "hand-e"]] | None, Parameter(negative=(), show_default=False)
+    ] = None,
     speedup: Annotated[float, Parameter(metavar="FACTOR")] = 1.0,
     like_hardware: Annotated[bool, Parameter(negative="--plain", show_default=False)] = True,
     exact: Flag = False,
@@ -47,7 +53,8 @@ async def simulate(
     rtu_over_tcp: Flag = False,
     urcap: Flag = False,
     unpaced: Flag = False,
-    device_id: Unit | None = None,
+    device_id: Annotated[list[Unit] | None, Parameter(negative=())] = None,
+    like: Annotated[Path | None, Parameter(metavar="report.json")] = None,
     trouble: Annotated[list[str] | None, Parameter(metavar="WORDS", negative=())] = None,
     troubles: Flag = False,
 ) -> None:
@@ -81,6 +88,8 @@ async def simulate(
         robotiq-async simulate --serial /dev/pts/3
         robotiq-async simulate --serial /dev/pts/3 --device-id 12
         robotiq-async simulate --rtu-over-tcp --port 54321
+        robotiq-async simulate --rtu-over-tcp --model 2f85 --device-id 9 --model 3f --device-id 12
+        robotiq-async simulate --like report/report.json
         robotiq-async simulate --urcap --model 2f85 --port 63352
         robotiq-async simulate --trouble "drop at 5 every 10" --trouble "delay 0.02"
         robotiq-async simulate --trouble "power-cut at 20 for 2; foreign 0 at 30"
@@ -88,7 +97,7 @@ async def simulate(
     Args:
         port: TCP port; 0 takes a free one.
         host: Interface to listen on. Modbus has no password: all who reach the port can command.
-        model: The gripper: a 3-Finger, 2F-85, 2F-140 or Hand-E.
+        model: The gripper: a 3-Finger (the default), 2F-85, 2F-140 or Hand-E; again for the next --device-id.
         speedup: Factor by which simulated time is faster than the clock.
         like_hardware: Have the habits of real grippers (the default), or with --plain none.
         exact: Stop exactly at the requested position, which no real gripper does.
@@ -100,48 +109,48 @@ async def simulate(
         urcap: Serve the text port of Robotiq's URCap, as a UR controller does; for a 2F or a Hand-E.
         unpaced: Do not simulate the transmission time of bytes; for a real serial port, which takes it.
         device_id: The only Modbus unit id that is answered (default: 9 for RTU and a URCap, any on TCP).
+            Given again, a line has another gripper with that id.
+        like: A report of verify, whose gripper and link this one is like; the model is the report's.
         trouble: A trouble, as above; may be given again.
         troubles: List the kinds of trouble, and end.
     """
     from ...simulator import (
+        Likeness,
         PhysicsError,
-        RtuOverTcpSimulatorServer,
-        SerialSimulatorServer,
         SimulatedGripper,
-        SimulatorServer,
-        UrcapSimulatorServer,
         own_habits,
         parse_troubles,
     )
-    from ...simulator import like_hardware as habits_like_hardware
 
     if troubles:
         _list_troubles()
         return
     with usage():
-        kind = model_of(model)
-        _check_wire(kind, serial=serial is not None, rtu_over_tcp=rtu_over_tcp, urcap=urcap, unpaced=unpaced)
-        plan = parse_troubles("\n".join(trouble or ()))
-        gripper = SimulatedGripper(
-            speedup=speedup,
-            spread=not exact,
-            habits=own_habits(kind) if like_hardware else None,
-            model=kind,
-            physics=_physics(physics, object_),
+        likeness = None if like is None else Likeness.from_file(like)
+        if likeness is not None:
+            _check_alone(likeness, model, object_, physics, exact)
+        kinds = [model_of(each) for each in model or ["3f"]] if likeness is None else [likeness.model]
+        units = device_id or [None if likeness is None else likeness.device_id]
+        _check_line(kinds, units, is_line=serial is not None or rtu_over_tcp)
+        _check_wire(
+            kinds[0], serial=serial is not None, rtu_over_tcp=rtu_over_tcp, urcap=urcap, unpaced=unpaced
         )
-        _place(gripper, object_, fixed=fixed)
-        server: SimulatorServer | SerialSimulatorServer
-        unit = RTU_REGISTERS.device_id if device_id is None else device_id
-        if serial is not None:
-            server = SerialSimulatorServer(serial, gripper, device_id=unit, paced=not unpaced)
-        elif rtu_over_tcp:
-            server = RtuOverTcpSimulatorServer(
-                gripper, port=port, host=host, device_id=unit, paced=not unpaced
+        plan = parse_troubles("\n".join(trouble or ()))
+
+        def made(kind: Model) -> SimulatedGripper:
+            if likeness is not None:
+                return likeness.gripper(time.monotonic, speedup=speedup)
+            habits = own_habits(kind) if like_hardware else None
+            moved = _physics(physics, object_)
+            return SimulatedGripper(
+                speedup=speedup, spread=not exact, habits=habits, model=kind, physics=moved
             )
-        elif urcap:
-            server = UrcapSimulatorServer(gripper, port=port, host=host, device_id=unit)
-        else:
-            server = SimulatorServer(gripper, port=port, host=host, device_id=device_id)
+
+        grippers = [made(kind) for kind in _of_each(kinds, units)]
+        for each in grippers:
+            _place(each, object_, fixed=fixed)
+        wire = _Wire(port, host, serial, rtu_over_tcp=rtu_over_tcp, urcap=urcap, paced=not unpaced)
+        server = wire.server(grippers, units)
         server.fault_injector.check(plan)
     if serial is None and not is_loopback(host):
         tell(f"anyone who reaches {host} can command this gripper")
@@ -149,9 +158,12 @@ async def simulate(
     try:
         with normal_end():
             async with server:
+                if likeness is not None:
+                    _tell_of(likeness)
+                    await likeness.begin(server)
                 # A URCap reads its gripper all the time, so there is no silence to simulate.
-                for habit in habits_like_hardware(kind) if like_hardware and not urcap else ():
-                    await server.fault_injector.begin(habit)
+                elif like_hardware and not urcap:
+                    await _begin_habits(server)
                 print(server.address, flush=True)
                 await _play(server, plan)
     except (ImportError, PhysicsError) as error:
@@ -180,6 +192,78 @@ async def _play(server: SimulatorServer | SerialSimulatorServer, plan: Sequence[
         playing.cancel()
         failing.cancel()
         await asyncio.gather(playing, failing, return_exceptions=True)
+
+
+@dataclass(frozen=True, slots=True)
+class _Wire:
+    """The kind of link, and its place."""
+
+    port: int
+    host: str
+    serial: str | None
+    rtu_over_tcp: bool
+    urcap: bool
+    paced: bool
+
+    def server(
+        self, grippers: Sequence[SimulatedGripper], units: Sequence[int | None]
+    ) -> SimulatorServer | SerialSimulatorServer:
+        from ...simulator import (
+            RtuOverTcpSimulatorServer,
+            SerialSimulatorServer,
+            SimulatorServer,
+            UrcapSimulatorServer,
+        )
+
+        first = grippers[0]
+        unit = RTU_REGISTERS.device_id if units[0] is None else units[0]
+        others = {each: gripper for each, gripper in zip(units[1:], grippers[1:], strict=True) if each}
+        if self.serial is not None:
+            return SerialSimulatorServer(self.serial, first, device_id=unit, paced=self.paced, others=others)
+        if self.rtu_over_tcp:
+            return RtuOverTcpSimulatorServer(
+                first, port=self.port, host=self.host, device_id=unit, paced=self.paced, others=others
+            )
+        if self.urcap:
+            return UrcapSimulatorServer(first, port=self.port, host=self.host, device_id=unit)
+        return SimulatorServer(first, port=self.port, host=self.host, device_id=units[0])
+
+
+async def _begin_habits(server: SimulatorServer | SerialSimulatorServer) -> None:
+    from ...simulator import like_hardware
+
+    for each in (server, *getattr(server, "others", {}).values()):
+        for habit in like_hardware(each.gripper.model):
+            await each.fault_injector.begin(habit)
+
+
+def _tell_of(likeness: Likeness) -> None:
+    if likeness.unknown:
+        tell(f"not simulated, though it differs in the report: {', '.join(likeness.unknown)}")
+
+
+def _check_alone(likeness: Likeness, *others: object) -> None:
+    """Refuse what a report says itself."""
+    if any(others):
+        raise ValueError(
+            f"--like takes all from the report, the model {likeness.model.name} too: no "
+            "--model, --object, --physics and --exact beside it"
+        )
+
+
+def _check_line(kinds: Sequence[Model], units: Sequence[int | None], *, is_line: bool) -> None:
+    if len(units) > 1 and not is_line:
+        raise ValueError("several --device-id need a line: --serial or --rtu-over-tcp")
+    if len(set(units)) < len(units):
+        raise ValueError("each gripper at a line needs a --device-id of its own")
+    if len(kinds) not in (1, len(units)):
+        raise ValueError(
+            f"--model is for all, or once for each --device-id: got {len(kinds)} and {len(units)}"
+        )
+
+
+def _of_each(kinds: Sequence[Model], units: Sequence[int | None]) -> Sequence[Model]:
+    return kinds if len(kinds) == len(units) else [*kinds] * len(units)
 
 
 def _check_wire(model: Model, *, serial: bool, rtu_over_tcp: bool, urcap: bool, unpaced: bool) -> None:

@@ -8,11 +8,14 @@ from typing import Final, NamedTuple
 from pymodbus.framer import FramerRTU
 
 from ..functions import READ_WRITE, RTU_FUNCTIONS, WRITE_MULTIPLE
+from .line_frames import has_checksum, size_of_others
 
 _MBAP: Final = 7
 _LONGEST_TCP_FRAME: Final = 260
 _LONGEST_RTU_FRAME: Final = 256
 _CRC: Final = 2
+BROADCAST: Final = 0
+"""The unit id of a request to all."""
 _COUNT_AT: Final = {WRITE_MULTIPLE: 6, READ_WRITE: 10}
 """Index of the count of data bytes in an RTU frame."""
 
@@ -53,17 +56,24 @@ def take_tcp(inbox: bytearray) -> Frame | None:
     return Frame(raw[6], int.from_bytes(raw[:2], "big"), raw[_MBAP:])
 
 
-def take_rtu(inbox: bytearray) -> Frame | None:
-    """The first complete frame, taken out of the inbox; None while it is incomplete.
+def take_rtu(inbox: bytearray, unit: int) -> Frame | None:
+    """The first complete request to a unit or to all, taken out of the inbox; None while it is incomplete.
+
+    Frames of other units, requests and replies, are left out. An own reply is never heard.
 
     After a function code that is not served, or a wrong checksum, there is no telling where the frame ends:
     the inbox is emptied.
     """
+    while len(inbox) >= 2 and inbox[0] not in (BROADCAST, unit):
+        others = size_of_others(inbox)
+        if others is None:
+            return None
+        del inbox[: others or len(inbox)]
     size = _rtu_size(inbox)
     if size is None or len(inbox) < size:
         return None
     raw = bytes(inbox[:size])
-    if not size or not FramerRTU.check_CRC(raw[:-_CRC], int.from_bytes(raw[-_CRC:], "big")):
+    if not size or not has_checksum(raw):
         inbox.clear()
         return None
     del inbox[:size]
@@ -83,6 +93,14 @@ def _rtu_size(inbox: bytearray) -> int | None:
         return None
     size = at + 1 + inbox[at] + _CRC
     return size if size <= _LONGEST_RTU_FRAME else 0
+
+
+def begins_with_frame(data: bytes, unit: int) -> bool:
+    """Whether bytes begin with a whole frame: a request to a unit or to all, or any of another unit."""
+    line = bytearray(data)
+    if len(line) >= 2 and line[0] not in (BROADCAST, unit):
+        return bool(size_of_others(line))
+    return take_rtu(line, unit) is not None
 
 
 def tcp_reply(frame: Frame, pdu: bytes) -> bytes:

@@ -21,6 +21,8 @@ from __future__ import annotations
 import asyncio
 import importlib.util
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from pymodbus.transport.serialtransport import create_serial_connection
@@ -31,7 +33,7 @@ from robotiq_async.values.registers import RTU_REGISTERS
 from ..functions import RTU_FUNCTIONS
 from .connection import MOST_UNREAD, Connection
 from .endpoint import SimulatorEndpoint
-from .framing import Frame, rtu_reply, take_rtu
+from .framing import BROADCAST, Frame, begins_with_frame, rtu_reply, take_rtu
 from .tcp_server import SimulatorServer
 
 if TYPE_CHECKING:
@@ -40,7 +42,6 @@ if TYPE_CHECKING:
     from ..physics.gripper import SimulatedGripper
 
 
-_BROADCAST: Final = 0
 BAUD: Final = 115200
 BYTE_S: Final = 10 / BAUD
 """8N1: a start bit, eight data bits and a stop bit, 86.8 us."""
@@ -70,26 +71,111 @@ class _RtuEndpoint(SimulatorEndpoint):
     Attributes:
         paced: whether bytes take their time, of connections to come.
         reply_silence: seconds from a request to the first byte of its reply, of connections to come.
+        device_id: the unit id of the gripper.
+        others: the servers of the other grippers at this line, by unit id, each with troubles of its own.
     """
 
     functions = RTU_FUNCTIONS
     paced: bool
+    device_id: int
     reply_silence = REPLY_SILENCE_S
+    others: Mapping[int, LineNeighbour] = MappingProxyType({})
+
+    async def start(self) -> None:
+        """Begin to answer, the others at the line as well.
+
+        Raises:
+            RuntimeError: it is running already.
+            OSError: the address or the serial port cannot be opened.
+        """
+        for each in self.others.values():
+            await each.start()
+        await super().start()
+
+    async def stop(self) -> None:
+        """Drop all connections and stop listening, the others at the line as well."""
+        await super().stop()
+        for each in self.others.values():
+            await each.stop()
 
     def take(self, inbox: bytearray) -> Frame | None:
-        """Cut the next request out of what has arrived."""
-        return take_rtu(inbox)
+        """Cut the next request to this gripper out of what has arrived."""
+        return take_rtu(inbox, self.device_id)
+
+    def _is_meant(self, unit: int) -> bool:
+        return unit in (BROADCAST, self.device_id)
+
+    def _share(self, others: Mapping[int, SimulatedGripper]) -> None:
+        units = [check_int("a unit id of others", unit, 1, 247) for unit in others]
+        if self.device_id in units:
+            raise ValueError(f"each gripper at a line needs a unit id of its own, got {self.device_id} twice")
+        self.others = {unit: LineNeighbour(self, others[unit], unit) for unit in units}
 
     def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
         """The parts to send for a reply; none for an exception, and none to a broadcast."""
         is_exception = bool(reply[1] & 0x80)
-        return () if is_exception or reply[0] == _BROADCAST else super().deliver(reply)
+        return () if is_exception or reply[0] == BROADCAST else super().deliver(reply)
 
     def _reply(self, frame: Frame, pdu: bytes) -> bytes:
         return rtu_reply(frame, pdu)
 
-    def _connection(self) -> SerialConnection:
-        return SerialConnection(self, self.reply_silence if self.paced else None)
+    def _connection(self) -> asyncio.Protocol:  # type: ignore[override]  # of several
+        ends = [each._end() for each in (self, *self.others.values())]  # noqa: SLF001  # of the same kind
+        return LineEnd(ends) if self.others else ends[0]
+
+    def _end(self) -> SerialConnection:
+        return SerialConnection(self, self.reply_silence if self.paced else None, self.device_id)
+
+
+class LineNeighbour(_RtuEndpoint):
+    """Another gripper at the line of a server, which opens and closes the line for both."""
+
+    def __init__(self, server: _RtuEndpoint, gripper: SimulatedGripper, device_id: int) -> None:
+        self.link = server.link  # type: ignore[misc]  # that of its server
+        super().__init__(gripper)
+        self.device_id = device_id
+        self.paced = server.paced
+        self._server = server
+
+    @property
+    def address(self) -> str:
+        """That of the line."""
+        return self._server.address
+
+    async def _open(self) -> None:
+        """The server opens the line."""
+
+    def _close(self) -> None:
+        """The server closes it."""
+
+
+class LineEnd(asyncio.Protocol):
+    """The end of a line at which several grippers are: all hear the client, and each hears the others."""
+
+    def __init__(self, ends: list[SerialConnection]) -> None:
+        self._ends = ends
+        for end in ends:
+            end.others = [each for each in ends if each is not end]
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        for each in self._ends:
+            each.connection_made(transport)
+
+    def data_received(self, data: bytes) -> None:
+        for each in self._ends:
+            each.data_received(data)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        for each in self._ends:
+            each.connection_lost(exc)
+
+    def pause_writing(self) -> None:
+        for each in self._ends:
+            each.pause_writing()
+
+    def resume_writing(self) -> None:
+        for each in self._ends:
+            each.resume_writing()
 
 
 class SerialSimulatorServer(_RtuEndpoint):
@@ -114,6 +200,7 @@ class SerialSimulatorServer(_RtuEndpoint):
         *,
         device_id: int = RTU_REGISTERS.device_id,
         paced: bool = True,
+        others: Mapping[int, SimulatedGripper] = MappingProxyType({}),
     ) -> None:
         """A server that is not started; needs no running loop.
 
@@ -123,15 +210,17 @@ class SerialSimulatorServer(_RtuEndpoint):
             device_id: the unit id of the gripper.
             paced: whether bytes take their time. False for a real serial port, which takes it itself, and for
                 programs that cannot wait.
+            others: more grippers at this line, by unit id; each hears what the others are asked and answer.
 
         Raises:
             TypeError: device_id is not an int, or paced is not a bool.
-            ValueError: device_id is outside 1..247.
+            ValueError: device_id is outside 1..247, or another gripper has it.
         """
         super().__init__(gripper)
-        self._device_id = check_int("device_id", device_id, 1, 247)
+        self.device_id = check_int("device_id", device_id, 1, 247)
         self._port = port
         self.paced = check_flag("paced", paced)
+        self._share(others)
 
     @property
     def port(self) -> str:
@@ -156,9 +245,6 @@ class SerialSimulatorServer(_RtuEndpoint):
 
             raise ImportError(f"a serial line needs pyserial: {install('serial')}")
         await super().start()
-
-    def _is_meant(self, unit: int) -> bool:
-        return unit in (_BROADCAST, self._device_id)
 
     def _close(self) -> None:
         """Nothing to close but the one connection."""
@@ -189,6 +275,7 @@ class RtuOverTcpSimulatorServer(_RtuEndpoint, SimulatorServer):
         port: int = 0,
         device_id: int = RTU_REGISTERS.device_id,
         paced: bool = True,
+        others: Mapping[int, SimulatedGripper] = MappingProxyType({}),
     ) -> None:
         """A server that is not started; needs no running loop.
 
@@ -198,21 +285,21 @@ class RtuOverTcpSimulatorServer(_RtuEndpoint, SimulatorServer):
             port: TCP port, 0 for any free one.
             device_id: the unit id of the gripper.
             paced: whether bytes take the time that they take on the line.
+            others: more grippers at this line, by unit id; each hears what the others are asked and answer.
 
         Raises:
             TypeError: port or device_id is not an int, or paced is not a bool.
-            ValueError: port is outside 0..65535, or device_id outside 1..247.
+            ValueError: port is outside 0..65535, device_id outside 1..247, or another gripper has it.
         """
-        super().__init__(gripper, host=host, port=port, device_id=check_int("device_id", device_id, 1, 247))
+        self.device_id = check_int("device_id", device_id, 1, 247)
+        super().__init__(gripper, host=host, port=port, device_id=self.device_id)
         self.paced = check_flag("paced", paced)
+        self._share(others)
 
     @property
     def address(self) -> str:
         """The address for :class:`~robotiq_async.RobotiqHand`."""
         return f"rtu+{super().address}"
-
-    def _is_meant(self, unit: int) -> bool:
-        return unit == _BROADCAST or super()._is_meant(unit)
 
 
 class WireTime:
@@ -254,11 +341,17 @@ class WireTime:
 
 
 class SerialConnection(Connection):
-    """The other end of a serial line, which has no connections, no packets and no flow control."""
+    """The other end of a serial line, which has no connections, no packets and no flow control.
 
-    def __init__(self, endpoint: SimulatorEndpoint, reply_silence: float | None) -> None:
+    Attributes:
+        others: the ends of other grippers at the same place of the line.
+    """
+
+    def __init__(self, endpoint: SimulatorEndpoint, reply_silence: float | None, unit: int) -> None:
         """Make a connection with the time of its bytes; None for one where they take none."""
         super().__init__(endpoint)
+        self.others: list[SerialConnection] = []
+        self._unit = unit
         self._line = endpoint.fault_injector
         self._wire = None if reply_silence is None else WireTime(reply_silence)
         self._heard_at = 0.0
@@ -290,9 +383,15 @@ class SerialConnection(Connection):
     def _hear(self, data: bytes, pause: float) -> None:
         """Take bytes that have come; those of a frame that was cut off before them are dropped."""
         self._answer_next()  # complete frames are answered, even if their turn has not come
-        if not self._goes_on and _begins_anew(pause, data):
+        if not self._goes_on and _begins_anew(pause, data, self._unit):
             self._inbox.clear()
         super().data_received(data)
+
+    def overhear(self, part: bytes) -> None:
+        """Take bytes that another gripper has put on the line; they have come already."""
+        if self.is_active():
+            pause, self._heard_at = self._loop.time() - self._heard_at, self._loop.time()
+            self._hear(part, pause)
 
     def pass_on(self, part: bytes) -> None:
         """Send bytes; a reader has them when the last one has arrived."""
@@ -310,6 +409,8 @@ class SerialConnection(Connection):
             self._unsent += len(part)
             self._sent_at = self._loop.time()
             super().pass_on(part)
+            for each in self.others:
+                each.overhear(part)
 
     def _regulate(self) -> None:
         """Drop requests that come faster than the answers: a serial line cannot make a client wait."""
@@ -317,10 +418,10 @@ class SerialConnection(Connection):
             self._inbox.clear()
 
 
-def _begins_anew(pause: float, data: bytes) -> bool:
+def _begins_anew(pause: float, data: bytes, unit: int) -> bool:
     """Whether bytes are the beginning of a frame and not the rest of one, judged by the pause before them.
 
     In between, when it may be the line or the machine that paused, a whole request is a beginning: by
     chance the rest of a frame has its checksum once in 65,536 times.
     """
-    return pause > LONGEST_PAUSE_S or (pause > FRAME_GAP_S and take_rtu(bytearray(data)) is not None)
+    return pause > LONGEST_PAUSE_S or (pause > FRAME_GAP_S and begins_with_frame(data, unit))
