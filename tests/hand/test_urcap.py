@@ -284,7 +284,7 @@ def test_a_urcap_has_no_3_finger() -> None:
     [
         ("GET POS", "POS 3\n"),
         ("GET  FLT ", "FLT 00\n"),
-        ("GET SID", "SID 9\n"),
+        ("GET SID", "SID [9]\n"),
         ("SET SID 9", "ack"),
         ("SET SID 2", "?"),
         ("SET  POS 12", "ack"),

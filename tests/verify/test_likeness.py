@@ -189,14 +189,15 @@ def test_a_report_comes_back_from_the_simulator_that_is_like_it() -> None:
 
 def test_the_plain_simulator_has_another_report() -> None:
     """Or the comparison would be blind."""
+    for number in range(3):
 
-    async def both(number: int) -> list[str]:
-        drawn = Set(number)
-        first = as_json(await drawn.report())
-        plain = Likeness(drawn.model, "rtu+tcp" if drawn.serial else "tcp")
-        return differences(first, as_json(await reported(plain)))
+        async def both(number: int = number) -> list[str]:
+            drawn = Set(number)
+            first = as_json(await drawn.report())
+            plain = Likeness(drawn.model, "rtu+tcp" if drawn.serial else "tcp")
+            return differences(first, as_json(await reported(plain)))
 
-    assert all(run(lambda number=number: both(number)) for number in range(3))
+        assert run(both)
 
 
 def _checks_of(**figures: dict[str, Any]) -> dict[str, Any]:

@@ -130,7 +130,7 @@ async def simulate(
         if likeness is not None:
             _check_alone(likeness, model, object_, physics, exact)
         kinds = [model_of(each) for each in model or ["3f"]] if likeness is None else [likeness.model]
-        units = device_id or [None if likeness is None else likeness.device_id]
+        units: Sequence[int | None] = device_id or [getattr(likeness, "device_id", None)]
         _check_line(kinds, units, is_line=serial is not None or rtu_over_tcp)
         _check_wire(
             kinds[0], serial=serial is not None, rtu_over_tcp=rtu_over_tcp, urcap=urcap, unpaced=unpaced

@@ -119,7 +119,7 @@ class _RtuEndpoint(SimulatorEndpoint):
     def _reply(self, frame: Frame, pdu: bytes) -> bytes:
         return rtu_reply(frame, pdu)
 
-    def _connection(self) -> asyncio.Protocol:  # type: ignore[override]  # of several
+    def _connection(self) -> asyncio.Protocol:
         ends = [each._end() for each in (self, *self.others.values())]  # noqa: SLF001  # of the same kind
         return LineEnd(ends) if self.others else ends[0]
 

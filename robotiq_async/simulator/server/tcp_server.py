@@ -129,7 +129,7 @@ class SimulatorServer(SimulatorEndpoint):
     def _reply(self, frame: Frame, pdu: bytes) -> bytes:
         return tcp_reply(frame, pdu)
 
-    def _connection(self) -> Connection:
+    def _connection(self) -> asyncio.Protocol:
         return Connection(self)
 
     def _close(self) -> None:

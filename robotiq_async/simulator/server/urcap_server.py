@@ -36,7 +36,7 @@ _STATUS: Final = {
     "POS": reg.gPO[0],
     "COU": reg.gCU[0],
 }
-"""Names that a GET reads from the status; two are those of a request, too."""
+"""Names that a GET reads from the status; two are those of a request, too. COU is the current in 10 mA."""
 _REQUEST: Final = {
     "ACT": reg.rACT,
     "GTO": reg.rGTO,
@@ -48,8 +48,25 @@ _REQUEST: Final = {
 }
 """Names that a SET writes."""
 _REGISTERS: Final = 3
-_FAULT_DIGITS: Final = 2
-"""The URScript that the URCap adds to programs reads two digits of FLT."""
+_BARE: Final = 1
+"""The unit, which lines do not have, of a question without an end of line."""
+_DIGITS: Final = {"FLT": 2, "PRE": 3}
+"""Digits that a value is shown with (a session with a real gripper, and the vendor's script)."""
+_ABOUT: Final = {
+    "DRI": "RUNNING",
+    "VER": "DCU-2.0.0",
+    "FWV": "0",
+    "SNU": "0",
+    "NCY": "0",
+    "MOD": "0",
+    "MSC": "0",
+    "VST": "0",
+}
+"""Names that say something about gripper and driver: state of the driver, its version, that of the firmware,
+serial number, cycles. The values but those of DRI and VER are made up; what the last three mean is open."""
+
+
+_NAMES: Final = frozenset({"SID", *_STATUS, *_REQUEST, *_ABOUT})
 
 
 class _RefusedError(Exception):
@@ -60,7 +77,9 @@ class UrcapSimulatorServer(SimulatorServer):
     """Serves a simulated jaw as Robotiq's URCap on a UR controller does, to any number of clients.
 
     A line is ``GET NAME`` or ``SET NAME VALUE NAME VALUE ...``. The answer to a GET ends with an end of line,
-    the ``ack`` of a SET without one, as clients want it that ran on hardware. All variables of a SET take
+    the ``ack`` of a SET without one, as clients want it that ran on hardware. Several lines may come in one
+    write. A ``GET NAME`` without an end of line is answered by the bare value, as the vendor's script has it;
+    so is the beginning of a longer line that comes in pieces, if it is one. All variables of a SET take
     effect at once, unless the trouble ``one-by-one`` spaces them: then the ``ack`` comes before the first.
     Other lines are answered by a question mark.
     """
@@ -107,13 +126,24 @@ class UrcapSimulatorServer(SimulatorServer):
         if end < 0:
             if len(inbox) > LONGEST_LINE:
                 raise BadFrameError(inbox[:16].hex(" "))
-            return None
+            return self._bare(inbox)
         line = bytes(inbox[:end])
         del inbox[: end + 1]
         return Frame(0, 0, line)
 
+    def _bare(self, inbox: bytearray) -> Frame | None:
+        """Cut out a question without an end of line."""
+        words = bytes(inbox).split(b" ")
+        if len(words) != 2 or words[0] != b"GET" or words[1].decode("ascii", "replace") not in _NAMES:
+            return None
+        line = bytes(inbox)
+        inbox.clear()
+        return Frame(_BARE, 0, line)
+
     def answer(self, frame: Frame) -> bytes:
         """Carry out a line; return the answer."""
+        if frame.unit == _BARE:
+            return self._shown(frame.pdu.decode("ascii").split()[1]).encode()
         match frame.pdu.decode("ascii", "replace").split():
             case ["GET", name]:
                 return self._get(name)
@@ -129,16 +159,19 @@ class UrcapSimulatorServer(SimulatorServer):
         return True
 
     def _get(self, name: str) -> bytes:
+        return f"{name} {self._shown(name)}\n".encode() if name in _NAMES else REFUSED
+
+    def _shown(self, name: str) -> str:
+        """The value of a variable as it is shown."""
         if name == "SID":
-            value = self._device_id or 0
-        elif name in _STATUS:
+            return f"[{self._device_id or 0}]"
+        if name in _ABOUT:
+            return _ABOUT[name]
+        if name in _STATUS:
             value = _STATUS[name].read(self.gripper.status_registers())
-        elif name in _REQUEST:
-            value = _REQUEST[name].read(self.gripper.request_registers)
         else:
-            return REFUSED
-        digits = _FAULT_DIGITS if name == "FLT" else 1
-        return f"{name} {value:0{digits}}\n".encode()
+            value = _REQUEST[name].read(self.gripper.request_registers)
+        return f"{value:0{_DIGITS.get(name, 1)}}"
 
     def _close(self) -> None:
         super()._close()

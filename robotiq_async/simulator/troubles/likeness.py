@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from robotiq_async.values.calibration.motion_profile import MotionProfile
 from robotiq_async.values.enums import Fault, Finger
@@ -30,10 +30,7 @@ from .like_hardware import own_habits
 from .trouble import Trouble
 
 if TYPE_CHECKING:
-    from ..server.serial_server import RtuOverTcpSimulatorServer, SerialSimulatorServer
-    from ..server.tcp_server import SimulatorServer
-
-    Server = SimulatorServer | SerialSimulatorServer | RtuOverTcpSimulatorServer
+    from .fault_injector import FaultInjector
 
 SCHEMA: Final = 1
 _SPEEDS: Final = (0, 64, 255)
@@ -64,6 +61,16 @@ _HAD: Final = frozenset(
     }
 )
 """The checks that a simulator can have otherwise."""
+
+
+class Server(Protocol):
+    """A running server of the gripper."""
+
+    @property
+    def link(self) -> str: ...
+
+    @property
+    def fault_injector(self) -> FaultInjector: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +163,8 @@ class Likeness:
             count = self.model.rtu.count
             # A read has 8 bytes, and its reply 5 beside the registers.
             rest = self.exchange_s - (13 + 2 * count) * _BYTE_S - _TIMERS_S
-            server.reply_silence = max(server.reply_silence, rest)  # type: ignore[union-attr]
+            line: Any = server  # which keeps this silence
+            line.reply_silence = max(line.reply_silence, rest)
         elif self.exchange_s > _SHORT_S:
             await server.fault_injector.begin(Trouble("delay", self.exchange_s))
 
