@@ -257,8 +257,12 @@ class Storm:
         if note.word in ("done", "had begun"):
             return not any(self.is_shown(note, image) for image in (*was_there, *since))
         if note.word == "nothing was done":
-            near = [image for image in images if note.begun <= image.at <= note.end + 5.0]
-            # A hold may be at any position, and the same value comes again after VALUES.
+            # A hold may be at any position, and the same value is asked for again after some seconds.
+            again = [
+                n.begun for n in self.notes if n.begun > note.begun and n.asked.items() & note.asked.items()
+            ]
+            until = min([note.end + 5.0, *again])
+            near = [image for image in images if note.begun <= image.at < until]
             is_certain = "speed" in note.asked or "force" in note.asked
             return (
                 is_certain

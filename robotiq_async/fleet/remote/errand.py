@@ -159,7 +159,7 @@ class Errand:
             reply = copy.result()
             self.was_empty |= reply is None and now() - sent_at < min(AT_ONCE_S, self.timeout / 2)
             if self.is_halt:
-                self._take_of_halt(reply)
+                self._take_of_halt(reply, sent_at)
             elif reply is not None or not self._copies:
                 self._take(reply, came_early)
 
@@ -180,7 +180,7 @@ class Errand:
                 return
         self.answered.set_result(reply)
 
-    def _take_of_halt(self, reply: Reply | None) -> None:
+    def _take_of_halt(self, reply: Reply | None, sent_at: float) -> None:
         # Only an answer about the gripper ends it before its time: that all have stopped, or why not.
         answer = None if reply is None else _answer(reply)
         if answer is None or not _is_about(self.call, answer):
@@ -194,7 +194,7 @@ class Errand:
         else:
             self._in_doubt = reply
         if not self._copies:
-            self._repeat(RETRY_S)
+            self._repeat(max(0.001, sent_at + RETRY_S - now()))
 
     def _repeat(self, pause: float = 0.0) -> None:
         self.stop_repeating()
