@@ -117,6 +117,10 @@ class Evidence:
     def update(self, status: RobotiqStatus, asked: float) -> Trigger | None:
         """Take in a status; return its condition, or None while the first one on a new link is undecided."""
         condition = classify(status)
+        # Nearly every poll ends here: the gripper was ready, is so, and has not shown 0x09.
+        if condition is self.condition is Trigger.SEEN_READY and not self._row:
+            self.status = status
+            return condition
         if self._row or condition is Trigger.SEEN_FAULT:  # if not, 0x09 need not be looked for
             judged = self.judged(status, asked)
             # In a fault 0x09 is no news, and counts at once: hiding it would show the fault as cleared.
@@ -125,7 +129,7 @@ class Evidence:
         if condition is Trigger.SEEN_BUSY and status.is_reset and status.fault is Fault.NONE:
             self._stuck = Stuck.after(self._stuck, status, asked)
             condition = Trigger.SEEN_STRANDED if self._stuck.is_long else condition
-        elif self._stuck is not None:
+        else:
             self._stuck = None
         self.status = status
         if self.condition is not None or not self.is_undecided:

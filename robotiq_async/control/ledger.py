@@ -299,8 +299,8 @@ class Ledger:
 
     def update(self, status: RobotiqStatus, asked: float) -> None:
         """Take in a status: from then on the questions are about it."""
-        before, entries = self.now.time, self._entries
-        self.now = Moment(asked, self.now.reads + 1)
+        before, entries = self.now, self._entries
+        self.now = Moment(asked, before.reads + 1)
         # This comes before the status is looked at: after a silence it must not show an echo of long ago.
         while len(entries) > 1 and self._is_old(entries[1]):
             entries.popleft()
@@ -314,7 +314,7 @@ class Ledger:
             self.match = self._find(status)
             # One with the echo of the image before shows only once that is forgotten: that tells no delay.
             if self.shown is not shown and self.shown.is_ours and self.shown.echo != shown.echo:
-                self._delay = max(0.0, before - self.shown.sent)
+                self._delay = max(0.0, before.time - self.shown.sent)
         if self._doubtful:  # drop those that did not show in time, now that this status was compared
             later = (each for each in self._doubtful if each.number > self.shown.number)
             self._doubtful = [each for each in later if not self._is_old(each)]

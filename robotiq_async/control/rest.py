@@ -147,20 +147,20 @@ class Contacts:
     """
 
     def __init__(self) -> None:
-        self._at: dict[Finger, tuple[ObjectStatus, int]] = {}
+        self._shown: dict[Finger, RobotiqStatus] = {}  # by axis, the newest status that shows it in contact
         self.open = NO_AXES
 
     def __bool__(self) -> bool:
-        return bool(self._at)
+        return bool(self._shown)
 
     def see(self, status: RobotiqStatus, contacts: Finger) -> None:
         """Take in a status with gGTO = 1, and those of its contacts that can be believed."""
-        before, self.open = self._at, NO_AXES
-        self._at = {axis: (status.finger_status(axis), status.position(axis)) for axis in contacts}
-        for axis in before.keys() - self._at.keys():  # usually none
-            at = before[axis]
-            if axis in status.moving and abs(status.position(axis) - at[1]) <= TOLERANCE:
-                self._at[axis] = at
+        before, self.open = self._shown, NO_AXES
+        self._shown = dict.fromkeys(contacts, status)
+        for axis in before.keys() - self._shown.keys():  # usually none
+            at = before[axis].position(axis)
+            if axis in status.moving and abs(status.position(axis) - at) <= TOLERANCE:
+                self._shown[axis] = before[axis]
                 self.open |= axis
 
     def ask(self, axes: Finger) -> None:
@@ -169,14 +169,14 @@ class Contacts:
 
     def forget(self) -> None:
         """A reset and an activation end every grip."""
-        self._at = {}
+        self._shown = {}
 
     def pressing(self, status: RobotiqStatus, base: Request) -> Finger:
         """The axes that have not moved since, and that ``base`` asks to press on."""
-        pressing = (
-            axis
-            for axis, (what, at) in self._at.items()
-            if abs(status.position(axis) - at) <= TOLERANCE
-            and agrees(status.model, base.position(axis), what, at, direction=0)
-        )
-        return Finger(sum(pressing))
+        pressing = NO_AXES
+        for axis, shown in self._shown.items():
+            what, at = shown.finger_status(axis), shown.position(axis)
+            is_there = abs(status.position(axis) - at) <= TOLERANCE
+            if is_there and agrees(status.model, base.position(axis), what, at, direction=0):
+                pressing |= axis
+        return pressing
