@@ -135,7 +135,7 @@ class RobotiqStatus:
 
     @property
     def has_current(self) -> bool:
-        """Whether the link carries the motor currents. A URCap's text port does not."""
+        """Whether the link carries the motor currents. A URCap's text port without COU does not."""
         return self._has_current
 
     # One axis. Each takes one Finger member; several, or one that the model lacks, is a ValueError.

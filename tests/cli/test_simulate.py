@@ -147,8 +147,8 @@ def test_urcap(call: Call, beside: Callable[..., Beside]) -> None:
     assert re.fullmatch(r"urcap://127\.0\.0\.1:[0-9]+\?model=2f85", address)
     shown = call("status", address)
     shown.assert_succeeded()
-    assert "mA" in shown.out, "the column is there, and empty"
-    assert "current_ma" not in json.loads(call("status", "--json", address).out)["A"]
+    assert re.search(r"\bmA\b", shown.out)
+    assert json.loads(call("status", "--json", address).out)["A"]["current_ma"] == 0, "COU, of a jaw at rest"
     call("status", "--device-id", "9", address).assert_succeeded()
     call("status", "--device-id", "2", address).assert_failed(1, "the URCap does not choose gripper 2")
     call("status", "--read-function", "3", address).assert_failed(2, "read_function is an option of Modbus")

@@ -28,7 +28,7 @@ async def test_every_stage_ends_well_but_the_one_with_foam(model: Model, last: i
     """
     async with served(model=model, physics=Physics("table")) as server:
         helper = Helper(server)
-        helper.before = lambda words: True if words in (soft_part.PLACE, soft_part.RELEASE) else None
+        helper.before = {soft_part.PLACE: True, soft_part.RELEASE: True, soft_part.AGAIN: "s"}.get
         report = await verified(server, helper, Roll(), first=3, last=last)
     assert report.why == "done", report.words
     assert report.stages == list(range(3, last + 1))

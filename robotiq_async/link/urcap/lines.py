@@ -4,7 +4,7 @@ Robotiq's URCap on a UR controller serves TCP port 63352. ``GET POS`` is answere
 line, ``SET POS 255 GTO 1`` by ``ack`` without one. No document of the vendor's describes the port. Clients
 that ran on hardware show this: the example of ur_rtde, with GELLO's after it, airo-robots, and the URScript
 that the URCap adds to programs. The variables are the registers of a jaw by name, so what is read becomes the
-status registers that a serial line would carry, but for the motor current, which has no variable.
+status registers that a serial line would carry. Some ports lack the variable of the motor current.
 """
 
 from __future__ import annotations
