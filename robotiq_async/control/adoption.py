@@ -9,7 +9,7 @@ theirs. docs/decisions/adoption.md has the rules.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 from ..values.enums import CLOSED, OPEN, Finger, ObjectStatus
 from ..values.request import AxisRequest, Request
@@ -21,24 +21,23 @@ DIRECTION_WAIT_S: Final = 0.1
 (234 counts in 10.0 s; thesis, table A1.1)."""
 
 
-class Adoption:
-    """Follows an adopted gripper until the hand writes its own first image."""
+class Adoption(NamedTuple):
+    """What an adopted gripper has shown until the hand writes its own first image."""
 
-    def __init__(self, first: RobotiqStatus, now: Moment, since: Moment) -> None:
-        # From then on a moving axis has time to show its direction, and a late object status to come.
-        self.since: Final = since
-        self._first: Final = first
-        self._latest, self._now = first, now
+    since: Moment  # from then on a moving axis has time to show its direction, and a late gDT to come
+    first: RobotiqStatus
+    latest: RobotiqStatus
+    now: Moment  # when that was asked for
 
-    def update(self, status: RobotiqStatus, now: Moment) -> None:
-        self._latest, self._now = status, now
+    def after(self, status: RobotiqStatus, now: Moment) -> Adoption:
+        return self._replace(latest=status, now=now)
 
     @property
     def is_certain(self) -> bool:
         """Whether the request made from the status can be relied on."""
-        status, moving = self._latest, self._latest.moving
+        status, moving = self.latest, self.latest.moving
         # A moving axis must have shown its direction, or have had the time to.
-        has_time = self._now.time - self.since.time < DIRECTION_WAIT_S
+        has_time = self.now.time - self.since.time < DIRECTION_WAIT_S
         if has_time and not all(self._direction(axis) for axis in moving):
             return False
         # An axis at rest must agree with its echo; if it does not, its gDT may be from before that request,
@@ -46,14 +45,14 @@ class Adoption:
         # cannot be told from a contradiction but by its time [vendor].
         at_rest = (axis for axis in status.model.axes if axis not in moving)
         return (
-            self.since.is_lag_over(self._now)
+            self.since.is_lag_over(self.now)
             or not status.go_echo
             or all(self._agrees(axis, status.requested_position(axis)) for axis in at_rest)
         )
 
     def request(self, settings: Sequence[AxisRequest]) -> Request:
         """The image that changes nothing, with speed and force from ``settings``: they have no echo."""
-        status = self._latest
+        status = self.latest
         return Request(
             activate=status.activation_echo,
             go=status.go_echo,
@@ -67,7 +66,7 @@ class Adoption:
 
     def _position(self, axis: Finger) -> int:
         """The echo that agrees with what an axis shows, if one does."""
-        status, position = self._latest, self._latest.position(axis)
+        status, position = self.latest, self.latest.position(axis)
         if not status.go_echo:
             return position  # it stands [manual 2014, p. 50], and the next rGTO = 1 must not move it
         # Under simple control the fingers B and C follow the registers of A [manual 2014, pp. 45, 47].
@@ -84,11 +83,11 @@ class Adoption:
         return position
 
     def _agrees(self, axis: Finger, request: int) -> bool:
-        status = self._latest
+        status = self.latest
         return agrees(
             status.model, request, status.finger_status(axis), status.position(axis), self._direction(axis)
         )
 
     def _direction(self, axis: Finger) -> int:
         """Counts the axis has moved since the first status: above 0 closing, below 0 opening, 0 unknown."""
-        return self._latest.position(axis) - self._first.position(axis)
+        return self.latest.position(axis) - self.first.position(axis)

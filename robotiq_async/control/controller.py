@@ -484,7 +484,7 @@ class Controller:
         return entry.image
 
     def _next_step(self, procedure: Procedure, status: RobotiqStatus, now: float) -> Request | None:
-        ledger, entry = self._ledger, procedure.entry
+        ledger, entry = self._ledger, procedure.writes[-1] if procedure.writes else None
         if entry is not None and not ledger.acts(entry):
             return None
         if entry is None and not procedure.releases and self._evidence.may_pass:

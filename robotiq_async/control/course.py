@@ -29,14 +29,16 @@ class Course:
         self._kept: Final[deque[tuple[float, RobotiqStatus]]] = deque(
             maxlen=math.ceil(BASELINE_S / SPACING_S)
         )
-        self.due = -math.inf  # when the next status is to be kept
 
     def keep(self, status: RobotiqStatus, asked: float) -> None:
-        self.due = asked + SPACING_S
-        self._kept.append((asked, status))
+        if not self._kept or asked >= self._kept[-1][0] + SPACING_S:
+            self._kept.append((asked, status))
 
-    def after(self, axis: Finger, status: RobotiqStatus, asked: float, seconds: float) -> int:
-        """Its position so long after a status, which was asked for then; as it shows if it may stand."""
+    def after(self, axis: Finger, request: int, status: RobotiqStatus, asked: float, seconds: float) -> int:
+        """Its position so long after a status, on its way to a request; as it shows if it may stand.
+
+        The status was asked for at ``asked``.
+        """
         at, since, first = status.position(axis), asked, status
         # A fault stops the axes, and gDT shows a motion.
         if axis not in status.moving or status.fault.is_serious:
@@ -46,4 +48,5 @@ class Course:
                 break
             since, first = kept, each
         time = asked - since
-        return at if time == 0 else at + int((at - first.position(axis)) * seconds / time)
+        place = at if time == 0 else at + int((at - first.position(axis)) * seconds / time)
+        return sorted((at, place, request))[1]

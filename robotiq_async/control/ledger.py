@@ -24,7 +24,7 @@ No I/O and no clock: callers give the time of a write, and questions are about t
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from itertools import takewhile
 from operator import attrgetter
 from typing import Final
@@ -149,7 +149,7 @@ class Ledger:
         # It does when its echo has shown, or a long enough time after its acknowledgement.
         if entry.number <= self.shown.number:
             return True
-        if self._is_in_flight(entry):
+        if entry is self.in_flight:
             return False
         age = self.now.time - entry.time
         if age >= WINDOW_S:
@@ -169,30 +169,26 @@ class Ledger:
         activating = (each for each in ours if each.image.activate and each.echo == status.echo)
         return any(self.now.time - each.time < WINDOW_S for each in activating)
 
-    @property
-    def ahead(self) -> list[Entry]:
-        """What may still act, in the order in which it would; an entry in doubt may also never act."""
-        # Every question about what the gripper may get is one about these, whatever a status shows today.
-        return [each for each in self.waiting() if self._is_ahead(each)]
-
-    def _is_ahead(self, entry: Entry) -> bool:
-        return not (self.acts(entry) or self._is_past(entry))
+    def _may_get(self, is_meant: Callable[[Request], bool]) -> bool:
+        """Whether such an image may still act; one in doubt may also never act."""
+        # Every question about what the gripper may get is this one, whatever a status shows today. Every
+        # write asks it, so what costs most comes last.
+        return any(
+            is_meant(each.image) and not (self.acts(each) or self._is_past(each)) for each in self.waiting()
+        )
 
     @property
     def may_reset(self) -> bool:
         """Whether the gripper may be reset by the time at which the next image acts: its rACT would rise."""
-        # As ahead, but every write asks this, and nearly every image has rACT.
-        return any(not each.image.activate and self._is_ahead(each) for each in self.waiting())
+        return self._may_get(lambda image: not image.activate)
 
     @property
     def may_set_go(self) -> bool:
-        return any(each.image.go for each in self.ahead)
+        return self._may_get(lambda image: image.go)
 
     def may_drive(self, status: RobotiqStatus) -> bool:
         """Whether an activation or a release may begin, which rGTO = 0 does not end."""
-        return any(
-            each.image.release or (each.image.activate and not status.activation_echo) for each in self.ahead
-        )
+        return self._may_get(lambda image: image.release or (image.activate and not status.activation_echo))
 
     @property
     def may_begin_to_move(self) -> bool:
@@ -214,22 +210,16 @@ class Ledger:
         if not axes or not (base := self.base).go:
             return {}
         may_move, axes = self.may_move(status), axes & ~self._pressing_again(status)
+        acts_in = age + self._delay  # the time until a write that leaves now acts
         return {
-            axis: self._place(axis, status, base.position(axis), age)
+            axis: self._course.after(axis, base.position(axis), status, self.now.time, acts_in)
             for axis in status.model.axes
             if axis in axes and drifts(axis, base, status, may_move)
         }
 
-    def _place(self, axis: Finger, status: RobotiqStatus, request: int, age: float) -> int:
-        """Where an axis will be, on its way to its request, when a write that leaves now acts."""
-        at = status.position(axis)
-        place = self._course.after(axis, status, self.now.time, age + self._delay)
-        return sorted((at, place, request))[1]
-
     def _pressing_again(self, status: RobotiqStatus) -> Finger:
         # To hold one that presses would end its grip.
-        pressing = self.contacts.pressing(status, self.base) if self.contacts else NO_AXES
-        return pressing & status.moving
+        return self.contacts.pressing(status, self.base) & status.moving
 
     def may_move(self, status: RobotiqStatus) -> Finger:
         """The axes that may move, or be about to, although the status shows them at rest."""
@@ -282,7 +272,7 @@ class Ledger:
     def lost(self, now: float = NEVER) -> None:
         """The link is down: a write without acknowledgement may have arrived at any time until now."""
         self._settle_base()
-        if self._is_in_flight(self.last):
+        if self.in_flight is not None:
             self.last.lose(now)
             self._doubtful = [*self._doubtful, self._entries.pop()]
             self._unproven = {axis: recent.without(self._doubtful) for axis, recent in self._unproven.items()}
@@ -320,17 +310,14 @@ class Ledger:
             self._doubtful = [each for each in later if not self._is_old(each)]
         # A moving axis of another client shows its direction with time, an axis at rest its true gDT.
         if self._adoption is not None and self.match is self.last:
-            self._adoption.update(status, self.now)
-
-    def _is_in_flight(self, entry: Entry) -> bool:
-        return entry is self.in_flight
+            self._adoption = self._adoption.after(status, self.now)
 
     def _is_past(self, entry: Entry) -> bool:
         """Whether an entry in doubt would have acted by now."""
         return entry in self._doubtful and self.now.time - entry.time >= SILENT_S
 
     def _is_old(self, entry: Entry) -> bool:
-        return not self._is_in_flight(entry) and self.now.time - entry.time > WINDOW_S
+        return entry is not self.in_flight and self.now.time - entry.time > WINDOW_S
 
     def _find(self, status: RobotiqStatus) -> Entry | None:
         """The entry that a status shows, perhaps with software limits in place of its requests."""
@@ -397,7 +384,7 @@ class Ledger:
         since = self.now if self._adoption is None else self._adoption.since
         before = self._settle_base()
         self._note_acting()  # what has shown in a fault, for one: from here on nothing asks for it
-        self._adoption = Adoption(status, self.now, since)
+        self._adoption = Adoption(since, status, status, self.now)
         image, time = self._adoption.request(before.axes), self.now.time
         other = Entry(self._newest.number + 1, image, status.echo, False, time, time, self.now)
         self._doubtful = self.waiting()
@@ -433,8 +420,7 @@ class Ledger:
     def update_rest(self, status: RobotiqStatus) -> None:
         """Find out which axes have come to rest. Not in a fault: it keeps axes from starting."""
         if self._unproven:
-            if self.now.time >= self._course.due:
-                self._course.keep(status, self.now.time)
+            self._course.keep(status, self.now.time)
             self._note_acting()
             # gDT has no meaning without rGTO [manual]. While an adopted request is a guess, no rest follows
             # from it: a late gDT alone may make an axis look as if it was asked for where it is.

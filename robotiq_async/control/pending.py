@@ -172,8 +172,8 @@ class OpenRequests:
         limited = ledger.limits.limited
         for move in self._written_moves:
             move.note_currents(status)
-            is_acting = move.entry is not None and ledger.acts(move.entry)
-            if is_acting and move.has_arrived(status, ledger.resting, limited):
+            assert move.entry is not None
+            if ledger.acts(move.entry) and move.has_arrived(status, ledger.resting, limited):
                 self.leave(move)
                 self._warn_of_unreached(move, move.end(status), limited)
 

@@ -39,18 +39,15 @@ class Procedure:
     def __init__(self, ledger: Ledger, begin: Callable[[Image], Steps]) -> None:
         self.releases: Final = begin is automatic_release
         self.steps: Final = begin(lambda status: at_rest(ledger.base, status))
-        self.entry: Entry | None = None  # of its newest image
-        self._first: Entry | None = None
+        self.writes: Final[list[Entry]] = []  # its images; if it has none to send, what shows instead
         next(self.steps)  # to its first yield: what the gripper shows decides whether it begins
 
     def written(self, entry: Entry) -> None:
-        """Its image is about to be sent. If it has none to send, what shows stands in for that."""
-        self.entry = entry
-        self._first = self._first or entry
+        self.writes.append(entry)
 
     @property
     def state(self) -> State:
-        if self._first is None or self._first.acknowledged is None:
+        if not self.writes or self.writes[0].acknowledged is None:
             return State.DO_ATR if self.releases else State.DO_ACTIVATION
         return State.WF_ATR if self.releases else State.WF_ACTIVATION
 

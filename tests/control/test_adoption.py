@@ -32,24 +32,28 @@ def gripper(
     return status_of(byte_0, byte_1, echo=echo, position=position, at=at)
 
 
-class Seen(Adoption):
-    """Each status was asked for when it came."""
+class Seen:
+    """The adoption after some statuses, each asked for when it came."""
 
     def __init__(self, first: RobotiqStatus) -> None:
-        self.reads, now = 0, Moment(first.timestamp, 0)
-        super().__init__(first, now, now)
+        now = Moment(first.timestamp, 0)
+        self.adoption = Adoption(now, first, first, now)
 
-    def see(self, status: RobotiqStatus) -> None:
-        self.reads += 1
-        self.update(status, Moment(status.timestamp, self.reads))
+    def see(self, status: RobotiqStatus, now: Moment | None = None) -> None:
+        reads = self.adoption.now.reads + 1
+        self.adoption = self.adoption.after(status, now or Moment(status.timestamp, reads))
+
+    @property
+    def is_certain(self) -> bool:
+        return self.adoption.is_certain
 
 
 def adopted(*statuses: RobotiqStatus) -> Request:
     """The request that follows from statuses, the first one first."""
-    adoption = Seen(statuses[0])
+    seen = Seen(statuses[0])
     for status in statuses[1:]:
-        adoption.see(status)
-    return adoption.request(SETTINGS)
+        seen.see(status)
+    return seen.adoption.request(SETTINGS)
 
 
 def positions(request: Request) -> list[int]:
@@ -160,9 +164,9 @@ def test_an_axis_at_rest_that_contradicts_its_echo_may_show_what_was_before_it(
     adoption.see(gripper(THERE, MOVING, THERE, THERE, echo=(100, echo, 100, 100), position=(100,) * 4))
     assert not adoption.is_certain, "its direction is not known yet"
     for reads in range(1, LAG_READS):
-        adoption.update(shown, Moment(LAG_S, reads))
+        adoption.see(shown, Moment(LAG_S, reads))
         assert not adoption.is_certain
-    adoption.update(shown, Moment(LAG_S, LAG_READS))
+    adoption.see(shown, Moment(LAG_S, LAG_READS))
     assert adoption.is_certain, "it is so, and not late"
 
 
