@@ -194,6 +194,7 @@ class Dialogues:
         self._image = ()
         came_to = yield self._ask(write_request(self._map, image))
         if isinstance(came_to, Outcome):
+            self._note_unheard(came_to)
             return came_to
         self._image = image
         return None
@@ -209,6 +210,8 @@ class Dialogues:
             self.serves_23 = False
             what = "%s is written with function 16: %s"
             self._log.warning(what, self.line.address, came_to.error)
+        else:
+            self._note_unheard(came_to)
         return came_to
 
     def _is_at_rest(self) -> bool:
@@ -322,6 +325,14 @@ class Dialogues:
         is_often = len(self._unanswered) == MOST_UNANSWERED and now - self._unanswered[0] < UNANSWERED_S
         if is_often and self.line.keeps_silence and not self.line.silence.is_long:
             self._keep_long_silence(why)
+
+    def _note_unheard(self, outcome: Outcome) -> None:
+        """Take the longer silence after a write without an answer: a stop that comes again must be heard.
+
+        The trial at the next opening would cost another response timeout, in which fingers go on.
+        """
+        if isinstance(outcome, Silent) and self.line.keeps_silence and not self.line.silence.is_long:
+            self._keep_long_silence(outcome.error)
 
     def _keep_long_silence(self, why: RobotiqConnectionError) -> None:
         silence = self.line.silence

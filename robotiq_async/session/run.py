@@ -360,6 +360,8 @@ class Run:
 
     async def _stop_fingers_once(self) -> None:
         if not self._link.is_open:
+            # It may have been lost since the last exchange: what has become of a grip meanwhile is not known.
+            self._lose(self.link_error())
             # A gripper without a client keeps moving. Read first: if it has lost its power, an image
             # with rACT would activate it.
             await self._open()

@@ -79,7 +79,7 @@ POLL_WHILE_KEEPING_S = min(POLL_S, 0.05)
 """A stop that keeps a grip has half a second to see that the rest has stopped, or it lets go."""
 TROUBLES_OF_A_JAW = (
     *(*LEFT_TO_A_JAW, "controller-fault for 60"),
-    *("drop once", "silence for 60", "line pulled", "status-lag 0.2 for 60"),
+    *("drop once", "silence for 60", "line pulled", "status-lag 0.2 for 60", "strict-silence for 60"),
 )
 """The troubles for a sibling here. ``MODEL=2f85`` in the environment tries the whole table."""
 OF_A_JAW = [cell for cell in EVERY if cell.link == "rtu" and cell.trouble in TROUBLES_OF_A_JAW]
@@ -95,8 +95,6 @@ OF_AN_AXIS = {
         ("tcp", "connecting", f"{kind} once"): "done → RUNNING_IDLE"
         for kind in ("drop", "half", "exception", "silence")
     },
-    # The first command shows it, and is not sent again: it may have been carried out.
-    ("rtu", "command pending", "no-function-23 for 60"): "ConnectionLost → RUNNING_IDLE",
 }
 """Outcomes of cells on a jaw."""
 WITH_FUNCTION_23 = {

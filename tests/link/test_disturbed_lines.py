@@ -120,6 +120,21 @@ async def test_a_device_that_needs_the_longer_silence_gets_it(
     await transport.close()
 
 
+async def test_a_line_that_does_not_answer_a_write_gets_the_longer_silence(device: Device) -> None:
+    """The write may be a stop: the next one must not wait for a trial of the short silence."""
+    transport = unopened(VirtualLine.NEAR)
+    await transport.open()
+    await transport.read()
+    device.least_pause = LONG_S - 1e-6
+    with pytest.raises(ResponseTimeoutError):
+        await transport.write(IMAGE)
+    began = asyncio.get_running_loop().time()
+    await transport.open()
+    await transport.write(IMAGE)
+    assert asyncio.get_running_loop().time() - began < 0.03, "no exchange without an answer"
+    await transport.close()
+
+
 # -- the first exchange --------------------------------------------------------------------------------------
 
 

@@ -74,6 +74,19 @@ async def test_a_link_that_is_lost_at_the_end_lets_a_grip_go(here: Polled) -> No
     assert not here.requests[-1].request.go
 
 
+async def test_a_link_that_is_lost_before_the_stop_leaves_lets_a_grip_go(here: Polled) -> None:
+    """The outcome is that of a loss in mid-exchange: it does not depend on the moment."""
+    await moves(here, 50, 255, polls=300)
+
+    def stop() -> None:
+        here.wire.is_open = False
+        here.run.request_stop(halt=True, keep_grip=True)
+
+    here.at_next_status = stop
+    await here.end()
+    assert not here.requests[-1].request.go
+
+
 async def test_a_stop_that_was_not_heard_is_sent_again(here: Polled) -> None:
     """Unlike a motion: a gripper that lost its client keeps moving."""
     await moves(here)
