@@ -294,3 +294,16 @@ def test_a_reply_that_was_read_late_tells_no_speed(scan: Scan) -> None:
     scan.hold(A)
     scan.step(poll=0.0)
     assert abs(scan.last_image.position(A) - at) <= 2
+
+
+@pytest.mark.parametrize("device_cycle", [0.1, 0.2])
+def test_a_hold_asks_an_axis_for_no_place_beyond_its_request(device_cycle: float) -> None:
+    """At its speed it would have gone 20 counts further by the time at which the hold acts."""
+    scan = started(device_cycle)
+    scan.move(120, A, speed=255)
+    scan.until(lambda: scan.positions()[A] > 110)
+    asked = scan.hold(A)
+    scan.run(1.0)
+    assert asked.is_answered
+    assert 110 <= scan.last_image.position(A) <= 120
+    assert scan.positions()[A] <= 120
