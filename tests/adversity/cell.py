@@ -12,6 +12,7 @@ from typing import NamedTuple, Self
 
 from robotiq_async import Finger, RobotiqError, State
 from robotiq_async.control.state_machine import RUNNING
+from robotiq_async.link.urcap.transport import LOST_S
 from robotiq_async.session.waiting import STALLED_S
 from robotiq_async.simulator import parse_troubles
 from robotiq_async.simulator.troubles.trouble import KINDS
@@ -62,6 +63,8 @@ async def outcome(world: World, phase: Phase, words: str) -> str:
         if kind == "e-stop" and phase.name == "connecting":
             bound += STALLED_S  # connected in time, start() waits for an activation that makes no progress
         ending = _noticed(world) if task is None else await _ending_of(task, before.time + bound)
+        if kind == "lost-set":
+            await asyncio.sleep(2 * LOST_S)  # it is noticed by what is not shown
         await _rest(world, (*SETTLED, *STUCK) if _stays_stuck(kind, phase) else SETTLED)
         state = world.hand.state
         if phase.name == "keeping a grip":

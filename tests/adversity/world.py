@@ -22,6 +22,7 @@ from robotiq_async.simulator import (
     parse_troubles,
 )
 from robotiq_async.simulator.server.framing import Frame
+from robotiq_async.simulator.server.urcap_server import UNREADABLE
 from robotiq_async.simulator.troubles.fault_injector import FaultInjector
 from robotiq_async.values.model import Model, model_of
 from robotiq_async.values.registers import Registers
@@ -129,7 +130,8 @@ class UrcapServer(Heard, UrcapSimulatorServer):
         self.was_spaced |= self.fault_injector.set_spacing > 0
         if frame.pdu.startswith(b"GET "):
             name, value = said.decode().split()
-            self.given.append((asyncio.get_running_loop().time(), name, int(value)))
+            if value != UNREADABLE:
+                self.given.append((asyncio.get_running_loop().time(), name, int(value)))
         elif frame.pdu.endswith(b" GTO 1"):
             self.motions.append(frame.pdu)
         return said

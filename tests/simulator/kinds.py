@@ -85,6 +85,8 @@ EXPECTED: Final = {
     "no-function-23": Expected(CONDITION, LINES),
     "one-connection-only": Expected(CONDITION, CONNECTIONS),
     "one-by-one": Expected(CONDITION, ("urcap",), (0.01, 0, 1)),
+    "lost-set": Expected(SILENCE, ("urcap",)),
+    "unreadable": Expected(CONDITION, ("urcap",)),
 }
 
 CONDITIONS: Final = [name for name, kind in EXPECTED.items() if kind.form == CONDITION]

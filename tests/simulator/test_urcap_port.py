@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator
 
 import pytest
 
-from robotiq_async.simulator import SimulatedGripper, UrcapSimulatorServer
+from robotiq_async.simulator import SimulatedGripper, Trouble, UrcapSimulatorServer
 from robotiq_async.values.model import TWO_FINGER_85
 from tests.grippers import activate_beforehand
 
@@ -15,9 +15,16 @@ pytestmark = pytest.mark.virtual_time
 
 
 class Port:
-    """A client with bytes and nothing else."""
+    """A client with bytes and nothing else.
 
-    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    Attributes:
+        server: the server that it talks to.
+    """
+
+    def __init__(
+        self, server: UrcapSimulatorServer, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        self.server = server
         self._reader, self._writer = reader, writer
 
     async def asks(self, *parts: bytes) -> bytes:
@@ -34,7 +41,7 @@ async def port() -> AsyncIterator[Port]:
     async with UrcapSimulatorServer(jaw) as server:
         await activate_beforehand(jaw)
         reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
-        yield Port(reader, writer)
+        yield Port(server, reader, writer)
         writer.close()
         await writer.wait_closed()
 
@@ -75,3 +82,21 @@ async def test_the_current_of_a_motion(port: Port) -> None:
     name, value = (await port.asks(b"GET COU\n")).split()
     assert name == b"COU"
     assert 5 < int(value) < 30
+
+
+async def test_what_a_controller_cannot_read_is_a_question_mark(port: Port) -> None:
+    async with port.server.fault_injector.making(Trouble("unreadable")):
+        assert await port.asks(b"GET POS\nGET PRE\nGET COU\nGET FOR\n") == b"POS ?\nPRE ?\nCOU ?\nFOR ?\n"
+        assert await port.asks(b"GET FLT") == b"?"
+        assert await port.asks(b"GET DRI\nGET SID\n") == b"DRI RUNNING\nSID [9]\n", "these it knows"
+        assert await port.asks(b"SET POS 77 GTO 1\n") == b"ack"
+    assert await port.asks(b"GET PRE\n") == b"PRE 077\n"
+
+
+async def test_a_set_is_lost_behind_its_acknowledgement(port: Port) -> None:
+    await port.server.fault_injector.begin(Trouble("lost-set", lasts=0))
+    assert await port.asks(b"SET SID 9\n") == b"ack", "the controller itself takes it"
+    assert await port.asks(b"SET POS 77 GTO 1\n") == b"ack"
+    assert await port.asks(b"GET PRE\nGET GTO\n") == b"PRE 000\nGTO 1\n"
+    assert await port.asks(b"SET POS 78 GTO 1\n") == b"ack", "it was one"
+    assert await port.asks(b"GET PRE\n") == b"PRE 078\n"

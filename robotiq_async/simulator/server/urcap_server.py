@@ -22,8 +22,11 @@ from .tcp_server import SimulatorServer
 if TYPE_CHECKING:
     from robotiq_async.values.registers import Field
 
+UNREADABLE: Final = "?"
+"""The value of a variable that the controller cannot read, as in an emergency stop (ur_rtde's client)."""
 REFUSED: Final = b"?"
 """The answer to a line that is not understood. Made up: no source has the URCap's."""
+ACKNOWLEDGED: Final = b"ack"
 LONGEST_LINE: Final = 256
 
 _STATUS: Final = {
@@ -81,7 +84,9 @@ class UrcapSimulatorServer(SimulatorServer):
     write. A ``GET NAME`` without an end of line is answered by the bare value, as the vendor's script has it;
     so is the beginning of a longer line that comes in pieces, if it is one. All variables of a SET take
     effect at once, unless the trouble ``one-by-one`` spaces them: then the ``ack`` comes before the first.
-    Other lines are answered by a question mark.
+    Other lines are answered by a question mark. With the trouble ``lost-set`` a SET is acknowledged in vain;
+    with ``unreadable`` a question mark is the value of each variable of the gripper, and a SET still reaches
+    it: no source says.
     """
 
     link = "urcap"
@@ -167,6 +172,8 @@ class UrcapSimulatorServer(SimulatorServer):
             return f"[{self._device_id or 0}]"
         if name in _ABOUT:
             return _ABOUT[name]
+        if self.fault_injector.is_unreadable:
+            return UNREADABLE
         if name in _STATUS:
             value = _STATUS[name].read(self.gripper.status_registers())
         else:
@@ -183,13 +190,15 @@ class UrcapSimulatorServer(SimulatorServer):
         except _RefusedError:
             return REFUSED
         asked = [(field, number) for field, number in pairs if field is not None]
+        if asked and self.fault_injector.loses_set():
+            return ACKNOWLEDGED
         if asked and not self._waiting and not self.fault_injector.set_spacing:
             self._take(asked)
         elif asked:
             self._waiting += asked
             if self._taking is None:
                 self._take_later()
-        return b"ack"
+        return ACKNOWLEDGED
 
     def _checked(self, name: str, value: str) -> tuple[Field | None, int]:
         """The field that a variable sets, and its value; SID sets none."""

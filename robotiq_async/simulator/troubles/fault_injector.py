@@ -5,9 +5,9 @@
 # A trouble is over as soon as it has begun (an event), or lasts in _ongoing until end(), or until its first
 # hit if it is for once. It acts in one of three ways:
 #
-#   on demand   the simulator calls hears(), lets_in() and deliver(), and reads the attributes; of several
-#               troubles about one request or reply the oldest decides. What needs no more than the reply is
-#               a function of corruption.py; what needs earlier ones keeps them here, in deliver()
+#   on demand   the simulator calls hears(), lets_in(), loses_set() and deliver(), and reads the attributes;
+#               of several troubles about one request or reply the oldest decides. What needs no more than
+#               the reply is a function of corruption.py; what needs earlier ones keeps them in deliver()
 #   on state    _do() changes the gripper or the server, and _undo() restores it. Troubles of one kind overlap
 #               in any order, so those that last are applied again
 #   on habits   the gripper's own habits are kept from the first such trouble on, and restored at its end
@@ -90,6 +90,7 @@ class FaultInjector:
         strict_silence: seconds after a reply in which no request is heard.
         served_registers: the number of registers of each block that are served.
         set_spacing: seconds between the variables of a SET; 0 if they are taken at once.
+        is_unreadable: whether what a GET asks of the gripper cannot be read.
     """
 
     def __init__(self, target: Target) -> None:
@@ -216,6 +217,7 @@ class FaultInjector:
         self.strict_silence = max(silences, default=0.0)
         self.served_registers = min(served, default=REGISTER_COUNT)
         self.set_spacing = max(spacings, default=0.0)
+        self.is_unreadable = bool(self._lasting("unreadable"))
         self._idle_after = min(waits, default=None)
 
     # Called by the simulator.
@@ -230,12 +232,14 @@ class FaultInjector:
 
     def hears(self) -> bool:
         """Whether the request that came in is heard."""
-        for ongoing in self._ongoing:
-            if ongoing.trouble.kind in ("silence", "accept-silence"):
-                self._hit(ongoing)
-                return False
+        if self._meets("silence", "accept-silence"):
+            return False
         self._await_request()
         return True
+
+    def loses_set(self) -> bool:
+        """Whether the SET that came in is lost on its way to the gripper."""
+        return self._meets("lost-set")
 
     def deliver(self, frame: bytes) -> Iterable[tuple[float, bytes]] | None:
         """The parts to send for a reply; None to hang up."""
@@ -245,6 +249,14 @@ class FaultInjector:
                 self._hit(ongoing)
                 return parts
         return self._target.policy(frame)
+
+    def _meets(self, *kinds: str) -> bool:
+        """Whether a trouble of these kinds lasts; the oldest of them counts a hit."""
+        for ongoing in self._ongoing:
+            if ongoing.trouble.kind in kinds:
+                self._hit(ongoing)
+                return True
+        return False
 
     def _hit(self, ongoing: Ongoing) -> None:
         """Count a hit of a trouble; it is over if it was for once."""

@@ -78,7 +78,8 @@ class Kind(NamedTuple):
     @property
     def can_hit_once(self) -> bool:
         """Whether it makes sense to have it for a single reply or a single moment."""
-        return self.lasts == _EVENT or self.corruption is not None or self is KINDS["silence"]
+        is_about_one = self in (KINDS["silence"], KINDS["lost-set"])
+        return self.lasts == _EVENT or self.corruption is not None or is_about_one
 
 
 KINDS: Final[dict[str, Kind]] = {
@@ -220,6 +221,10 @@ KINDS: Final[dict[str, Kind]] = {
         "the variables of a SET are taken one by one, VALUE seconds apart",
         *(_CONDITION, 0.01, 0, 1),
         link="urcap",
+    ),
+    "lost-set": Kind("a SET is acknowledged, and does not reach the gripper", _CONDITION, link="urcap"),
+    "unreadable": Kind(
+        "the answer to a GET is NAME ?, as while the arm is in an emergency stop", _CONDITION, link="urcap"
     ),
 }
 """Every kind of trouble, by its name."""
