@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
-from typing import Any
 
 import pytest
 
+from robotiq_async import RobotiqConnectionError, RobotiqHand
 from robotiq_async.ros2.gripper.connection import make_hand
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_parameter, check_settings
 
@@ -57,24 +58,47 @@ def test_bad_parameters_are_refused_with_the_reason(name: str, value: object, re
         check_parameter(name, value)
 
 
+@pytest.mark.parametrize("kind", ["tcp", "rtu+tcp"])
 @pytest.mark.parametrize(
     ("given", "expected"),
     [
-        ({}, (2, 4, 0.005, 0.4)),
-        ({"device_id": 0, "read_function": 3, "response_timeout": 5.0}, (0, 3, 0.005, 5.0)),
-        ({"address": "rtu:///dev/ttyUSB0"}, (9, 3, 0.005, 0.4)),
-        ({"address": "rtu:///dev/ttyUSB0", "poll_interval": 0.01}, (9, 3, 0.01, 0.4)),
+        ({}, {"tcp": (2, 4), "rtu+tcp": (9, 3)}),
+        ({"device_id": 7}, {"tcp": (7, 4), "rtu+tcp": (7, 3)}),
+        ({"read_function": 3}, {"tcp": (2, 3), "rtu+tcp": (9, 3)}),
+        ({"read_function": 4}, {"tcp": (2, 4), "rtu+tcp": (9, 4)}),
     ],
 )
-def test_the_hand_of_the_parameters(
-    given: dict[str, object], expected: tuple[int, int, float, float]
+async def test_the_gripper_is_asked_as_the_parameters_say(
+    given: dict[str, object], expected: dict[str, tuple[int, int]], kind: str
 ) -> None:
-    hand: Any = make_hand(check_settings({**USUAL, "address": "tcp://192.168.1.11", **given}))
-    transport: Any = hand._options.make_transport()
-    registers = transport._map
-    assert expected == (
-        registers.device_id,
-        registers.read_function,
-        hand._options.poll_interval,
-        transport._response_timeout,
-    )
+    """The unit and the function, which are the first bytes of a request; over TCP six others come before."""
+    asked: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
+
+    async def listen(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        asked.set_result(await reader.readexactly(8))
+        writer.close()
+
+    async with await asyncio.start_server(listen, "127.0.0.1", 0) as server:
+        address = f"{kind}://127.0.0.1:{server.sockets[0].getsockname()[1]}"
+        hand = make_hand(check_settings({**USUAL, "address": address, **given}))
+        assert isinstance(hand, RobotiqHand)
+        transport = hand.options.make_transport()
+        with pytest.raises(RobotiqConnectionError):
+            await transport.open()
+    request = (await asked)[6 if kind == "tcp" else 0 :]
+    assert tuple(request[:2]) == expected[kind]
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({}, (0.005, 0.4)),
+        ({"response_timeout": 5.0}, (0.005, 5.0)),
+        ({"address": "rtu:///dev/ttyUSB0"}, (0.005, 0.4)),
+        ({"address": "rtu:///dev/ttyUSB0", "poll_interval": 0.01}, (0.01, 0.4)),
+    ],
+)
+def test_the_times_of_the_parameters(given: dict[str, object], expected: tuple[float, float]) -> None:
+    hand = make_hand(check_settings({**USUAL, "address": "tcp://192.168.1.11", **given}))
+    assert isinstance(hand, RobotiqHand)
+    assert (hand.options.poll_interval, hand.options.response_timeout) == expected
