@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import inspect
 import re
+from collections.abc import Callable
 
 import pytest
 
 from robotiq_async import RobotiqHand
-from robotiq_async.fleet import RemoteHand
 from robotiq_async.hand.arguments import ARGUMENTS, describes_arguments
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
 from robotiq_async.sync import RobotiqHand as BlockingHand
 
 MOTIONS = ("set_position", "set_speed", "set_force", "command", "move", "open", "close", "grasp", "hold")
-HANDS = {"async": RobotiqHand, "blocking": BlockingHand, "remote": RemoteHand}
-CONSTRUCTORS = (RobotiqHand, RemoteHand, SimulatedGripper, SimulatorServer, SerialSimulatorServer)
+HANDS = {"async": RobotiqHand, "blocking": BlockingHand}
+CONSTRUCTORS = (RobotiqHand, SimulatedGripper, SimulatorServer, SerialSimulatorServer)
 
 
 def described(text: str | None) -> list[str]:
@@ -24,20 +24,25 @@ def described(text: str | None) -> list[str]:
     return re.findall(r"^    (\w+): ", section[1], re.MULTILINE) if section else []
 
 
-@pytest.mark.parametrize("hand", HANDS)
-@pytest.mark.parametrize("name", MOTIONS)
-def test_a_motion_describes_what_it_takes(hand: str, name: str) -> None:
-    call = getattr(HANDS[hand], name)
+def assert_describes(call: Callable[..., object]) -> None:
     parameters = [each for each in inspect.signature(call).parameters if each != "self"]
     assert described(call.__doc__) == parameters != []
 
 
+def assert_constructor_describes(kind: type) -> None:
+    names = described(kind.__doc__) or described(inspect.getattr_static(kind, "__init__").__doc__)
+    assert sorted(names) == sorted(inspect.signature(kind).parameters)
+
+
+@pytest.mark.parametrize("hand", HANDS)
+@pytest.mark.parametrize("name", MOTIONS)
+def test_a_motion_describes_what_it_takes(hand: str, name: str) -> None:
+    assert_describes(getattr(HANDS[hand], name))
+
+
 @pytest.mark.parametrize("kind", CONSTRUCTORS)
 def test_a_constructor_describes_what_it_takes(kind: type) -> None:
-    parameters = list(inspect.signature(kind).parameters)
-    assert sorted(
-        described(kind.__doc__) or described(inspect.getattr_static(kind, "__init__").__doc__)
-    ) == sorted(parameters)
+    assert_constructor_describes(kind)
 
 
 def test_the_section_stands_before_what_is_raised_and_has_ranges() -> None:
