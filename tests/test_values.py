@@ -49,13 +49,15 @@ from robotiq_async.fleet.control.lease import Holder
 from robotiq_async.fleet.keys.access import AccessList
 from robotiq_async.fleet.keys.certificates import Credentials
 from robotiq_async.fleet.network.endpoints import Endpoint
+from robotiq_async.fleet.remote.errand import NoAnswerError
 from robotiq_async.link.address import Simulation, parse_address
-from robotiq_async.simulator import Habits, Trouble
+from robotiq_async.simulator import Habits, Likeness, Trouble
 from robotiq_async.tools.doctor import Finding, Level
 from robotiq_async.tools.verify.catalogue import EndError
 from robotiq_async.tools.web.settings import PageSettings
 from robotiq_async.values.calibration import ForceCalibration, SpeedCalibration
 from robotiq_async.values.calibration.csv_tables import SPEED, TableError
+from robotiq_async.values.conventions import Convention
 from robotiq_async.values.frozen_mapping import FrozenMapping
 from robotiq_async.values.model import HAND_E
 from robotiq_async.values.registers import TCP_REGISTERS, gDT
@@ -107,6 +109,8 @@ VALUES: list[object] = [
     ReconnectPolicy(give_up_after=3.0),
     Simulation(speedup=10.0, object=150),
     Habits(status_lag=0.05),
+    Likeness(HAND_E, link="rtu", device_id=9),
+    Convention("bench", open=0.0, closed=5.0),
     SpeedCalibration.thesis(),
     SpeedCalibration("mine", [[0, 9.0], [255, 2.0]]),  # type: ignore[arg-type]
     ForceCalibration.nominal(),
@@ -145,6 +149,7 @@ ERRORS: list[Exception] = [
     MoveTimeoutError("too slow", status_of(0x39, 0xC0)),
     ConnectFailedError("tcp://192.168.1.11:502", "refused"),
     ControlLostError("another client commands the gripper", "held"),
+    NoAnswerError(LEFT, "move"),
     NotAllStoppedError("not stopped", {LEFT: "no answer"}, ["tls/cell-2:7447"]),
     TableError("table.csv", 3, "no number"),
     TableError("table.csv", None, "the file is empty"),
