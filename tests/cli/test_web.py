@@ -127,8 +127,9 @@ def test_bad_input_is_one_clear_line(
 
 async def test_the_demo_waits_until_the_page_is_opened(shell: Shell) -> None:
     process = await shell.start("demo", "--show")
-    lines = [await shell.read_line(process) for _ in range(3)]
-    url = next(line.partition(": ")[2] for line in lines if line.startswith("Watch it move: "))
+    while not (line := await shell.read_line(process)).startswith("Watch it move: "):
+        assert line, "the demo ended before it named the page"
+    url = line.partition(": ")[2].strip()
     assert await asyncio.to_thread(status, url) == 303
     process.send_signal(signal.SIGINT)
     outcome = await shell.finish(process)
