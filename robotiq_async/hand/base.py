@@ -49,7 +49,7 @@ class Hand(Kind):
     Timestamps are monotonic seconds of this process, wherever the gripper is. No motion is ever sent twice.
 
     To add a kind of hand, supply what is abstract, give ``_channels`` each status and transition, and set
-    ``_session`` to the present :class:`~robotiq_async.hand.run.Run`, or override ``_check_running``.
+    ``_session`` to the present :class:`~robotiq_async.hand.run.PresentRun`, or override ``_check_running``.
 
     Args:
         address: of the gripper; no two hands of a process have the same one.

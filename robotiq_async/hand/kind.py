@@ -15,7 +15,7 @@ from ..values.errors import ConnectionLostError, NotStartedError
 from ..values.model import THREE_FINGER, Model
 from ..values.move_result import MoveResult
 from ..values.status import RobotiqStatus
-from .run import NamesErrors, Run, refuse_copy
+from .run import NamesErrors, PresentRun, refuse_copy
 
 T = TypeVar("T")
 
@@ -23,7 +23,7 @@ T = TypeVar("T")
 class Kind(ABC):
     """The inside of a hand; :class:`~robotiq_async.hand.Hand` has its calls, and the steps for a new kind."""
 
-    _session: Run | None = None
+    _session: PresentRun | None = None
     """The present run, or the last one; None before the first start."""
 
     def __init__(

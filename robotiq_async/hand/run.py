@@ -7,7 +7,7 @@ from typing import NoReturn, Protocol
 from ..values.errors import RobotiqError
 
 
-class Run(Protocol):
+class PresentRun(Protocol):
     """The present run of a hand, from a start to the next stop."""
 
     @property
