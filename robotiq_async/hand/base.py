@@ -86,13 +86,15 @@ class Hand(Kind):
 
         Args:
             activate: False writes nothing: a gripper that is reset stays in RESET.
-            wait: seconds to keep trying while nothing answers, 0..86400, for a gripper that is switched on
-                later than the program starts. Its fingers may MOVE long after the call then.
+            wait: seconds to keep trying while nothing answers, 0..86400, counted while the event loop runs,
+                for a gripper that is switched on later than the program starts. Its fingers may MOVE long
+                after the call then.
 
         Raises:
             InvalidStateError: this hand is started already, or another one owns the gripper.
             NotStartedError: stop() was called during the start.
-            ConnectFailedError: nothing answers within the connect timeout, or within ``wait``.
+            ConnectFailedError: nothing answers within the connect timeout, or within ``wait``, while the
+                event loop runs.
             RobotiqConnectionError: something answers, but not a gripper; or the link went down again.
             GripperFaultError: the activation ended in a fault.
             NotActivatedError: the gripper was reset during the activation.
@@ -252,7 +254,7 @@ class Hand(Kind):
         where they are; an axis in contact keeps its request and its grip.
 
         Raises:
-            MoveTimeoutError: an axis still moved when the time was over.
+            MoveTimeoutError: an axis still moved when the time was over, counted while the event loop runs.
             MoveSupersededError: another command, halt(), reset() or another client took over an axis.
             GripperFaultError: the gripper reports a minor or a major fault.
             NotActivatedError: the gripper is not activated, or lost its activation.
@@ -364,7 +366,8 @@ class Hand(Kind):
         Raises:
             MoveSupersededError: reset() took over before it was sent.
             StateTimeoutError: the gripper does not show that it has stopped after two writes, or that an
-                activation or a release has ended within 5 s: the fingers MAY STILL MOVE.
+                activation or a release has ended within 5 s while the event loop runs: the fingers MAY STILL
+                MOVE.
             RobotiqError: not connected, or the link went down before the acknowledgement.
         """
         with self._naming:
@@ -380,8 +383,8 @@ class Hand(Kind):
         Raises:
             GripperFaultError: a fault is latched (see :meth:`recover`), or the activation ended in one.
             NotActivatedError: the gripper was reset during the activation.
-            ActivationTimeoutError: not finished within the activation timeout, or nothing but fault 0x05 for
-                5 s, as with a pressed emergency stop. The activation continues.
+            ActivationTimeoutError: not finished within the activation timeout while the event loop runs, or
+                nothing but fault 0x05 for 5 s, as with a pressed emergency stop. The activation continues.
             RobotiqError: not possible now, or the link went down.
         """
         with self._naming:
@@ -394,7 +397,7 @@ class Hand(Kind):
         cancelled, the reset continues. A lost link ends it as it ends a :meth:`halt`.
 
         Raises:
-            StateTimeoutError: the gripper did not report the reset within 5 s.
+            StateTimeoutError: the gripper did not report the reset within 5 s while the event loop runs.
             RobotiqError: not possible now, or the link went down.
         """
         with self._naming:
@@ -409,7 +412,7 @@ class Hand(Kind):
         Raises:
             InvalidStateError: not in FAULT.
             NotActivatedError: the gripper is reset, or was reset during the release.
-            StateTimeoutError: the release was not finished within 60 s.
+            StateTimeoutError: the release was not finished within 60 s while the event loop runs.
             RobotiqError: the link went down.
         """
         with self._naming:
@@ -421,7 +424,8 @@ class Hand(Kind):
         A minor or unknown fault, and an activation, reset or release that runs, are waited for. After a major
         fault the gripper is reset and activated. So is a gripper that makes no progress for 5 s while it
         waits for its activation (0x05, as after an emergency stop) or releases, at most twice. A reset DROPS
-        the part, and an activation MOVES the fingers. The ``timeout`` is for all of it; None for 90 s.
+        the part, and an activation MOVES the fingers. The ``timeout`` is for all of it, in seconds
+        while the event loop runs; None for 90 s.
 
         Raises:
             StateTimeoutError: not active in time, with the fault that lasts, or not after two resets.
@@ -546,7 +550,7 @@ class Hand(Kind):
     async def wait_for_state(self, *states: State, timeout: float | None = None) -> State:
         """Wait until the hand is in one of these states, if only for a moment, and return that state.
 
-        None as ``timeout`` waits for as long as the hand runs.
+        The ``timeout`` counts while the event loop runs; None waits for as long as the hand runs.
 
         Raises:
             StateTimeoutError: not reached in time.

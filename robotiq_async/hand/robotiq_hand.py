@@ -110,12 +110,12 @@ class RobotiqHand(Hand):
             Requests made in that time are merged. A gripper may lose writes that come sooner (3-Finger
             manual of 2014: 10 ms; manual of the 2F-85: 5 ms); pass 0 for one that does not. A stop and a
             halt do not wait.
-        connect_timeout: seconds for opening the link, 0.01..5.
+        connect_timeout: seconds for opening the link, while the event loop runs, 0.01..5.
         response_timeout: seconds for one answer, 0.005..5. A write fails within twice that, and over RTU,
             where a read may be sent again, within 0.15 s more (three times that if it is above 0.4).
             :meth:`stop` ends within 2 s whatever it is; but a gripper that takes longer than 0.4 s to
             answer may not have confirmed by then that the fingers were stopped, and the log says so.
-        activation_timeout: seconds for an activation, 0.01..120.
+        activation_timeout: seconds for an activation, while the event loop runs, 0.01..120.
         reconnect: whether a lost link is opened again, or a :class:`ReconnectPolicy`.
         speed: speed of the axes until another is set, 0..255.
         force: force of the axes until another is set, 0..255.

@@ -204,6 +204,16 @@ async def test_a_move_that_has_arrived_while_the_loop_was_held_up_has_arrived(he
 
 
 @inside(started)
+async def test_a_part_that_is_held_by_then_is_held(here: World) -> None:
+    """The fingers "still moved": the limit passed before the status that shows the grip."""
+    here.gripper.place_object(Finger.ABC, position=150)
+    grasping = asyncio.create_task(here.hand.grasp(timeout=2.0))
+    await asyncio.sleep(0.1)
+    here.loop.hold_up(30.0)
+    assert (await grasping).is_held
+
+
+@inside(started)
 @pytest.mark.parametrize("turns", range(1, POLL_TURNS))
 async def test_a_reset_that_was_done_while_the_loop_was_held_up_is_done(here: World, turns: int) -> None:
     here.loop.after_turns(turns, lambda: here.loop.hold_up(6.0))

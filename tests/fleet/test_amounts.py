@@ -9,7 +9,7 @@ import pytest
 from robotiq_async import JAW, TWO_FINGER_85
 from robotiq_async.fleet.remote.mirror import Mirror
 from robotiq_async.fleet.wire.values import reading
-from robotiq_async.runtime.clock import now
+from robotiq_async.runtime.limit import Limit
 from robotiq_async.runtime.log import log
 from robotiq_async.session.streams import Channels
 from robotiq_async.values.amounts import UNITS
@@ -26,7 +26,9 @@ async def test_the_points_of_the_agents_hand_are_those_of_the_client() -> None:
         assert hand.units.stroke == here.local.units.stroke
         assert hand._session is not None
         hand._session.mirror.points = ()
-        assert await hand._session._ask_info(now() + 1), "an answer tells them, without a summary"
+        limit = Limit(1.0)
+        assert await hand._session._ask_info(limit), "an answer tells them, without a summary"
+        limit.stop()
         assert hand.units.stroke == here.local.units.stroke
         result = await hand.move(mm=40)
         assert here.gripper.writes[-1].registers[1] & 0xFF == hand.units.position(mm=40)

@@ -26,7 +26,7 @@ from robotiq_async.values.request import Request as Image
 from tests.fleet.cell import ending
 from tests.fleet.lab import LEFT, Garbling, Lab, Spoiling, lab
 from tests.fleet.world import World, world
-from tests.virtual import inside, until
+from tests.virtual import VirtualLoop, inside, until
 
 # -- control -----------------------------------------------------------------------------------------------
 
@@ -475,3 +475,20 @@ async def test_an_agent_serves_without_records(here: World) -> None:
     await asyncio.sleep(2)
     here.mend(here.holder)
     await here.until(lambda: here.holder.hand.is_in_control)
+
+
+# -- a loop that is held up --------------------------------------------------------------------------------
+
+
+@inside(lab)
+@pytest.mark.parametrize("turns", range(1, 40, 4))
+async def test_a_start_outlasts_a_loop_that_is_held_up(here: Lab, turns: int) -> None:
+    """Its time had passed with the block, and no agent was looked for any more."""
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualLoop)
+    hand = here.reader()
+    loop.after_turns(turns, lambda: loop.hold_up(10.0))
+    await hand.start()
+    loop.after_turns(turns, lambda: loop.hold_up(10.0))
+    await hand.stop()
+    assert hand.state is State.SHUTDOWN

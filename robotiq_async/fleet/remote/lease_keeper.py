@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Final
 
-from ...runtime.clock import now
+from ...runtime.limit import Limit
 from ...values.enums import StopLevel
 from ...values.errors import ControlLostError, RobotiqError
 from ..wire.values import Fields, reading
@@ -40,13 +40,13 @@ class LeaseKeeper:
         self._level: StopLevel | None = None  # of the last release
         self._releasing: asyncio.Task[Any] | None = None  # the wait for the answer to it
 
-    async def begin(self, deadline: float) -> None:
-        """Acquire the lease at the start of a run; repeat until the deadline if an answer was lost."""
+    async def begin(self, limit: Limit) -> None:
+        """Acquire the lease at the start of a run; repeat within the limit if an answer was lost."""
         while not self._lease.is_held:  # also in doubt: acquire() says which
             try:
                 await self.acquire()
             except (NoAnswerError, ControlLostError) as error:
-                if getattr(error, "reason", "late") != "late" or now() >= deadline:
+                if getattr(error, "reason", "late") != "late" or limit.left <= 0:
                     raise
 
     async def acquire(self, *, take: bool = False) -> None:

@@ -70,7 +70,7 @@ class RemoteHand(Hand):
             ``ROBOTIQ_ASYNC_KEYS``); the default is an agent on this machine.
         control: True acquires the lease when the hand starts, None with the first command that is awaited,
             False never: the hand only reads (and halts) unless :meth:`acquire` is called.
-        connect_timeout: seconds for finding the agent, 0.1..60.
+        connect_timeout: seconds for finding the agent, while the event loop runs, 0.1..60.
         bus: an open session to share; it stays open. None opens one.
         calibration: the speeds of :attr:`units`; default timeouts are the agent's. None for the thesis's
             gripper.

@@ -29,6 +29,7 @@ from typing import Any, Final
 
 from ...runtime.clock import now
 from ...runtime.concurrency import check_loop, wait_shielded
+from ...runtime.limit import Limit
 from ...runtime.log import Log
 from ...session.streams import Channels
 from ...session.waiting import StateWaiters
@@ -105,36 +106,35 @@ class RemoteSession:
 
     async def connect(self, timeout: float, *, acquires: bool) -> None:
         """Wait for the agent, and acquire the lease if that is asked for; errors as of RemoteHand.start()."""
-        deadline = now() + timeout
-        while not await self._ask_info(deadline):
-            if now() >= deadline:
-                await self._give_up()
-            await asyncio.sleep(0.05)
-        if acquires:
-            await self.keeper.begin(deadline)
-        self.dialog.spawn(self._supervise())
-        await self._wait_for_gripper(deadline)
+        limit = Limit(timeout)
+        try:
+            while not await self._ask_info(limit):
+                if limit.left <= 0:
+                    await self._give_up()
+                await asyncio.sleep(0.05)
+            if acquires:
+                await self.keeper.begin(limit)
+            self.dialog.spawn(self._supervise())
+            await self._wait_for_gripper(limit.left)
+        finally:
+            limit.stop()
 
-    async def _wait_for_gripper(self, deadline: float) -> None:
+    async def _wait_for_gripper(self, seconds: float) -> None:
         known = set(State) - {State.DISCONNECTED, State.SHUTDOWN, State.DO_SHUTDOWN}
         if self.mirror.state in known:
             return
         with self.waiters.watching(known, {}) as reached:
-            try:
-                async with asyncio.timeout(max(ANSWER_S, deadline - now())):
-                    await reached
-                # An event arrives before the status that shows it; an answer brings the newest status.
-                await self.dialog.ask("info", timeout=ANSWER_S)
-            except TimeoutError:
-                problem = (await self.dialog.ask("info", timeout=ANSWER_S))["problem"]
-                raise ConnectFailedError(
-                    str(self.dialog.name),
-                    f"its agent cannot reach the gripper: {problem or 'the link is down'}",
-                ) from None
+            with Limit(max(ANSWER_S, seconds)) as limit:
+                await reached
+            # An event arrives before the status that shows it; an answer brings the newest status.
+            info = await self.dialog.ask("info", timeout=ANSWER_S)
+            if limit.is_over:
+                why = f"its agent cannot reach the gripper: {info['problem'] or 'the link is down'}"
+                raise ConnectFailedError(str(self.dialog.name), why)
 
-    async def _ask_info(self, deadline: float) -> bool:
+    async def _ask_info(self, limit: Limit) -> bool:
         try:
-            info = await self.dialog.ask("info", timeout=min(ANSWER_S, max(0.05, deadline - now())))
+            info = await self.dialog.ask("info", timeout=min(ANSWER_S, max(0.05, limit.left)))
         except (NoAnswerError, NotAllowedError):
             return False
         with reading("its figures"):
@@ -169,9 +169,11 @@ class RemoteSession:
 
     async def _close(self) -> None:
         try:
-            async with asyncio.timeout(END_S - BUS_S if self._owns_bus else END_S):
+            with Limit(END_S - BUS_S if self._owns_bus else END_S) as limit:
                 await self.dialog.halted()
                 await self.keeper.released()
+            if limit.is_over:
+                raise TimeoutError
         except (RobotiqError, TimeoutError) as error:
             why = str(error) or "no answer in time"
             self.dialog.log.warning(
