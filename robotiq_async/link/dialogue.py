@@ -41,6 +41,8 @@ SHORT_READS: Final = 3
 MOST_UNANSWERED: Final = 3
 UNANSWERED_S: Final = 60.0
 """With so many unanswered reads in so many seconds, a line gets the longer silence."""
+MOST_OUTSTANDING: Final = 64
+"""Requests in a row whose answers may come late: half a minute of them."""
 REPEAT_WARNING_S: Final = 60.0
 """At most one warning about repeated reads in this time."""
 
@@ -84,6 +86,8 @@ class Dialogues:
         """Registers that the last read to bring the line in step asked for."""
         self._rest: Registers = ()
         """The registers after those that a poll reads, as the first opening found them, if any was not 0."""
+        self._outstanding: Final[deque[bytes]] = deque(maxlen=MOST_OUTSTANDING)
+        """Requests whose answers may still come, in order: function, address and number of registers."""
         self._unanswered: Final[deque[float]] = deque(maxlen=MOST_UNANSWERED)
         """The times of the last reads that were repeated because there was no answer."""
         self._image: Sequence[int] = ()
@@ -196,6 +200,7 @@ class Dialogues:
         if isinstance(came_to, Outcome):
             self._note_unheard(came_to)
             return came_to
+        self._outstanding.clear()
         self._image = image
         return None
 
@@ -257,8 +262,9 @@ class Dialogues:
 
         Serial replies carry no transaction id, and a gateway from TCP to a serial line gives a late reply the
         id of the next request. So this reads fewer registers than a poll, another number each time. A late
-        answer to a poll has another length. The gripper answers in order, so after an answer of the right
-        length nothing older than the last of these reads can follow, and so no status.
+        answer to a poll has another length. The gripper answers in order. The answer may be that to an
+        earlier one of these reads with the same number: a jaw has two numbers only. So this reads on until
+        no status has been asked for since the oldest read that the answer may belong to.
 
         The first one of all asks a jaw for eight registers, which show a wrong model.
         """
@@ -268,10 +274,23 @@ class Dialogues:
             if isinstance(came_to, bytes):
                 rest = registers_in(came_to)[count:]
                 self._rest = rest if any(rest) else ()
-        else:
+                self._outstanding.clear()
+            return came_to if isinstance(came_to, Outcome) else None
+        while True:
             self._probe = self._probe % (count - 1) + 1
-            came_to = yield self._ask(read_request(self._map, self._probe), by=by, is_long=is_long)
-        return came_to if isinstance(came_to, Outcome) else None
+            request = read_request(self._map, self._probe)
+            came_to = yield self._ask(request, by=by, is_long=is_long)
+            if isinstance(came_to, Outcome):
+                return came_to
+            if self._is_in_step_after(request):
+                return None
+
+    def _is_in_step_after(self, request: bytes) -> bool:
+        """Whether no answer but those to probes can follow an answer to this probe."""
+        outstanding, poll = self._outstanding, self._poll[1:6]
+        while outstanding and outstanding.popleft() != request[1:6]:
+            pass
+        return all(each[0] == poll[0] and each != poll for each in outstanding)
 
     def _try_short_silence(self) -> Dialogue[None]:
         """Read a few times after 3.5 characters of silence; take the longer one if an answer is missing."""
@@ -291,6 +310,7 @@ class Dialogues:
     # -- requests, and what outcomes mean ------------------------------------------------------------------
 
     def _ask(self, request: bytes, *, by: float = math.inf, is_long: bool = False) -> Exchange:
+        self._outstanding.append(request[1:6])
         exchange = self._make(request)
         exchange.seconds, exchange.by, exchange.is_long = self._response_s, by, is_long
         return exchange
@@ -307,6 +327,7 @@ class Dialogues:
 
     def _status_in(self, answer: bytes) -> Registers:
         registers = registers_in(answer)
+        self._outstanding.clear()
         self._status = registers[: self._map.count] + self._rest if self._rest else registers
         return self._status
 

@@ -101,6 +101,18 @@ def test_what_a_lost_byte_cannot_explain_ends_a_read(first: Any) -> None:
     assert said(speaker().read(), first) == (["3x3"], first.error)
 
 
+def test_the_answer_to_an_earlier_probe_does_not_prove_that_no_status_can_follow() -> None:
+    """On a shared line the silence of another turn drops what would show that answers come late."""
+    dialogues = speaker()
+    said(dialogues.opening())
+    assert said(dialogues.opening(), SILENT, SILENT)[0] == ["3x1", "TURN", "HUSH", "3x2"]
+    assert said(dialogues.opening())[0] == ["3x1"], "the answer may be that to the first one"
+    steps, status = said(dialogues.read(), SILENT)
+    assert steps == ["3x3", "TURN", "HUSH", "3x2", "3x1", "3x2", "3x3"], "3x2 was asked before 3x3, too"
+    assert status[:3] == AT_REST
+    assert said(dialogues.read(), SILENT)[0] == ["3x3", "TURN", "HUSH", "3x1", "3x3"]
+
+
 def test_a_second_failure_ends_it_with_the_first_reason() -> None:
     dialogues = speaker()
     said(dialogues.opening())
