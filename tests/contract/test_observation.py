@@ -184,6 +184,7 @@ async def test_no_axis_moves_while_is_moving_is_false(here: Bench) -> None:
     await hand.atr()
     await hand.recover()
     assert not unseen
+    await hand.move(100, A)  # so that the release has a way to go on every model
     here.gripper.emergency_release()
     await hand.wait_for_state(State.FAULT)
     await asyncio.sleep(0.002)
