@@ -119,7 +119,7 @@ constraints: $(STAMP)  ## Take the newest versions of all dependencies into cons
 	$(BIN)/python -m uv pip compile --quiet --universal --upgrade --python-version 3.11 --no-header --no-annotate \
 		docs/site/requirements.in --output-file docs/site/requirements.txt
 	$(BIN)/python -m uv pip compile --quiet --universal --upgrade --python-version 3.11 --generate-hashes --no-header \
-		--no-annotate tests/release/requirements.in --output-file tests/release/requirements.txt
+		--no-annotate --constraints constraints.txt tests/release/requirements.in --output-file tests/release/requirements.txt
 
 clean:  ## Remove what the other commands made
 	rm -rf $(VENV) $(SITE) $(RELEASE) .venv-ros2 .venv-lerobot .venv-lerobot-uv .venv-urcap .venv-upstream .venv-urdf build dist site .cache .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
