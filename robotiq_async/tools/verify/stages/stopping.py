@@ -62,7 +62,7 @@ async def _halt(bench: Bench, watch: Watch, away: Request, home: dict[Finger, in
     bench.judge("stop.halt", stop.is_quick, words, follows, **stop.figures)
 
 
-class _Stop(NamedTuple):
+class _StopTrial(NamedTuple):
     """A stop: the counts that a finger still moved, and the time that the link took of it."""
 
     counts: int
@@ -95,7 +95,7 @@ class _Stop(NamedTuple):
         }
 
 
-async def _stop(bench: Bench, watch: Watch, image: Request, status: RobotiqStatus) -> _Stop:
+async def _stop(bench: Bench, watch: Watch, image: Request, status: RobotiqStatus) -> _StopTrial:
     """Write an image that stops, and watch the fingers until they rest."""
     rest = Rest(bench.fingers)
     rest.lasts(status, 0.3)  # from here on
@@ -104,7 +104,7 @@ async def _stop(bench: Bench, watch: Watch, image: Request, status: RobotiqStatu
     await watch.until(lambda now: rest.lasts(now, 0.3), 4.0)
     counts = max(abs(at - was) for at, was in zip(rest.positions, before, strict=True))
     rate = SpeedCalibration.usual(bench.model).counts_per_s(SPEED)
-    return _Stop(counts, rest.moved_at - began, acknowledged - asked, rate)
+    return _StopTrial(counts, rest.moved_at - began, acknowledged - asked, rate)
 
 
 async def _resume(bench: Bench, watch: Watch, away: Request, far: dict[Finger, int]) -> None:
