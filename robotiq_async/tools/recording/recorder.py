@@ -286,6 +286,9 @@ class Recorder:
                 await in_a_thread(self._file.close)
         except TimeoutError:
             self._fail(f"the disk does not answer within {DISK_S:g} s")
+        except NoThreadError as error:
+            self._fail(str(error))
+            self._file.close()  # no thread of ours uses it: the last one has ended
         except OSError as error:
             self._fail(error.strerror)
 
