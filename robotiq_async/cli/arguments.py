@@ -36,6 +36,16 @@ def _integer(name: str, low: int, high: int) -> Callable[[object, Sequence[Token
     return convert
 
 
+def _integers(name: str, low: int, high: int) -> Callable[[object, Sequence[Token]], list[int]]:
+    """The same for an option that may be given again."""
+    each = _integer(name, low, high)
+
+    def convert(_type: object, tokens: Sequence[Token]) -> list[int]:
+        return [each(int, [token]) for token in tokens]
+
+    return convert
+
+
 UNITS: Final = {"": "counts", "mm": "mm", "mm/s": "mm_per_s", "N": "label_n"}
 """The units of amounts on the command line, and the arguments of a hand, and of ``values.amounts``, that they
 are. A new one is a row here, and one more unit where it may be typed: :data:`Position` and below."""
@@ -95,6 +105,9 @@ Force = Annotated[Amount | None, _amount("the value", "N", metavar="0..255|N")]
 Byte = Annotated[int, Parameter(converter=_integer("the value", 0, 255), metavar="0..255")]
 Port = Annotated[int, Parameter(converter=_integer("the port", 0, 65535), metavar="0..65535")]
 Unit = Annotated[int, Parameter(converter=_integer("the unit id", 0, 255), metavar="0..255")]
+Units = Annotated[
+    list[int], Parameter(converter=_integers("the unit id", 0, 255), metavar="0..255", negative=())
+]
 Stage = Annotated[int, Parameter(converter=_integer("the stage", 0, 9), metavar="0..9")]
 Runs = Annotated[int, Parameter(converter=_integer("the runs", 1, 100), metavar="N")]
 Step = Annotated[int, Parameter(converter=_integer("the step", 1, 255), metavar="N")]

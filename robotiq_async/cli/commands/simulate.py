@@ -18,7 +18,7 @@ from ...values.enums import Finger
 from ...values.errors import RobotiqError
 from ...values.model import Model, model_of
 from ...values.registers import RTU_REGISTERS
-from ..arguments import Byte, Flag, Host, Port, Unit
+from ..arguments import Byte, Flag, Host, Port, Units
 from ..failures import normal_end, usage
 from ..output.messages import tell
 
@@ -53,7 +53,7 @@ async def simulate(
     rtu_over_tcp: Flag = False,
     urcap: Flag = False,
     unpaced: Flag = False,
-    device_id: Annotated[list[Unit] | None, Parameter(negative=())] = None,
+    device_id: Units | None = None,
     like: Annotated[Path | None, Parameter(metavar="report.json")] = None,
     trouble: Annotated[list[str] | None, Parameter(metavar="WORDS", negative=())] = None,
     troubles: Flag = False,
@@ -108,8 +108,7 @@ async def simulate(
         rtu_over_tcp: Serve Modbus RTU through a TCP socket, as serial servers and tool ports do.
         urcap: Serve the text port of Robotiq's URCap, as a UR controller does; for a 2F or a Hand-E.
         unpaced: Do not simulate the transmission time of bytes; for a real serial port, which takes it.
-        device_id: The only Modbus unit id that is answered (default: 9 for RTU and a URCap, any on TCP).
-            Given again, a line has another gripper with that id.
+        device_id: The only unit id answered (default: 9, on TCP any); again for another gripper on a line.
         like: A report of verify, whose gripper and link this one is like; the model is the report's.
         trouble: A trouble, as above; may be given again.
         troubles: List the kinds of trouble, and end.
