@@ -33,7 +33,6 @@ from typing import Final, TypeVar
 from weakref import WeakKeyDictionary, WeakSet, WeakValueDictionary
 
 from ..runtime.limit import Limit
-from ..runtime.log import log
 from ..values.errors import ConnectFailedError, ConnectionLostError, ProtocolError, RobotiqConnectionError
 from .address import Address, canonical_address
 from .exchange import Answer, Echo, Exchange
@@ -135,9 +134,6 @@ class Line:
     why: Outcome | None
 
     def _become(self, state: LineState, why: Outcome | None = None) -> None:
-        if state is not self.state:
-            reason = "" if why is None else f" ({why.error})"
-            log.debug("%s: line: %s -> %s%s", self.address, self.state.name, state.name, reason)
         self.state, self.why = state, why
 
     @property
