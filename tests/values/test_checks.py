@@ -124,7 +124,8 @@ def test_an_array_of_numpy_without_dimensions_is_the_number_in_it() -> None:
 
 
 @pytest.mark.parametrize(
-    "value", [[1], [[1]], [], "1", True, None, 1j, np.timedelta64(1), np.datetime64(1, "s"), np.ma.masked]
+    "value",
+    [[1], [[1]], [], "1", True, None, 1j, np.timedelta64(1, "s"), np.datetime64(1, "s"), np.ma.masked],
 )
 def test_an_array_of_anything_else_is_refused(value: object) -> None:
     array = np.asarray(value) if value is not np.ma.masked else value
