@@ -63,7 +63,7 @@ class _SerialBus(Bus):
     """An adapter with several devices at the far end of its cable."""
 
     def __init__(self, line: VirtualLine, servers: Mapping[int, Server]) -> None:
-        super().__init__(f"rtu://{VirtualLine.NEAR}", servers)
+        super().__init__(f"rtu://{line.near}", servers)
         self._line = line
 
     def _pull(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import warnings
 from typing import Any
 
@@ -12,11 +13,17 @@ from pymodbus.transport.serialtransport import SerialTransport
 
 from tests.virtual import MemoryFile, VirtualLoop
 
+_NUMBERS = itertools.count(1)
+
 
 class VirtualLine:
     """Serial ports and the cable between them, which can be pulled and put back.
 
     One port is at the near end, and any number at the far end, as several devices hang on RS-485.
+
+    Attributes:
+        near: The near port under a name that no other line has. A hand must be given this one: the process
+            remembers by the address what the last hand has left on its way, also beyond the end of a test.
     """
 
     NEAR, FAR = "/dev/ttyNEAR", "/dev/ttyFAR"
@@ -24,6 +31,7 @@ class VirtualLine:
     def __init__(self, patch: pytest.MonkeyPatch) -> None:
         loop = asyncio.get_running_loop()
         assert isinstance(loop, VirtualLoop)
+        self.near = f"{self.NEAR}{next(_NUMBERS)}"
         self._loop = loop
         self._ports: list[_Port] = []
         self._is_plugged = True
@@ -35,7 +43,7 @@ class VirtualLine:
     def pull(self) -> None:
         """Pull the near port out, as one pulls a USB adapter."""
         self._is_plugged = False
-        for port in self._at(self.NEAR):
+        for port in self._at(is_near=True):
             port.lose()
 
     def plug(self) -> None:
@@ -43,32 +51,34 @@ class VirtualLine:
         self._is_plugged = True
 
     def _open(self, url: str, **_: Any) -> _Port:
-        if url == self.NEAR and not self._is_plugged:
+        is_near = url in (self.NEAR, self.near)
+        if is_near and not self._is_plugged:
             raise serial.SerialException(2, f"could not open port {url}")
-        port = _Port(self, url, self._loop)
+        port = _Port(self, url, is_near, self._loop)
         self._ports.append(port)
         return port
 
-    def carry(self, sender: str, data: bytes) -> None:
+    def carry(self, is_from_near: bool, data: bytes) -> None:
         """Bring bytes to the other end, where it is open."""
         if self._is_plugged:
-            for port in self._at(self.FAR if sender == self.NEAR else self.NEAR):
+            for port in self._at(is_near=not is_from_near):
                 port.arrive(data)
 
     def closed(self, port: _Port) -> None:
         if port in self._ports:
             self._ports.remove(port)
 
-    def _at(self, url: str) -> list[_Port]:
-        return [port for port in self._ports if port.url == url]
+    def _at(self, *, is_near: bool) -> list[_Port]:
+        return [port for port in self._ports if port.is_near is is_near]
 
 
 class _Port(MemoryFile):
     """The part of serial.Serial that pymodbus uses."""
 
-    def __init__(self, line: VirtualLine, url: str, loop: VirtualLoop) -> None:
+    def __init__(self, line: VirtualLine, url: str, is_near: bool, loop: VirtualLoop) -> None:
         super().__init__(loop)
         self.url = url
+        self.is_near = is_near
         self.timeout = self.write_timeout = 0
         self._line = line
         self._is_closed = False
@@ -81,7 +91,7 @@ class _Port(MemoryFile):
 
     def write(self, data: bytes) -> int:
         # The simulator's end takes the time that bytes take, both ways.
-        self._loop.call_soon(self._line.carry, self.url, data)
+        self._loop.call_soon(self._line.carry, self.is_near, data)
         return len(data)
 
     def lose(self) -> None:

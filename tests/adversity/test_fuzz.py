@@ -35,7 +35,7 @@ def test_a_live_link(
         async with world(link, monkeypatch=monkeypatch, model=model) as here:
             await here.activate_beforehand()
             line = Line(random.Random(1), serial=link == "rtu", share=0.25, model=model)
-            address = here.server.address if here.line is None else f"rtu://{here.line.NEAR}"
+            address = here.server.address if here.line is None else f"rtu://{here.line.near}"
             return await live(here.server, address, line, 500)
 
     caplog.set_level(logging.CRITICAL, logger="robotiq_async")

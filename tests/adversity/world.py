@@ -278,7 +278,7 @@ async def world(
     if link == "rtu":
         assert monkeypatch is not None
         line = VirtualLine(monkeypatch)
-        server, address = RtuServer(line.FAR, gripper), f"rtu://{line.NEAR}"
+        server, address = RtuServer(line.FAR, gripper), f"rtu://{line.near}"
     elif link == "urcap":
         server, address = UrcapServer(gripper), ""
     else:

@@ -122,7 +122,7 @@ class Line:
         if self._wire == "rtu":
             cable = VirtualLine(patch)
             self.server = SerialSimulatorServer(cable.FAR, self.gripper)
-            self.address = f"rtu://{cable.NEAR}?model={self.gripper.model.name}"
+            self.address = f"rtu://{cable.near}?model={self.gripper.model.name}"
             await self.server.start()
         else:
             self.server = SERVERS[self._wire](self.gripper)

@@ -402,11 +402,11 @@ class WatchedLine(VirtualLine):
         super().__init__(patch)
         self.written: list[tuple[float, Request]] = []
 
-    def carry(self, sender: str, data: bytes) -> None:
-        if sender == self.NEAR and data[1] == 16:
+    def carry(self, is_from_near: bool, data: bytes) -> None:
+        if is_from_near and data[1] == 16:
             words = [int.from_bytes(data[at : at + 2], "big") for at in range(7, 23, 2)]
             self.written.append((asyncio.get_running_loop().time(), Request.from_registers(words)))
-        super().carry(sender, data)
+        super().carry(is_from_near, data)
 
 
 async def test_an_image_that_waits_for_the_silence_of_the_line_is_not_sent_after_a_stop(
@@ -417,7 +417,7 @@ async def test_an_image_that_waits_for_the_silence_of_the_line_is_not_sent_after
     await activate_beforehand(gripper)
     async with SerialSimulatorServer(line.FAR, gripper):
         for step in range(40):
-            async with RobotiqHand(f"rtu://{line.NEAR}") as hand:
+            async with RobotiqHand(f"rtu://{line.near}") as hand:
                 hand.command(position=200 - 100 * (step % 2), speed=0)
                 await asyncio.sleep(step * 0.0005)
                 called = loop.time()

@@ -52,13 +52,13 @@ async def test_a_serial_port_has_one_hand_unless_both_name_their_units(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     line, link = VirtualLine(monkeypatch), tmp_path / "tty"
-    link.symlink_to(line.NEAR)
+    link.symlink_to(line.near)
     gripper = SimulatedGripper(asyncio.get_running_loop().time, speedup=20)
     async with (
         SerialSimulatorServer(line.FAR, gripper),
-        RobotiqHand(f"rtu://{line.NEAR}", device_id=9) as hand,
+        RobotiqHand(f"rtu://{line.near}", device_id=9) as hand,
     ):
-        for port in (line.NEAR, link):
+        for port in (line.near, link):
             for unit in (None, 9):
                 other = RobotiqHand(f"rtu://{port}", device_id=unit)
                 with pytest.raises(InvalidStateError, match="give each of the hands its device_id"):

@@ -62,7 +62,7 @@ async def at_a_line(
     gripper = SimulatedGripper(asyncio.get_running_loop().time, model=model_of(model), speedup=speedup)
     async with device(cable.FAR, gripper) as server:
         await activate_beforehand(gripper)
-        address = f"rtu://{cable.NEAR}?model={model}"
+        address = f"rtu://{cable.near}?model={model}"
         if model == "2f85" and write_function is None:
             write_function = 23  # believed, and not tried
         async with RobotiqHand(address, poll_interval=poll_interval, write_function=write_function) as hand:

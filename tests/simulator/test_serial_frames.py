@@ -51,7 +51,7 @@ async def line(
     cable = VirtualLine(patch)
     gripper = SimulatedGripper(asyncio.get_running_loop().time)
     async with SerialSimulatorServer(cable.FAR, gripper, **options) as server:
-        port = serial.serial_for_url(cable.NEAR)
+        port = serial.serial_for_url(cable.near)
         try:
             yield server, Client(port)
         finally:

@@ -68,7 +68,7 @@ async def test_an_exchange_takes_what_its_bytes_take(
     loop, cable = asyncio.get_running_loop(), VirtualLine(monkeypatch)
     expected = pytest.approx(on_the_wire(request_, size), abs=1e-6) if paced else 0
     async with SerialSimulatorServer(cable.FAR, SimulatedGripper(loop.time), paced=paced):
-        port: Any = serial.serial_for_url(cable.NEAR)
+        port: Any = serial.serial_for_url(cable.near)
         for _ in range(3):
             arrived: asyncio.Future[None] = loop.create_future()
             loop.add_reader(port.fileno(), arrived.set_result, None)
@@ -155,7 +155,7 @@ async def test_how_often_a_hand_polls(
     gripper = SimulatedGripper(loop.time, model=model_of(model))
     async with SerialSimulatorServer(cable.FAR, gripper):
         await activate_beforehand(gripper)
-        address = f"rtu://{cable.NEAR}?model={model}"
+        address = f"rtu://{cable.near}?model={model}"
         async with RobotiqHand(address, write_spacing=0.0, **options) as hand:  # type: ignore[arg-type]
             await asyncio.sleep(0.02)
             seconds, before = 2.0 if streaming else 1.0, hand.statistics
@@ -203,7 +203,7 @@ async def test_a_hand_works_on_lines_as_they_are(
         await activate_beforehand(gripper)
         plan = asyncio.create_task(server.fault_injector.run(parse_troubles(words)))
         await asyncio.sleep(0)
-        async with RobotiqHand(f"rtu://{cable.NEAR}?model={model}") as hand:
+        async with RobotiqHand(f"rtu://{cable.near}?model={model}") as hand:
             for position in (100, 40, 70):
                 result = await hand.move(position, Finger.A)
                 assert result.positions[Finger.A] == pytest.approx(position, abs=3)
@@ -224,7 +224,7 @@ async def test_a_device_that_needs_the_longer_silence_now_and_then(
     loop, cable = asyncio.get_running_loop(), VirtualLine(monkeypatch)
     async with (
         SerialSimulatorServer(cable.FAR, SimulatedGripper(loop.time)) as server,
-        RobotiqHand(f"rtu://{cable.NEAR}") as hand,
+        RobotiqHand(f"rtu://{cable.near}") as hand,
         server.fault_injector.making(Trouble("strict-silence")),
     ):
         await asyncio.sleep(3)
@@ -242,7 +242,7 @@ async def test_a_loop_that_is_held_up_misses_polls_on_a_line_too(monkeypatch: py
     gripper = SimulatedGripper(loop.time)
     async with SerialSimulatorServer(cable.FAR, gripper):
         await activate_beforehand(gripper)
-        async with RobotiqHand(f"rtu://{cable.NEAR}") as hand:
+        async with RobotiqHand(f"rtu://{cable.near}") as hand:
             await asyncio.sleep(0.1)
             assert hand.statistics.overruns == 0
             loop.hold_up(0.03)
@@ -256,7 +256,7 @@ async def test_a_line_that_takes_fifty_milliseconds_misses_polls(monkeypatch: py
     gripper = SimulatedGripper(loop.time)
     async with SerialSimulatorServer(cable.FAR, gripper) as server:
         await activate_beforehand(gripper)
-        async with RobotiqHand(f"rtu://{cable.NEAR}") as hand:
+        async with RobotiqHand(f"rtu://{cable.near}") as hand:
             server.policy = lambda frame: [(0.06, frame)]
             await asyncio.sleep(1.0)
             assert hand.statistics.overruns > 100
@@ -271,7 +271,7 @@ async def test_a_line_as_slow_as_bluetooth_works_with_the_right_timeouts(
     async with SerialSimulatorServer(cable.FAR, gripper) as server:
         await activate_beforehand(gripper)
         server.policy = lambda reply: [(0.08, reply)]
-        address = f"rtu://{cable.NEAR}"
+        address = f"rtu://{cable.near}"
         async with RobotiqHand(address, poll_interval=0.1, response_timeout=0.5) as hand:
             result = await hand.move(200)
             assert result.positions[Finger.A] == pytest.approx(200, abs=2)

@@ -548,7 +548,7 @@ async def test_a_line_that_is_lost_in_the_middle_drops_no_packets(monkeypatch: p
     line, loop = VirtualLine(monkeypatch), asyncio.get_running_loop()
     async with SerialSimulatorServer(line.FAR, SimulatedGripper(loop.time)) as server:
         loop.call_later(1.0, setattr, server, "policy", lambda frame: [(0.0, frame + b"\0")])
-        found = (await findings(f"rtu://{line.NEAR}", seconds=120))["link"]
+        found = (await findings(f"rtu://{line.near}", seconds=120))["link"]
     assert found.level is Level.BAD
     assert "1 bytes more than the answer" in found.found
     assert "shield, ground and termination" in found.advice
@@ -572,7 +572,7 @@ async def test_a_serial_port_is_no_network(what: str, monkeypatch: pytest.Monkey
                 loop.call_later(1.0, line.pull)
             case _:
                 server.policy = lost
-        found = await findings(f"rtu://{line.NEAR}", seconds=120)
+        found = await findings(f"rtu://{line.near}", seconds=120)
     finding = found[{"slow": "round trip", "pulled out": "link"}.get(what, "Modbus")]
     assert finding.level is not Level.GOOD
     assert ("poll_interval" if what == "slow" else "fuser -v") in finding.advice
