@@ -110,7 +110,10 @@ class Line:
 
     async def serve(self, hand: RobotiqHand, keys: Path | None = None) -> None:
         """An agent that serves a hand as zenoh://lab/cell/left."""
-        served = Agent("lab", "cell", {"left": hand}, await self.agent_bus(keys))
+        await self.serve_over(await self.agent_bus(keys), hand)
+
+    async def serve_over(self, bus: ZenohBus, hand: RobotiqHand) -> None:
+        served = Agent("lab", "cell", {"left": hand}, bus)
         await self.stack.enter_async_context(serving(served))
 
     async def server(self, keys: Path) -> None:

@@ -20,7 +20,11 @@ from robotiq_async.fleet.keys.certificates import HERE, issue, make_authority
 from robotiq_async.fleet.keys.key_folder import ACCESS
 from robotiq_async.fleet.network import zenoh_bus
 from robotiq_async.fleet.network.bus import Urgency
-from robotiq_async.fleet.network.configuration import agent_configuration, client_configuration
+from robotiq_async.fleet.network.configuration import (
+    agent_configuration,
+    client_configuration,
+    router_configuration,
+)
 from robotiq_async.fleet.network.route import Route
 from robotiq_async.fleet.network.zenoh_bus import open_bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
@@ -207,7 +211,7 @@ async def test_an_empty_list_denies_everything(tmp_path: Path) -> None:
 
 
 def test_every_right_has_its_rule_and_what_is_not_allowed_is_denied() -> None:
-    control = access_control("lab", "cell", AccessList(("a",), ("b",), ("c", "d")))
+    control = access_control("lab", ["cell"], AccessList(("a",), ("b",), ("c", "d")))
     rules = control["rules"]
     assert isinstance(rules, list)
     own = {f"ask info {who}" for who in ("read:a", "halt:b", "operate:c", "operate:d")}
@@ -275,6 +279,45 @@ async def test_a_fleet_is_halted_in_the_role_for_it(keys: Path) -> None:
         Fleet("lab", route=Route((endpoint,), keys / "halt-panel")) as fleet,
     ):
         assert list((await fleet.halt_all()).values()) == ["stopped"]
+
+
+async def test_behind_a_router_the_rules_are_the_routers(keys: Path) -> None:
+    """The agent sees the router's certificate alone: each client has its role all the same."""
+    router = keys / "agent-gate"
+    if not router.exists():
+        issue(keys, "gate", Role.AGENT)
+        (router / ACCESS).write_bytes((keys / "agent-cell" / ACCESS).read_bytes())
+    async with line(patience=3 * PATIENCE) as here:
+        await here.open(router_configuration("lab", ["cell"], [here.endpoint], router))
+        bus = await here.open(
+            agent_configuration("lab", "cell", [], [here.endpoint], keys=keys / "agent-cell")
+        )
+        await here.serve_over(bus, RobotiqHand("sim://"))
+        async with (
+            hand(here.endpoint, keys / "read-alice") as alice,
+            hand(here.endpoint, keys / "operate-bob") as bob,
+        ):
+            for attempt in (alice.halt, alice.acquire):
+                with pytest.raises(NotAllowedError):
+                    await attempt()
+            await bob.acquire()
+            await bob.hold()
+            await bob.halt()
+            eve, other, own = [
+                (await here.client(keys / who)).bus for who in ("operate-eve", "read-alice", "operate-bob")
+            ]
+            while (
+                await own.ask(LEFT.question("operate:bob"), b"?", timeout=1.0, urgency=Urgency.COMMAND)
+                is None
+            ):
+                pass
+            for bus in (eve, other):
+                assert (
+                    await bus.ask(LEFT.question("operate:bob"), b"?", timeout=0.5, urgency=Urgency.COMMAND)
+                    is None
+                )
+        async with Fleet("lab", route=Route((here.endpoint,), keys / "halt-panel")) as fleet:
+            assert list((await fleet.halt_all()).values()) == ["stopped"]
 
 
 # -- without keys ------------------------------------------------------------------------------------------

@@ -116,22 +116,30 @@ def _check(table: Mapping[str, object]) -> dict[str, tuple[str, ...]]:
     return names
 
 
-def access_control(site: str, host: str, clients: AccessList) -> dict[str, object]:
-    """The part of an agent's zenoh configuration that denies everything but the rights of its clients."""
-    own = f"{ROOT}/{check_name('site', site)}/{check_name('host', host)}/*"
+def access_control(
+    site: str, hosts: Sequence[str], clients: AccessList, *, is_router: bool = False
+) -> dict[str, object]:
+    """The part of a zenoh configuration that denies everything but the rights of the clients of some agents.
+
+    It is an agent's, or that of a router: there the links of the agents have the other side of each right.
+    """
+    own = tuple(f"{ROOT}/{check_name('site', site)}/{check_name('host', host)}/*" for host in hosts)
     names = [role.common_name(each) for role in CLIENTS for each in clients.of(role)]
+    rules = [
+        *_reading(own),
+        *(_rule(f"ask info {name}", ("query",), _IN, _below(own, f"info/{name}")) for name in names),
+        *_asking("halt", own, "halt"),
+        *_asking("lease", own, "lease"),
+        *_asking("cmd", own, "cmd/*"),
+    ]
+    agents = [Role.AGENT.common_name(host) for host in hosts] if is_router else []
+    other_side = [_other_side(rule) for rule in rules] if is_router else []
     return {
         "enabled": True,
         "default_permission": "deny",
-        "rules": [
-            *_reading(own),
-            *(_rule(f"ask info {name}", ("query",), _IN, (f"{own}/info/{name}",)) for name in names),
-            *_asking("halt", own, "halt"),
-            *_asking("lease", own, "lease"),
-            *_asking("cmd", own, "cmd/*"),
-        ],
+        "rules": [*rules, *other_side],
         # Each client asks under its own name alone: that is what its budget of questions is counted by.
-        "subjects": [{"id": name, "cert_common_names": [name]} for name in names],
+        "subjects": [{"id": name, "cert_common_names": [name]} for name in (*names, *agents)],
         "policies": [
             # Roles without clients are left out: zenoh treats an empty list like a missing one.
             *(
@@ -143,6 +151,7 @@ def access_control(site: str, host: str, clients: AccessList) -> dict[str, objec
                 if clients.of(role)
             ),
             *({"rules": [f"ask info {name}"], "subjects": [name]} for name in names),
+            *({"rules": [rule["id"] for rule in other_side], "subjects": [name]} for name in agents),
         ],
     }
 
@@ -152,11 +161,11 @@ def rights(role: Role) -> tuple[str, ...]:
     return tuple(rule for each in roles for rule in _RIGHTS[each])
 
 
-def _reading(own: str) -> list[Rule]:
+def _reading(own: Sequence[str]) -> list[Rule]:
     return [
         # The topics of one gripper, and the summaries of a whole fleet.
-        _rule("watch", ("declare_subscriber",), _IN, (f"{own}/*", f"{ROOT}/*/*/*/summary")),
-        _rule("published", ("put",), _OUT, (f"{own}/feed", f"{own}/summary")),
+        _rule("watch", ("declare_subscriber",), _IN, (*_below(own, "*"), f"{ROOT}/*/*/*/summary")),
+        _rule("published", ("put",), _OUT, _below(own, "feed", "summary")),
         # Peers receive tokens without a query; zenoh clients and routers query them.
         _rule(
             "presence",
@@ -164,19 +173,28 @@ def _reading(own: str) -> list[Rule]:
             _IN,
             (f"{ROOT}/*/*/*/alive/*",),
         ),
-        _rule("present", ("liveliness_token",), _OUT, (f"{own}/alive/*",)),
+        _rule("present", ("liveliness_token",), _OUT, _below(own, "alive/*")),
         _asking("info", own, "info/*")[1],
         # Clients of version 1 ask there, and get to know that this is another one.
         *_asking("old info", own, "info"),
     ]
 
 
-def _asking(name: str, own: str, key: str) -> list[Rule]:
+def _asking(name: str, own: Sequence[str], key: str) -> list[Rule]:
     # A request and its answer. The client's side sends a request only if it knows of the queryable.
     return [
-        _rule(f"ask {name}", ("query",), _IN, (f"{own}/{key}",)),
-        _rule(f"answer {name}", ("declare_queryable", "reply"), _OUT, (f"{own}/{key}",)),
+        _rule(f"ask {name}", ("query",), _IN, _below(own, key)),
+        _rule(f"answer {name}", ("declare_queryable", "reply"), _OUT, _below(own, key)),
     ]
+
+
+def _below(own: Sequence[str], *keys: str) -> list[str]:
+    return [f"{base}/{key}" for base in own for key in keys]
+
+
+def _other_side(rule: Rule) -> Rule:
+    # What comes from the clients goes to the agent, and what comes from there goes to them.
+    return {**rule, "id": f"agent: {rule['id']}", "flows": list(_OUT if rule["flows"] == list(_IN) else _IN)}
 
 
 def _rule(name: str, messages: Sequence[str], flows: Sequence[str], keys: Sequence[str]) -> Rule:

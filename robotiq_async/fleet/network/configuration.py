@@ -32,7 +32,8 @@ def agent_configuration(
 ) -> dict[str, object]:
     """Configuration of an agent's session. With keys, clients may do only what its access list permits.
 
-    Without an endpoint to listen on, the agent is reached through the routers in ``connect`` alone.
+    Without an endpoint to listen on, the agent is reached through the routers in ``connect`` alone, and the
+    access list is theirs.
 
     Raises:
         TypeError, ValueError: a malformed or unprotected endpoint; a folder that lacks a file.
@@ -42,10 +43,22 @@ def agent_configuration(
     # A router forwards nothing between peers. Our clients are peers, so the agent is a client of the router.
     mode = "client" if connect and not listen else "peer"
     session = session_configuration(listen, connect, keys) | {"mode": mode}
-    if keys is None:
+    if keys is None or mode == "client":
         return session
+    return session | {"access_control": access_control(site, (host,), AccessList.read_file(keys / ACCESS))}
+
+
+def router_configuration(
+    site: str, hosts: Sequence[str], listen: Sequence[str], keys: Path
+) -> dict[str, object]:
+    """Configuration of a router between the agents of some hosts and the clients in its access list.
+
+    ``keys`` are those of an agent with the name of the router's host; errors as of an agent's configuration.
+    """
+    listen = check_endpoints("listen", listen, has_keys=True)
     clients = AccessList.read_file(keys / ACCESS)
-    return session | {"access_control": access_control(site, host, clients)}
+    rules = access_control(site, hosts, clients, is_router=True)
+    return session_configuration(listen, (), keys) | {"mode": "router", "access_control": rules}
 
 
 def client_configuration(
