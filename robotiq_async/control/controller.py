@@ -549,6 +549,10 @@ class Controller:
         self._free_at = now + self._spacing
         return entry
 
+    def note_repeat(self, now: float) -> None:
+        """The link has written the last image again: the next write keeps its distance from that, too."""
+        self._free_at = now + self._spacing
+
     def acknowledged(self, now: float) -> None:
         self._ledger.acknowledge(now)
         self._requests.acknowledged()

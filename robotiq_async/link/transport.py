@@ -102,9 +102,10 @@ class CyclicLink(Link, Protocol):
         """Whether it has, once."""
 
     async def send_and_read(self, decide: Callable[[], Sequence[int] | None]) -> Answer | None:
-        """As :meth:`send`, and read the status in the same exchange; None if nothing was written.
+        """As :meth:`send`, and read the status in the same exchange; None if nothing new was written.
 
-        ``decide`` is called again if the gripper refuses such an exchange, before another one is tried.
+        ``decide`` is called again if the gripper refuses such an exchange, before another one is tried. It is
+        not called if the last image was written once more, to try such an exchange.
 
         Raises:
             RobotiqConnectionError: no clean answer in time, and no status after it; the transport is closed.

@@ -163,10 +163,19 @@ class Poller:
         if link is None or not link.reads_with_writes or not write.is_command:
             await self._write()
             return False
+        has_decided = False
+
+        def decide() -> Registers | None:
+            nonlocal has_decided
+            has_decided = True
+            return self._decide_or_repeat()
+
         with self._noting_doubt():
-            answer = await link.send_and_read(self._decide_or_repeat)
+            answer = await link.send_and_read(decide)
             entry = self._controller.in_flight
             if entry is None:
+                if not has_decided:
+                    self._controller.note_repeat(self.tick.time())
                 return False
             answered = self.tick.time()
             if answer is None:

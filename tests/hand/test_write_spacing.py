@@ -11,11 +11,12 @@ from typing import Any
 import pytest
 
 from robotiq_async import Fault, Finger, RobotiqHand, State
-from robotiq_async.simulator import Habits, SimulatedGripper, SimulatorServer
+from robotiq_async.simulator import Habits, SerialSimulatorServer, SimulatedGripper, SimulatorServer
 from robotiq_async.values.request import Request
 from tests.fake_transport import Wire
 from tests.grippers import activate_beforehand
 from tests.virtual import until
+from tests.virtual_line import VirtualLine
 
 pytestmark = pytest.mark.virtual_time
 
@@ -60,6 +61,20 @@ async def test_a_move_right_after_another_one_goes_where_it_is_asked() -> None:
             await asyncio.sleep(step * 0.0005)
             assert (await hand.move(10, A)).positions[A] == pytest.approx(10, abs=2)
             await asyncio.sleep(0.02)
+
+
+async def test_a_command_keeps_its_distance_from_a_trial_of_function_23(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It came 6 ms after it: forgotten, and its move failed with "another client commands the gripper"."""
+    cable, habits = VirtualLine(monkeypatch), Habits(write_spacing=SPACING_S)
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, habits=habits, model="2f85")
+    async with SerialSimulatorServer(cable.FAR, gripper):
+        await activate_beforehand(gripper)
+        address = f"rtu://{cable.NEAR}?model=2f85"
+        async with RobotiqHand(address, write_spacing=SPACING_S) as hand:
+            for position in (60, 30):  # the second one finds the jaw at rest, as this link has requested it
+                assert (await hand.move(position, speed=255)).positions[A] == pytest.approx(position, abs=3)
 
 
 @pytest.mark.parametrize("spacing", [0.0, 0.004, 0.01, 0.03])
