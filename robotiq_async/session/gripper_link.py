@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -24,6 +25,10 @@ from ..values.registers import RegisterMap
 _GATEWAY: Final = " (two grippers behind one gateway: give each of the hands its device_id)"
 _LINE: Final = " (two grippers on one serial line: give each of the hands its device_id, in one event loop)"
 _URCAP: Final = " (two grippers behind one URCap: give each of the hands its device_id)"
+
+MOST_LEFT: Final = 64
+"""The most grippers of which is kept what their last hands have left. Half a second after its end only the
+contacts of a hand matter: they keep a grip when rGTO rises again."""
 
 T = TypeVar("T")
 L = TypeVar("L")
@@ -153,12 +158,15 @@ class _Claim(Generic[T]):
 
 
 class Claims(Generic[T, L]):
-    """Grippers and their owners, and what the last owner of each has left for the next. Thread-safe."""
+    """Grippers and their owners, and what the last owner of each has left for the next. Thread-safe.
+
+    What is left is kept for the last :data:`MOST_LEFT` grippers.
+    """
 
     def __init__(self) -> None:
         self._claiming = threading.Lock()
         self._claims: dict[T, _Claim[T]] = {}
-        self._left: dict[Gripper, L] = {}
+        self._left: OrderedDict[Gripper, L] = OrderedDict()  # the newest last
 
     def claim(self, gripper: Callable[[], Gripper], owner: T, is_over: Callable[[T], bool]) -> T | None:
         """Claim a gripper for the running loop; return its present owner if it has one.
@@ -183,11 +191,16 @@ class Claims(Generic[T, L]):
         """Give up a claim, and leave something for the next owner. Takes no lock: any thread may call it."""
         claim = self._claims.pop(owner, None)
         if claim is not None and left is not None:
-            self._left[claim.gripper()] = left
+            gripper = claim.gripper()
+            self._left[gripper] = left
+            self._left.move_to_end(gripper)
+            if len(self._left) > MOST_LEFT:
+                self._left.popitem(last=False)
 
     def left(self, gripper: Gripper) -> L | None:
         """What the last owner of a gripper has left."""
-        return self._left.get(gripper)
+        newest_first = reversed([*self._left.items()])
+        return next((left for each, left in newest_first if each.may_be(gripper)), None)
 
 
 def _conflict(owned: Gripper, wanted: Gripper, *, is_here: bool) -> bool:

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from robotiq_async.session.gripper_link import Claims, Gripper
+from robotiq_async.session.gripper_link import MOST_LEFT, Claims, Gripper
 
 
 def never(_: object) -> bool:
@@ -124,3 +124,29 @@ async def test_the_next_owner_gets_what_the_last_one_has_left(claims: Claims[str
     claims.claim(lambda: here, "second", never)
     claims.release("second")
     assert (claims.left(here), claims.left(there)) == ("what is on its way", None)
+
+
+@pytest.mark.parametrize(("last", "following"), [(None, 9), (9, None)])
+async def test_what_was_left_is_found_with_and_without_a_unit_id(
+    claims: Claims[str, str], last: int | None, following: int | None
+) -> None:
+    claims.claim(lambda: Gripper("x", last), "first", never)
+    claims.release("first", "what is on its way")
+    assert claims.left(Gripper("x", following)) == "what is on its way"
+
+
+async def test_what_was_left_is_kept_for_the_newest_grippers() -> None:
+    claims: Claims[str, int] = Claims()
+
+    def run(number: int) -> None:
+        claims.claim(lambda: Gripper(f"gripper {number}"), "hand", never)
+        claims.release("hand", number)
+
+    for number in range(MOST_LEFT):
+        run(number)
+    run(0)
+    run(MOST_LEFT)
+    kept = [
+        number for number in range(MOST_LEFT + 1) if claims.left(Gripper(f"gripper {number}")) is not None
+    ]
+    assert kept == [0, *range(2, MOST_LEFT + 1)]
