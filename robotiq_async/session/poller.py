@@ -10,7 +10,7 @@ import functools
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Final
+from typing import Final, NamedTuple
 
 from ..control.controller import Controller, NextWrite
 from ..control.entry import Entry
@@ -30,6 +30,16 @@ from .options import HandOptions
 from .publisher import Publisher
 
 
+class Parts(NamedTuple):
+    """The parts of a run; its poller works with the same."""
+
+    link: Link
+    controller: Controller
+    counters: Counters
+    publisher: Publisher
+    options: HandOptions
+
+
 class Poller:
     """Makes the cycles, and passes on what they read and write.
 
@@ -37,20 +47,11 @@ class Poller:
         tick: the tick of the cycles.
     """
 
-    def __init__(
-        self,
-        link: Link,
-        controller: Controller,
-        counters: Counters,
-        publisher: Publisher,
-        options: HandOptions,
-    ) -> None:
+    def __init__(self, parts: Parts) -> None:
+        link, self._controller, self._counters, self._publisher, options = parts
         self._link: Final = link
         self._cyclic: Final = link if isinstance(link, CyclicLink) else None
         self._line: Final = link if isinstance(link, SharedLink) else None
-        self._controller: Final = controller
-        self._counters: Final = counters
-        self._publisher: Final = publisher
         self._model: Final = options.model
         self._is_slow: Final = options.link.is_slow
         self._make_status: Final = functools.partial(

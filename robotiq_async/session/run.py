@@ -34,9 +34,8 @@ from enum import Enum
 from time import strftime
 from typing import Final, NamedTuple
 
-from ..control.controller import Controller, NextWrite
+from ..control.controller import NextWrite
 from ..control.waiters import fail, resolve
-from ..link.transport import Link
 from ..runtime.limit import Limit
 from ..values.enums import StopLevel
 from ..values.errors import (
@@ -47,13 +46,10 @@ from ..values.errors import (
     RobotiqConnectionError,
     RobotiqError,
 )
-from ..values.statistics import Counters
 from .cycle import STOP
 from .ending import IN_FLIGHT_S, Ending
 from .opening import Opener
-from .options import HandOptions
-from .poller import Poller
-from .publisher import Publisher
+from .poller import Parts, Poller
 
 # anyio loads its backend at its first use, which would hold up the loop for some 20 ms when a hand starts.
 # The name of the backend is not documented; if it changes, it only costs those 20 ms.
@@ -101,35 +97,23 @@ class Run:
         failure: what has ended the run, unless that was a stop.
     """
 
-    def __init__(
-        self,
-        link: Link,
-        controller: Controller,
-        counters: Counters,
-        publisher: Publisher,
-        options: HandOptions,
-        ended: Callable[[], None] = lambda: None,
-    ) -> None:
+    def __init__(self, parts: Parts, ended: Callable[[], None] = lambda: None) -> None:
         """``ended`` is called once, in the turn of the loop in which the run ends."""
         self.state = RunState.CONNECTING
         self.connected: Final[asyncio.Future[None]] = asyncio.get_running_loop().create_future()
         self.down: Down | None = None
         self.failure: BaseException | None = None
         self._ended: Final = ended
-        self._link: Final = link
-        self._controller: Final = controller
-        self._counters: Final = counters
-        self._publisher: Final = publisher
-        self._options: Final = options
+        self._parts: Final = parts
         self._loop: Final = asyncio.get_running_loop()
-        self._poller: Final = Poller(link, controller, counters, publisher, options)
-        self._opener: Final = Opener(self._connect, options)
+        self._poller: Final = Poller(parts)
+        self._opener: Final = Opener(self._connect, parts.options)
         self._in_flight: Final = Limit()  # of the exchange in flight when a stop comes
         self._ending: Ending | None = None
 
     def _become(self, state: RunState) -> None:
         assert state in _NEXT[self.state], f"{self.state.name} -> {state.name}"
-        self._options.log.debug("run: %s -> %s", self.state.name, state.name)
+        self._parts.options.log.debug("run: %s -> %s", self.state.name, state.name)
         self.state = state
 
     # -- what others ask -------------------------------------------------------------------------------
@@ -139,7 +123,7 @@ class Run:
 
         Who must not hear of it before the write waits for that, unless it is far.
         """
-        publisher, controller, write = self._publisher, self._controller, self._poller.hurry()
+        publisher, controller, write = self._parts.publisher, self._parts.controller, self._poller.hurry()
         if write is not None and (write.is_urgent or controller.has_ended_callers) and self._is_soon(write):
             publisher.hold_back(publication=write.is_urgent)
         elif not publisher.has_to_tell:
@@ -158,19 +142,19 @@ class Run:
         level = StopLevel.of(halt=halt, keep_grip=keep_grip)
         if self._ending is None:
             # A halt, a reset or a hold that is not over is dropped with the rest: this stop must replace it.
-            level = max(level, StopLevel.KEEP) if self._controller.has_open_stop else level
-            self._ending = Ending(level, self._options.log)
+            level = max(level, StopLevel.KEEP) if self._parts.controller.has_open_stop else level
+            self._ending = Ending(level, self._parts.options.log)
             if self.state is not RunState.CONNECTING:
                 self._in_flight.restart(IN_FLIGHT_S)
             if level > StopLevel.LEAVE and self._is_soon(STOP):
-                self._publisher.hold_back(publication=True)
+                self._parts.publisher.hold_back(publication=True)
                 self._poller.tick.hurry()
             self._become(RunState.ENDING)
-            self._controller.refuse_requests()
-            if not self._publisher.has_to_tell:
-                self._publisher.tell()
+            self._parts.controller.refuse_requests()
+            if not self._parts.publisher.has_to_tell:
+                self._parts.publisher.tell()
         elif self._ending.strengthen(level) and level is StopLevel.SHUTDOWN:
-            self._controller.keep_no_grip()
+            self._parts.controller.keep_no_grip()
         self._opener.end()
 
     def link_error(self) -> RobotiqConnectionError:
@@ -179,7 +163,7 @@ class Run:
         why = "" if down is None else f": {down.why} (down since {down.since})"
         error = ConnectionLostError(f"the link is down{why}")
         error.__cause__ = None if down is None else down.why
-        return error.of_hand(self._options.given_name)
+        return error.of_hand(self._parts.options.given_name)
 
     def why_over(self) -> RobotiqError:
         """Make the error for those who wait for anything of a run that is over."""
@@ -222,7 +206,7 @@ class Run:
         if self.state is RunState.OVER:
             return
         if bug is not None:
-            self._options.log.critical("the task that owns the link failed", exc_info=bug)
+            self._parts.options.log.critical("the task that owns the link failed", exc_info=bug)
             self.failure = bug
         self._become(RunState.OVER)
         stopped = NotStartedError("the hand was stopped while it connected")
@@ -248,9 +232,9 @@ class Run:
             return False
         self._become(RunState.POLLING)
         resolve([self.connected])
-        policy = self._options.policy
+        policy = self._parts.options.policy
         # From here on the reconnect policy decides about activations.
-        self._controller.allow_activation(policy is not None and policy.activate)
+        self._parts.controller.allow_activation(policy is not None and policy.activate)
         return True
 
     async def _connect(self) -> None:
@@ -258,22 +242,22 @@ class Run:
         await self._open()
         self._poller.break_period()
         await self._poller.read(is_first=True)
-        while self._controller.is_undecided:  # the silence before may show as a fault, once
-            await asyncio.sleep(self._options.poll_interval)
+        while self._parts.controller.is_undecided:  # the silence before may show as a fault, once
+            await asyncio.sleep(self._parts.options.poll_interval)
             await self._poller.read()
         self._poller.start_ticking()
 
     async def _open(self) -> None:
         try:
-            await self._link.open()
+            await self._parts.link.open()
         except RobotiqConnectionError:
             raise
         except Exception as error:
             if self.state is RunState.CONNECTING:
                 raise  # a mistake of ours, or of a transport object
             # No thread, no memory, no descriptor: what the system lacks now it may have at the next try.
-            self._options.log.debug("the link could not be opened", exc_info=error)
-            raise ConnectFailedError(self._options.link.address, repr(error)) from error
+            self._parts.options.log.debug("the link could not be opened", exc_info=error)
+            raise ConnectFailedError(self._parts.options.link.address, repr(error)) from error
 
     # -- polling ---------------------------------------------------------------------------------------
 
@@ -284,8 +268,8 @@ class Run:
                 return
             try:
                 await self._poller.cycle()
-                if self._publisher.has_to_tell and self.state is RunState.POLLING:
-                    self._publisher.tell()
+                if self._parts.publisher.has_to_tell and self.state is RunState.POLLING:
+                    self._parts.publisher.tell()
                 if not is_regular:
                     self._poller.break_period()
             except RobotiqConnectionError as error:
@@ -293,7 +277,7 @@ class Run:
 
     async def _reconnect(self, why: RobotiqConnectionError) -> None:
         """Open the link again, unless a stop comes; if it is given up, the run has failed."""
-        log, policy, since = self._options.log, self._options.policy, self._loop.time()
+        log, policy, since = self._parts.options.log, self._parts.options.policy, self._loop.time()
         log.warning("link lost: %s", why)
         self._note_down(why)
         if self.state is RunState.POLLING:
@@ -312,17 +296,17 @@ class Run:
             return
         self.down = None
         self._become(RunState.POLLING)
-        self._counters.note_reconnect()
+        self._parts.counters.note_reconnect()
         log.warning("link back after %.2f s", self._loop.time() - since)
 
     def _note_down(self, why: RobotiqConnectionError) -> None:
         """The newest reason counts: the first one is often the least telling."""
         self.down = Down(why, strftime("%H:%M:%S") if self.down is None else self.down.since)
-        self._controller.machine.note_down(f"{why} (down since {self.down.since})")
+        self._parts.controller.machine.note_down(f"{why} (down since {self.down.since})")
 
     def _lose(self, why: RobotiqConnectionError) -> None:
-        self._controller.lost(why, self._poller.tick.time())
-        self._publisher.tell()
+        self._parts.controller.lost(why, self._poller.tick.time())
+        self._parts.publisher.tell()
 
     # -- the end ---------------------------------------------------------------------------------------
 
@@ -330,8 +314,8 @@ class Run:
         """Stop the fingers if there is time, then disconnect."""
         if self._ending is None:
             # A hand that has only looked leaves the fingers to the client that moves them.
-            has_written = self._counters.has_begun_to_write
-            self.request_stop(halt=has_written, keep_grip=self._options.keep_grip)
+            has_written = self._parts.counters.has_begun_to_write
+            self.request_stop(halt=has_written, keep_grip=self._parts.options.keep_grip)
         assert self._ending is not None, "it was requested"
         try:
             await self._ending.carry_out(self._stop_fingers, self._close)
@@ -341,25 +325,25 @@ class Run:
 
     async def _close(self) -> None:
         if not self._loop.is_closed():
-            self._publisher.tell()
-            await self._link.close()
+            self._parts.publisher.tell()
+            await self._parts.link.close()
 
     async def _stop_fingers(self) -> None:
         """Clear rGTO and see it, trying until the time is over. Unlike a motion, a stop may be sent again."""
         failed = False
-        while self._controller.status is not None:
+        while self._parts.controller.status is not None:
             try:
                 await self._stop_fingers_once()
                 return
             except RobotiqConnectionError as error:
                 if not failed:
-                    self._options.log.warning("the stop was not delivered, trying again: %s", error)
+                    self._parts.options.log.warning("the stop was not delivered, trying again: %s", error)
                 failed = True
                 self._lose(error)
             await asyncio.sleep(STOP_PAUSE_S)
 
     async def _stop_fingers_once(self) -> None:
-        if not self._link.is_open:
+        if not self._parts.link.is_open:
             # It may have been lost since the last exchange: what has become of a grip meanwhile is not known.
             self._lose(self.link_error())
             # A gripper without a client keeps moving. Read first: if it has lost its power, an image
@@ -367,11 +351,11 @@ class Run:
             await self._open()
             await self._poller.read()
         assert self._ending is not None, "the fingers are stopped at the end"
-        self._controller.stop_fingers(self._ending.level)
+        self._parts.controller.stop_fingers(self._ending.level)
         while True:
             await self._poller.cycle()
-            if self._publisher.has_to_tell:
-                self._publisher.tell()  # if nothing had to be written in it
-            if not self._controller.is_busy:
+            if self._parts.publisher.has_to_tell:
+                self._parts.publisher.tell()  # if nothing had to be written in it
+            if not self._parts.controller.is_busy:
                 return
-            await asyncio.sleep(self._options.poll_interval)
+            await asyncio.sleep(self._parts.options.poll_interval)

@@ -47,6 +47,7 @@ from ..values.statistics import Counters
 from ..values.status import RobotiqStatus
 from .gripper_link import Claims
 from .options import HandOptions
+from .poller import Parts
 from .publisher import Publisher
 from .run import Run, RunState
 from .streams import Channels
@@ -105,7 +106,8 @@ class Session:
         except BaseException:
             self._claims.release(self)
             raise
-        self.run = Run(link, self.controller, self.counters, self._publisher, options, self._end)
+        parts = Parts(link, self.controller, self.counters, self._publisher, options)
+        self.run = Run(parts, self._end)
         channels.reopen(self._loop)
         machine.begin(self._on_transition)
         machine.show(State.DISCONNECTED, Trigger.ASK_START)
