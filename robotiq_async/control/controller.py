@@ -293,6 +293,11 @@ class Controller:
         """Whether a halt or a reset is not over, or a hold waits for its acknowledgement."""
         return self._stop is not None or self._requests.has_undelivered_hold
 
+    @property
+    def may_have_to_stop(self) -> bool:
+        """Whether a status was read, or the last session has left something that may still act."""
+        return self.status is not None or self._activation is not None or not self._ledger.is_settled
+
     def _view(self) -> State:
         """The state: that of the stop or procedure that runs; if none does, what the gripper shows."""
         if self.machine.state in _OFF:

@@ -331,7 +331,7 @@ class Run:
     async def _stop_fingers(self) -> None:
         """Clear rGTO and see it, trying until the time is over. Unlike a motion, a stop may be sent again."""
         failed = False
-        while self._parts.controller.status is not None:
+        while self._parts.controller.may_have_to_stop:
             try:
                 await self._stop_fingers_once()
                 return

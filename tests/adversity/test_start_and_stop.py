@@ -7,12 +7,13 @@ import logging
 
 import pytest
 
-from robotiq_async import Finger, NotStartedError, RobotiqError, State
+from robotiq_async import Finger, NotStartedError, RobotiqError, RobotiqHand, State
 from robotiq_async.simulator import Trouble
+from robotiq_async.values.model import TWO_FINGER_85, Model
 from robotiq_async.values.request import Request
 from tests.adversity.phases import PHASES, Phase
-from tests.adversity.world import World, started, world
-from tests.virtual import inside
+from tests.adversity.world import MODEL, World, started, world
+from tests.virtual import inside, run
 
 A = Finger.A
 
@@ -82,6 +83,41 @@ async def test_an_activation_of_ours_is_taken_back_also_after_the_link_blinked(h
         await asyncio.sleep(0.5)
         await here.hand.stop()
     await here.nothing_moves_for(6, tolerance=2)
+
+
+@pytest.mark.parametrize("finds_it", [True, False])
+@pytest.mark.parametrize(
+    ("link", "model"), [("tcp", MODEL), ("rtu", MODEL), ("urcap", TWO_FINGER_85)], ids=str
+)
+@pytest.mark.parametrize(("device_cycle", "after"), [(0.005, 0.0), (0.05, 0.02), (0.2, 0.3), (0.05, 1.0)])
+def test_a_stop_takes_back_an_activation_that_the_last_start_has_left(
+    monkeypatch: pytest.MonkeyPatch,
+    link: str,
+    model: Model,
+    device_cycle: float,
+    after: float,
+    finds_it: bool,
+) -> None:
+    """By a stop that comes as soon as the next start has found it, or before that has read anything."""
+
+    async def main() -> None:
+        async with world(link, monkeypatch=monkeypatch, model=model, speedup=1.0) as here:
+            await here.hand.start(activate=False)
+            here.gripper.device_cycle = device_cycle
+            activating = asyncio.create_task(here.hand.activate())
+            await here.until(lambda: bool(here.gripper.writes))
+            await here.hand.stop(halt=False)
+            await asyncio.gather(activating, return_exceptions=True)
+            await asyncio.sleep(after)
+            hand = RobotiqHand(here.hand.address, model=model)
+            starting = asyncio.create_task(hand.start(activate=False))
+            await (starting if finds_it else asyncio.sleep(0))
+            await hand.stop()
+            await asyncio.gather(starting, return_exceptions=True)
+            await here.nothing_moves_for(4, tolerance=2)
+            assert not Request.from_registers(here.gripper.request_registers, model).activate
+
+    run(main)
 
 
 @inside(world)
