@@ -49,6 +49,7 @@ class NextWrite(NamedTuple):
     wait: float  # seconds until it may leave, because of write_spacing
     is_urgent: bool  # a stop, which does not wait for a status that may never come
     is_command: bool  # a command or a hold, and no step of something longer
+    is_stop: bool  # it stops motion, as urgent ones and holds do: nobody hears of it before it leaves
 
 
 class Left(NamedTuple):
@@ -448,7 +449,8 @@ class Controller:
             return None  # most cycles end here
         stop, status = self._stop, self._evidence.status
         urgent = stop is not None and status is not None and stop.is_urgent(self._ledger, status)
-        return NextWrite(self._wait(now), urgent, stop is None and self._procedure is None)
+        is_command = stop is None and self._procedure is None
+        return NextWrite(self._wait(now), urgent, is_command, urgent or bool(self._requests.pending.hold))
 
     def _wait(self, now: float) -> float:
         stop = self._stop

@@ -39,7 +39,7 @@ SOON_S: Final = 0.0025
 """Longest wait of a cycle for write_spacing: half of a usual period, so that its status is still fresh."""
 
 
-STOP: Final = NextWrite(wait=0.0, is_urgent=True, is_command=False)  # the first write of a stop
+STOP: Final = NextWrite(wait=0.0, is_urgent=True, is_command=False, is_stop=True)  # its first write
 
 
 class Step(Enum):

@@ -8,12 +8,11 @@ What they do may hold up the loop. So a write that is due leaves first.
 # A listener may command the hand. If it got a change of state in the middle of a call, the rest of the call
 # would overwrite its request: changes are noted, and published after the call.
 #
-# A request may end what others wait for, and one that stops the fingers leaves at once. Until its image has
-# left
+# A request may end what others wait for, and one that stops the fingers leaves soon. Until its image has left
 #
 # * the callers whom it has ended wait, whatever it is;
-# * the publication waits, too, if it is a stop, a halt or a reset: see hold_back(). State waiters are woken
-#   by the publication, and so they wait with it.
+# * the publication waits, too, if it is a stop, a halt, a reset or a hold: see hold_back(). State waiters are
+#   woken by the publication, and so they wait with it.
 #
 # They hear in the turn of the loop after that in which the image leaves; sooner if none leaves, because the
 # cycle had nothing to write, the link failed or is closed: see tell(). A write that is not expected soon, as

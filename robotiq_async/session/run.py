@@ -124,8 +124,8 @@ class Run:
         Who must not hear of it before the write waits for that, unless it is far.
         """
         publisher, controller, write = self._parts.publisher, self._parts.controller, self._poller.hurry()
-        if write is not None and (write.is_urgent or controller.has_ended_callers) and self._is_soon(write):
-            publisher.hold_back(publication=write.is_urgent)
+        if write is not None and (write.is_stop or controller.has_ended_callers) and self._is_soon(write):
+            publisher.hold_back(publication=write.is_stop)
         elif not publisher.has_to_tell:
             controller.answer_ended()
         publisher.publish_changes()

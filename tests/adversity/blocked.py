@@ -152,9 +152,7 @@ class Life:
         self.answer()
         said, where = await self.said(), self.case.place.where
         if said == "blocked":
-            # Callers hear after the write, and listeners too, but not of a hold.
-            hears_after = where == "clean-up" or (where == "listener" and self.case.call != "hold")
-            if hears_after and not await self.has_stopped(within=5.0):
+            if where in ("clean-up", "listener") and not await self.has_stopped(within=5.0):
                 return "the fingers move while the program is held up"
             await asyncio.sleep(self.case.block)
             self.answer()

@@ -29,7 +29,8 @@ def test_the_fingers_stop_wherever_the_loop_is_held_up(call: str, place: Place) 
 async def test_a_gripper_in_another_process_stops_before_whoever_hears_of_it_can_hold_up_the_loop() -> None:
     """Clean-ups and listeners ran before the write; after a block of 2 s in the loop there was none."""
     in_clean_up = [Case(call, Place("clean-up"), 0.0, 0.0) for call in blocked.CALLS]
-    in_listener = [Case(call, Place("listener"), 0.0, 0.0) for call in ("stop", "signal", "halt", "reset")]
+    stops = ("stop", "signal", "halt", "reset", "hold")
+    in_listener = [Case(call, Place("listener"), 0.0, 0.0) for call in stops]
     turns = {"stop": 0, "leave": 3, "signal": 3, "halt": 8}
     in_turn = [Case(call, Place("turn", turn), 2.0, 0.0) for call, turn in turns.items()]
     assert await blocked.judge([*in_clean_up, *in_listener, *in_turn]) == {}

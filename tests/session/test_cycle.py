@@ -8,9 +8,9 @@ from robotiq_async.control.controller import NextWrite
 from robotiq_async.session.cycle import FRESH_S, READS, SOON_S, Step, next_step
 from robotiq_async.session.options import LONGEST_SPACING_S
 
-STOP = NextWrite(wait=0.0, is_urgent=True, is_command=False)
-COMMAND = NextWrite(wait=0.0, is_urgent=False, is_command=True)
-PROCEDURE = NextWrite(wait=0.0, is_urgent=False, is_command=False)
+STOP = NextWrite(wait=0.0, is_urgent=True, is_command=False, is_stop=True)
+COMMAND = NextWrite(wait=0.0, is_urgent=False, is_command=True, is_stop=False)
+PROCEDURE = NextWrite(wait=0.0, is_urgent=False, is_command=False, is_stop=False)
 LONG_S = 1e-4  # more than that is too much
 
 
