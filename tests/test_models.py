@@ -17,11 +17,13 @@ from robotiq_async import (
     THREE_FINGER,
     TWO_FINGER_85,
     TWO_FINGER_140,
+    ConnectionLostError,
     Fault,
     Finger,
     GripperFaultError,
     Model,
     ObjectStatus,
+    ProtocolError,
     RobotiqHand,
     RobotiqStatus,
     Severity,
@@ -266,6 +268,37 @@ async def test_a_gripper_of_another_model_is_refused_and_not_written_to(
         with pytest.raises(WrongModelError, match=words):
             await hand.start()
     assert not gripper.writes
+
+
+def of_no_gripper(reply: bytes) -> list[tuple[float, bytes]]:
+    """A reply over TCP: one with registers shows several axes, and a controller as siblings have it."""
+    strange = reply[:10] + b"\xff\xf0" + reply[12:]
+    return [(0.0, strange if reply[7] in (3, 4) and len(reply) > 13 else reply)]
+
+
+@pytest.mark.parametrize("model", [THREE_FINGER, TWO_FINGER_85], ids=lambda model: model.name)
+@virtual
+async def test_another_device_is_refused_and_not_written_to(model: Model) -> None:
+    """At a start, at a reconnection, and at the stop in the end."""
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, model=model)
+    async with SimulatorServer(gripper) as server:
+        hand = RobotiqHand(f"127.0.0.1:{server.port}", model=model)
+        server.policy = of_no_gripper
+        with pytest.raises(ProtocolError, match="another device answers: its registers"):
+            await hand.start()
+        assert not gripper.writes
+        server.policy = lambda reply: [(0.0, reply)]
+        await hand.start()
+        await hand.set_position(200)
+        server.policy = of_no_gripper
+        written = len(gripper.writes)
+        server.cut()
+        await hand.wait_for_state(State.DISCONNECTED)
+        await asyncio.sleep(3)
+        with pytest.raises(ConnectionLostError, match="another device answers"):
+            hand.command(position=0)
+        await hand.stop()
+        assert len(gripper.writes) == written
 
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=lambda model: model.name)

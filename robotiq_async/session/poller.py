@@ -17,9 +17,9 @@ from ..control.entry import Entry
 from ..link.transport import CyclicLink, Link, SharedLink
 from ..runtime.limit import HELD_S
 from ..runtime.tick import Tick
-from ..values.errors import RobotiqConnectionError, WrongModelError
+from ..values.errors import ProtocolError, RobotiqConnectionError, WrongModelError
 from ..values.events import SentRequest
-from ..values.model import names_that_fit
+from ..values.model import names_that_fit, why_stranger
 from ..values.registers import Registers
 from ..values.request import Request
 from ..values.statistics import Counters
@@ -260,15 +260,20 @@ class Poller:
         await self.read()
 
     async def read(self, *, is_first: bool = False) -> None:
-        """Read the status; the first one on a link must be of the model."""
+        """Read the status; who answers is settled by the first one on a link, before anything is written."""
         asked = self.tick.time()
         registers = await self._link.read()
         answered = self.tick.time()
-        if is_first and (why := self._model.contradiction(registers)):
-            raise WrongModelError(
-                f"this is no {self._model.title}: its registers show {why}; {names_that_fit(registers)}"
-            )
+        if is_first and (shown := self._model.contradiction(registers)):
+            await self._link.close()  # a stop would be written to a link that is open
+            raise self._not_this_gripper(registers, shown)
         self._take(self._status(registers, answered), asked)
+
+    def _not_this_gripper(self, registers: Registers, shown: str) -> ProtocolError:
+        if why := why_stranger(registers):
+            return ProtocolError(f"another device answers: {why}")
+        what = f"this is no {self._model.title}: its registers show {shown}"
+        return WrongModelError(f"{what}; {names_that_fit(registers)}")
 
     def _status(self, registers: Registers, answered: float) -> RobotiqStatus:
         number, has_current = next(self._publisher.numbers), self._link.has_current

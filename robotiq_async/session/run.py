@@ -347,9 +347,9 @@ class Run:
             # It may have been lost since the last exchange: what has become of a grip meanwhile is not known.
             self._lose(self.link_error())
             # A gripper without a client keeps moving. Read first: if it has lost its power, an image
-            # with rACT would activate it.
+            # with rACT would activate it, and another device may have its address.
             await self._open()
-            await self._poller.read()
+            await self._poller.read(is_first=True)
         assert self._ending is not None, "the fingers are stopped at the end"
         self._parts.controller.stop_fingers(self._ending.level)
         while True:

@@ -155,14 +155,16 @@ class Model:
         """The status registers that only another model can have, as a text; empty if there are none.
 
         A sibling leaves byte 1 and bytes 6 to 14 at 0. On a 3-Finger the positions of B, C and the scissor
-        lie there, which are never 0 together. All zeros prove nothing: a gateway may send them before its
-        gripper answers.
+        lie there, which are never 0 together. Reserved bits are 0. All zeros prove nothing: a gateway may
+        send them before its gripper answers.
         """
         has_one = not registers[0] & 0xFF and not any(registers[3:7]) and not registers[7] >> 8
         if has_one and len(self.axes) > 1 and registers[2] >> 8:
             return "one axis alone, as a 2F or a Hand-E: bytes 1 and 6 to 14 are 0"
         if not has_one and len(self.axes) == 1:
             return "more than one axis, as a 3-Finger: bytes 1 and 6 to 14 are not all 0"
+        if any(field.read(registers) for field in reg.status_reserved(self.has_modes)):
+            return "bits that are always 0 in it"
         return ""
 
     @property
@@ -257,6 +259,14 @@ def model_of(value: object, name: str = "model") -> Model:
         hint = f"; did you mean {meant[0]}?" if meant else ""
         raise ValueError(f"{name} must be one of {', '.join(MODELS)}, got {value!r:.100}{hint}")
     return MODELS[value.lower()]
+
+
+def why_stranger(registers: Registers) -> str:
+    """The reason why status registers are of no model; empty if they may be those of one."""
+    if not all(model.contradiction(registers) for model in MODELS.values()):
+        return ""
+    words = " ".join(f"{word:04X}" for word in registers)
+    return f"its registers {words} have bits set that are 0 in a gripper"
 
 
 def names_that_fit(registers: Registers) -> str:

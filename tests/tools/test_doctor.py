@@ -162,7 +162,7 @@ STRANGERS: dict[str, tuple[Callable[[bytes], bytes], str, Level, str]] = {
         Level.BAD,
         "the gripper behind it does not",
     ),
-    "zeros": (lambda request: registers_in(request, bytes(16)), "gripper", Level.DOUBT, "have no power"),
+    "zeros": (lambda request: registers_in(request, bytes(16)), "gripper", Level.BAD, "never activated"),
     "ones": (
         lambda request: registers_in(request, b"\xff" * 16),
         "gripper",

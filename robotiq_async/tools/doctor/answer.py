@@ -21,8 +21,8 @@ from ...values.errors import (
     ResponseTimeoutError,
     RobotiqConnectionError,
 )
-from ...values.model import Model, model_of
-from ...values.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap, status_reserved
+from ...values.model import model_of, why_stranger
+from ...values.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap
 from ...values.status import RobotiqStatus
 from .findings import Finding, GiveUpError, Level, Report
 
@@ -60,7 +60,7 @@ async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> 
     """
     failure: RobotiqConnectionError | None = None
     echoes = False
-    stranger: RobotiqStatus | None = None
+    stranger = ""
     for number, (registers, patience) in enumerate(_attempts(address, usual)):
         link = _link(address, registers, patience)
         try:
@@ -77,9 +77,9 @@ async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> 
             continue
         if number == 0:
             _report_port(address, report)
-        if _has_reserved_bits(status, model_of(address.model)):
+        if why := why_stranger(status.registers):
             await link.close()
-            stranger = stranger or status
+            stranger = stranger or why
             continue
         tries = number + 1
         if registers != usual and (again := await _ask_again(address, usual, link)) is not None:
@@ -91,7 +91,7 @@ async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> 
         _report_place(usual, registers, report)
         report_silence(status, report)
         return Answering(link, registers)
-    if stranger is not None:
+    if stranger:
         _report_stranger(stranger, report)
         raise GiveUpError
     assert failure is not None
@@ -116,7 +116,7 @@ async def _ask_again(
             status, seconds = await _first_reading(link)
         except RobotiqConnectionError:
             continue
-        if _has_reserved_bits(status, model_of(address.model)):
+        if why_stranger(status.registers):
             await link.close()
             break
         return link, status, seconds
@@ -323,21 +323,17 @@ def _report_place(usual: RegisterMap, found: RegisterMap, report: Report) -> Non
 
 
 def report_silence(status: RobotiqStatus, report: Report) -> None:
-    """Report a status that no gripper has."""
+    """Report a status that tells nothing."""
     if not any(status.registers):
-        found = "all registers read 0, which never happens with a gripper"
-        advice = "The gripper behind the fieldbus may have no power, or this is another device."
-        report(Finding(Level.DOUBT, "gripper", found, advice))
+        found = "all registers read 0: nothing shows that this is a gripper"
+        advice = (
+            "Another device, a gripper without power behind its fieldbus, or one that was never activated. A "
+            "hand cannot tell them apart, and start() writes: look at the gripper's lights and address first."
+        )
+        report(Finding(Level.BAD, STRANGER, found, advice))
 
 
-def _has_reserved_bits(status: RobotiqStatus, model: Model) -> bool:
-    # Random memory passes this check once in 4096 times.
-    return any(field.read(status.registers) for field in status_reserved(model.has_modes))
-
-
-def _report_stranger(status: RobotiqStatus, report: Report) -> None:
+def _report_stranger(why: str, report: Report) -> None:
     report(Finding(Level.GOOD, "Modbus", "answers"))
-    words = " ".join(f"{word:04X}" for word in status.registers)
-    found = f"another device answers: its registers {words} have bits set that are 0 in a gripper"
     advice = "Send it no commands: another machine may move. Are address, unit id and registers right?"
-    report(Finding(Level.BAD, STRANGER, found, advice))
+    report(Finding(Level.BAD, STRANGER, f"another device answers: {why}", advice))

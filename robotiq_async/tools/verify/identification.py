@@ -8,8 +8,7 @@ from typing import Final
 from ...link.registers import registers_of
 from ...session.options import POLL_INTERVAL_S
 from ...values.enums import Fault
-from ...values.model import names_that_fit
-from ...values.registers import status_reserved
+from ...values.model import names_that_fit, why_stranger
 from ...values.status import RobotiqStatus
 from ..doctor.answer import STRANGER, find_gripper
 from ..doctor.findings import Finding, GiveUpError
@@ -49,11 +48,11 @@ def why_no_gripper(status: RobotiqStatus) -> str:
     words = " ".join(f"{word:04X}" for word in status.registers)
     if not any(status.registers):
         return "all registers read 0; the gripper behind the fieldbus may have no power"
+    if why := why_stranger(status.registers):
+        return why
     if shown := status.model.contradiction(status.registers):
         how = names_that_fit(status.registers)
         return f"this is no {status.model.title}: its registers show {shown}; {how}"
-    if any(field.read(status.registers) for field in status_reserved(status.model.has_modes)):
-        return f"bits are set that are always 0 in a gripper: {words}"
     if status.fault.name.startswith("UNKNOWN"):
         return f"a fault code that is not in the manual: {words}"
     if not status.activation_echo and not status.is_reset:
