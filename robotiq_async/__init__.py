@@ -20,7 +20,7 @@ Nothing of this has run on real hardware yet.
 """
 
 from .hand.robotiq_hand import RobotiqHand
-from .link.transport import Transport
+from .link.tunnel import Tunnel
 from .runtime.version import __version__ as __version__
 from .session.options import ReconnectPolicy
 from .session.streams import Stream
@@ -122,8 +122,8 @@ __all__ = [
     "Statistics",
     "Stream",
     "Transition",
-    "Transport",
     "Trigger",
+    "Tunnel",
     "Units",
     "WrongModelError",
 ]

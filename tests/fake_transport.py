@@ -1,9 +1,10 @@
-"""Transports without a network: a simulated gripper that hears, and one that does not follow at first."""
+"""Ways without a network: a simulated gripper that hears, and one that does not follow at first."""
 
 from __future__ import annotations
 
 import asyncio
 import math
+import struct
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -13,7 +14,7 @@ from robotiq_async.values.errors import (
     ConnectionLostError,
     ResponseTimeoutError,
 )
-from robotiq_async.values.registers import Registers, gPR
+from robotiq_async.values.registers import REGISTER_COUNT, Registers, gPR
 from robotiq_async.values.request import Request
 
 EXCHANGE_S = 0.001
@@ -21,10 +22,47 @@ SILENCE_S = 0.4
 """Seconds that a transport waits for an answer."""
 DEVICE_CYCLE_S = 0.005
 """Seconds until a write acts on a simulated gripper."""
+WRITE, WRITE_AND_READ = 16, 23
+"""Functions; the second is refused."""
 LOST = ConnectionLostError("unplugged")
 
 
-class Wire:
+class Exchanging:
+    """A tunnel made of reads and writes of whole blocks. It refuses function 23.
+
+    A read of more or fewer registers than a poll has is answered with zeros: nothing that the gripper shows
+    is spent on bringing a link in step.
+    """
+
+    count = REGISTER_COUNT
+    """Registers of a poll, and of a write."""
+
+    async def read(self) -> Registers:
+        raise NotImplementedError
+
+    async def write(self, registers: Sequence[int]) -> None:
+        raise NotImplementedError
+
+    async def probe(self) -> None:
+        """A read of another length."""
+
+    async def exchange(self, pdu: bytes) -> bytes:
+        if pdu[0] == WRITE_AND_READ:
+            return bytes((WRITE_AND_READ | 0x80, 1))
+        count = int.from_bytes(pdu[3:5], "big")
+        if pdu[0] == WRITE:
+            image = struct.unpack_from(f">{count}H", pdu, 6)
+            await self.write((*image, *(0,) * (REGISTER_COUNT - count)))
+            return pdu[:5]
+        words: Registers = (0,) * count
+        if count == self.count:
+            words = (await self.read())[:count]
+        else:
+            await self.probe()
+        return struct.pack(f">BB{count}H", pdu[0], 2 * count, *words)
+
+
+class Wire(Exchanging):
     """A gripper in the time of the loop; the transport fails on demand.
 
     Attributes:
@@ -42,6 +80,7 @@ class Wire:
     def __init__(self, speedup: float = 1.0, **options: Any) -> None:
         time = asyncio.get_running_loop().time
         self.gripper = SimulatedGripper(time, spread=False, speedup=speedup, **options)
+        self.count = self.gripper.model.rtu.count
         self.is_open = False
         self.calls: list[str] = []
         self.written: list[Request] = []
@@ -57,8 +96,10 @@ class Wire:
         await self._carry("read")
         return self.shown()
 
+    async def probe(self) -> None:
+        await self._carry("read")
+
     async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
-        """The part of a link beyond a transport object."""
         registers = decide()
         if registers is None:
             return False

@@ -40,7 +40,7 @@ EXTRAS = {
     "GripEvent": "what RobotiqHand.grip_events() gives",
     "GripChange": "type of GripEvent.change",
     "SentRequest": "what RobotiqHand.requests() gives",
-    "Transport": "what may be passed in place of an address",
+    "Tunnel": "what may be passed in place of an address",
     "ReconnectPolicy": "what may be passed as reconnect",
     "Model": "type of RobotiqHand.model",
     "THREE_FINGER": "what may be passed as model",

@@ -447,7 +447,7 @@ class Hand(Kind):
 
     @property
     def address(self) -> str:
-        """The gripper's address in its full form; for a transport object, its name in messages."""
+        """The gripper's address in its full form; for a tunnel object, its name in messages."""
         return self._address
 
     @property

@@ -26,7 +26,7 @@ from typing import Final, Literal
 
 from ..control.pending import Command
 from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
-from ..link.transport import Transport
+from ..link.tunnel import Tunnel
 from ..runtime.limit import Limit
 from ..session.options import (
     ACTIVATION_TIMEOUT_S,
@@ -87,7 +87,7 @@ class RobotiqHand(Hand):
     Args:
         address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``rtu+tcp://HOST:PORT``
             (a serial line behind a socket), ``urcap://HOST[:63352]`` (a UR with Robotiq's URCap, for a jaw:
-            it carries no currents), ``sim://`` (or ``sim://?speedup=10&object=150``), or a transport object.
+            it carries no currents), ``sim://`` (or ``sim://?speedup=10&object=150``), or a :class:`Tunnel`.
             Without one the gripper is simulated, and the first start logs a warning of that. A serial port
             sends at 115200 baud, 8N1, unless the address ends in
             ``?baud=500000``, ``&parity=E`` or ``&stopbits=2``. Any of them can end in ``?model=2f85`` and in
@@ -147,7 +147,7 @@ class RobotiqHand(Hand):
 
     def __init__(
         self,
-        address: str | Transport = NO_ADDRESS,
+        address: str | Tunnel = NO_ADDRESS,
         *,
         name: str | None = None,
         device_id: int | None = None,

@@ -98,7 +98,7 @@ USUAL_LINE: Final = Line()
 USUAL: Final = "without them 115200 baud, 8N1, as a gripper comes"
 
 
-Kind = Literal["tcp", "rtu", "rtu+tcp", "urcap", "sim"]
+Kind = Literal["tcp", "rtu", "rtu+tcp", "urcap", "sim", "tunnel"]
 
 _SOCKETS: Final[dict[str, tuple[Kind, int | None]]] = {
     "tcp": ("tcp", TCP_PORT),
@@ -113,8 +113,9 @@ class Address:
     """A checked address.
 
     Attributes:
-        kind: "tcp", "rtu", "rtu+tcp", "urcap" or "sim".
-        host: host name or IP address (tcp, rtu+tcp, urcap), device of the serial port (rtu), empty (sim).
+        kind: "tcp", "rtu", "rtu+tcp", "urcap", "sim" or "tunnel".
+        host: host name or IP address (tcp, rtu+tcp, urcap), device of the serial port (rtu), empty (sim),
+            name of the object (tunnel).
         port: TCP port; 0 for the others.
         simulation: what the gripper is like (sim); nothing special for the others.
         line: how the serial port sends (rtu); the usual for the others.
@@ -133,8 +134,8 @@ class Address:
 
     @property
     def is_rtu(self) -> bool:
-        """Whether a serial line leads to the gripper, from here or from a serial server."""
-        return self.kind in ("rtu", "rtu+tcp")
+        """Whether a serial line leads to the gripper, from here, from a serial server or from an arm."""
+        return self.kind in ("rtu", "rtu+tcp", "tunnel")
 
     @property
     def is_socket(self) -> bool:
@@ -149,6 +150,8 @@ class Address:
         if self.is_socket:
             host = f"[{self.host}]" if ":" in self.host else self.host
             return f"{self.kind}://{host}:{self.port}{query}"
+        if self.kind == "tunnel":
+            return self.host
         return f"{self.kind}://{self.host}{query}"
 
 

@@ -68,6 +68,17 @@ class TcpExchange(Exchange):
         return expected.after(header).verdict(received)
 
 
+class PduExchange(Exchange):
+    """A request through a tunnel, which brings a whole reply or none."""
+
+    def __init__(self, request: bytes) -> None:
+        super().__init__(request[1:])
+        self._expected = frames.expected_in_a_tunnel(request)
+
+    def feed(self, data: bytes) -> Answer | None:
+        return self._expected.verdict(data) or Noise(ProtocolError(f"half an answer: {frames.show(data)}"))
+
+
 class Echo:
     """The echo of a line, as far as it is known.
 

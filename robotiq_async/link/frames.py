@@ -186,6 +186,13 @@ def expected_over_tcp(request: bytes) -> Expected:
     return Expected(_length(size) + start, size + 2, _length(refusal_size) + refusal, refusal_size + 2, 0)
 
 
+@lru_cache(maxsize=32)
+def expected_in_a_tunnel(request: bytes) -> Expected:
+    """The same through a tunnel, which keeps the unit id to itself."""
+    start, size, refusal, refusal_size, _ = expected_reply(request)
+    return Expected(start[1:], size - 1, refusal[1:], refusal_size - 1, 0)
+
+
 def _whole(count: int) -> str:
     return f": a hand writes all {count} at once, and a gateway must let that through"
 

@@ -40,7 +40,7 @@ from .frames import stray
 from .outcome import Lost, Noise, Outcome, Refused, Stray
 from .silence import Silence
 from .watchdog import Watchdog
-from .wires import Send, wire_to
+from .wires import Send, Wire, wire_to
 
 SETTLE_S: Final = 0.02
 """From connecting to the first request over TCP: a few round trips of a network in a building."""
@@ -99,12 +99,13 @@ class Line:
         address: Address,
         stray: Callable[[bytes], Stray | None] = stray,
         *,
+        wire: Wire | None = None,
         shares: bool = False,
     ) -> None:
         """Keep the settings; opens nothing.
 
-        ``stray`` says what bytes without a request mean. With ``shares`` the line may have several users at a
-        time.
+        ``stray`` says what bytes without a request mean. ``wire`` is that to the address unless given. With
+        ``shares`` the line may have several users at a time.
         """
         self.state, self.why = LineState.CLOSED, None
         self.forgives = address.is_rtu
@@ -112,7 +113,7 @@ class Line:
         self.silence = Silence(address.line.character_s)
         self.echo = Echo()
         self.address: Final = address
-        self._wire: Final = wire_to(address)
+        self._wire: Final = wire or wire_to(address)
         self._stray: Final = stray
         self._shares: Final = shares
         self._turns: Final = asyncio.Lock()
@@ -370,13 +371,15 @@ class Line:
             self._answer.set_result(answer)
 
     def _note(self, outcome: Outcome) -> None:
-        """Take news that no exchange waits for, or the end of the wire."""
+        """Take news that are no bytes, or that no exchange waits for, or the end of the wire."""
         if self.state is LineState.OPENING:
             self._become(LineState.OPENING, outcome)
-        elif self.forgives and not isinstance(outcome, Lost):
-            self._become(LineState.DISTURBED, outcome)
-        else:
+        elif isinstance(outcome, Lost) or not self.forgives:
             self._close(outcome)
+        elif self._exchange is not None:
+            self._end(outcome)
+        else:
+            self._become(LineState.DISTURBED, outcome)
 
 
 def renewed(error: RobotiqConnectionError) -> RobotiqConnectionError:

@@ -23,9 +23,10 @@ from ..runtime.log import Log, log
 from ..values.registers import RegisterMap, Registers
 from .address import Address
 from .dialogue import Decide, Dialogues
-from .exchange import Exchange, SerialExchange, TcpExchange
+from .exchange import Exchange, PduExchange, SerialExchange, TcpExchange
 from .line import Line, shared_line
 from .transport import Answer
+from .tunnel import Tunnel, TunnelWire
 
 # pymodbus logs every failed connection attempt; our exceptions say the same. A level that the application
 # sets on its logger stays.
@@ -50,21 +51,24 @@ class ModbusTransport:
         connect_timeout: float,
         response_timeout: float,
         shares_line: bool = False,
+        tunnel: Tunnel | None = None,
         log: Log = log,
     ) -> None:
         """Keep the settings; opens nothing.
 
-        The address is tcp, rtu or rtu+tcp. Timeouts are in seconds; on a serial line a read may be repeated
-        after ``response_timeout``. With ``shares_line``, others of the event loop may use the serial line,
-        too, for grippers with other unit ids.
+        The address is tcp, rtu, rtu+tcp, or that of a ``tunnel``. Timeouts are in seconds; on a serial line a
+        read may be repeated after ``response_timeout``. With ``shares_line``, others of the event loop may
+        use the serial line, too, for grippers with other unit ids.
         """
         self._address: Final = address
         self._connect_timeout: Final = connect_timeout
         self._shares_line: Final = shares_line
-        self._line = Line(address)
+        self._tunnel: Final = None if tunnel is None else TunnelWire(tunnel, address, log)
+        self._line = Line(address, wire=self._tunnel)
         self._number = secrets.randbelow(LAST_NUMBER)
         """Transaction id of the last request; starts at random to differ from those of other programs."""
         make: Callable[[bytes], Exchange] = self._over_a_line if address.is_rtu else self._over_tcp
+        make = make if tunnel is None else PduExchange
         self._dialogues: Final = Dialogues(self._line, registers, make, response_timeout, log)
 
     def _over_tcp(self, request: bytes) -> Exchange:
@@ -153,5 +157,7 @@ class ModbusTransport:
         await self.send(lambda: registers)
 
     async def close(self) -> None:
-        """Disconnect; does nothing when closed."""
+        """Disconnect; does nothing when closed. Waits for a tunnel to close, half a second at most."""
         self._line.release(self)
+        if self._tunnel is not None:
+            await self._tunnel.closed()

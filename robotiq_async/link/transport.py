@@ -1,4 +1,4 @@
-"""Transport: the connection to a gripper, as a hand uses it."""
+"""What a hand needs of the connection to its gripper, whatever the wire."""
 
 from __future__ import annotations
 
@@ -9,13 +9,27 @@ from ..values.errors import RobotiqConnectionError
 from ..values.registers import Registers
 
 
-@runtime_checkable
-class Transport(Protocol):
-    """A connection to a gripper. Pass an object of this shape instead of an address to use another bus.
+class Answer(NamedTuple):
+    """The outcome of a write that also reads.
 
-    One task makes all calls, one at a time. After any failure the transport is closed; :meth:`open` starts
-    again.
+    Attributes:
+        registers: the status registers, read after the write.
+        doubt: why it is unknown whether the write was carried out; None if it was acknowledged.
     """
+
+    registers: Registers
+    doubt: RobotiqConnectionError | None
+
+
+class Link(Protocol):
+    """A connection to a gripper. One task makes all calls, one at a time.
+
+    After any failure it is closed; :meth:`open` starts again.
+    """
+
+    @property
+    def has_current(self) -> bool:
+        """Whether a status has the motor currents, as the last opening has found."""
 
     @property
     def is_open(self) -> bool:
@@ -32,61 +46,25 @@ class Transport(Protocol):
         """The eight status registers.
 
         Raises:
-            RobotiqConnectionError: no clean answer in time; the transport is closed.
+            RobotiqConnectionError: no clean answer in time; the link is closed.
         """
-
-    async def write(self, registers: Sequence[int]) -> None:
-        """Write the eight request registers, exactly once.
-
-        Raises:
-            RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
-        """
-
-    async def close(self) -> None:
-        """Disconnect; never fails, and does nothing when closed."""
-
-
-class Answer(NamedTuple):
-    """The outcome of a write that also reads.
-
-    Attributes:
-        registers: the status registers, read after the write.
-        doubt: why it is unknown whether the write was carried out; None if it was acknowledged.
-    """
-
-    registers: Registers
-    doubt: RobotiqConnectionError | None
-
-
-class Link(Protocol):
-    """A transport as the poller uses it: the image is decided in the moment of the write."""
-
-    @property
-    def has_current(self) -> bool:
-        """Whether a status has the motor currents, as the last opening has found."""
-
-    @property
-    def is_open(self) -> bool: ...
-
-    async def open(self) -> None: ...
-
-    async def read(self) -> Registers: ...
 
     async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
         """Write what ``decide`` returns, exactly once, if it returns anything.
 
-        A write may have to wait: for the silence between the frames of a serial line, or for the task that
-        calls a transport object. A request that stops the hand in that time must still count, so ``decide``
-        is called in the turn of the event loop in which the write leaves.
+        A write may have to wait for the silence between the frames of a serial line, or for its turn on one
+        that others use. A request that stops the hand in that time must still count, so ``decide`` is called
+        in the turn of the event loop in which the write leaves.
 
         Returns:
             Whether something was written, and acknowledged.
 
         Raises:
-            RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
+            RobotiqConnectionError: no clean acknowledgement in time; the link is closed.
         """
 
-    async def close(self) -> None: ...
+    async def close(self) -> None:
+        """Disconnect; never fails, and does nothing when closed."""
 
 
 @runtime_checkable
@@ -108,7 +86,7 @@ class CyclicLink(Link, Protocol):
         not called if the last image was written once more, to try such an exchange.
 
         Raises:
-            RobotiqConnectionError: no clean answer in time, and no status after it; the transport is closed.
+            RobotiqConnectionError: no clean answer in time, and no status after it; the link is closed.
         """
 
 
@@ -130,5 +108,5 @@ class SharedLink(Link, Protocol):
             The status registers; None if something was written, and acknowledged.
 
         Raises:
-            RobotiqConnectionError: no clean answer in time; the transport is closed.
+            RobotiqConnectionError: no clean answer in time; the link is closed.
         """

@@ -29,7 +29,7 @@ from ..runtime.host_names import addresses_of, why_no_socket, why_unreachable
 from ..runtime.limit import Limit
 from ..values.errors import ConnectFailedError, ConnectionLostError, RobotiqConnectionError
 from .address import Address
-from .outcome import Lost
+from .outcome import Lost, Outcome
 from .serial_ports import GONE, hasten, why_no_port
 
 Client = AsyncModbusTcpClient | AsyncModbusSerialClient
@@ -37,7 +37,7 @@ AsyncioTransport = Any
 """Of a connection: one of asyncio's, or pymodbus's for serial ports, which is not typed."""
 Send = Callable[[bytes], None]
 OnData = Callable[[bytes], None]
-OnEnd = Callable[[Lost], None]
+OnEnd = Callable[[Outcome], None]
 OnConnection = Callable[[bool], None]
 
 LARGEST_READ: Final = 4096  # bytes read at a time; the longest Modbus frame has 260
@@ -76,7 +76,7 @@ class Wire(Protocol):
 
         Args:
             on_data: gets what arrives, from the first byte on.
-            on_end: gets the reason when the wire has ended by itself.
+            on_end: gets the reason when the wire has ended by itself, or a request on it without an answer.
             seconds: for how long the caller waits; it cancels the call then.
 
         Raises:

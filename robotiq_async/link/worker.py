@@ -1,4 +1,4 @@
-"""Calls of foreign coroutines, made in a task of their own so that they cannot block the caller."""
+"""_Calls of foreign coroutines, made in a task of their own so that they cannot block the caller."""
 
 from __future__ import annotations
 
@@ -56,6 +56,10 @@ class Worker:
             raise call.error
         raise RuntimeError(f"it ended with {call.error!r}") from call.error
 
+    def begin(self, what: Callable[[], Awaitable[Any]]) -> Call:
+        """Begin a call, after those before it; its ``done`` comes when it has ended."""
+        return self._put(what)
+
     def end(self, what: Callable[[], Awaitable[None]]) -> None:
         """Make a last call, which must limit its own time and not fail, then end the task. Does not wait."""
         self._put(what, is_last=True)
@@ -66,9 +70,9 @@ class Worker:
             await asyncio.wait({self._task}, timeout=seconds)
         return self._task is None or self._task.done()
 
-    def _put(self, what: Callable[[], Awaitable[Any]], *, is_last: bool = False) -> _Call:
+    def _put(self, what: Callable[[], Awaitable[Any]], *, is_last: bool = False) -> Call:
         loop = asyncio.get_running_loop()
-        call = _Call(what, loop.create_future(), is_last)
+        call = Call(what, loop.create_future(), is_last)
         if self._task is None or self._task.done() or self._task.get_loop() is not loop:
             self._calls = _Calls()
             self._start(loop)
@@ -98,23 +102,29 @@ class _Calls:
     """The queue of calls. ``asyncio.Queue`` raises when its loop is closed while a task waits for an item."""
 
     def __init__(self) -> None:
-        self.waiting: deque[_Call] = deque()
+        self.waiting: deque[Call] = deque()
         self.has_ended = False  # whether the call that was started last is the last one
         self._more = asyncio.Event()
 
-    def put(self, call: _Call) -> None:
+    def put(self, call: Call) -> None:
         self.waiting.append(call)
         self._more.set()
 
-    async def get(self) -> _Call:
+    async def get(self) -> Call:
         while not self.waiting:
             self._more.clear()
             await self._more.wait()
         return self.waiting.popleft()
 
 
-class _Call:
-    """One call and its outcome."""
+class Call:
+    """One call and its outcome.
+
+    Attributes:
+        done: comes to None when the call has ended; never if it was given up before it began.
+        result: what it returned.
+        error: what it raised.
+    """
 
     def __init__(self, what: Callable[[], Awaitable[Any]], done: asyncio.Future[None], is_last: bool) -> None:
         self._what: Final = what

@@ -10,7 +10,7 @@ from ..runtime.log import Log
 from ..values.enums import StopLevel
 
 STOP_S: Final = 1.4
-"""From stop() to the disconnection at the latest. stop() promises 2 s, and a transport object may take half a
+"""From stop() to the disconnection at the latest. stop() promises 2 s, and a tunnel may take half a
 second to close. Like every limit it counts while the loop runs: a stop is tried at least once."""
 IN_FLIGHT_S: Final = 0.9
 """Of STOP_S: how long the exchange in flight may take before the link is closed and reopened."""

@@ -11,11 +11,11 @@ from functools import partial
 from typing import Final, Generic, TypeVar
 
 from ..link.address import Address, canonical_address, parse_address
-from ..link.guard import GuardedTransport
 from ..link.modbus import ModbusTransport
 from ..link.registers import check_urcap, registers_of
 from ..link.sim_transport import SimulatedTransport, named, new_gripper
-from ..link.transport import Link, Transport
+from ..link.transport import Link
+from ..link.tunnel import Tunnel
 from ..link.urcap.transport import UrcapTransport
 from ..runtime.log import Log
 from ..values.checks import repr_of
@@ -86,8 +86,8 @@ def gripper_link(
     """The way to the gripper at an address. Opens nothing.
 
     Args:
-        address: a string or a transport object.
-        registers: the options that :func:`registers_of` takes; a transport object has no use for them.
+        address: a string or a tunnel.
+        registers: the options that :func:`registers_of` takes.
         name: of the hand, for the log; empty for the address.
         model: a Model or its name; None for that of the address.
     """
@@ -99,11 +99,9 @@ def gripper_link(
             check_urcap(parsed, registers)
         make = _over_urcap if parsed.kind == "urcap" else _over_modbus
         return make(parsed, registers_of(parsed, **registers), names_unit, name)
-    if isinstance(address, Transport):
-        shown = f"<{type(address).__name__} at {id(address):#x}>"
-        guarded = partial(GuardedTransport, address, shown, log=Log(name or shown))
-        return GripperLink(shown, partial(Gripper, shown), guarded, model=model_of(model))
-    raise TypeError(f"address must be a string or a Transport, got {repr_of(address)}")
+    if isinstance(address, Tunnel):
+        return _through(address, registers, name, model)
+    raise TypeError(f"address must be a string or a Tunnel, got {repr_of(address)}")
 
 
 def with_model(address: Address, model: object) -> Address:
@@ -136,6 +134,15 @@ def _over_modbus(address: Address, registers: RegisterMap, names_unit: bool, nam
         model,
         stroke=address.stroke,
     )
+
+
+def _through(tunnel: Tunnel, registers: Mapping[str, object], name: str, model: object) -> GripperLink:
+    """The way through a tunnel object."""
+    shown = f"<{type(tunnel).__name__} at {id(tunnel):#x}>"
+    address = with_model(Address("tunnel", shown), model)
+    block = registers_of(address, **registers)
+    make = partial(ModbusTransport, address, block, tunnel=tunnel, log=Log(name or shown))
+    return GripperLink(shown, partial(Gripper, shown), make, is_slow=True, model=model_of(address.model))
 
 
 def _over_urcap(address: Address, registers: RegisterMap, names_unit: bool, name: str) -> GripperLink:

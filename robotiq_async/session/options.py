@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Annotated, Final, get_type_hints
 
 from ..link.registers import LAST_BLOCK, check_write_function
-from ..link.transport import Link, Transport
+from ..link.transport import Link
+from ..link.tunnel import Tunnel
 from ..runtime.log import Log
 from ..values.calibration import ForceCalibration, SpeedCalibration, Units
 from ..values.calibration.csv_tables import TableError, read_stroke
@@ -235,7 +236,7 @@ class HandOptions:
     """
 
     address: Annotated[
-        str | Transport,
+        str | Tunnel,
         Option(
             "Gripper: tcp://, rtu://, rtu+tcp://, urcap:// or sim://", _check_address, Place.FILE | Place.ROS
         ),

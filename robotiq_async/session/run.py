@@ -254,7 +254,7 @@ class Run:
             raise
         except Exception as error:
             if self.state is RunState.CONNECTING:
-                raise  # a mistake of ours, or of a transport object
+                raise  # a mistake of ours
             # No thread, no memory, no descriptor: what the system lacks now it may have at the next try.
             self._parts.options.log.debug("the link could not be opened", exc_info=error)
             raise ConnectFailedError(self._parts.options.link.address, repr(error)) from error

@@ -9,7 +9,7 @@ from typing import Generic, Self, TypeVar
 from ..hand.grip_watch import SLIP_COUNTS
 from ..hand.robotiq_hand import RobotiqHand as AsyncRobotiqHand
 from ..hand.run import refuse_copy
-from ..link.transport import Transport
+from ..link.tunnel import Tunnel
 from ..session.options import (
     ACTIVATION_TIMEOUT_S,
     CONNECT_TIMEOUT_S,
@@ -113,7 +113,7 @@ class RobotiqHand:
 
     def __init__(
         self,
-        address: str | Transport = NO_ADDRESS,
+        address: str | Tunnel = NO_ADDRESS,
         *,
         name: str | None = None,
         device_id: int | None = None,

@@ -133,7 +133,7 @@ def check_registers(registers: Sequence[int]) -> Registers:
     block = tuple(registers)
     if len(block) != REGISTER_COUNT:
         raise ValueError(f"registers: expected {REGISTER_COUNT} of them, got {len(block)}")
-    # A fast path for plain tuples: over a transport object this runs at every poll.
+    # A fast path for plain tuples: each status passes here.
     return tuple(
         register if type(register) is int and 0 <= register <= 0xFFFF else _checked(index, register)
         for index, register in enumerate(block)

@@ -23,6 +23,7 @@ from robotiq_async.values.errors import ConnectionLostError
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import AxisRequest, Request
 from tests.conftest import Clock
+from tests.fake_transport import Exchanging
 from tests.forked import CORE, ROOT, forking
 from tests.patience import patience
 
@@ -30,8 +31,8 @@ T = TypeVar("T")
 PATIENCE = 5.0
 
 
-class Wire:
-    """A transport without a network; its gripper has a clock that the test moves ahead.
+class Wire(Exchanging):
+    """A tunnel without a network; its gripper has a clock that the test moves ahead.
 
     The hand calls it in its own thread, and the test in another one: one at a time.
     """

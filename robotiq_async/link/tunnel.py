@@ -1,0 +1,180 @@
+"""Tunnels: the way of an application to its gripper, as a wire.
+
+An arm carries the serial line at its tool in a protocol of its own. Who knows that protocol writes a class of
+three methods; all that a link does is built on it, as on a serial line.
+
+Each frame of a :class:`TunnelWire` is one call of :meth:`Tunnel.exchange`, in a task that makes all calls. A
+call whose answer is no longer waited for is cancelled when the next request leaves, and that request waits
+for its end. So a tunnel never carries two requests at a time, and a request that its tunnel still keeps has
+left it before the next one does. What it brings back late is dropped, and a write without an answer stays in
+doubt until the gripper shows what became of it (dialogue.py).
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final, Protocol, runtime_checkable
+
+import anyio
+
+from ..runtime.concurrency import LateError
+from ..runtime.host_names import why_unreachable
+from ..runtime.log import Log, log
+from ..values.errors import ConnectionLostError, ProtocolError, ResponseTimeoutError
+from .address import Address
+from .outcome import Lost, Noise, Outcome, Silent
+from .wires import OnData, OnEnd, Send, Table, failing_as
+from .worker import Call, Worker
+
+CLOSE_S: Final = 0.5
+"""Time for a tunnel to close."""
+ENDED_S: Final = CLOSE_S + 0.1
+"""For how long its close is waited for: its last call, which is cancelled, comes before."""
+OPENING: Final[Table] = {
+    LateError: lambda error: f"no connection {error}",
+    TimeoutError: lambda error: str(error) or "no connection in time",
+    OSError: why_unreachable,
+    Exception: repr,
+}
+
+
+@runtime_checkable
+class Tunnel(Protocol):
+    """A way to one gripper that carries Modbus requests. Pass such an object in place of an address.
+
+    One task makes all calls, one at a time. Blocking work belongs into a thread, and a call must not return
+    before that has ended: ``await anyio.to_thread.run_sync(...)`` waits for it, also when it is cancelled.
+    ``asyncio.to_thread`` does not, and would carry two requests at a time.
+    """
+
+    async def open(self) -> None:
+        """Connect. Called again after :meth:`close`.
+
+        It is cancelled after the hand's ``connect_timeout``.
+
+        Raises:
+            Exception: there is no way to the gripper; the hand has a ConnectFailedError then.
+        """
+
+    async def exchange(self, pdu: bytes) -> bytes:
+        """Send a request exactly once, and return the reply to it.
+
+        Both are a PDU of Modbus: function code and data, without unit id and checksum. An exception of the
+        gripper is a reply like others; ``bytes((pdu[0] | 0x80, 1))`` is that to a function which cannot be
+        carried. The call is cancelled some time after the hand's ``response_timeout``. A reply that comes
+        later should be dropped, not returned for the next request.
+
+        Args:
+            pdu: a request of function 3, 4, 16 or 23, of 26 bytes at most.
+
+        Raises:
+            TimeoutError: the gripper does not answer, and the tunnel stays open; a read is asked once more.
+            ProtocolError: what has come is not the answer; as above.
+            Exception: the tunnel is lost: the hand closes it and opens it again.
+        """
+
+    async def close(self) -> None:
+        """Disconnect, within half a second; does nothing when closed."""
+
+
+@dataclass(frozen=True, slots=True)
+class TunnelPlace:
+    """What the address of a tunnel says, for the function that makes the tunnel.
+
+    Attributes:
+        host: name or IP address.
+        port: after the host; None if there is none.
+        unit: unit id of the gripper, 1..247: ``device_id``, or the usual one.
+        options: those after the question mark that are not for every gripper, as texts.
+    """
+
+    host: str
+    port: int | None = None
+    unit: int = 9
+    options: Mapping[str, str] = field(default_factory=dict)
+
+
+class TunnelWire:
+    """A tunnel as a wire, over all its connections."""
+
+    may_echo = False
+
+    def __init__(self, tunnel: Tunnel, address: Address, log: Log = log) -> None:
+        """Keep the tunnel; opens nothing."""
+        self._tunnel: Final = tunnel
+        self._address: Final = address
+        self._log: Final = log
+        self._worker: Final = Worker("robotiq_async tunnel")
+        self._loop: asyncio.AbstractEventLoop | None = None
+        """The loop in which it was opened; None once it was closed."""
+        self._call: Call | None = None
+        """The exchange that was begun last, until it has ended."""
+        self._on_data: OnData
+        self._on_end: OnEnd
+
+    async def open(self, on_data: OnData, on_end: OnEnd, seconds: float) -> Send:
+        """Open the tunnel, after whatever it still does for an earlier connection."""
+        self._on_data, self._on_end = on_data, on_end
+        self._loop = asyncio.get_running_loop()
+        with failing_as(OPENING, self._address):
+            await self._worker.call(self._tunnel.open, seconds)
+        return self._send
+
+    def _send(self, pdu: bytes) -> None:
+        self._give_up()
+        self._call = call = self._worker.begin(lambda: self._tunnel.exchange(pdu))
+        call.done.add_done_callback(lambda _: self._take(call))
+
+    def _take(self, call: Call) -> None:
+        """Pass on what a call came to, if it is still waited for."""
+        if call is not self._call:
+            return
+        self._call = None
+        if call.error is not None:
+            self._on_end(self._outcome(call.error))
+        elif isinstance(call.result, bytes | bytearray):
+            self._on_data(bytes(call.result))
+        else:
+            self._on_end(self._lost(f"exchange() must return bytes, got {type(call.result).__name__}"))
+
+    def _outcome(self, error: BaseException) -> Outcome:
+        match error:
+            case ProtocolError():
+                return Noise(error)
+            case ConnectionLostError():
+                return Lost(error)
+            case TimeoutError(errno=None):  # with a number it is a socket's, which has ended
+                return Silent(ResponseTimeoutError(f"{self._address}: {str(error) or 'no answer'}"))
+        return self._lost(repr(error))
+
+    def _lost(self, why: str) -> Lost:
+        return Lost(ConnectionLostError(f"{self._address}: {why}"))
+
+    def _give_up(self) -> None:
+        call, self._call = self._call, None
+        if call is not None:
+            call.give_up()
+
+    def close(self) -> None:
+        """Close the tunnel after its present call, which is cancelled; only the next open() waits."""
+        loop, self._loop = self._loop, None
+        if loop is None or loop.is_closed():  # its calls have ended with the loop
+            self._call = None
+            return
+        self._give_up()
+        self._worker.end(self._close)
+
+    async def _close(self) -> None:
+        try:
+            async with asyncio.timeout(CLOSE_S):
+                await self._tunnel.close()
+        except Exception as error:  # noqa: BLE001  # nothing is left to do
+            self._log.warning("the tunnel did not close: %r", error)
+
+    async def closed(self) -> None:
+        """Wait until the tunnel has closed, for a limited time."""
+        with anyio.CancelScope(shield=True):
+            if not await self._worker.ended(ENDED_S):
+                self._log.warning("the tunnel is abandoned: its last call did not return")
