@@ -492,3 +492,20 @@ async def test_a_start_outlasts_a_loop_that_is_held_up(here: Lab, turns: int) ->
     loop.after_turns(turns, lambda: loop.hold_up(10.0))
     await hand.stop()
     assert hand.state is State.SHUTDOWN
+
+
+@inside(lab)
+@pytest.mark.parametrize(("call", "held"), [("acquire", 0.9), ("halt", 10.0)])
+async def test_a_lost_request_is_repeated_after_a_loop_that_was_held_up(
+    here: Lab, call: str, held: float
+) -> None:
+    """Its time had passed with the block, and no other copy was sent."""
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualLoop)
+    bus = Spoiling(here.network.bus("client"), "/halt" if call == "halt" else "/lease", times=0)
+    async with here.client_over(bus, control=False) as hand:
+        bus.left = 1
+        calling = asyncio.create_task(getattr(hand, call)())
+        loop.after_turns(2, lambda: loop.hold_up(held))
+        await calling
+        assert bus.left == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -117,6 +118,29 @@ async def test_settings_are_restored_after_another_client_changed_them(here: Lab
     image = Request.from_registers(here.gripper.request_registers)
     assert [axis.force for axis in image.axes] == [5, 200, 200, 200], "it moves one axis"
     assert [axis.speed for axis in image.axes] == [128, 3, 3, 3], "of the speed it has asked for nothing"
+
+
+@inside(lab)
+async def test_a_copy_of_the_request_for_the_lease_forgets_no_setting_on_its_way(
+    here: Lab, reader: RemoteHand
+) -> None:
+    """The force was acknowledged, and the next time the hand's own was written in its place."""
+    assert reader._session is not None
+    dialog = reader._session.dialog
+    take = dialog.call({"what": "take", "label": "twice"})
+    lease = (await here.answer("lease", take.pack())).value["lease"]
+    force = replace(dialog.call({"value": 200, "fingers": 1}), lease=lease)
+    setting = asyncio.create_task(here.answer("cmd/set_force", force.pack()))
+    await asyncio.sleep(0.001)
+    await here.answer("lease", take.pack())
+    assert (await setting).begun is True
+    async with here.client("other", control=False) as other:
+        await other.take()
+        await other.move(20, A)
+        await other.release()
+    await reader.acquire()
+    await reader.set_position(30, A)
+    assert Request.from_registers(here.gripper.request_registers).axes[0].force == 200
 
 
 @inside(lab)

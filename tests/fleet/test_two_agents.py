@@ -12,8 +12,8 @@ import pytest
 from robotiq_async import ConnectionLostError, Finger, RobotiqHand, State
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.fleet import Fleet
-from robotiq_async.fleet.network.bus import PendingQuery
-from robotiq_async.fleet.remote.errand import is_refusal, of_its_run
+from robotiq_async.fleet.network.bus import PendingQuery, Urgency
+from robotiq_async.fleet.remote.errand import Errand, of_its_run
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import Answer, Call, failure
 from robotiq_async.values.errors import AgentError, ControlLostError, NotAllStoppedError
@@ -172,9 +172,15 @@ CALL = Call(LEFT.base, "stranger", epoch=7, number=3)
         (b"?", False, True),
     ],
 )
-def test_which_reply_decides(reply: bytes, counts: bool, refuses: bool) -> None:
+async def test_which_reply_decides(reply: bytes, counts: bool, refuses: bool) -> None:
+    def decides(verb: str, urgency: Urgency) -> bool:
+        errand = Errand(LEFT, CALL, verb, 1.0, urgency, 1, lambda _: None, lambda: None)
+        errand.end()
+        return errand.decides(Answered(reply))
+
     assert of_its_run(CALL)(Answered(reply)) is counts
-    assert is_refusal(Answered(reply)) is refuses
+    assert decides("cmd/move", Urgency.COMMAND) is counts
+    assert decides("halt", Urgency.STOP) is refuses
 
 
 @pytest.mark.parametrize(

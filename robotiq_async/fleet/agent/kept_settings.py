@@ -52,12 +52,15 @@ class KeptSettings:
         self._asked: dict[Setting, int] = {}  # by the holder, on the way to the gripper
         self._has: set[Setting] = set()  # settings in which the gripper has the holder's value
 
-    def grant(self, client: str) -> bool:
-        """A client gets the lease; returns whether its settings are kept."""
+    def grant(self, client: str) -> None:
+        """A client gets the lease."""
         self._asked.clear()
         if client != self._holder:
             self._holder = client
             self._has.clear()
+
+    def are_kept(self, client: str) -> bool:
+        """Whether settings of a client are known."""
         return client in self._of
 
     def receive(self, settings: Mapping[Setting, int]) -> None:

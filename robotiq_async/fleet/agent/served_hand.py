@@ -208,7 +208,6 @@ class ServedHand:
 
     def _change_lease(self, call: Call, query: Query) -> Fields | None:
         what = call.arguments.get("what")
-        is_kept = True
         if what == "renew":
             self._admission.renew(call, now())
         elif what == "settings":
@@ -216,18 +215,21 @@ class ServedHand:
             self._settings.receive(read_settings(call.arguments.get("settings")))
         elif what in ("acquire", "take"):
             self._admission.check_fresh(call, now())
-            is_kept = self._grant(call, take=what == "take")
+            self._grant(call, take=what == "take")
         elif what == "release":
             self._release(call, query)
             return None
         else:
             raise AgentError(f"unknown lease request {what!r}")
-        return {"lease": self._lease.number, "window": self._lease.window, "settings": is_kept}
+        return {
+            "lease": self._lease.number,
+            "window": self._lease.window,
+            "settings": self._settings.are_kept(call.client),
+        }
 
-    def _grant(self, call: Call, *, take: bool) -> bool:
-        """Give the lease; returns whether the settings of the client are known."""
+    def _grant(self, call: Call, *, take: bool) -> None:
         if self._admission.is_repeated(call):
-            return self._settings.grant(call.client)
+            return
         holder = self._lease.holder
         label = label_of(call)
         if take:
@@ -241,9 +243,8 @@ class ServedHand:
         self._log.info("%s commands the gripper", label)
         self.publisher.add({"kind": "lease", "number": number, "holder": label, "reason": "granted"})
         self._watch_expiry()
-        is_kept = self._settings.grant(call.client)
+        self._settings.grant(call.client)
         self._keep_record()
-        return is_kept
 
     def _release(self, call: Call, query: Query) -> None:
         # A client may repeat its release, or strengthen it, as long as no other client has acquired the

@@ -12,8 +12,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import Any, Final
 
-from ...runtime.clock import now
-from ...runtime.limit import Limit
 from ...values.checks import check_seconds
 from ...values.enums import Finger, StopLevel
 from ...values.errors import (
@@ -26,18 +24,17 @@ from ...values.errors import (
     RobotiqError,
 )
 from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
-from ..network.bus import Bus, Reply, Urgency
-from ..wire.envelope import Answer, Call, unpack_answer
+from ..network.bus import Bus, Urgency
+from ..wire.envelope import Answer, Call
 from ..wire.names import GripperName
 from ..wire.settings import Setting, moved_by, settings_fields, settings_of
 from ..wire.values import Fields
-from .errand import AT_ONCE_S, HALT_S, Errand, NoAnswerError
+from .errand import HALT_S, Errand, NoAnswerError
 from .lease_state import ClientLease
 from .mirror import Mirror
 
 OWN: Final = ("info", "lease", "halt", "cmd/cancel")
 """Requests whose arguments come from this library: a TypeError in the answer is not the user's."""
-IN_ANY_RUN: Final = ("info", "halt")  # requests that any run of the agent may answer
 RECENT_S: Final = 0.5
 """Seconds in which a message of the agent must follow an empty reply to prove that access was denied."""
 EARLY_S: Final = 0.005  # seconds until all commands are repeated when the agent waits for a lost one
@@ -161,8 +158,9 @@ class Dialog:
 
         With Urgency.STOP that wait continues if the agent falls silent.
         """
-        errand = Errand(call, verb, timeout, urgency, agents, send=lambda: self._resend(errand))
+        errand = Errand(self.name, call, verb, timeout, urgency, agents, self._resend, self._resend_all_soon)
         if self.is_over and not errand.is_allowed_after_stop:
+            errand.end()
             raise NotStartedError("the hand was stopped")
         self._pending.add(errand)
         if errand.is_command:
@@ -182,7 +180,7 @@ class Dialog:
         """
         begun: bool | None = None
         try:
-            answer, status = self._read(await self._reply(errand), errand)
+            answer = await self._reply(errand)
             begun = answer.begun
         except NoAnswerError:
             if not errand.is_allowed_after_stop:
@@ -192,8 +190,8 @@ class Dialog:
             self._forget(errand)
             if errand.is_command:
                 self.settings.note(errand.call.number, errand.asked, begun)
-        if status:
-            self._receive(status, errand.asked_at)
+        if errand.status:
+            self._receive(errand.status, errand.asked_at)
         try:
             return answer.outcome(self.mirror.clock)
         except (TypeError, ValueError) as error:
@@ -341,7 +339,7 @@ class Dialog:
             if errand.call.lease == self.lease.number:
                 outcome = f"{errand.verb} may have been carried out"
                 error = ControlLostError(f"{self.name}: the lease has ended ({reason}); {outcome}", reason)
-                self.loop.call_later(LAST_ANSWER_S, errand.fail, error)
+                errand.end_soon(LAST_ANSWER_S, error)
 
     # -- the end ---------------------------------------------------------------------------------------
 
@@ -392,7 +390,7 @@ class Dialog:
             urgency=Urgency.QUESTION if is_question else errand.urgency,
             decides=errand.decides,
         )
-        errand.add(copy, self._resend_all_soon)
+        errand.add(copy)
 
     def _resend(self, errand: Errand) -> None:
         # A full network drops requests and answers.
@@ -415,48 +413,21 @@ class Dialog:
         self._pending.discard(errand)
         errand.end()
 
-    def _read(self, reply: Reply, errand: Errand) -> tuple[Answer, bytes]:
-        answer, verb = unpack_answer(reply.payload), errand.verb
-        if answer.to != self.name.base or answer.number not in (0, errand.call.number):
-            raise AgentError(f"{self.name}: another answer came to {verb}; it may have been carried out")
-        if errand.call.epoch not in (0, answer.epoch) and verb not in IN_ANY_RUN:
-            # That run did nothing. Whether the addressed run carried it out is unknown.
-            raise NoAnswerError(self.name, verb, "another run of its agent answered")
-        return answer, reply.attachment
-
-    async def _reply(self, errand: Errand) -> Reply:
-        reply, at_once = await self._wait(errand)
-        if reply is None and errand.is_halt and errand.was_empty and not self.mirror.is_silent:
-            raise NotAllowedError(f"{self.name}: no reply to {errand.verb}: access denied")
-        if reply is None and at_once and not errand.is_halt and await self._is_agent_present():
+    async def _reply(self, errand: Errand) -> Answer:
+        ends = [self._closed] if errand.is_allowed_after_stop else [self._closed, self._silence]
+        answer = await errand.wait(*ends)
+        if answer is None and errand.was_empty and not errand.is_halt and await self._is_agent_present():
             # Just after a link has come up, zenoh may not know the agent yet. The second request is carried
             # out once at most: its number and its stamp are the same.
             errand.begin()
             self._resend(errand)
-            reply, at_once = await self._wait(errand)
-            if reply is None and at_once and await self._is_agent_present():
-                raise NotAllowedError(f"{self.name}: no reply to {errand.verb}: access denied")
-        if reply is None:
-            raise NoAnswerError(self.name, errand.verb)
-        return reply
-
-    async def _wait(self, errand: Errand) -> tuple[Reply | None, bool]:
-        """A reply, and whether the wait ended at once: then the access rules denied the request."""
-        answered = errand.answered
-        awaited: set[asyncio.Future[Any]] = {answered, self._closed}
-        if not errand.is_allowed_after_stop:
-            awaited.add(self._silence)
-        # The bus ends the wait in time; the limit holds even if it does not.
-        with Limit(errand.left + LAST_ANSWER_S) as limit:
-            await asyncio.wait(awaited, return_when=asyncio.FIRST_COMPLETED)
-        if limit.is_over:
-            return None, False
-        if not answered.done() or answered.cancelled():
-            raise NoAnswerError(self.name, errand.verb, "the agent fell silent")
-        reply = answered.result()
-        if isinstance(reply, RobotiqError):
-            raise reply
-        return reply, now() - errand.asked_at < min(AT_ONCE_S, errand.timeout / 2)
+            answer = await errand.wait(*ends)
+        if answer is not None:
+            return answer
+        is_heard = not self.mirror.is_silent  # enough for a halt, which has been repeated all the time
+        if errand.was_empty and (is_heard if errand.is_halt else await self._is_agent_present()):
+            raise NotAllowedError(f"{self.name}: no reply to {errand.verb}: access denied")
+        raise NoAnswerError(self.name, errand.verb)
 
     async def _is_agent_present(self) -> bool:
         # By a message from now on: a link that is down now may have delivered one just before.

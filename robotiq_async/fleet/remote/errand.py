@@ -9,10 +9,11 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 from ...runtime.clock import now
-from ...values.errors import ConnectionLostError, RobotiqError
+from ...runtime.limit import Limit
+from ...values.errors import AgentError, ConnectionLostError, RobotiqError
 from ..network.bus import Reply, Urgency
 from ..wire.envelope import Answer, Call, unpack_answer
 from ..wire.settings import asked_of
@@ -27,6 +28,7 @@ ATTEMPT_S: Final = 0.3  # seconds from one copy of a halt to the next
 RETRY_S: Final = 0.05  # the same after a copy that failed at once, as no agent was reached
 AT_ONCE_S: Final = 0.25
 """Seconds: an empty reply before that is no timeout, but means that no process received the request."""
+IN_ANY_RUN: Final = ("info", "halt")  # requests that any run of the agent may answer
 _RETRIED: Final = ("AgentError", "ProtocolError")  # answers to a halt after which the next copy may succeed
 
 
@@ -47,26 +49,18 @@ def of_its_run(call: Call) -> Callable[[Reply], bool]:
 
     With two agents for one gripper, the refusal of the wrong one arrives first.
     """
-
-    def decides(reply: Reply) -> bool:
-        answer = _answer(reply)
-        return answer is not None and _is_about(call, answer) and call.epoch in (0, answer.epoch)
-
-    return decides
+    return lambda reply: _is_of_its_run(call, _read(reply))
 
 
-def is_refusal(reply: Reply) -> bool:
-    # A halt ends with the first refusal. Of two agents both must confirm it, so a success does not end the
-    # wait.
-    answer = _answer(reply)
-    return answer is None or answer.error is not None
+def _is_of_its_run(call: Call, said: Answer | RobotiqError) -> bool:
+    return isinstance(said, Answer) and _is_about(call, said) and call.epoch in (0, said.epoch)
 
 
-def _answer(reply: Reply) -> Answer | None:
+def _read(reply: Reply) -> Answer | RobotiqError:
     try:
         return unpack_answer(reply.payload)
-    except RobotiqError:
-        return None
+    except RobotiqError as error:
+        return error
 
 
 def _is_about(call: Call, answer: Answer) -> bool:
@@ -78,30 +72,46 @@ class Errand:
 
     Attributes:
         verb: the last part of its key.
-        timeout: seconds for the answer, from the first copy.
+        timeout: seconds for the answer, from the first copy, while the event loop runs.
         asked: the positions, speeds and forces that it asks for.
         asked_at: when the wait for an answer began.
-        answered: the reply; None if there is none, or the error that ended the wait.
-        was_empty: whether a copy came back at once without a reply.
+        answered: the answer; None if there is none, or the error that ended the wait.
+        status: that came with the newest answer.
+        was_empty: whether the last copy came back at once without a reply; for a halt, any of them.
     """
 
     def __init__(
-        self, call: Call, verb: str, timeout: float, urgency: Urgency, agents: int, send: Callable[[], None]
+        self,
+        name: object,
+        call: Call,
+        verb: str,
+        timeout: float,
+        urgency: Urgency,
+        agents: int,
+        resend: Callable[[Errand], None],
+        came_early: Callable[[], None],
     ) -> None:
-        """``send`` sends another copy. A halt is answered when so many ``agents`` have confirmed it."""
+        """A halt of a gripper, by its ``name``, is answered when so many ``agents`` have confirmed it.
+
+        ``resend`` sends another copy. ``came_early`` is called when one arrived before a preceding command.
+        """
         self.call = call
         self.verb = verb
         self.timeout = timeout
         self.urgency = urgency
         self.was_empty = False
+        self.status = b""
+        self._name = name
         self._agents = agents
-        self._send = send
+        self._resend, self._came_early = resend, came_early
         self._confirmed: set[int] = set()  # the runs of agents that have
-        self._in_doubt: Reply | RobotiqError | None = None
-        """What a halt is answered with when its time is over."""
+        self._newest: Reply | None = None
+        self._said: Answer | RobotiqError | None = None  # by that
+        self._in_doubt: Answer | RobotiqError | None = None
+        """What is the outcome when the time is over."""
         self.asked = asked_of(verb.removeprefix("cmd/"), call.arguments)
         self._loop = asyncio.get_running_loop()
-        self._until = now() + timeout
+        self._limit = Limit(timeout)
         self._strays = 0
         self._copies: set[asyncio.Future[Reply | None]] = set()
         self._timer: asyncio.TimerHandle | None = None
@@ -109,7 +119,7 @@ class Errand:
 
     def begin(self) -> None:
         self.asked_at = now()
-        self.answered: asyncio.Future[Reply | RobotiqError | None] = self._loop.create_future()
+        self.answered: asyncio.Future[Answer | RobotiqError | None] = self._loop.create_future()
 
     @property
     def is_halt(self) -> bool:
@@ -133,92 +143,144 @@ class Errand:
 
     @property
     def left(self) -> float:
-        return max(0.0, self._until - now())
+        return max(0.0, self._limit.left)
 
     def packed(self, after: int) -> bytes:
         """The request as bytes; ``after`` is the number of the unanswered command before it, or 0."""
         return (replace(self.call, after=after) if after else self.call).pack()
 
+    async def wait(self, *ends: asyncio.Future[None]) -> Answer | None:
+        """Wait for the answer; None if there is none. NoAnswerError: one of the others is done before."""
+        with self._limit as limit:
+            awaited: set[asyncio.Future[Any]] = {self.answered, *ends}
+            await asyncio.wait(awaited, return_when=asyncio.FIRST_COMPLETED)
+        if limit.is_over:
+            self.fail(self._in_doubt)
+        elif not self.answered.done() or self.answered.cancelled():
+            raise NoAnswerError(self._name, self.verb, "the agent fell silent")
+        said = self.answered.result()
+        if isinstance(said, RobotiqError):
+            raise said
+        return said
+
+    # -- replies ---------------------------------------------------------------------------------------
+
     def decides(self, reply: Reply) -> bool:
-        """Whether a reply ends the wait for the others."""
+        """Whether a reply ends the wait for the others to its copy."""
+        said = self._say(reply)
         if not self.is_halt:
-            return of_its_run(self.call)(reply)
-        answer = _answer(reply)
-        if answer is not None and answer.error is None and _is_about(self.call, answer):
-            self._confirmed.add(answer.epoch)
-        return is_refusal(reply)
+            return _is_of_its_run(self.call, said)
+        if isinstance(said, Answer) and said.error is None:
+            # Of two agents both must confirm it.
+            if _is_about(self.call, said):
+                self._confirmed.add(said.epoch)
+                missing = f"no answer from {self._agents - len(self._confirmed)} of {self._agents} agents"
+                self._in_doubt = NoAnswerError(self._name, self.verb, missing)
+            return False
+        return True
 
-    def add(self, copy: asyncio.Future[Reply | None], came_early: Callable[[], None]) -> None:
-        """Add a copy that was sent. ``came_early`` is called if it arrived before a preceding command."""
+    def add(self, copy: asyncio.Future[Reply | None]) -> None:
+        """Add a copy that was sent."""
         sent_at = now()
-
-        def take(_: object) -> None:
-            self._copies.discard(copy)
-            if self.answered.done() or copy.cancelled():
-                return
-            reply = copy.result()
-            self.was_empty |= reply is None and now() - sent_at < min(AT_ONCE_S, self.timeout / 2)
-            if self.is_halt:
-                self._take_of_halt(reply, sent_at)
-            elif reply is not None or not self._copies:
-                self._take(reply, came_early)
-
         self._copies.add(copy)
-        copy.add_done_callback(take)
-        self._repeat()
+        copy.add_done_callback(lambda copy: self._end_copy(copy, sent_at))
+        self._repeat_later()
 
-    def _take(self, reply: Reply | None, came_early: Callable[[], None]) -> None:
-        answer = _answer(reply) if reply is not None and self.may_repeat else None
-        if answer is not None:
-            is_stray = bool(answer.number) and not _is_about(self.call, answer)
+    def _end_copy(self, copy: asyncio.Future[Reply | None], sent_at: float) -> None:
+        self._copies.discard(copy)
+        if self.answered.done() or copy.cancelled():
+            return
+        reply = copy.result()
+        at_once = reply is None and now() - sent_at < min(AT_ONCE_S, self.timeout / 2)
+        self.was_empty = at_once or (self.is_halt and self.was_empty)
+        if self.is_halt:
+            self._take_of_halt(reply)
+            if not self.answered.done() and not self._copies:
+                self._repeat_later(max(0.001, sent_at + RETRY_S - now()))
+        elif reply is not None:
+            self._take(reply)
+        # A copy whose time passed while the loop was held up is followed by another.
+        elif not self._copies and (at_once or not self.may_repeat or self.left <= RETRY_S):
+            self.answered.set_result(None)
+
+    def _take(self, reply: Reply) -> None:
+        said = self._say(reply)
+        if isinstance(said, Answer) and self.may_repeat:
+            is_stray = bool(said.number) and not _is_about(self.call, said)
             if is_stray and self._strays < STRAYS:
                 self._strays += 1
-                self._repeat(RETRY_S)  # the copy, or its answer, was misrouted
+                self._repeat_later(RETRY_S)  # the copy, or its answer, was misrouted
                 return
-            if isinstance(answer.error, dict) and answer.error.get("reason") == "early":
-                came_early()
+            if said.error is not None and said.error.get("reason") == "early":
+                self._came_early()
                 return
-        self.answered.set_result(reply)
+        self._settle(reply)
 
-    def _take_of_halt(self, reply: Reply | None, sent_at: float) -> None:
+    def _take_of_halt(self, reply: Reply | None) -> None:
         # Only an answer about the gripper ends it before its time: that all have stopped, or why not.
-        answer = None if reply is None else _answer(reply)
-        if answer is None or not _is_about(self.call, answer):
-            self._in_doubt = reply or self._in_doubt
-        elif answer.error is None and len(self._confirmed) < self._agents:
-            missing = f"no answer from {self._agents - len(self._confirmed)} of {self._agents} agents"
-            self._in_doubt = NoAnswerError(self.call.to, self.verb, missing)
-        elif answer.error is None or answer.error.get("kind") not in _RETRIED:
-            self.answered.set_result(reply)
+        if reply is None:
             return
-        else:
-            self._in_doubt = reply
-        if not self._copies:
-            self._repeat(max(0.001, sent_at + RETRY_S - now()))
+        said = self._say(reply)
+        if not isinstance(said, Answer) or not _is_about(self.call, said):
+            self._in_doubt = self._checked(said)
+        elif said.error is not None:
+            self._in_doubt = said
+            if said.error.get("kind") not in _RETRIED:
+                self._settle(reply)
+        elif len(self._confirmed) >= self._agents:
+            self._settle(reply)
 
-    def _repeat(self, pause: float = 0.0) -> None:
-        self.stop_repeating()
+    def _settle(self, reply: Reply) -> None:
+        self.status = reply.attachment
+        self.answered.set_result(self._checked(self._say(reply)))
+
+    def _say(self, reply: Reply) -> Answer | RobotiqError:
+        if reply is not self._newest or self._said is None:
+            self._newest, self._said = reply, _read(reply)
+        return self._said
+
+    def _checked(self, said: Answer | RobotiqError) -> Answer | RobotiqError:
+        """An answer if it may be the one to this request, else the error."""
+        if not isinstance(said, Answer):
+            return said
+        if said.to != self.call.to or said.number not in (0, self.call.number):
+            return AgentError(
+                f"{self._name}: another answer came to {self.verb}; it may have been carried out"
+            )
+        if self.call.epoch not in (0, said.epoch) and self.verb not in IN_ANY_RUN:
+            # That run did nothing. Whether the addressed run carried it out is unknown.
+            return NoAnswerError(self._name, self.verb, "another run of its agent answered")
+        return said
+
+    # -- time ------------------------------------------------------------------------------------------
+
+    def _repeat_later(self, pause: float = 0.0) -> None:
+        self._stop_repeating()
         if self.may_repeat:
-            usual = REPEAT_S if now() < self._until - self.timeout + REPEAT_SLOWLY_S else REPEAT_SLOWLY_S
+            usual = REPEAT_S if now() < self.asked_at + REPEAT_SLOWLY_S else REPEAT_SLOWLY_S
             pause = pause or (ATTEMPT_S if self.is_halt else usual)
-            self._timer = self._loop.call_later(min(pause, self.left), self._send_again)
+            self._timer = self._loop.call_later(pause, self._repeat)
 
-    def _send_again(self) -> None:
+    def _repeat(self) -> None:
         if self.left > RETRY_S:
-            self._send()
-        elif self.is_halt and not self._copies and not self.answered.done():  # else those end in time
-            self.answered.set_result(self._in_doubt)
+            self._resend(self)
 
-    def stop_repeating(self) -> None:
+    def _stop_repeating(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
 
-    def fail(self, error: RobotiqError) -> None:
+    def end_soon(self, seconds: float, error: RobotiqError) -> None:
+        """Wait for the answer no longer than these seconds; the error is the outcome then."""
+        self._in_doubt = error
+        self._limit.restart(min(seconds, self.left))
+
+    def fail(self, why: Answer | RobotiqError | None) -> None:
         if not self.answered.done():
-            self.answered.set_result(error)
+            self.answered.set_result(why)
 
     def end(self) -> None:
-        self.stop_repeating()
+        self._stop_repeating()
+        self._limit.stop()
         self.answered.cancel()
         for copy in list(self._copies):
             copy.cancel()
