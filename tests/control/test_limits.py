@@ -269,8 +269,12 @@ BEFORE = Request(activate=True, go=True, axes=(AxisRequest(0),) * 3 + (AxisReque
     [
         ((0, 0, 0, 220), 130, {S: 255}, True),
         ((0, 0, 0, 120), 130, {S: 255}, False),  # behind it
+        ((0, 0, 0, 128), 130, {S: 255}, True),  # an axis rests within two counts of its limit
+        ((0, 0, 0, 127), 130, {S: 255}, False),
         ((0, 0, 0, 15), 130, {S: 0}, True),
         ((0, 0, 0, 140), 130, {S: 0}, False),
+        ((0, 0, 0, 132), 130, {S: 0}, True),
+        ((0, 0, 0, 133), 130, {S: 0}, False),
         ((0, 0, 0, 220), 130, {}, False),  # an axis without a request
         ((113, 113, 113, 130), 130, {A: 255, B: 255, C: 255}, False),  # the scissor is not near pinch
         ((113, 113, 113, 130), 219, {A: 255, B: 255, C: 255}, True),

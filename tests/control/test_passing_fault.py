@@ -9,6 +9,7 @@ import pytest
 from robotiq_async import Fault, Finger, GripperFaultError, State
 from robotiq_async.control.evidence import LASTS_READS, LASTS_S, Evidence
 from robotiq_async.simulator import Habits
+from robotiq_async.values.enums import Trigger
 from tests.control.other_client import going_to
 from tests.control.scan import POLL_S, Scan
 from tests.register_words import status_of
@@ -212,6 +213,7 @@ def test_it_does_not_clear_another_fault(silent: Scan) -> None:
     [
         ([0.0], [True]),
         ([0.0, LASTS_S, 2 * LASTS_S], [True, True, False]),
+        ([0.0, LASTS_S / 2, LASTS_S], [True, True, False]),
         ([0.0, 0.001, 0.002, 0.003], [True] * 4),  # some time, too
         ([0.0, 0.1, 0.2], [True, True, False]),  # a slow poll
         ([0.0, 1.2, 2.4, 3.6], [True] * 4),  # each after a silence
@@ -222,6 +224,13 @@ def test_it_takes_some_reads_and_some_time_without_a_silence(at: list[float], sh
     evidence = Evidence()
     judged = [evidence.judged(status_of(0x31, 0xFF, 0x09, at=time), time) for time in at]
     assert [each.fault is Fault.NONE for each in judged] == shown
+
+
+def test_without_it_the_first_status_decides() -> None:
+    evidence = Evidence()
+    assert not evidence.may_pass
+    assert evidence.update(status_of(0x31, 0xFF, at=0.0), 0.0) is Trigger.SEEN_READY
+    assert not evidence.is_undecided
 
 
 @pytest.mark.parametrize("code", [0x00, 0x05, 0x0A, 0x0C, 0x0E])

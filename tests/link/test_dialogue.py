@@ -113,6 +113,13 @@ def test_the_answer_to_an_earlier_probe_does_not_prove_that_no_status_can_follow
     assert said(dialogues.read(), SILENT)[0] == ["3x3", "TURN", "HUSH", "3x1", "3x3"]
 
 
+def test_a_jaw_may_refuse_the_first_read_of_all_and_no_other() -> None:
+    """That one asks for eight registers, and a device with three may refuse it."""
+    refused, dialogues = Refused(ProtocolError("illegal address"), 2), speaker()
+    assert said(dialogues.opening(), refused) == (["3x8", "TURN", "HUSH", "3x1"], None)
+    assert said(dialogues.opening(), refused) == (["3x2"], refused.error)
+
+
 def test_a_second_failure_ends_it_with_the_first_reason() -> None:
     dialogues = speaker()
     said(dialogues.opening())

@@ -202,6 +202,7 @@ REFUSED: list[tuple[object, type[Exception], str]] = [
         "stroke: positions must rise and openings fall, got 85 mm at 3 and then 85 mm at 100",
     ),
     ([(228, 0), (3, 85)], ValueError, "stroke: positions must rise and openings fall"),
+    ([(3, 85), (3, 80), (228, 0)], ValueError, "stroke: positions must rise and openings fall"),
 ]
 
 
@@ -381,6 +382,8 @@ def test_the_ends_of_a_gripper_are_those_that_were_measured() -> None:
         (14, 0, True),
         (16, 0, False),
         (14, 13, True),
+        (10, 13, True),  # requests of the ends themselves, and fingers beyond them
+        (216, 213, True),
     ):
         assert of_jaw(0xF9, position, stroke=own).has_reached(JAW, request) is reached, (position, request)
     assert not of_jaw(0xF9, 213).has_reached(JAW, 255)
