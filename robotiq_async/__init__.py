@@ -20,7 +20,7 @@ Nothing of this has run on real hardware yet.
 """
 
 from .hand.robotiq_hand import RobotiqHand
-from .link.tunnel import Tunnel
+from .link.tunnel.protocol import Tunnel, TunnelPlace
 from .runtime.version import __version__ as __version__
 from .session.options import ReconnectPolicy
 from .session.streams import Stream
@@ -124,6 +124,7 @@ __all__ = [
     "Transition",
     "Trigger",
     "Tunnel",
+    "TunnelPlace",
     "Units",
     "WrongModelError",
 ]

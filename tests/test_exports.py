@@ -41,6 +41,7 @@ EXTRAS = {
     "GripChange": "type of GripEvent.change",
     "SentRequest": "what RobotiqHand.requests() gives",
     "Tunnel": "what may be passed in place of an address",
+    "TunnelPlace": "what makes a tunnel from an address gets",
     "ReconnectPolicy": "what may be passed as reconnect",
     "Model": "type of RobotiqHand.model",
     "THREE_FINGER": "what may be passed as model",

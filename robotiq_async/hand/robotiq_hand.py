@@ -26,7 +26,7 @@ from typing import Final, Literal
 
 from ..control.pending import Command
 from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
-from ..link.tunnel import Tunnel
+from ..link.tunnel.protocol import Tunnel
 from ..runtime.limit import Limit
 from ..session.options import (
     ACTIVATION_TIMEOUT_S,

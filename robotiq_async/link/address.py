@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import re
-import socket
-import stat
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from ipaddress import IPv4Address, IPv6Address
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 from ..values.checks import check_byte, repr_of
 from ..values.model import MODELS, Model, model_of
 
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
 TCP_PORT: Final = 502  # the port of Modbus TCP, and the gripper's
 URCAP_PORT: Final = 63352  # the text port of Robotiq's URCap on a UR controller
 
+TUNNELS: Final = "robotiq_async.tunnels"
+"""The group of entry points in which a package names its tunnels: each name is a scheme."""
 REMOTE_SCHEME: Final = "zenoh://"  # of a gripper on another host, for a remote hand
 FORMS: Final = "tcp://HOST, rtu://DEVICE, rtu+tcp://HOST:PORT, urcap://HOST, sim://, zenoh://..."
 """For messages; docs/how-to/which-wire.md and the help of the command line explain them."""
@@ -114,14 +115,16 @@ class Address:
 
     Attributes:
         kind: "tcp", "rtu", "rtu+tcp", "urcap", "sim" or "tunnel".
-        host: host name or IP address (tcp, rtu+tcp, urcap), device of the serial port (rtu), empty (sim),
-            name of the object (tunnel).
-        port: TCP port; 0 for the others.
+        host: host name or IP address (tcp, rtu+tcp, urcap, tunnel), device of the serial port (rtu), empty
+            (sim), name of a tunnel that is an object.
+        port: TCP port; 0 for the others, and for a tunnel without one.
         simulation: what the gripper is like (sim); nothing special for the others.
         line: how the serial port sends (rtu); the usual for the others.
         model: of the gripper; None if the address does not name it.
         stroke: absolute path of a file with measured openings, which is read when a hand is made; None for
             nominal ones.
+        scheme: of a tunnel; empty for the others, and for a tunnel that is an object.
+        options: those that are for the tunnel alone, names and values.
     """
 
     kind: Kind
@@ -131,6 +134,8 @@ class Address:
     line: Line = USUAL_LINE
     model: Model | None = None
     stroke: str | None = None
+    scheme: str = ""
+    options: tuple[tuple[str, str], ...] = ()
 
     @property
     def is_rtu(self) -> bool:
@@ -143,16 +148,23 @@ class Address:
         return self.kind in _SOCKETS
 
     def __str__(self) -> str:
-        query = str(self.simulation) + str(self.line)
+        query = str(self.simulation) + str(self.line) + own_options(self.options)
         name = None if self.model is None else self.model.name
         for option, value in zip(GRIPPER_OPTIONS, (name, self.stroke), strict=True):
             query += "" if value is None else f"{'&' if query else '?'}{option}={value}"
-        if self.is_socket:
-            host = f"[{self.host}]" if ":" in self.host else self.host
-            return f"{self.kind}://{host}:{self.port}{query}"
-        if self.kind == "tunnel":
+        if self.kind == "tunnel" and not self.scheme:
             return self.host
+        if self.is_socket or self.scheme:
+            host = f"[{self.host}]" if ":" in self.host else self.host
+            port = f":{self.port}" if self.port else ""
+            return f"{self.scheme or self.kind}://{host}{port}{query}"
         return f"{self.kind}://{self.host}{query}"
+
+
+def own_options(options: Iterable[tuple[str, str]]) -> str:
+    """The options of a tunnel as they are written, with the question mark before them; empty for none."""
+    written = "&".join(f"{name}={value}" for name, value in options)
+    return f"?{written}" if written else ""
 
 
 def is_remote(address: object) -> bool:
@@ -202,7 +214,48 @@ def parse_address(address: object) -> Address:
     if scheme == "zenoh":
         what = "is a gripper on another host: use robotiq_async.fleet.RemoteHand, or an address here"
         raise ValueError(_within(f"{_shown(address)} {what}: {FORMS}"))
-    raise malformed(address, _meant(rest) if scheme == "sim" else "")
+    if scheme in ("sim", "rtu", *_SOCKETS) or not _SCHEME.fullmatch(scheme):
+        raise malformed(address, _meant(rest) if scheme == "sim" else "")
+    try:
+        return _through_a_tunnel(scheme, rest, model, stroke)
+    except ValueError as error:
+        raise malformed(address, str(error)) from None
+
+
+_SCHEME: Final = re.compile("[a-z][a-z0-9+.-]*")
+
+
+def entry_of(scheme: str) -> EntryPoint | None:
+    """What an installed package names under a scheme; None if there is nothing. It is not loaded.
+
+    Raises:
+        ValueError: several packages name the same.
+    """
+    from importlib.metadata import entry_points  # noqa: PLC0415  # a tenth of the time that all else takes
+
+    found = tuple(entry_points(group=TUNNELS, name=scheme))
+    if len({each.value for each in found}) > 1:
+        makers = " and ".join(sorted(each.value for each in found))
+        raise ValueError(f"several packages have tunnels for {scheme}://: {makers}")
+    return found[0] if found else None
+
+
+def _through_a_tunnel(scheme: str, rest: str, model: Model | None, stroke: str | None) -> Address:
+    """An address of a package; only this one knows what its options mean."""
+    if entry_of(scheme) is None:
+        raise ValueError(f"no package here has {scheme}://; accepted: {FORMS}")
+    place, _, query = rest.partition("?")
+    host, port = _host_and_port(place, 0)
+    if not host or port is None:
+        raise ValueError(f"a tunnel is {scheme}://HOST, or {scheme}://HOST:PORT")
+    options: dict[str, str] = {}
+    for part in query.split("&") if query else ():
+        name, separator, value = part.partition("=")
+        if not (name and separator and part.isprintable()) or name in options:
+            raise ValueError(f"an option of a tunnel is given once, as NAME=VALUE, got {part!r}")
+        options[name] = value
+    given = tuple(options.items())
+    return Address("tunnel", host, port, model=model, stroke=stroke, scheme=scheme, options=given)
 
 
 def malformed(address: str, why: str, forms: str = FORMS) -> ValueError:
@@ -418,53 +471,3 @@ def _object(text: str) -> int:
     if not re.fullmatch(r"[0-9]{1,9}", text):
         raise ValueError(f"object must be an integer in 0..255, got {text!r}")
     return check_byte("object", int(text))
-
-
-# -- one spelling for all ways to write an address, without asking a name server --------------------------
-
-HERE: Final = "localhost"
-
-
-def canonical_address(address: Address) -> str:
-    """One spelling of an address: equal strings for equal places.
-
-    Every spelling of this machine becomes localhost. A symbolic link to a serial port becomes that port. A
-    socket is the same place whatever protocol it carries.
-    """
-    host = _serial_port(address.host) if address.kind == "rtu" else _host(address.host)
-    return f"{'tcp' if address.is_socket else address.kind}://{host}:{address.port}"
-
-
-def _host(host: str) -> str:
-    """One spelling of a host. Names are not resolved."""
-    if ":" in host:
-        number, _, zone = host.partition("%")
-        address = IPv6Address(number)
-        if address.ipv4_mapped is None:
-            if address.is_loopback or address.is_unspecified:
-                return HERE
-            # Only link-local addresses depend on an interface.
-            return f"{address}%{_interface(zone)}" if address.is_link_local else str(address)
-        host = str(address.ipv4_mapped)
-    name = host.removesuffix(".")
-    # Connecting to 0.0.0.0 or :: reaches this machine. Other addresses in 127.0.0.0/8 are other places.
-    return HERE if name in (HERE, "127.0.0.1", "0.0.0.0") or name.endswith(f".{HERE}") else name
-
-
-def _interface(zone: str) -> str:
-    """The number of a network interface; its name as given if it does not exist."""
-    with contextlib.suppress(OSError):
-        return str(socket.if_nametoindex(zone))
-    return str(int(zone)) if zone.isdecimal() else zone
-
-
-def _serial_port(device: str) -> str:
-    """One spelling of a serial port: the device number if it exists, else its path."""
-    windows = re.fullmatch(r"(?:\\\\[.?]\\)?(com[0-9]+)", device, re.IGNORECASE)
-    if windows is not None:
-        return windows[1].upper()
-    with contextlib.suppress(OSError):
-        found = os.stat(device)
-        if sys.platform != "win32" and stat.S_ISCHR(found.st_mode):
-            return f"device {os.major(found.st_rdev)}:{os.minor(found.st_rdev)}"
-    return os.path.realpath(device)

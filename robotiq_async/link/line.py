@@ -34,7 +34,8 @@ from weakref import WeakKeyDictionary, WeakSet, WeakValueDictionary
 
 from ..runtime.limit import Limit
 from ..values.errors import ConnectFailedError, ConnectionLostError, ProtocolError, RobotiqConnectionError
-from .address import Address, canonical_address
+from .address import Address
+from .canonical import canonical_address
 from .exchange import Answer, Echo, Exchange
 from .frames import stray
 from .outcome import Lost, Noise, Outcome, Refused, Stray

@@ -26,7 +26,8 @@ from .dialogue import Decide, Dialogues
 from .exchange import Exchange, PduExchange, SerialExchange, TcpExchange
 from .line import Line, shared_line
 from .transport import Answer
-from .tunnel import Tunnel, TunnelWire
+from .tunnel.protocol import Tunnel, tunnel_to
+from .tunnel.wire import TunnelWire
 
 # pymodbus logs every failed connection attempt; our exceptions say the same. A level that the application
 # sets on its logger stays.
@@ -56,13 +57,15 @@ class ModbusTransport:
     ) -> None:
         """Keep the settings; opens nothing.
 
-        The address is tcp, rtu, rtu+tcp, or that of a ``tunnel``. Timeouts are in seconds; on a serial line a
-        read may be repeated after ``response_timeout``. With ``shares_line``, others of the event loop may
-        use the serial line, too, for grippers with other unit ids.
+        The address is tcp, rtu, rtu+tcp or tunnel; ``tunnel`` is made from the address unless given. Timeouts
+        are in seconds; on a serial line a read may be repeated after ``response_timeout``. With
+        ``shares_line``, others of the event loop may use the serial line, too, for grippers with other ids.
         """
         self._address: Final = address
         self._connect_timeout: Final = connect_timeout
         self._shares_line: Final = shares_line
+        if tunnel is None and address.scheme:
+            tunnel = tunnel_to(address, registers.device_id)
         self._tunnel: Final = None if tunnel is None else TunnelWire(tunnel, address, log)
         self._line = Line(address, wire=self._tunnel)
         self._number = secrets.randbelow(LAST_NUMBER)

@@ -10,12 +10,13 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Final, Generic, TypeVar
 
-from ..link.address import Address, canonical_address, parse_address
+from ..link.address import Address, parse_address
+from ..link.canonical import canonical_address
 from ..link.modbus import ModbusTransport
 from ..link.registers import check_urcap, registers_of
 from ..link.sim_transport import SimulatedTransport, named, new_gripper
 from ..link.transport import Link
-from ..link.tunnel import Tunnel
+from ..link.tunnel.protocol import Tunnel, tunnel_to
 from ..link.urcap.transport import UrcapTransport
 from ..runtime.log import Log
 from ..values.checks import repr_of
@@ -24,6 +25,7 @@ from ..values.registers import RegisterMap
 
 _GATEWAY: Final = " (two grippers behind one gateway: give each of the hands its device_id)"
 _LINE: Final = " (two grippers on one serial line: give each of the hands its device_id, in one event loop)"
+_TUNNEL: Final = " (two grippers behind one arm: give each of the hands its device_id)"
 _URCAP: Final = " (two grippers behind one URCap: give each of the hands its device_id)"
 
 MOST_LEFT: Final = 64
@@ -97,10 +99,12 @@ def gripper_link(
         parsed = with_model(parsed, model)
         if parsed.kind == "urcap":
             check_urcap(parsed, registers)
-        make = _over_urcap if parsed.kind == "urcap" else _over_modbus
+        make = {"urcap": _over_urcap, "tunnel": _through_a_tunnel}.get(parsed.kind, _over_modbus)
         return make(parsed, registers_of(parsed, **registers), names_unit, name)
     if isinstance(address, Tunnel):
-        return _through(address, registers, name, model)
+        shown = Address("tunnel", f"<{type(address).__name__} at {id(address):#x}>")
+        shown = with_model(shown, model)
+        return _through(address, shown, registers_of(shown, **registers), name)
     raise TypeError(f"address must be a string or a Tunnel, got {repr_of(address)}")
 
 
@@ -136,13 +140,23 @@ def _over_modbus(address: Address, registers: RegisterMap, names_unit: bool, nam
     )
 
 
-def _through(tunnel: Tunnel, registers: Mapping[str, object], name: str, model: object) -> GripperLink:
-    """The way through a tunnel object."""
-    shown = f"<{type(tunnel).__name__} at {id(tunnel):#x}>"
-    address = with_model(Address("tunnel", shown), model)
-    block = registers_of(address, **registers)
-    make = partial(ModbusTransport, address, block, tunnel=tunnel, log=Log(name or shown))
-    return GripperLink(shown, partial(Gripper, shown), make, is_slow=True, model=model_of(address.model))
+def _through_a_tunnel(address: Address, registers: RegisterMap, names_unit: bool, name: str) -> GripperLink:
+    # Made with the hand: it imports a package, for which a running loop would wait.
+    tunnel = tunnel_to(address, registers.device_id)
+    return _through(tunnel, address, registers, name, registers.device_id if names_unit else None)
+
+
+def _through(
+    tunnel: Tunnel, address: Address, registers: RegisterMap, name: str, unit: int | None = None
+) -> GripperLink:
+    return GripperLink(
+        str(address),
+        lambda: Gripper(canonical_address(address), unit, _TUNNEL),
+        partial(ModbusTransport, address, registers, tunnel=tunnel, log=Log(name or str(address))),
+        is_slow=True,
+        model=model_of(address.model),
+        stroke=address.stroke,
+    )
 
 
 def _over_urcap(address: Address, registers: RegisterMap, names_unit: bool, name: str) -> GripperLink:

@@ -17,7 +17,7 @@ from typing import Annotated, Final, get_type_hints
 
 from ..link.registers import LAST_BLOCK, check_write_function
 from ..link.transport import Link
-from ..link.tunnel import Tunnel
+from ..link.tunnel.protocol import Tunnel
 from ..runtime.log import Log
 from ..values.calibration import ForceCalibration, SpeedCalibration, Units
 from ..values.calibration.csv_tables import TableError, read_stroke
@@ -238,7 +238,9 @@ class HandOptions:
     address: Annotated[
         str | Tunnel,
         Option(
-            "Gripper: tcp://, rtu://, rtu+tcp://, urcap:// or sim://", _check_address, Place.FILE | Place.ROS
+            "Gripper: tcp://, rtu://, rtu+tcp://, urcap://, sim://, or the scheme of a tunnel",
+            _check_address,
+            Place.FILE | Place.ROS,
         ),
     ] = "sim://"
     name: Annotated[str | None, Option("What errors and the log call the hand", _check_name)] = None

@@ -9,7 +9,7 @@ from typing import Generic, Self, TypeVar
 from ..hand.grip_watch import SLIP_COUNTS
 from ..hand.robotiq_hand import RobotiqHand as AsyncRobotiqHand
 from ..hand.run import refuse_copy
-from ..link.tunnel import Tunnel
+from ..link.tunnel.protocol import Tunnel
 from ..session.options import (
     ACTIVATION_TIMEOUT_S,
     CONNECT_TIMEOUT_S,

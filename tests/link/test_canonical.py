@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.link.address import canonical_address, parse_address
+from robotiq_async.link.address import parse_address
+from robotiq_async.link.canonical import canonical_address
 
 LOOPBACK = "lo" if os.path.exists("/sys/class/net/lo") else "lo0"
 

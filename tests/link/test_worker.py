@@ -9,7 +9,7 @@ from functools import partial
 
 import pytest
 
-from robotiq_async.link.worker import Worker
+from robotiq_async.link.tunnel.worker import Worker
 from robotiq_async.runtime.clock import now
 from robotiq_async.runtime.concurrency import LateError
 

@@ -1,31 +1,27 @@
-"""Tunnels: the way of an application to its gripper, as a wire.
+"""A tunnel as a wire.
 
-An arm carries the serial line at its tool in a protocol of its own. Who knows that protocol writes a class of
-three methods; all that a link does is built on it, as on a serial line.
-
-Each frame of a :class:`TunnelWire` is one call of :meth:`Tunnel.exchange`, in a task that makes all calls. A
-call whose answer is no longer waited for is cancelled when the next request leaves, and that request waits
-for its end. So a tunnel never carries two requests at a time, and a request that its tunnel still keeps has
-left it before the next one does. What it brings back late is dropped, and a write without an answer stays in
-doubt until the gripper shows what became of it (dialogue.py).
+Each frame is one call of :meth:`Tunnel.exchange`, in a task that makes all calls. A call whose answer is no
+longer waited for is cancelled when the next request leaves, and that request waits for its end. So a tunnel
+never carries two requests at a time, and a request that it still keeps has left it before the next one does.
+What it brings back late is dropped, and a write without an answer stays in doubt until the gripper shows what
+became of it (dialogue.py).
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Final, Protocol, runtime_checkable
+from typing import Final
 
 import anyio
 
-from ..runtime.concurrency import LateError
-from ..runtime.host_names import why_unreachable
-from ..runtime.log import Log, log
-from ..values.errors import ConnectionLostError, ProtocolError, ResponseTimeoutError
-from .address import Address
-from .outcome import Lost, Noise, Outcome, Silent
-from .wires import OnData, OnEnd, Send, Table, failing_as
+from ...runtime.concurrency import LateError
+from ...runtime.host_names import why_unreachable
+from ...runtime.log import Log, log
+from ...values.errors import ConnectionLostError, ProtocolError, ResponseTimeoutError
+from ..address import Address
+from ..outcome import Lost, Noise, Outcome, Silent
+from ..wires import OnData, OnEnd, Send, Table, failing_as
+from .protocol import Tunnel
 from .worker import Call, Worker
 
 CLOSE_S: Final = 0.5
@@ -38,62 +34,6 @@ OPENING: Final[Table] = {
     OSError: why_unreachable,
     Exception: repr,
 }
-
-
-@runtime_checkable
-class Tunnel(Protocol):
-    """A way to one gripper that carries Modbus requests. Pass such an object in place of an address.
-
-    One task makes all calls, one at a time. Blocking work belongs into a thread, and a call must not return
-    before that has ended: ``await anyio.to_thread.run_sync(...)`` waits for it, also when it is cancelled.
-    ``asyncio.to_thread`` does not, and would carry two requests at a time.
-    """
-
-    async def open(self) -> None:
-        """Connect. Called again after :meth:`close`.
-
-        It is cancelled after the hand's ``connect_timeout``.
-
-        Raises:
-            Exception: there is no way to the gripper; the hand has a ConnectFailedError then.
-        """
-
-    async def exchange(self, pdu: bytes) -> bytes:
-        """Send a request exactly once, and return the reply to it.
-
-        Both are a PDU of Modbus: function code and data, without unit id and checksum. An exception of the
-        gripper is a reply like others; ``bytes((pdu[0] | 0x80, 1))`` is that to a function which cannot be
-        carried. The call is cancelled some time after the hand's ``response_timeout``. A reply that comes
-        later should be dropped, not returned for the next request.
-
-        Args:
-            pdu: a request of function 3, 4, 16 or 23, of 26 bytes at most.
-
-        Raises:
-            TimeoutError: the gripper does not answer, and the tunnel stays open; a read is asked once more.
-            ProtocolError: what has come is not the answer; as above.
-            Exception: the tunnel is lost: the hand closes it and opens it again.
-        """
-
-    async def close(self) -> None:
-        """Disconnect, within half a second; does nothing when closed."""
-
-
-@dataclass(frozen=True, slots=True)
-class TunnelPlace:
-    """What the address of a tunnel says, for the function that makes the tunnel.
-
-    Attributes:
-        host: name or IP address.
-        port: after the host; None if there is none.
-        unit: unit id of the gripper, 1..247: ``device_id``, or the usual one.
-        options: those after the question mark that are not for every gripper, as texts.
-    """
-
-    host: str
-    port: int | None = None
-    unit: int = 9
-    options: Mapping[str, str] = field(default_factory=dict)
 
 
 class TunnelWire:

@@ -7,9 +7,9 @@ from collections import deque
 from collections.abc import Awaitable, Callable
 from typing import Any, Final, TypeVar
 
-from ..runtime.concurrency import LateError
-from ..runtime.limit import HELD_S
-from .watchdog import GRACE_S
+from ...runtime.concurrency import LateError
+from ...runtime.limit import HELD_S
+from ..watchdog import GRACE_S
 
 T = TypeVar("T")
 

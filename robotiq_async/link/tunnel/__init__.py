@@ -1,0 +1,1 @@
+"""Tunnels: gripper and hand on two sides of a protocol that an application knows."""
