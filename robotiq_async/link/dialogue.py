@@ -27,7 +27,7 @@ from ..values import registers as reg
 from ..values.errors import ResponseTimeoutError, RobotiqConnectionError
 from ..values.registers import REGISTER_COUNT, RegisterMap, Registers
 from . import transport
-from .exchange import Answer, Exchange
+from .exchange import Answer, Exchange, Timing
 from .frames import read_request, registers_in, write_and_read_request, write_request
 from .line import Dialogue, Line, Step
 from .outcome import Noise, Outcome, Refused, Silent
@@ -56,7 +56,7 @@ class Dialogues:
     """What is said to one gripper, over all connections to it.
 
     Attributes:
-        line: the line to it; another one may be set before an opening.
+        line: the line to it.
         repeats: number of reads repeated because an answer was missing or damaged.
         serves_23: whether function 23 is used; None while it has yet to be tried.
         has_served_23: whether it was answered once.
@@ -66,7 +66,7 @@ class Dialogues:
         self,
         line: Line,
         registers: RegisterMap,
-        make: Callable[[bytes], Exchange],
+        make: Callable[[bytes, Timing], Exchange],
         response_timeout: float,
         log: Log,
     ) -> None:
@@ -77,7 +77,7 @@ class Dialogues:
         self.has_served_23 = False
         self._map: Final = registers
         self._make: Final = make
-        self._response_s: Final = response_timeout
+        self._usual: Final = Timing(response_timeout)
         self._repeat_s: Final = response_timeout if response_timeout > USUAL_RESPONSE_S else REPEAT_S
         self._log: Final = log
         self._poll: Final = read_request(registers, registers.count)
@@ -97,6 +97,10 @@ class Dialogues:
         self._warned = -math.inf
         """The time of the last warning about a repeated read."""
 
+    def move_to(self, line: Line) -> None:
+        """Another line leads to the gripper, before an opening."""
+        self.line = line
+
     # -- dialogues ---------------------------------------------------------------------------------------
 
     def opening(self) -> Dialogue[None]:
@@ -113,7 +117,7 @@ class Dialogues:
             if not (is_harmless or self._can_repeat(first)):
                 raise first.error
             yield Step.TURN
-            if (again := (yield from self._in_step(self._repeat_by()))) is not None:
+            if (again := (yield from self._in_step(self._repeated()))) is not None:
                 raise first.error from again.error
             if asks_for_rest:
                 what = "%s did not answer a read of all registers: %s"
@@ -242,22 +246,22 @@ class Dialogues:
             RobotiqConnectionError: that of the first request, if there is again no clean answer.
         """
         yield Step.TURN
-        by = self._repeat_by()
-        bad = yield from self._in_step(by, is_long=True)  # the shorter silence may be why there was no answer
+        timing = self._repeated(is_long=True)  # the shorter silence may be why there was no answer
+        bad = yield from self._in_step(timing)
         if bad is None:
-            came_to = yield self._ask(self._poll, by=by, is_long=True)
+            came_to = yield self._ask(self._poll, timing)
             if isinstance(came_to, bytes):
                 self._note_repeat(first.error)
                 return came_to
             bad = came_to
         raise first.error from (bad.error if bad else None)
 
-    def _in_step(self, by: float = math.inf, *, is_long: bool = False) -> Part:
+    def _in_step(self, timing: Timing | None = None) -> Part:
         """Wait for silence, and drop the rest of a damaged reply; then make sure that nothing can come."""
         noise = yield Step.HUSH
-        return noise if isinstance(noise, Outcome) else (yield from self._probed(by, is_long=is_long))
+        return noise if isinstance(noise, Outcome) else (yield from self._probed(timing))
 
-    def _probed(self, by: float = math.inf, *, is_long: bool = False) -> Part:
+    def _probed(self, timing: Timing | None = None) -> Part:
         """Make sure that no answer to an earlier request is still on its way.
 
         Serial replies carry no transaction id, and a gateway from TCP to a serial line gives a late reply the
@@ -270,7 +274,7 @@ class Dialogues:
         """
         count, is_first, self._has_probed = self._map.count, not self._has_probed, True
         if is_first and count < REGISTER_COUNT:
-            came_to = yield self._ask(read_request(self._map, REGISTER_COUNT), by=by, is_long=is_long)
+            came_to = yield self._ask(read_request(self._map, REGISTER_COUNT), timing)
             if isinstance(came_to, bytes):
                 rest = registers_in(came_to)[count:]
                 self._rest = rest if any(rest) else ()
@@ -279,7 +283,7 @@ class Dialogues:
         while True:
             self._probe = self._probe % (count - 1) + 1
             request = read_request(self._map, self._probe)
-            came_to = yield self._ask(request, by=by, is_long=is_long)
+            came_to = yield self._ask(request, timing)
             if isinstance(came_to, Outcome):
                 return came_to
             if self._is_in_step_after(request):
@@ -309,11 +313,9 @@ class Dialogues:
 
     # -- requests, and what outcomes mean ------------------------------------------------------------------
 
-    def _ask(self, request: bytes, *, by: float = math.inf, is_long: bool = False) -> Exchange:
+    def _ask(self, request: bytes, timing: Timing | None = None) -> Exchange:
         self._outstanding.append(request[1:6])
-        exchange = self._make(request)
-        exchange.seconds, exchange.by, exchange.is_long = self._response_s, by, is_long
-        return exchange
+        return self._make(request, timing or self._usual)
 
     def _can_repeat(self, outcome: Outcome) -> bool:
         """Whether a read can be asked again after this."""
@@ -321,9 +323,9 @@ class Dialogues:
             return outcome.is_passing
         return self.line.forgives and isinstance(outcome, Noise | Silent)
 
-    def _repeat_by(self) -> float:
-        """The latest end of a repeated read, in the loop's time."""
-        return self.line.now() + self._repeat_s
+    def _repeated(self, *, is_long: bool = False) -> Timing:
+        """The limits of all that a repeated read takes."""
+        return self._usual._replace(by=self.line.now() + self._repeat_s, is_long=is_long)
 
     def _status_in(self, answer: bytes) -> Registers:
         registers = registers_in(answer)
@@ -357,6 +359,6 @@ class Dialogues:
 
     def _keep_long_silence(self, why: RobotiqConnectionError) -> None:
         silence = self.line.silence
-        silence.is_long = True
+        silence.lengthen()
         what = "%s does not answer after a silence of %.1f ms, so it gets 1.75 ms: %s"
         self._log.warning(what, self.line.address, 1000 * silence.short_s, why)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from typing import NamedTuple
 
 from ..values.errors import ProtocolError, ResponseTimeoutError
 from . import frames
@@ -22,24 +23,34 @@ from .outcome import Noise, Outcome, Silent, Stray
 Answer = bytes | Outcome
 
 
+class Timing(NamedTuple):
+    """The limits of an exchange.
+
+    Attributes:
+        seconds: the longest time from the request to the end of the reply.
+        by: when it must be over even so, in the loop's time.
+        is_long: whether the longer silence is kept before it.
+    """
+
+    seconds: float
+    by: float = math.inf
+    is_long: bool = False
+
+
 class Exchange(ABC):
     """A request and its reply, whatever the protocol.
 
     Attributes:
         frame: the bytes to send.
-        seconds: the longest time from the request to the end of the reply.
-        by: when it must be over even so, in the loop's time.
-        is_long: whether the longer silence is kept before it.
+        timing: its limits.
         extra: bytes that came after the answer and answer nothing, if any did.
     """
 
-    seconds = math.inf
-    by = math.inf
-    is_long = False
     extra: Stray | None = None
 
-    def __init__(self, frame: bytes) -> None:
+    def __init__(self, frame: bytes, timing: Timing) -> None:
         self.frame = frame
+        self.timing = timing
         self._received = b""
 
     @abstractmethod
@@ -48,14 +59,14 @@ class Exchange(ABC):
 
     def late(self, place: object) -> Silent:
         """The outcome when the reply has not come in time."""
-        return Silent(ResponseTimeoutError(f"{place} did not answer within {self.seconds:g} s"))
+        return Silent(ResponseTimeoutError(f"{place} did not answer within {self.timing.seconds:g} s"))
 
 
 class TcpExchange(Exchange):
     """A request over Modbus TCP."""
 
-    def __init__(self, number: int, request: bytes) -> None:
-        super().__init__(frames.tcp_frame(number, request))
+    def __init__(self, number: int, request: bytes, timing: Timing) -> None:
+        super().__init__(frames.tcp_frame(number, request), timing)
         self._expected = frames.expected_over_tcp(request)
 
     def feed(self, data: bytes) -> Answer | None:
@@ -71,8 +82,8 @@ class TcpExchange(Exchange):
 class PduExchange(Exchange):
     """A request through a tunnel, which brings a whole reply or none."""
 
-    def __init__(self, request: bytes) -> None:
-        super().__init__(request[1:])
+    def __init__(self, request: bytes, timing: Timing) -> None:
+        super().__init__(request[1:], timing)
         self._expected = frames.expected_in_a_tunnel(request)
 
     def feed(self, data: bytes) -> Answer | None:
@@ -89,12 +100,19 @@ class Echo:
     def __init__(self) -> None:
         self.is_on: bool | None = False
 
+    def begin(self, *, may_be_on: bool) -> None:
+        """A connection begins: what it does is not known, unless the wire cannot echo."""
+        self.is_on = None if may_be_on else False
+
+    def found(self, *, is_on: bool) -> None:
+        self.is_on = is_on
+
 
 class SerialExchange(Exchange):
     """A request on a serial line; it notes in ``echo`` what it learns."""
 
-    def __init__(self, request: bytes, echo: Echo) -> None:
-        super().__init__(frames.serial_frame(request))
+    def __init__(self, request: bytes, timing: Timing, echo: Echo) -> None:
+        super().__init__(frames.serial_frame(request), timing)
         self._echo = echo
         self._expected = frames.expected_reply(request, checksum=frames.CHECKSUM)
 
@@ -110,7 +128,7 @@ class SerialExchange(Exchange):
             reply, self.extra = reply[:size], frames.stray(reply[size:])
         verdict = self._expected.verdict(reply)
         if type(verdict) is bytes:
-            self._echo.is_on = bool(self._echo.is_on)
+            self._echo.found(is_on=bool(self._echo.is_on))
         return verdict
 
     def _without_echo(self, received: bytes) -> bytes | Noise:
@@ -123,5 +141,5 @@ class SerialExchange(Exchange):
             return received
         if len(received) < size:
             return b""
-        self._echo.is_on = True
+        self._echo.found(is_on=True)
         return received[size:]

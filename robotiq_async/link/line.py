@@ -67,7 +67,9 @@ class LineState(Enum):
     HUSHING = "the same, which is dropped until the line is silent"
 
 
-_IS_NEWS: Final = (LineState.OPENING, LineState.IN_STEP)
+# Python 3.11 finds a member of an Enum by a detour that costs as much as a call: each poll asks for several.
+CLOSED, OPENING, IN_STEP, DISTURBED, HUSHING = LineState
+_IS_NEWS: Final = (OPENING, IN_STEP)
 """The states in which bytes without a request mean something new."""
 
 
@@ -78,6 +80,10 @@ class Step(Enum):
     HUSH = "silence; comes to noise if there is none"
     TURN = "that others have their turn; comes to nothing"
 
+
+READY: Final = Step.READY
+HUSH: Final = Step.HUSH
+TURN: Final = Step.TURN
 
 Dialogue = Generator[Exchange | Step, Answer | None, T]
 """Yields steps and gets what they come to; an exchange always comes to an answer or an outcome."""
@@ -108,7 +114,7 @@ class Line:
         ``stray`` says what bytes without a request mean. ``wire`` is that to the address unless given. With
         ``shares`` the line may have several users at a time.
         """
-        self.state, self.why = LineState.CLOSED, None
+        self.state, self.why = CLOSED, None
         self.forgives = address.is_rtu
         self.keeps_silence = address.kind == "rtu"
         self.silence = Silence(address.line.character_s)
@@ -165,7 +171,7 @@ class Line:
             RobotiqConnectionError: the connection was closed at once, or bytes arrive without a request.
         """
         async with self._turns:
-            if self.state is LineState.CLOSED:
+            if self.state is CLOSED:
                 await self._connect(seconds)
             self._users.add(user)
             try:
@@ -178,8 +184,8 @@ class Line:
     async def _connect(self, seconds: float) -> None:
         _close_abandoned()
         self._watchdog = Watchdog(lambda: self._exchange is not None, self._on_timeout)
-        self.echo.is_on = None if self._wire.may_echo else False
-        self._become(LineState.OPENING)
+        self.echo.begin(may_be_on=self._wire.may_echo)
+        self._become(OPENING)
         is_open = False
         try:
             with Limit(seconds):
@@ -192,9 +198,9 @@ class Line:
         except BaseException:
             self._close()
             raise
-        self._become(LineState.IN_STEP if self.why is None else LineState.DISTURBED, self.why)
+        self._become(IN_STEP if self.why is None else DISTURBED, self.why)
         _opened[id(self)] = self
-        self.silence.heard = self._watchdog.clock()  # whatever the line carried for the last connection
+        self.silence.hear(self._watchdog.clock())  # whatever the line carried for the last connection
 
     async def _settle(self) -> None:
         """Wait for bytes left over from an earlier connection before the first request.
@@ -219,21 +225,21 @@ class Line:
     def leave(self, user: object) -> None:
         """End the use of the line, between two exchanges; the last user closes it."""
         self._users.discard(user)
-        if not self._users and self.state is not LineState.OPENING:
+        if not self._users and self.state is not OPENING:
             self._close()
 
     def _abandon(self, user: object) -> None:
         """End the use of a line on which a reply may still come."""
         self._give_up()
         if user in self._users:
-            self._become(LineState.DISTURBED)
+            self._become(DISTURBED)
             self._speaker = None
             self.leave(user)
 
     def _close(self, why: Outcome | None = None) -> None:
-        if self.state is LineState.CLOSED:
+        if self.state is CLOSED:
             return
-        self._become(LineState.CLOSED, why)
+        self._become(CLOSED, why)
         self._users.clear()
         self._watchdog.stop()
         self._give_up(why)
@@ -246,7 +252,7 @@ class Line:
 
     def close_if_abandoned(self) -> None:
         """Close it if the loop was closed before."""
-        if self.state is not LineState.CLOSED and self._watchdog.loop.is_closed():
+        if self.state is not CLOSED and self._watchdog.loop.is_closed():
             self._exchange = None  # its user has gone with the loop
             with contextlib.suppress(RuntimeError):  # asyncio's sockets tell the loop that they close
                 self._close()
@@ -266,13 +272,13 @@ class Line:
                 if must_hush and (noise := await self._hush()) is not None:
                     raise noise.error
                 came_to: Answer | None = None
-                while (step := dialogue.send(came_to)) is not Step.TURN:
-                    if step is Step.HUSH:
+                while (step := dialogue.send(came_to)) is not TURN:
+                    if step is HUSH:
                         came_to = await self._hush()
                         continue
                     if self.keeps_silence:
                         await self._keep_silence(step)
-                    came_to = self._obstacle(user) if step is Step.READY else await self._begin(user, step)
+                    came_to = self._obstacle(user) if step is READY else await self._begin(user, step)
             except StopIteration as end:
                 result: T = end.value
                 return result
@@ -289,24 +295,24 @@ class Line:
             await asyncio.sleep(rest)
         await self._turns.acquire()
         before, self._speaker = self._speaker, user
-        is_left_over = self.state is LineState.DISTURBED and not isinstance(self.why, Stray)
+        is_left_over = self.state is DISTURBED and not isinstance(self.why, Stray)
         return is_left_over and before is not user and user in self._users
 
     async def _keep_silence(self, step: Exchange | Step) -> None:
-        if self.state is not LineState.CLOSED:
-            is_long = isinstance(step, Exchange) and step.is_long
+        if self.state is not CLOSED:
+            is_long = not isinstance(step, Step) and step.timing.is_long
             await self.silence.keep(self._watchdog.clock, is_long=is_long)
 
     def _begin(self, user: object, exchange: Exchange) -> asyncio.Future[Answer]:
         """Send a request; what is returned comes to its answer, or to what prevents it."""
         self._answer = answer = self._watchdog.loop.create_future()
-        if self.state is not LineState.IN_STEP or user not in self._users:
+        if self.state is not IN_STEP or user not in self._users:
             obstacle = self._obstacle(user)
             assert obstacle is not None
             answer.set_result(obstacle)
             return answer
-        self._exchange = exchange
-        self._watchdog.watch(min(self._watchdog.loop.time() + exchange.seconds, exchange.by))
+        self._exchange, (seconds, by, _) = exchange, exchange.timing
+        self._watchdog.watch(min(self._watchdog.loop.time() + seconds, by))
         try:
             self._send(exchange.frame)
         except OSError as error:
@@ -315,7 +321,7 @@ class Line:
 
     def _obstacle(self, user: object) -> Outcome | None:
         """What keeps this user from sending."""
-        if self.state is LineState.CLOSED and self.why is not None:
+        if self.state is CLOSED and self.why is not None:
             return Lost(renewed(self.why.error))
         return self.why if user in self._users else Lost(self._not_connected())
 
@@ -324,9 +330,9 @@ class Line:
 
     async def _hush(self) -> Noise | None:
         """Drop what arrives until the line is silent."""
-        if self.state is LineState.CLOSED:
+        if self.state is CLOSED:
             return None  # the next request has the reason
-        self._become(LineState.HUSHING)
+        self._become(HUSHING)
         clock = self._watchdog.clock
         began = clock()
         until = began + HUSH_S
@@ -335,8 +341,8 @@ class Line:
                 return Noise(ProtocolError(f"{self.address}: the line does not become silent"))
             await asyncio.sleep(left)
             until = max(until, self.silence.heard + HUSH_S)
-        if self.state is LineState.HUSHING:
-            self._become(LineState.IN_STEP)
+        if self.state is HUSHING:
+            self._become(IN_STEP)
         return None
 
     # -- what the wire and the watchdog call -------------------------------------------------------------
@@ -344,12 +350,12 @@ class Line:
     def _heard(self, data: bytes) -> None:
         """Take what has arrived; the last byte of the reply ends the exchange, or the first wrong one."""
         if self.forgives:
-            self.silence.heard = self._watchdog.clock()
+            self.silence.hear(self._watchdog.clock())
         if self._exchange is not None:
             if (answer := self._exchange.feed(data)) is not None:
                 self._end(answer)
-        elif self.state is LineState.HUSHING:
-            self.silence.heard = self._watchdog.clock()  # and dropped
+        elif self.state is HUSHING:
+            self.silence.hear(self._watchdog.clock())  # and dropped
         elif (self.state in _IS_NEWS or not self.forgives) and (news := self._stray(data)) is not None:
             self._note(news)
 
@@ -366,21 +372,21 @@ class Line:
         if type(answer) is bytes:
             if exchange.extra is not None:
                 self._note(exchange.extra)
-        elif not isinstance(answer, bytes | Refused) and self.state is not LineState.CLOSED:
-            self._become(LineState.DISTURBED, answer)
+        elif not isinstance(answer, bytes | Refused) and self.state is not CLOSED:
+            self._become(DISTURBED, answer)
         if not self._answer.done():  # as it is when its user was cancelled
             self._answer.set_result(answer)
 
     def _note(self, outcome: Outcome) -> None:
         """Take news that are no bytes, or that no exchange waits for, or the end of the wire."""
-        if self.state is LineState.OPENING:
-            self._become(LineState.OPENING, outcome)
+        if self.state is OPENING:
+            self._become(OPENING, outcome)
         elif isinstance(outcome, Lost) or not self.forgives:
             self._close(outcome)
         elif self._exchange is not None:
             self._end(outcome)
         else:
-            self._become(LineState.DISTURBED, outcome)
+            self._become(DISTURBED, outcome)
 
 
 def renewed(error: RobotiqConnectionError) -> RobotiqConnectionError:

@@ -23,7 +23,7 @@ from ..runtime.log import Log, log
 from ..values.registers import RegisterMap, Registers
 from .address import Address
 from .dialogue import Decide, Dialogues
-from .exchange import Exchange, PduExchange, SerialExchange, TcpExchange
+from .exchange import Exchange, PduExchange, SerialExchange, TcpExchange, Timing
 from .line import Line, shared_line
 from .transport import Answer
 from .tunnel.protocol import Tunnel, tunnel_to
@@ -70,16 +70,16 @@ class ModbusTransport:
         self._line = Line(address, wire=self._tunnel)
         self._number = secrets.randbelow(LAST_NUMBER)
         """Transaction id of the last request; starts at random to differ from those of other programs."""
-        make: Callable[[bytes], Exchange] = self._over_a_line if address.is_rtu else self._over_tcp
+        make: Callable[[bytes, Timing], Exchange] = self._over_a_line if address.is_rtu else self._over_tcp
         make = make if tunnel is None else PduExchange
         self._dialogues: Final = Dialogues(self._line, registers, make, response_timeout, log)
 
-    def _over_tcp(self, request: bytes) -> Exchange:
+    def _over_tcp(self, request: bytes, timing: Timing) -> Exchange:
         self._number = self._number % LAST_NUMBER + 1  # never 0, which some devices answer to anything
-        return TcpExchange(self._number, request)
+        return TcpExchange(self._number, request, timing)
 
-    def _over_a_line(self, request: bytes) -> Exchange:
-        return SerialExchange(request, self._line.echo)
+    def _over_a_line(self, request: bytes, timing: Timing) -> Exchange:
+        return SerialExchange(request, timing, self._line.echo)
 
     @property
     def repeats(self) -> int:
@@ -118,7 +118,8 @@ class ModbusTransport:
         """
         self._line.leave(self)
         if self._shares_line:
-            self._line = self._dialogues.line = shared_line(self._address, self)
+            self._line = shared_line(self._address, self)
+            self._dialogues.move_to(self._line)
         await self._line.open(self, self._connect_timeout)
         await self._line.talk(self, self._dialogues.opening())
 

@@ -38,6 +38,14 @@ class Silence:
         self.heard = -math.inf
         self.is_long = False
 
+    def hear(self, now: float) -> None:
+        """Bytes have arrived."""
+        self.heard = now
+
+    def lengthen(self) -> None:
+        """This line needs the longer silence."""
+        self.is_long = True
+
     async def keep(self, clock: Callable[[], float], *, is_long: bool = False) -> None:
         """Wait until the line has been silent for long enough, or for the longer time; at once if it has.
 

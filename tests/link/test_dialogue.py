@@ -9,7 +9,7 @@ import pytest
 
 from robotiq_async import ConnectionLostError, ProtocolError, ResponseTimeoutError
 from robotiq_async.link.dialogue import Dialogues
-from robotiq_async.link.exchange import Answer, Exchange
+from robotiq_async.link.exchange import Answer, Exchange, Timing
 from robotiq_async.link.outcome import Lost, Noise, Refused, Silent, Stray
 from robotiq_async.link.silence import Silence
 from robotiq_async.runtime.log import log
@@ -28,8 +28,8 @@ GOOD = "the right answer"
 class PduExchange(Exchange):
     """A request without a form: what it comes to is given here."""
 
-    def __init__(self, request: bytes) -> None:
-        super().__init__(request[1:])
+    def __init__(self, request: bytes, timing: Timing) -> None:
+        super().__init__(request[1:], timing)
 
     def feed(self, data: bytes) -> Answer | None:
         raise NotImplementedError
@@ -202,5 +202,5 @@ def test_it_is_not_tried_unless_the_jaw_rests_as_it_was_told(status: tuple[int, 
     dialogues = speaker(is_sure=False)
     said(dialogues.opening())
     said(dialogues.write(lambda: IMAGE))
-    said(dialogues.read(), answer(PduExchange(bytes.fromhex("09 03 07d0 0003")), status))
+    said(dialogues.read(), answer(PduExchange(bytes.fromhex("09 03 07d0 0003"), Timing(0.4)), status))
     assert said(dialogues.write_and_read(lambda: IMAGE))[0] == ["READY", "16x3", "3x3"]

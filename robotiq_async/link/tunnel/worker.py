@@ -94,7 +94,7 @@ async def _work(calls: _Calls) -> None:
     while calls.waiting or not calls.has_ended:
         call = await calls.get()
         if not call.is_given_up:
-            calls.has_ended = call.is_last
+            calls.begin(call)
             await call.make()
 
 
@@ -105,6 +105,10 @@ class _Calls:
         self.waiting: deque[Call] = deque()
         self.has_ended = False  # whether the call that was started last is the last one
         self._more = asyncio.Event()
+
+    def begin(self, call: Call) -> None:
+        """It is started now."""
+        self.has_ended = call.is_last
 
     def put(self, call: Call) -> None:
         self.waiting.append(call)

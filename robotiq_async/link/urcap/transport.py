@@ -42,7 +42,7 @@ from ...values import registers as reg
 from ...values.errors import ConnectFailedError, ConnectionLostError, ProtocolError, ResponseTimeoutError
 from ...values.registers import Echo, Registers
 from ..address import Address
-from ..exchange import Answer, Exchange
+from ..exchange import Answer, Exchange, Timing
 from ..line import Dialogue, Line, Step
 from ..outcome import Noise, Outcome, Silent
 from . import lines
@@ -76,8 +76,8 @@ class Questions(Exchange):
         values: those that were answered so far, in this order.
     """
 
-    def __init__(self, names: Sequence[str]) -> None:
-        super().__init__(b"".join(map(lines.question, names)))
+    def __init__(self, names: Sequence[str], timing: Timing) -> None:
+        super().__init__(b"".join(map(lines.question, names)), timing)
         self.names = names
         self.values: list[int | str] = []
 
@@ -101,7 +101,7 @@ class Questions(Exchange):
         return lines.stray(self._received) or b""
 
     def late(self, place: object) -> Silent:
-        return _late(place, self._received, f"GET {self.unanswered}", self.seconds)
+        return _late(place, self._received, f"GET {self.unanswered}", self.timing.seconds)
 
 
 class Setting(Exchange):
@@ -115,7 +115,7 @@ class Setting(Exchange):
             return Noise(error)
 
     def late(self, place: object) -> Silent:
-        return _late(place, self._received, self.frame.decode().strip(), self.seconds)
+        return _late(place, self._received, self.frame.decode().strip(), self.timing.seconds)
 
 
 def _late(place: object, received: bytes, asked: str, seconds: float) -> Silent:
@@ -150,7 +150,7 @@ class UrcapTransport:
         self._address: Final = address
         self._gripper: Final = gripper
         self._connect_timeout: Final = connect_timeout
-        self._response_s: Final = response_timeout
+        self._timing: Final = Timing(response_timeout)
         self._line: Final = Line(address, stray=lines.stray)
         self._unanswered = ""
         """The first question that has no answer; that of a connection that has ended, too."""
@@ -236,13 +236,12 @@ class UrcapTransport:
         if (yield from self._read("FLT" if self._unanswered == "STA" else "STA")) is None:
             return False
         if self._gripper is not None:
-            outcome = yield self._set(lines.choice(self._gripper))
+            outcome = yield Setting(lines.choice(self._gripper), self._timing)
             if isinstance(outcome, Noise | Silent):
                 why = f"the URCap does not choose gripper {self._gripper}: {outcome.error}"
                 raise ConnectFailedError(str(self._address), why) from outcome.error
             _check(outcome)
-        question = Questions([CURRENT])
-        question.seconds = self._response_s
+        question = Questions([CURRENT], self._timing)
         outcome = yield question
         if isinstance(outcome, Noise | Silent):
             yield Step.HUSH
@@ -251,7 +250,7 @@ class UrcapTransport:
 
     def _reading(self) -> Dialogue[Registers | None]:
         """Read a status; None if the gripper cannot be read."""
-        by = self._line.now() + self._response_s
+        by = self._line.now() + self._timing.seconds
         current = (CURRENT,) if self.has_current else ()
         if not self._changes:
             slow = SLOW[self._turn]
@@ -279,7 +278,7 @@ class UrcapTransport:
             self._written = self._sent[-1]
         shown = None if self._releases else self._values.get("ACT")
         self._releases = bool(reg.rATR.read(image))
-        _check((yield self._set(lines.command(image, shown))))
+        _check((yield Setting(lines.command(image, shown), self._timing)))
         self._lost_by = min(self._lost_by, self._line.now() + LOST_S)
         return True
 
@@ -336,8 +335,7 @@ class UrcapTransport:
         Raises:
             RobotiqConnectionError: there are not all of the answers, in time.
         """
-        questions = Questions(names)
-        questions.seconds, questions.by = self._response_s, by
+        questions = Questions(names, self._timing._replace(by=by))
         self._unanswered = names[0]
         outcome = yield questions
         self._unanswered = questions.unanswered
@@ -349,11 +347,6 @@ class UrcapTransport:
         values = [int(value) for value in questions.values]
         self._values.update(zip(names, values, strict=True))
         return values
-
-    def _set(self, line: bytes) -> Setting:
-        setting = Setting(line)
-        setting.seconds = self._response_s
-        return setting
 
 
 def _check(came_to: Answer | None) -> None:
