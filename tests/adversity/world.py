@@ -25,7 +25,7 @@ from robotiq_async.simulator.server.framing import Frame
 from robotiq_async.simulator.server.urcap_server import UNREADABLE
 from robotiq_async.simulator.troubles.fault_injector import FaultInjector
 from robotiq_async.values.model import Model, model_of
-from robotiq_async.values.registers import Registers
+from robotiq_async.values.registers import Registers, gFLT, gIMC
 from robotiq_async.values.request import Request
 from tests.grippers import activate_beforehand
 from tests.virtual import VirtualLoop
@@ -44,10 +44,15 @@ class HeldLoopError(AssertionError):
     """Callbacks kept the loop for too long, in real time: the code did, or the machine."""
 
 
-class StampedGripper(SimulatedGripper):
-    """Writes a number into reserved bits of each status, so that no two in a row are alike.
+WAITS = (5, 6, 7, 11)
+"""Faults with which a gripper waits for an activation, or to release."""
 
-    These are the last byte; on a jaw, of which only three registers are read, the upper half of the fault's.
+
+class StampedGripper(SimulatedGripper):
+    """Writes a number into each status, so that no two in a row are alike.
+
+    Its place is the current of the scissor, or on a jaw, of which only three registers are read, the fault of
+    a controller. A current that changes is progress: where there is none, the number stays.
 
     Attributes:
         stamps: when each status was given out, and its number.
@@ -62,10 +67,12 @@ class StampedGripper(SimulatedGripper):
 
     def status_registers(self) -> Registers:
         registers = super().status_registers()
-        self._number = (self._number + 1) % (256 if len(self.model.axes) > 1 else 16)
+        has_modes = self.model.has_modes
+        if not (has_modes and (gIMC.read(registers) == 0 or gFLT.read(registers) in WAITS)):
+            self._number = (self._number + 1) % (256 if has_modes else 16)
         self.stamps.append((self._clock(), self._number))
-        if len(self.model.axes) > 1:
-            return (*registers[:7], registers[7] & 0xFF00 | self._number)
+        if has_modes:
+            return (*registers[:7], self._number << 8)
         return (registers[0], registers[1] & 0x0FFF | self._number << 12, *registers[2:])
 
     def write(self, address_offset: int, registers: Sequence[int]) -> None:
@@ -76,7 +83,7 @@ class StampedGripper(SimulatedGripper):
 def stamp_of(status: RobotiqStatus) -> int:
     """The number that the gripper wrote into a status."""
     registers = status.registers
-    return registers[7] & 0xFF if len(status.model.axes) > 1 else registers[1] >> 12
+    return registers[7] >> 8 if status.model.has_modes else registers[1] >> 12
 
 
 class Heard:
