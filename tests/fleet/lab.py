@@ -10,6 +10,7 @@ from typing import Any
 
 from robotiq_async import Finger, RobotiqHand
 from robotiq_async.fleet.agent.agent import Agent
+from robotiq_async.fleet.agent.records import Records
 from robotiq_async.fleet.network.bus import Reply, Urgency
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire import status_message
@@ -116,6 +117,7 @@ async def lab(
     stroke: Points | None = None,
     kind_of_server: type[SimulatorServer] = SimulatorServer,
     poll_interval: float = POLL_S,
+    records: Records | None = None,
 ) -> AsyncIterator[Lab]:
     """An agent that serves zenoh://lab/cell/left, under a name in a network, by default one of its own."""
     network = network or Network()
@@ -127,7 +129,7 @@ async def lab(
         hand = RobotiqHand(
             server.address, keep_grip=keep_grip, model=model, stroke=stroke, poll_interval=poll_interval
         )
-        agent = Agent("lab", "cell", {"left": hand}, network.bus(name), window=window)
+        agent = Agent("lab", "cell", {"left": hand}, network.bus(name), window=window, records=records)
         async with serving(agent) as task:
             yield Lab(network, gripper, server, hand, agent, task)
 

@@ -1,4 +1,4 @@
-"""The force of a grip after a trouble is the same with a hand of this process and with one on another host."""
+"""The force of a grip after a trouble is the same with a local hand and with a remote one."""
 
 from __future__ import annotations
 
