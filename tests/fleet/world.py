@@ -17,7 +17,7 @@ from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.simulator import SimulatorServer
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
-from tests.adversity.world import StampedGripper
+from tests.adversity.world import StampedGripper, stamp_of
 from tests.fleet.hosts import Host
 from tests.fleet.network import LINK_LEASE_S, RECONNECT_S, MemoryBus, Network
 from tests.grippers import activate_beforehand
@@ -253,7 +253,7 @@ class Client:
 
     def given_at(self, status: RobotiqStatus) -> float:
         """The time when the gripper gave out this status, by the number in it: the last before now."""
-        stamps, number = self.world.grippers[self.gripper].stamps, status.registers[7] & 0xFF
+        stamps, number = self.world.grippers[self.gripper].stamps, stamp_of(status)
         # 256 numbers at 200 Hz are 1.3 s: start from when the client thinks it was.
         index = bisect_right(stamps, status.timestamp + 0.1, key=itemgetter(0))
         for at, each in (stamps[before] for before in range(index - 1, -1, -1)):
