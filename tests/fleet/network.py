@@ -244,6 +244,8 @@ class MemoryBus:
         self.is_closed = False
         self.endpoints: list[str] = []
         """Names of buses that it connects to."""
+        self.listen: Callable[[str, bytes], object] = lambda *_: None
+        """Hears what is asked here."""
 
     def _others(self) -> list[MemoryBus]:
         return [
@@ -296,6 +298,7 @@ class MemoryBus:
         self, key: str, payload: bytes, timeout: float, urgency: Urgency, decides: Callable[[Reply], bool]
     ) -> Reply | None:
         network = self.network
+        self.listen(key, payload)
         found = [
             (other, handler)
             for other in self._others()

@@ -62,7 +62,7 @@ def records(tmp_path: Path, disk: Disk) -> FileRecords:  # lies below it
     return FileRecords(tmp_path)
 
 
-def force_of(folder: Path, client: RemoteHand) -> int | None:
+def force_of(folder: Path, client: RemoteHand) -> object:
     """The force of finger A that the next agent would know of a client."""
     assert client._session is not None
     record = FileRecords(folder).read(LEFT)

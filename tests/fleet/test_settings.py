@@ -8,10 +8,12 @@ from typing import Any
 
 import pytest
 
-from robotiq_async import Finger, State
+from robotiq_async import Finger, MoveTimeoutError, State
 from robotiq_async.fleet.remote.dialog import Settings
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
+from robotiq_async.fleet.wire.envelope import unpack_call
 from robotiq_async.fleet.wire.settings import Setting, asked_of, read_settings, settings_fields, settings_of
+from robotiq_async.fleet.wire.values import Fields
 from robotiq_async.values.request import Request
 from tests.fleet.lab import Lab, instantly, lab
 from tests.fleet.world import World, world
@@ -158,6 +160,67 @@ async def test_a_new_holder_changes_no_grip(here: Lab, hand: RemoteHand) -> None
         await other.move(110, A)
         axes = Request.from_registers(here.gripper.request_registers).axes
         assert (axes[0].speed, axes[0].force) == (128, 64)
+
+
+@inside(lab)
+async def test_what_was_acknowledged_is_kept_however_its_move_ended(here: Lab, hand: RemoteHand) -> None:
+    with pytest.raises(MoveTimeoutError):
+        await hand.move(140, A, speed=0, force=200, timeout=0.2)
+    async with here.client("other", control=False) as other:
+        await other.take()
+        await other.move(20, A, force=7)
+        await other.release()
+    await hand.acquire()
+    await hand.set_position(30, A)
+    assert Request.from_registers(here.gripper.request_registers).axes[0].force == 200
+
+
+def of_settings(here: World) -> list[Fields]:
+    """Have the settings noted that the holder sends to its agent."""
+    sent: list[Fields] = []
+
+    def note(_key: str, payload: bytes) -> None:
+        arguments = unpack_call(payload).arguments
+        if arguments.get("what") == "settings":
+            sent.append(arguments["settings"])
+
+    here.holder.bus.listen = note
+    return sent
+
+
+@inside(world)
+async def test_an_agent_that_knows_a_clients_settings_is_sent_none(here: World) -> None:
+    """Also a hand that was started again has its own, of which it knows nothing any more."""
+    hand, sent = here.holder.hand, of_settings(here)
+    await here.holder.do(hand.set_force(200, A))
+    await next_agent(here)
+    await here.holder.do(hand.move(20, A))
+    await here.holder.do(hand.stop())
+    await here.other.do(here.other.hand.take())
+    await here.other.do(here.other.hand.move(30, A, force=7))
+    await here.other.do(here.other.hand.release())
+    here.kill(here.agent.host)
+    await asyncio.sleep(1)
+    await here.start_agent("third agent")
+    await here.holder.do(hand.start())
+    await here.holder.do(hand.move(40, A))
+    assert images(here, 0)[-1].axes[0].force == 200
+    assert not sent
+
+
+@inside(world)
+async def test_an_agent_without_a_record_is_sent_what_was_carried_out(here: World) -> None:
+    hand, sent = here.holder.hand, of_settings(here)
+    await here.holder.do(hand.set_force(200, A))
+    here.kill(here.agent.host)
+    await asyncio.sleep(1)
+    here.records.records.clear()
+    await here.start_agent("next agent")
+    await here.until(lambda: hand.state is State.RUNNING_IDLE)
+    await here.holder.do(hand.acquire())
+    assert sent == [{"1": {"force": 200}}]
+    await here.holder.do(hand.move(40, A))
+    assert images(here, 0)[-1].axes[0].force == 200
 
 
 @inside(world)
