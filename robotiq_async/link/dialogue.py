@@ -107,13 +107,14 @@ class Dialogues:
         """Make sure that no answer to an earlier request is taken for one to come.
 
         The first exchange is made twice if it fails harmlessly: the tool port of some arms loses the first
-        request of a connection, and ``socat`` with ``waitslave`` connects only when it sees one. A device
-        with three registers may refuse the read of eight, or not answer it.
+        request of a connection, so do some gateways over TCP, and ``socat`` with ``waitslave`` connects only
+        when it sees one. Over TCP an answer that is only late gives itself away by its transaction id. A
+        device with three registers may refuse the read of eight, or not answer it.
         """
         asks_for_rest = not self._has_probed and self._map.count < REGISTER_COUNT
         first = yield from self._probed()
         if first is not None:
-            is_harmless = asks_for_rest and isinstance(first, Refused | Silent)
+            is_harmless = isinstance(first, Silent) or (asks_for_rest and isinstance(first, Refused))
             if not (is_harmless or self._can_repeat(first)):
                 raise first.error
             yield Step.TURN

@@ -90,11 +90,8 @@ CONNECTION_LOST = [("tcp", "silence once"), ("tcp", "reset"), ("tcp", "close"), 
 PASSES = "fault 9 for 60"
 """A poll sees it once, so it does not end a grip."""
 OF_AN_AXIS = {
-    # The first exchange reads all registers, which a jaw may refuse or not answer: it is made again.
-    **{
-        ("tcp", "connecting", f"{kind} once"): "done → RUNNING_IDLE"
-        for kind in ("drop", "half", "exception", "silence")
-    },
+    # The first exchange reads all registers, which a jaw may refuse: it is made again.
+    ("tcp", "connecting", "exception once"): "done → RUNNING_IDLE",
 }
 """Outcomes of cells on a jaw."""
 WITH_FUNCTION_23 = {

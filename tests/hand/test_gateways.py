@@ -13,6 +13,7 @@ from robotiq_async import ConnectionLostError, Finger, RobotiqConnectionError, R
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from tests.conftest import Clock
 from tests.patience import patience
+from tests.virtual import virtual
 
 A = Finger.A
 FOR_EVER = 1e4
@@ -22,6 +23,29 @@ FOR_EVER = 1e4
 async def gateway(clock: Clock) -> AsyncIterator[SimulatorServer]:
     async with SimulatorServer(SimulatedGripper(clock, speedup=25)) as server:
         yield server
+
+
+@virtual
+async def test_a_gateway_that_loses_the_first_request_of_each_connection_is_reached() -> None:
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, speedup=25)
+    async with SimulatorServer(gripper) as server:
+        lost = []
+
+        def losing(reply: bytes) -> list[tuple[float, bytes]]:
+            here = server.connections[-1]
+            if here in lost:
+                return [(0.0, reply)]
+            lost.append(here)
+            return []
+
+        server.policy = losing
+        async with RobotiqHand(server.address) as hand:
+            await hand.move(200)
+            server.cut()
+            await hand.wait_for_state(State.DISCONNECTED)
+            await hand.wait_for_state(State.RUNNING_IDLE, timeout=2)
+            await hand.move(100)
+        assert len(lost) == 2
 
 
 REFUSALS = [

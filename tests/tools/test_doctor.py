@@ -288,12 +288,14 @@ def test_how_long_an_adapter_keeps_what_it_hears(kept: int, level: Level, tmp_pa
     assert found == [finding], "a port without an adapter"
 
 
-@pytest.mark.parametrize("words", ["drop", "wrong-function"])
-async def test_one_lost_reply_does_not_make_it_another_unit(words: str) -> None:
+@pytest.mark.parametrize(
+    ("words", "answers"), [("drop", "answers"), ("wrong-function", "answers when asked 2 times")]
+)
+async def test_one_lost_reply_does_not_make_it_another_unit(words: str, answers: str) -> None:
     async with SimulatorServer() as server, server.fault_injector.making(Trouble(words)):
         found = await findings(server.address)
     assert found["unit id"] == Finding(Level.GOOD, "unit id", "2")
-    assert found["Modbus"].found == "answers when asked 2 times"
+    assert found["Modbus"].found == answers
 
 
 def echoing(answer: Callable[[bytes], bytes]) -> Callable[[bytes], bytes]:
@@ -380,7 +382,7 @@ async def test_a_line_that_loses_its_first_requests_needs_no_option(
 ) -> None:
     """Settings that answered after them were taken for the gripper's: read_function=4, request_address=0.
 
-    The first and last attempts with the usual settings, and others; on a serial line each asks twice.
+    The first and last attempts with the usual settings, and others; each asks twice.
     """
     left = [lost]
 
@@ -394,8 +396,8 @@ async def test_a_line_that_loses_its_first_requests_needs_no_option(
     assert left[0] < 0
     assert [each.what for each in found.values() if "Pass" in each.advice] == []
     assert found["registers"].level is found["unit id"].level is Level.GOOD
-    if server_of is RtuOverTcpSimulatorServer and lost == 1:
-        assert found["Modbus"].level is Level.GOOD, "on a serial line the first exchange is repeated"
+    if lost == 1:
+        assert found["Modbus"].level is Level.GOOD, "the first exchange is repeated"
         return
     assert found["Modbus"].level is Level.DOUBT
     assert "answers when asked" in found["Modbus"].found
