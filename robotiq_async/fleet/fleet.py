@@ -105,6 +105,7 @@ class Fleet:
             RobotiqError: no session could be opened.
         """
         loop = running_loop()
+        self._changes.check_loop(loop)
         self._bus = bus = self._shared or await self._open()
         self._changes.reopen(loop)
         self._entered_at = now()

@@ -34,7 +34,8 @@ class Hand(Kind):
     in which it was started: any number of tasks of that loop may call it. No call blocks the loop, and each
     ends in bounded time unless its arguments allow longer. Every such time counts while the event loop runs:
     what holds up the loop lets no call time out. From another thread or another loop every call raises
-    RuntimeError and sends nothing; the properties can be read from anywhere.
+    RuntimeError and sends nothing; the properties can be read from anywhere. A hand whose loop was closed
+    before :meth:`stop` takes no call any more: its fingers may still move, and a new hand can start.
 
     Many calls take the same arguments, and each lists its own. Any other value raises TypeError or
     ValueError, and nothing is sent. Any object with ``__index__`` is an integer, except a bool.
@@ -103,8 +104,7 @@ class Hand(Kind):
         """
         check_flag("activate", activate)
         wait = check_seconds("wait", wait, 0.0, LONGEST_WAIT_S)
-        running_loop()
-        self._abandon_if_loop_closed()
+        self._check_may_start(running_loop())
         with self._naming:
             await self._start(activate, wait)
 
@@ -130,15 +130,12 @@ class Hand(Kind):
         way, is not known. A gripper that is not polled may lose its activation, and the part: it is in RESET
         then.
 
-        If the event loop was closed, the hand counts as stopped, and the fingers keep moving.
-
         Args:
             halt: False disconnects and leaves the fingers as they are; for programs that only look.
             keep_grip: whether a grip stays in force; None for the hand's own ``keep_grip``.
         """
         check_flag("halt", halt)
         keeps = self._keeps_grip(keep_grip)
-        self._abandon_if_loop_closed()
         await self._stop(halt, keeps)
 
     # -- commands --------------------------------------------------------------------------------------
@@ -505,11 +502,12 @@ class Hand(Kind):
         """Every status from now on, in order, for one reader.
 
         A slow reader costs only itself: the stream keeps the newest ``buffer`` statuses, 1..1000000, and its
-        ``missed`` counts the others. Opened before the start it waits for it. It ends after :meth:`stop`, and
-        raises RobotiqConnectionError when the hand gives up on its link. While the link is down it waits; a
-        control loop passes ``lost_after``, 0.01..3600 s: when no status has come for that time since the last
-        one, or since the opening, it raises ConnectionLostError, also if the event loop was held up for that
-        time. It may be read on, unless the hand has given up: then it is in SHUTDOWN.
+        ``missed`` counts the others. Opened before the start it waits for it, in the same event loop. It ends
+        after :meth:`stop`, and raises RobotiqConnectionError when the hand gives up on its link. While the
+        link is down it waits; a control loop passes ``lost_after``, 0.01..3600 s: when no status has come for
+        that time since the last one, or since the opening, it raises ConnectionLostError, also if the event
+        loop was held up for that time. It may be read on, unless the hand has given up: then it is in
+        SHUTDOWN.
         """
         kept, limit = check_buffer(buffer), check_limit("lost_after", lost_after)
         return self._opened(self._channels.statuses, kept, limit)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection
 from typing import Literal, TypeVar
@@ -113,11 +114,18 @@ class Kind(ABC):
             raise NotStartedError("the hand is not started", advice="use 'async with' or start()")
         self._session.check_running()
 
+    def _check_may_start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Refuse another loop than that of a run, also one that was closed under it, and of readers."""
+        self._check_loop("hand.start()")
+        self._channels.check_loop(loop)
+
     def _check_may_listen(self) -> None:
         """Refuse another thread or loop while the hand runs: neither streams nor listeners are locked."""
-        session = self._session
-        if session is not None and not session.is_over and not session.lost_its_loop:
-            session.check_loop("a stream or a listener of the hand")
+        self._check_loop("a stream or a listener of the hand")
+
+    def _check_loop(self, what: str) -> None:
+        if self._session is not None and not self._session.is_over:
+            self._session.check_loop(what)
 
     def _opened(self, channel: Channel[T], buffer: int | None, limit: float | None = None) -> Stream[T]:
         self._check_may_listen()
@@ -126,7 +134,3 @@ class Kind(ABC):
     def _no_status_for(self, seconds: float) -> ConnectionLostError:
         why = f"no status for {seconds:g} s (the hand is in {self.state.name})"
         return ConnectionLostError(why).of_hand(self._given_name)
-
-    def _abandon_if_loop_closed(self) -> None:
-        if self._session is not None and self._session.lost_its_loop:
-            self._session.abandon()

@@ -204,8 +204,6 @@ class RobotiqHand(Hand):
     # -- lifetime --------------------------------------------------------------------------------------
 
     async def _start(self, activate: bool, wait: float) -> None:
-        if self._session is not None and not self._session.is_over:
-            self._session.check_loop("hand.start()")
         if self._session is None and isinstance(self._options.address, NoAddress):
             self._options.log.warning("no address was given: the gripper is simulated, nothing real moves")
         self._session = session = Session(

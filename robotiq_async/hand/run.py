@@ -14,18 +14,11 @@ class PresentRun(Protocol):
     def is_over(self) -> bool:
         """Whether the run has ended, or is ending."""
 
-    @property
-    def lost_its_loop(self) -> bool:
-        """Whether the event loop was closed before the stop."""
-
     def check_running(self) -> None:
         """Raise NotStartedError, or the error that ended the link, if the run has ended."""
 
     def check_loop(self, what: str) -> None:
-        """Raise RuntimeError if called outside the event loop of the run."""
-
-    def abandon(self) -> None:
-        """End a run whose event loop was closed."""
+        """Raise RuntimeError if called outside the event loop of the run, or after that was closed."""
 
 
 class NamesErrors:

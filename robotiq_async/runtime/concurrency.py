@@ -107,7 +107,12 @@ def running_loop() -> asyncio.AbstractEventLoop:
 
 
 def check_loop(own: asyncio.AbstractEventLoop, what: str) -> None:
-    """Refuse a call that does not come from the loop a hand runs in."""
+    """Refuse a call that does not come from the loop a hand runs in, or if that loop was closed."""
+    if own.is_closed():
+        raise RuntimeError(
+            "the event loop that the hand ran in was closed before stop(), and the fingers may still move: "
+            "make a new hand"
+        )
     try:
         running: asyncio.AbstractEventLoop | None = asyncio.get_running_loop()
     except RuntimeError:

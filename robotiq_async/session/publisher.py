@@ -87,10 +87,6 @@ class Publisher:
 
     def tell(self) -> None:
         """Let everybody hear who waits for a write: it has left, or there is none."""
-        self.release()
-        self._controller.answer_ended()
-
-    def release(self) -> None:
-        """Publish what was held back. The callers whom a request has ended are left."""
         self.has_to_tell = self._is_held_back = False
         self.publish_changes()
+        self._controller.answer_ended()

@@ -13,7 +13,7 @@ start() and stop() may be called from different tasks.
 # POLLING      the first status, or the link is back        the link fails, a stop, or a mistake of ours
 # LOST         the link failed                              the link is back or given up, or a stop
 # ENDING       request_stop(), also by the run itself       the fingers are stopped and the link is closed
-# OVER         end_with(), or abandon()                     -
+# OVER         end_with()                                   -
 #
 # _become() alone sets the state, and _NEXT has the order. A stop may come in any turn of the loop, also in
 # that in which a link was opened: after each wait the state is looked at, and ENDING never goes back.
@@ -190,7 +190,7 @@ class Run:
                     if self._in_flight.is_over:
                         self._lose(ResponseTimeoutError("no answer until the hand was stopped"))
             finally:
-                # An abandoned task is ended when it is collected: the hand may run again by then.
+                # The task of a closed loop is ended when it is collected, by any thread.
                 if not self._loop.is_closed():
                     await self._finish()
         except Exception as error:
@@ -212,12 +212,6 @@ class Run:
         stopped = NotStartedError("the hand was stopped while it connected")
         fail([self.connected], stopped if self.failure is None else self.why_over())
         self._ended()
-
-    def abandon(self) -> None:
-        """The loop was closed: release the shared timer. The futures of that loop are left."""
-        if self.state is not RunState.OVER:
-            self._become(RunState.OVER)
-        self._poller.tick.close()
 
     # -- connecting ------------------------------------------------------------------------------------
 

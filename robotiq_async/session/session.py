@@ -13,8 +13,7 @@
 #
 # A run ends once, in Run.end_with(), and _end() is called in that turn of the loop. The gripper is given back
 # before SHUTDOWN is published, because a reader of that may start a hand, and every future that is left
-# fails. If the event loop was closed, no turn is left: abandon() ends the run and does not touch the futures
-# of that loop.
+# fails. If the event loop was closed, no turn is left: the run never ends, and its hand is of no use.
 
 from __future__ import annotations
 
@@ -60,7 +59,7 @@ Failing = Mapping[State, Callable[[], RobotiqError]]
 
 
 class Session:
-    """A run: from start() to stop(), or until the link is given up or the event loop closed.
+    """A run: from start() to stop(), or until the link is given up.
 
     Making one claims the gripper and begins to connect. This needs a running event loop. The machine and the
     channels outlive it.
@@ -122,11 +121,6 @@ class Session:
         """Whether it has ended."""
         return self.run.state is RunState.OVER
 
-    @property
-    def lost_its_loop(self) -> bool:
-        """Whether the event loop was closed before the stop, so that the task can never end."""
-        return not self.is_over and self._loop.is_closed()
-
     async def stop(self, *, halt: bool, keep_grip: bool = False) -> None:
         """Stop as :meth:`Hand.stop` promises, also when cancelled during it."""
         self.check_loop("hand.stop()")
@@ -140,17 +134,6 @@ class Session:
         finally:
             if self._task.done():  # not if a second Ctrl-C has broken the event loop
                 self._end_with(self._task)
-
-    def abandon(self) -> None:
-        """End a run whose event loop was closed. Its callers' futures belong to that loop: leave them."""
-        self.options.log.warning("the event loop was closed before stop(); the fingers may still move")
-        self.run.abandon()
-        self._claims.release(self, self.controller.left())
-        self._waiters = StateWaiters()
-        self._channels.end()
-        self.controller.refuse_requests()
-        self.controller.close()
-        self._publisher.release()
 
     def _claim(self) -> Left | None:
         """Claim the gripper; return what the last run of any hand of it has left to act."""
@@ -193,7 +176,7 @@ class Session:
                 raise self.link_lost()
             raise NotStartedError("the hand is not started", advice="use 'async with' or start()")
         if self._loop.is_closed():
-            raise NotStartedError("the event loop that the hand ran in was closed", advice="start() it again")
+            raise NotStartedError("the event loop that the hand ran in was closed", advice="make a new hand")
 
     def check_takes_requests(self) -> None:
         """Raise NotStartedError once stop() was called."""

@@ -6,11 +6,10 @@ The iterators are plain classes and not async generators: a reader that drops on
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import itertools
 import weakref
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Coroutine, Iterable, Iterator
 from typing import TYPE_CHECKING, Any, Final, Generic, Self, TypeVar
 
 from ..runtime.concurrency import check_loop
@@ -39,25 +38,13 @@ def check_limit(name: str, value: object) -> float | None:
 
 
 class Stream(Generic[T]):
-    """An async iterator with one reader; made by a :class:`Channel`.
+    """An async iterator with one reader, in the event loop of the hand.
 
     It keeps the newest items, up to the buffer with which it was opened.
-
-    Attributes:
-        missed: items that were dropped because the reader was slow.
     """
 
-    def __init__(self, buffer: int | None, kept: set[Stream[Any]]) -> None:
-        self._kept = kept
-        """Streams with a waiting reader: a strong reference, because nothing else may hold the task of the
-        reader."""
-        self._loop: asyncio.AbstractEventLoop | None = None
-        """The loop of the hand, while it runs: items come from there."""
-        self.missed = 0
-        self._items: deque[T] = deque(maxlen=buffer)
-        self._waiting: asyncio.Future[None] | None = None
-        self._ended = False
-        self._failure: Callable[[], RobotiqError] | None = None
+    def __init__(self, intake: Intake[T]) -> None:
+        self._intake = intake
 
     def __aiter__(self) -> Self:
         return self
@@ -67,7 +54,7 @@ class Stream(Generic[T]):
         def __iter__(self) -> None:
             raise TypeError("a stream of a hand is read with 'async for', in a coroutine")
 
-    async def __anext__(self) -> T:
+    def __anext__(self) -> Coroutine[Any, Any, T]:
         """The next item. A cancelled wait loses nothing.
 
         Raises:
@@ -75,18 +62,55 @@ class Stream(Generic[T]):
             RobotiqConnectionError: the hand gave up on its link.
             RuntimeError: another task is waiting on the same stream, or the hand runs in another event loop.
         """
-        while True:
-            if self._loop is not None:
-                check_loop(self._loop, "a stream of the hand")
-            if self._items or self._ended:
-                break
+        return self._intake.next()
+
+    @property
+    def missed(self) -> int:
+        """Items that were dropped because the reader was slow."""
+        return self._intake.missed
+
+    def take_nowait(self) -> T | None:
+        """The next item if there is one now, or None."""
+        return self._intake.take()
+
+    def drain(self) -> Iterator[T]:
+        """Iterate over the items that are there now."""
+        return self._intake.drain()
+
+    async def aclose(self) -> None:
+        """End the stream; a waiting reader ends too. Idempotent."""
+        self._intake.close()
+
+
+class Intake(Generic[T]):
+    """The inside of a stream: a :class:`Channel` puts items in, and its reader waits here.
+
+    Attributes:
+        missed: items that were dropped because the reader was slow.
+    """
+
+    def __init__(self, buffer: int | None, kept: set[Intake[Any]]) -> None:
+        self.missed = 0
+        self._loop: asyncio.AbstractEventLoop | None = None
+        """The loop of the hand, while it runs: items come from there."""
+        self._kept: Final = kept
+        """Those with a waiting reader: strong references, because nothing else may hold the reader's task."""
+        self._items: Final[deque[T]] = deque(maxlen=buffer)
+        self._waiting: asyncio.Future[None] | None = None
+        self._ended = False
+        self._failure: Callable[[], RobotiqError] | None = None
+
+    async def next(self) -> T:
+        """Wait for the next item."""
+        if self._loop is not None:
+            check_loop(self._loop, "a stream of the hand")
+        while not self._items and not self._ended:
             if self._waiting is not None:
                 raise RuntimeError("a stream has one reader; open another with statuses() or transitions()")
             self._waiting = asyncio.get_running_loop().create_future()
             self._kept.add(self)
             try:
-                if not self._items and not self._ended:  # once more: the hand may run in another thread
-                    await self._waiting
+                await self._waiting
             except BaseException:
                 self._wait_no_longer()
                 # A cancelled task keeps the traceback, which must not keep the stream alive.
@@ -103,19 +127,14 @@ class Stream(Generic[T]):
         await asyncio.sleep(0)
         raise failure()
 
-    def take_nowait(self) -> T | None:
-        """The next item if there is one now, or None."""
+    def take(self) -> T | None:
+        """The next item if there is one now."""
         return self._items.popleft() if self._items else None
 
     def drain(self) -> Iterator[T]:
         """Iterate over the items that are there now."""
         while self._items:
             yield self._items.popleft()
-
-    async def aclose(self) -> None:
-        """End the stream; a waiting reader ends too. Idempotent."""
-        self._items.clear()
-        self.end(None)
 
     def push(self, item: T) -> None:
         """Add an item; a full buffer drops its oldest one."""
@@ -126,6 +145,13 @@ class Stream(Generic[T]):
         self._items.append(item)
         self._wake()
 
+    def close(self) -> None:
+        """Drop the items, and end."""
+        if self._waiting is not None:
+            check_loop(self._waiting.get_loop(), "a stream of the hand")
+        self._items.clear()
+        self.end(None)
+
     def end(self, failure: Callable[[], RobotiqError] | None) -> None:
         """End the stream: the reader gets the remaining items, then the end or the failure."""
         if self._ended:
@@ -133,32 +159,25 @@ class Stream(Generic[T]):
         self._ended, self._failure, self._loop = True, failure, None
         self._wake()
 
+    def waits_outside_of(self, loop: asyncio.AbstractEventLoop) -> bool:
+        """Whether its reader waits in another loop than this."""
+        return self._waiting is not None and self._waiting.get_loop() is not loop
+
     def belong_to(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Set the loop of the hand. A reader that waits in another loop wakes up and gets RuntimeError."""
+        """The hand runs in this loop, in which the reader waits if it does."""
         self._loop = loop
-        if self._waiting is not None and self._waiting.get_loop() is not loop:
-            self._wake()
 
     def _wait_no_longer(self) -> None:
         self._kept.discard(self)
         self._waiting = None
 
     def _wake(self) -> None:
-        waiting = self._waiting
-        if waiting is None or waiting.done():
-            return
-        loop = waiting.get_loop()
-        if loop.is_closed():
-            self._wait_no_longer()  # the reader in that loop never wakes up
-        elif loop is asyncio.get_running_loop():
-            waiting.set_result(None)
-        else:
-            with contextlib.suppress(RuntimeError):  # closed at this moment
-                loop.call_soon_threadsafe(_wake, waiting)
+        if self._waiting is not None and not self._waiting.done():
+            self._waiting.set_result(None)
 
 
-class LimitedStream(Stream[T]):
-    """A stream whose reader gets an error if no item comes for some time, and may then read on.
+class LimitedIntake(Intake[T]):
+    """The inside of a stream whose reader gets an error if no item comes for some time, and may then read on.
 
     The time counts from the last item, or from the last error; before the first item from the opening, if the
     hand runs then. A reader that waits for the start waits for the first item without a limit.
@@ -174,7 +193,7 @@ class LimitedStream(Stream[T]):
     def __init__(
         self,
         buffer: int | None,
-        kept: set[Stream[Any]],
+        kept: set[Intake[Any]],
         limit: float,
         make_error: Callable[[float], RobotiqError],
         since: float | None,
@@ -185,12 +204,12 @@ class LimitedStream(Stream[T]):
         self._since = since
         """From when the time counts, by the clock of the loop; None before the first item after a start."""
 
-    async def __anext__(self) -> T:
+    async def next(self) -> T:
         if self._items or self._ended or self._since is None:
-            return await super().__anext__()
+            return await super().next()
         timer = asyncio.get_running_loop().call_at(self._since + self._limit, self._expire)
         try:
-            return await super().__anext__()
+            return await super().next()
         finally:
             timer.cancel()
 
@@ -204,13 +223,13 @@ class LimitedStream(Stream[T]):
             self._waiting.set_exception(self._make_error(self._limit))
 
 
-class DerivedStream(Stream[T]):
-    """A stream of items that ``make`` derives from those of a channel; it drops none.
+class DerivedIntake(Intake[T]):
+    """The inside of a stream of items that ``make`` derives from those of a channel; it drops none.
 
     ``make`` is called in the turn of each push, so it must be quick and must not fail.
     """
 
-    def __init__(self, make: Callable[[Any], Iterable[T]], kept: set[Stream[Any]]) -> None:
+    def __init__(self, make: Callable[[Any], Iterable[T]], kept: set[Intake[Any]]) -> None:
         super().__init__(None, kept)
         self._make = make
 
@@ -218,11 +237,6 @@ class DerivedStream(Stream[T]):
         if not self._ended:
             for made in self._make(item):
                 super().push(made)
-
-
-def _wake(waiting: asyncio.Future[None]) -> None:
-    if not waiting.done():
-        waiting.set_result(None)
 
 
 class Listeners:
@@ -285,9 +299,9 @@ class Channel(Generic[T]):
     def __init__(self, listeners: Listeners) -> None:
         self._listeners = listeners
         # A list of references and not a WeakSet, which takes several times as long, at every poll.
-        self._streams: list[weakref.ref[Stream[Any]]] = []
+        self._intakes: list[weakref.ref[Intake[Any]]] = []
         self._has_dropped = False  # whether some of these were dropped by their readers
-        self._waited_for: set[Stream[Any]] = set()
+        self._waited_for: set[Intake[Any]] = set()
         self._failure: Callable[[], RobotiqError] | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
 
@@ -302,33 +316,41 @@ class Channel(Generic[T]):
         With a ``limit`` its reader gets the error for these seconds if no item comes in them.
         """
         if limit is None:
-            return self._begin(Stream(buffer, self._waited_for))
+            return self._begin(Intake(buffer, self._waited_for))
         since = None if self._loop is None else self._loop.time()
-        return self._begin(LimitedStream(buffer, self._waited_for, limit, make_error, since))
+        return self._begin(LimitedIntake(buffer, self._waited_for, limit, make_error, since))
 
     def derive(self, make: Callable[[T], Iterable[U]]) -> Stream[U]:
         """Open a stream of the items that ``make`` derives from each item from now on."""
-        return self._begin(DerivedStream(make, self._waited_for))
+        return self._begin(DerivedIntake(make, self._waited_for))
 
-    def _begin(self, stream: Stream[U]) -> Stream[U]:
+    def _begin(self, intake: Intake[U]) -> Stream[U]:
         if self._failure is not None:
-            stream.end(self._failure)
+            intake.end(self._failure)
         else:
             if self._loop is not None:
-                stream.belong_to(self._loop)
+                intake.belong_to(self._loop)
             self._let_go()
-            self._streams.append(weakref.ref(stream, self._forget))
-        return stream
+            self._intakes.append(weakref.ref(intake, self._forget))
+        return Stream(intake)
+
+    def check_loop(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Refuse a loop to start in, if a reader waits in another one."""
+        if any(each.waits_outside_of(loop) for each in self._living()):
+            raise RuntimeError(
+                "a stream of the hand is read in another event loop than the hand starts in, and nothing was "
+                "asked of the gripper"
+            )
 
     def reopen(self, loop: asyncio.AbstractEventLoop) -> None:
-        """The hand starts in this loop: forget an earlier failure."""
+        """The hand starts in this loop, which was checked: forget an earlier failure."""
         self._failure, self._loop = None, loop
-        for stream in self._living():
-            stream.belong_to(loop)
+        for intake in self._living():
+            intake.belong_to(loop)
 
     def push(self, item: T) -> None:
-        for stream in self._living():
-            stream.push(item)
+        for intake in self._living():
+            intake.push(item)
         if self._has_dropped:
             self._let_go()
         self._listeners.tell(item)
@@ -336,22 +358,21 @@ class Channel(Generic[T]):
     def end(self, failure: Callable[[], RobotiqError] | None = None) -> None:
         """End every stream, quietly or with a failure."""
         self._failure, self._loop = failure, None
-        streams, self._streams = self._streams, []
-        for reference in streams:
-            stream = reference()
-            if stream is not None:
-                stream.end(failure)
+        ended = [*self._living()]
+        self._intakes = []
+        for intake in ended:
+            intake.end(failure)
 
-    def _living(self) -> Iterator[Stream[Any]]:
-        for reference in self._streams:
-            if (stream := reference()) is not None:
-                yield stream
+    def _living(self) -> Iterator[Intake[Any]]:
+        for reference in self._intakes:
+            if (intake := reference()) is not None:
+                yield intake
 
     def _let_go(self) -> None:
         self._has_dropped = False
-        self._streams = [each for each in self._streams if each() is not None]
+        self._intakes = [each for each in self._intakes if each() is not None]
 
-    def _forget(self, _: weakref.ref[Stream[Any]]) -> None:
+    def _forget(self, _: weakref.ref[Intake[Any]]) -> None:
         # Called in the thread that drops the last reference; only a flag, because another may open a stream
         # now.
         self._has_dropped = True
@@ -372,7 +393,13 @@ class Channels:
         self.requests: Channel[SentRequest] = Channel(self.listeners)
         self._all: tuple[Channel[Any], ...] = (self.statuses, self.transitions, self.requests)
 
+    def check_loop(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Refuse a loop to start in, if a reader waits in another one."""
+        for channel in self._all:
+            channel.check_loop(loop)
+
     def reopen(self, loop: asyncio.AbstractEventLoop) -> None:
+        """The hand starts in this loop."""
         for channel in self._all:
             channel.reopen(loop)
 

@@ -75,7 +75,9 @@ async def test_a_session_that_could_not_begin_leaves_the_address_free() -> None:
     broken = replace(here.options, link=replace(here.options.link, make=fail))
     with pytest.raises(ZeroDivisionError):
         Session(broken, here.machine, here.channels, activate=False)
-    await begins_and_ends(here)
+    session = here.session()
+    await session.connected()
+    await session.stop(halt=False)
 
 
 # -- its end -----------------------------------------------------------------------------------------------
@@ -275,59 +277,34 @@ async def test_a_bug_while_it_connects_is_named(caplog: pytest.LogCaptureFixture
 
 @pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning")
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-class TestClosedLoop:
-    @pytest.mark.parametrize("state", [State.RUNNING_IDLE, State.DO_SHUTDOWN])
-    def test_it_counts_as_over_once_it_is_abandoned(self, state: State) -> None:
-        here, session = in_a_loop_that_is_closed(state)
-        assert session.lost_its_loop
-        with pytest.raises(NotStartedError, match="was closed"):
-            session.check_running()
+@pytest.mark.parametrize("state", [State.RUNNING_IDLE, State.DO_SHUTDOWN, State.SHUTDOWN])
+def test_a_closed_loop_leaves_the_address_and_the_next_run_alone(state: State) -> None:
+    """When the old task was thrown away, it shut down the hand of the new one."""
+    _, left = in_a_loop_that_is_closed(state)
+    with pytest.raises(NotStartedError, match=r"was closed|not started"):
+        left.check_running()
 
-        async def abandon() -> None:
-            session.abandon()
-            assert session.is_over
-            assert not session.lost_its_loop
-            assert here.machine.state is State.SHUTDOWN
-            await begins_and_ends(here)
-
-        run(abandon)
+    async def again() -> None:
+        nonlocal left
+        with pytest.raises(RuntimeError, match=r"closed before stop\(\)"):
+            await left.stop(halt=True)
+        here = Run()
+        await here.wire.activate()
+        left = session = here.session()
+        await session.connected()
+        with pytest.raises(InvalidStateError):
+            Run().session()
+        await asyncio.sleep(0.1)
+        polls = session.counters.polls
         gc.collect()
+        await asyncio.sleep(0.1)
+        assert here.machine.state is State.RUNNING_IDLE
+        assert here.wire.is_open
+        assert session.counters.polls == pytest.approx(polls + 10, abs=1)
+        await session.stop(halt=False)
 
-    @pytest.mark.parametrize("state", [State.RUNNING_IDLE, State.DO_SHUTDOWN, State.SHUTDOWN])
-    def test_remains_of_a_closed_loop_leave_the_next_run_alone(self, state: State) -> None:
-        """When the old task was thrown away, it shut down the state of the hand under the new one."""
-        here, session = in_a_loop_that_is_closed(state)
-
-        async def again() -> None:
-            nonlocal session
-            session.abandon()
-            session = here.session()
-            await session.connected()
-            await asyncio.sleep(0.1)
-            polls = session.counters.polls
-            gc.collect()
-            await asyncio.sleep(0.1)
-            assert here.machine.state is State.RUNNING_IDLE
-            assert here.wire.is_open
-            assert session.counters.polls == pytest.approx(polls + 10, abs=1)
-            session.controller.command(Command(Finger.A, 100))
-            await session.stop(halt=False)
-
-        run(again)
-
-    def test_its_address_is_free(self) -> None:
-        _, session = in_a_loop_that_is_closed(State.RUNNING_IDLE)
-
-        async def again() -> None:
-            other = Run().session()
-            await other.connected()
-            session.abandon()
-            with pytest.raises(InvalidStateError):
-                Run().session()
-            await other.stop(halt=False)
-
-        run(again)
-        gc.collect()
+    run(again)
+    gc.collect()
 
 
 def in_a_loop_that_is_closed(state: State) -> tuple[Run, Session]:
@@ -356,12 +333,6 @@ def in_a_loop_that_is_closed(state: State) -> tuple[Run, Session]:
     assert here.machine.state is state
     loop.close()
     return here, session
-
-
-async def begins_and_ends(here: Run) -> None:
-    session = here.session()
-    await session.connected()
-    await session.stop(halt=False)
 
 
 async def test_an_interrupt_during_a_stop_is_raised(session: Session) -> None:

@@ -116,7 +116,6 @@ async def test_after_the_end_nothing_is_added(channel: Channel[int]) -> None:
     stream = channel.open(None)
     channel.end()
     channel.push(1)
-    stream.push(2)
     assert await rest(stream) == []
 
 
@@ -317,16 +316,16 @@ async def test_a_dropped_stream_is_forgotten_at_once(
 def held(channel: Channel[int]) -> int:
     """The number of streams that a channel knows of, once another one has been opened."""
     last = channel.open(None)
-    assert channel._streams.pop()() is last
-    return len(channel._streams)
+    assert channel._intakes.pop()() is last._intake
+    return len(channel._intakes)
 
 
-def test_a_stream_that_another_thread_drops_takes_no_other_with_it(channel: Channel[int]) -> None:
+async def test_a_stream_that_another_thread_drops_takes_no_other_with_it(channel: Channel[int]) -> None:
     """The list was rebuilt in that thread, without the one opened at the same moment in the loop's."""
-    dropped, before = [channel.open(1)], channel._streams
+    dropped, before = [channel.open(1)], channel._intakes
     with ThreadPoolExecutor(1) as pool:
         pool.submit(dropped.clear).result()
-    assert channel._streams is before
+    assert channel._intakes is before
     assert held(channel) == 0
 
 
@@ -346,37 +345,30 @@ async def test_a_waiting_reader_is_kept_although_its_task_is_not_referenced(chan
 # -- other loops -------------------------------------------------------------------------------------------
 
 
-async def test_a_reader_whose_loop_was_closed_delays_no_other(channel: Channel[int]) -> None:
-    """It waits in a loop that was closed without cancelling its tasks."""
-
-    def leave_one_behind() -> asyncio.Task[None]:
-        loop = asyncio.new_event_loop()
-        task = loop.create_task(read(channel, []))
-        loop.run_until_complete(steps())
-        loop.close()
-        return task
-
-    left = await asyncio.to_thread(leave_one_behind)
-    stream = channel.open(1)
-    channel.push(1)
-    assert await anext(stream) == 1
-    assert not channel._waited_for
-    assert not left.done()
-    left._log_destroy_pending = False  # type: ignore[attr-defined]  # it will never run again
-
-
-@pytest.mark.parametrize("debug", [False, True])
-async def test_a_reader_in_the_loop_of_another_thread_does_no_harm(
-    channel: Channel[int], debug: bool
-) -> None:
-    """In debug mode the loop refuses to be called from another thread."""
+async def test_a_stream_of_a_hand_that_runs_is_read_in_its_loop(channel: Channel[int]) -> None:
     stream = channel.open(None)
-    reader = asyncio.create_task(asyncio.to_thread(lambda: asyncio.run(rest(stream), debug=debug)))
-    for item in range(100):
-        channel.push(item)
-        await asyncio.sleep(0.0001)
+    channel.reopen(asyncio.get_running_loop())
+    for each in (stream, channel.open(None)):
+        with pytest.raises(RuntimeError, match="outside of the event loop"):
+            await asyncio.to_thread(asyncio.run, rest(each))
+    channel.push(1)
     channel.end()
-    assert await reader == [*range(100)]
+    assert await asyncio.to_thread(asyncio.run, rest(stream)) == [1], "what is left is read anywhere"
+
+
+def test_a_hand_does_not_start_while_a_reader_waits_in_another_loop(channel: Channel[int]) -> None:
+    stream = channel.open(None)
+    with asyncio.Runner() as here, asyncio.Runner() as other:
+        task = other.get_loop().create_task(rest(stream))
+        other.run(steps())
+        with pytest.raises(RuntimeError, match="nothing was asked of the gripper"):
+            channel.check_loop(here.get_loop())
+        with pytest.raises(RuntimeError, match="outside of the event loop"):
+            here.run(stream.aclose())
+        channel.check_loop(other.get_loop())
+        other.run(stream.aclose())
+        assert other.get_loop().run_until_complete(task) == []
+        channel.check_loop(here.get_loop())
 
 
 # -- what is made of items ---------------------------------------------------------------------------------

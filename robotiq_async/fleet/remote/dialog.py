@@ -369,7 +369,7 @@ class Dialog:
         if self.is_over:
             raise NotStartedError("the hand is not started: use 'async with' or start()")
         if self.loop.is_closed():
-            raise NotStartedError("the event loop that the hand ran in was closed: start() it again")
+            raise NotStartedError("the event loop that the hand ran in was closed: make a new hand")
 
     def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
         task = self.loop.create_task(work)

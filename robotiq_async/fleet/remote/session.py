@@ -204,18 +204,6 @@ class RemoteSession:
     def check_loop(self, what: str = "the hand") -> None:
         check_loop(self.dialog.loop, what)
 
-    @property
-    def lost_its_loop(self) -> bool:
-        """Whether its event loop was closed: its tasks can never end then."""
-        return not self.dialog.has_ended and self.dialog.loop.is_closed()
-
-    def abandon(self) -> None:
-        """Give up a run whose event loop was closed. Without renewals the agent holds what moves."""
-        self.dialog.log.warning("the event loop was closed before stop()")
-        self.dialog.lease.end()
-        self.waiters = StateWaiters()
-        self._end()
-
     # -- messages -------------------------------------------------------------------------------------
 
     def _receive(self, _key: str, payload: bytes) -> None:
