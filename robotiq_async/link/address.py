@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from ipaddress import IPv4Address, IPv6Address
 from typing import TYPE_CHECKING, Final, Literal
 
 from ..values.checks import check_byte, repr_of
-from ..values.model import MODELS, Model, model_of
+from ..values.model import Model, model_of
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -179,8 +178,8 @@ def parse_address(address: object) -> Address:
     scheme, separator, rest = address.partition("://")
     scheme = scheme.lower()
     if not separator:
-        if meant := _meant(address):
-            raise malformed(address, meant)
+        if re.fullmatch(r"com[0-9]{1,3}|/dev/.*", address, re.IGNORECASE):  # it would be a host
+            raise malformed(address, f"a serial port is rtu://{address}")
         scheme, rest = "tcp", address
     try:
         rest, model, stroke = _without_options_of_a_gripper(rest)
@@ -200,7 +199,7 @@ def parse_address(address: object) -> Address:
     if scheme in _SOCKETS:
         if "?" in rest:  # model and stroke have been taken out
             names = [option.partition("=")[0] for option in rest.partition("?")[2].split("&")]
-            what = f"no option {_guess(names[0], GRIPPER_OPTIONS)}; known are: {', '.join(GRIPPER_OPTIONS)}"
+            what = _unknown(names[0], GRIPPER_OPTIONS)
             if not set(names).isdisjoint(LINE_OPTIONS):
                 what = "baud, parity and stopbits are options of a serial port; a serial server has its own"
             raise malformed(address, what)
@@ -215,7 +214,7 @@ def parse_address(address: object) -> Address:
         what = "is a gripper on another host: use robotiq_async.fleet.RemoteHand, or an address here"
         raise ValueError(_within(f"{_shown(address)} {what}: {FORMS}"))
     if scheme in ("sim", "rtu", *_SOCKETS) or not _SCHEME.fullmatch(scheme):
-        raise malformed(address, _meant(rest) if scheme == "sim" else "")
+        raise malformed(address)
     try:
         return _through_a_tunnel(scheme, rest, model, stroke)
     except ValueError as error:
@@ -258,7 +257,7 @@ def _through_a_tunnel(scheme: str, rest: str, model: Model | None, stroke: str |
     return Address("tunnel", host, port, model=model, stroke=stroke, scheme=scheme, options=given)
 
 
-def malformed(address: str, why: str, forms: str = FORMS) -> ValueError:
+def malformed(address: str, why: str = "", forms: str = FORMS) -> ValueError:
     """The error about an address: why it is malformed, else the forms that there are."""
     rest = f": {why}" if why else f"; accepted: {forms}"
     return ValueError(_within(f"malformed address {_shown(address)}{rest}"))
@@ -271,23 +270,6 @@ def _shown(address: str) -> str:
 
 def _within(message: str) -> str:
     return message if len(message) <= LONGEST else f"{message[: LONGEST - 3]}..."
-
-
-def _meant(address: str) -> str:
-    """A guess at an address that names no host, and no scheme or a simulation; empty if it may be one."""
-    if re.fullmatch(r"com[0-9]{1,3}", address, re.IGNORECASE):
-        return f"a serial port is rtu://{address.upper()}"
-    if address.startswith("/dev/"):
-        return f"a serial port is rtu://{address}"
-    name = next((name for name in MODELS if _plain(name) == _plain(address)), None)
-    if name is None:
-        return ""
-    return f"a model is part of an address: tcp://192.168.1.11?model={name}, or sim://?model={name}"
-
-
-def _plain(model: str) -> str:
-    """The name of a model as people type it: Hand-E, hande, hand_e."""
-    return re.sub(r"[-_ ]", "", model).lower()
 
 
 def _without_options_of_a_gripper(text: str) -> tuple[str, Model | None, str | None]:
@@ -326,42 +308,12 @@ _WINDOWS_PATH: Final = "\\\\?\\"
 def _device_and_line(text: str) -> tuple[str, Line]:
     """Split DEVICE?baud=...&parity=...&stopbits=..."""
     device, mark, query = _split(text)
-    if meant := _meant_by_port(device):
-        raise ValueError(meant)
-    given = _options(query if mark else None, LINE_OPTIONS, _no_option_of_a_line)
+    given = _options(query if mark else None, LINE_OPTIONS, f" ({USUAL})")
     return device, Line(
         baud=_baud(given["baud"]) if "baud" in given else BAUD,
         parity=_one_of("parity", given.get("parity", "N"), "N", "E", "O"),
         stopbits=int(_one_of("stopbits", given.get("stopbits", "1"), "1", "2")),
     )
-
-
-def _meant_by_port(device: str) -> str:
-    """A guess at a serial port that is none; empty if it may be one."""
-    if host := re.fullmatch(r"([0-9]{1,3}(?:\.[0-9]{1,3}){3})(?::([0-9]+))?", device):
-        return f"a serial line behind a TCP socket is rtu+tcp://{host[1]}:{host[2] or 'PORT'}"
-    if rate := re.search(r":([0-9]+)$", device):
-        return f"the rate of a serial port is ?baud={rate[1]}"
-    if device.startswith("dev/"):
-        return f"a serial port is rtu:///{device}"
-    return "options follow a question mark" if re.search("&.*=", device) else ""
-
-
-def _no_option_of_a_line(name: str) -> str:
-    known = *GRIPPER_OPTIONS, *LINE_OPTIONS
-    guess = _guess(name, known, " of a serial port")
-    return f"no option {guess}; known are: {', '.join(known)} ({USUAL})"
-
-
-def _guess(name: str, known: Sequence[str], where: str = "") -> str:
-    """A name that is not known, and the known one that may be meant."""
-    meant = next((each for each in known if _is_like(name, each)), "")
-    return f"{name!r}{where}" + (f"; did you mean {meant}?" if meant else "")
-
-
-def _is_like(name: str, known: str) -> bool:
-    """Whether a name is a misspelling of a known one."""
-    return bool(get_close_matches(name.lower(), [known], 1, 0.6)) or name.lower().startswith(known)
 
 
 def _baud(text: str) -> int:
@@ -432,12 +384,7 @@ def _ends_in_a_number(host: str) -> bool:
 
 def parse_simulation(query: str) -> Simulation:
     """Parse the part after ``sim://``: nothing, or ``?OPTION=VALUE&...``."""
-    known = GRIPPER_OPTIONS + SIMULATION_OPTIONS
-    given = _options(
-        query.removeprefix("?") if query else None,
-        SIMULATION_OPTIONS,
-        lambda name: f"no option {_guess(name, known)}; known are: {', '.join(known)}",
-    )
+    given = _options(query.removeprefix("?") if query else None, SIMULATION_OPTIONS)
     if "object" in given and "physics" in given:
         raise ValueError("object and physics cannot be combined: physics has its own part")
     return Simulation(
@@ -447,17 +394,21 @@ def parse_simulation(query: str) -> Simulation:
     )
 
 
-def _options(query: str | None, known: Sequence[str], unknown: Callable[[str], str]) -> dict[str, str]:
-    """Split NAME=VALUE&...; ``unknown`` makes the message for a name that is not known."""
+def _options(query: str | None, known: Sequence[str], usual: str = "") -> dict[str, str]:
+    """Split NAME=VALUE&...; ``usual`` is added to the message about a name that is not known."""
     given: dict[str, str] = {}
     for part in () if query is None else query.split("&"):
         name, separator, value = part.partition("=")
         if name not in known:
-            raise ValueError(unknown(name))
+            raise ValueError(_unknown(name, (*GRIPPER_OPTIONS, *known)) + usual)
         if not separator or name in given:
             raise ValueError(f"{name} must be given once, as {name}=VALUE")
         given[name] = value
     return given
+
+
+def _unknown(name: str, known: Sequence[str]) -> str:
+    return f"no option {name!r}; known are: {', '.join(known)}"
 
 
 def _speedup(text: str) -> float:

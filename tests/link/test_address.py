@@ -209,31 +209,18 @@ def test_a_character_has_ten_to_twelve_bits() -> None:
     ("what", "meant"),
     [
         ("COM3", "rtu://COM3"),
-        ("com12", "rtu://COM12"),
+        ("com12", "rtu://com12"),
         ("/dev/ttyUSB0", "rtu:///dev/ttyUSB0"),
-        ("2f85", "tcp://192.168.1.11?model=2f85"),
-        ("2F-140", "?model=2f140"),
-        ("HandE", "?model=hand-e"),
-        ("sim://2f85", "sim://?model=2f85"),
-        ("rtu:///dev/ttyUSB0?baudrate=9600", "no option 'baudrate' of a serial port; did you mean baud?"),
-        ("rtu://COM3?baudrate=9600&model=2f85", "did you mean baud?"),
-        ("rtu:///dev/ttyUSB0?modle=2f85", "did you mean model?"),
-        ("tcp://host?modle=2f85", "no option 'modle'; did you mean model?; known are: model, stroke"),
-        ("urcap://host?Model=2f85", "did you mean model?"),
         ("tcp://host?x=1", "no option 'x'; known are: model, stroke"),
         (
             "rtu:///dev/ttyUSB0?x=1",
             "known are: model, stroke, baud, parity, stopbits",
         ),
-        ("rtu:///dev/ttyUSB0:115200", "the rate of a serial port is ?baud=115200"),
         ("rtu:///dev/ttyUSB0?baud", "baud must be given once, as baud=VALUE"),
-        ("rtu:///dev/ttyUSB0?", "no option '' of a serial port"),
-        ("rtu:///dev/ttyUSB0?115200", "no option '115200' of a serial port"),
-        (r"rtu://\\?\COM10?2f85", "no option '2f85' of a serial port"),
-        ("rtu:///dev/ttyUSB0&model=2f85", "options follow a question mark"),
-        ("rtu://192.168.1.20:54321", "a serial line behind a TCP socket is rtu+tcp://192.168.1.20:54321"),
-        ("rtu://192.168.1.20", "a serial line behind a TCP socket is rtu+tcp://192.168.1.20:PORT"),
-        ("rtu://dev/ttyUSB0", "a serial port is rtu:///dev/ttyUSB0"),
+        ("rtu:///dev/ttyUSB0?baudrate=9600", "no option 'baudrate'; known are: model, stroke, baud, parity"),
+        ("rtu:///dev/ttyUSB0?", "no option ''"),
+        ("rtu:///dev/ttyUSB0?115200", "no option '115200'"),
+        (r"rtu://\\?\COM10?2f85", "no option '2f85'"),
         ("rtu:///dev/ttyUSB0?baud=300", "baud must be an integer in 9600..1000000, got '300'"),
         ("rtu:///dev/ttyUSB0?baud=1e6", "baud must be an integer"),
         ("rtu:///dev/ttyUSB0?parity=M", "parity must be N, E or O, got 'M'"),
@@ -243,7 +230,7 @@ def test_a_character_has_ten_to_twelve_bits() -> None:
         ("rtu+tcp://192.168.1.20:54321?baud=9600", "a serial server has its own"),
     ],
 )
-def test_what_somebody_may_have_meant_is_told(what: str, meant: str) -> None:
+def test_a_refusal_names_the_form_or_the_options(what: str, meant: str) -> None:
     message = refusal(what)
     assert message.startswith(f"malformed address {what!r}: ")
     assert meant in message.partition("; accepted")[0]
@@ -286,7 +273,7 @@ def test_an_ipv4_address_is_four_numbers(host: str) -> None:
         ("object=1.5", "object must be an integer in 0..255, got '1.5'"),
         ("speedup", "speedup must be given once, as speedup=VALUE"),
         ("object=1&object=2", "object must be given once, as object=VALUE"),
-        ("speed=10", "no option 'speed'; did you mean speedup?; known are: model, stroke, speedup, object"),
+        ("speed=10", "no option 'speed'; known are: model, stroke, speedup, object"),
         ("", "no option ''; known are: model, stroke, speedup, object, physics"),
         ("object=1&", "no option ''; known are: model, stroke, speedup, object, physics"),
     ],
