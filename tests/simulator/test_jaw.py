@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robotiq_async.simulator import SimulatedGripper
+from robotiq_async.simulator import Physics, SimulatedGripper
 from robotiq_async.values.calibration import MotionProfile, SpeedCalibration
 from robotiq_async.values.enums import JAW, ObjectStatus
 from robotiq_async.values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
@@ -169,6 +169,26 @@ def test_requests_that_follow_one_another_do_not_begin_the_motion_again() -> Non
         jaw.write(100 + count, 255)
         jaw.now += 0.01
     assert 185 <= jaw.reading <= 201
+
+
+@pytest.mark.parametrize("hz", [100, 50])
+@pytest.mark.parametrize("physics", [None, "table"])
+def test_a_stream_of_small_steps_lags_at_its_beginning_only(physics: str | None, hz: int) -> None:
+    """It reached each step before the next came, began each anew, and lagged up to ten counts for ever."""
+    jaw = Jaw(physics=physics and Physics(physics))
+    jaw.move(50, 255)
+    jaw.now += 1
+    lags = []
+    for count in range(51, 151):
+        jaw.write(count, 255)
+        jaw.now += 1 / hz
+        lags.append(count - jaw.reading)
+    assert max(lags[:10]) >= 0.07 * hz, "from a rest it begins late"
+    assert max(lags[30:]) <= 4
+    jaw.now += 0.1
+    jaw.write(50, 255)
+    jaw.now += 0.1
+    assert jaw.reading >= 149, "and so it does when it turns"
 
 
 def test_with_other_ends() -> None:

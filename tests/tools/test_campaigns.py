@@ -9,13 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from robotiq_async import HAND_E, TWO_FINGER_85, Finger, RobotiqHand
+from robotiq_async import HAND_E, THREE_FINGER, TWO_FINGER_85, Finger, RobotiqHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.simulator.physics.axis import peak
 from robotiq_async.simulator.physics.scale import SimulatedScale
 from robotiq_async.tools.measure.campaigns import (
     GRASP_S,
+    REST_S,
     Campaign,
+    expected_seconds,
     force_campaign,
     force_values,
     grasp,
@@ -70,6 +72,13 @@ async def test_closing_times_are_those_of_the_thesis(speedup: float, speeds: tup
             seconds = await time_closing(hand, speed, Finger.ABC, speedup)
             expected = closing_time(speed)
             assert expected <= seconds <= 1.01 * expected + 2 * POLL_S * speedup
+
+
+def test_the_time_of_a_run_is_that_of_the_model() -> None:
+    """The bar of a 2F-85 took the 10 s of a 3-Finger for its slowest closing, which takes 4.3."""
+    fast = SpeedCalibration.usual(TWO_FINGER_85).closing_time(255)
+    assert expected_seconds(TWO_FINGER_85, 0) == pytest.approx(4.3 + fast + REST_S, abs=0.1)
+    assert expected_seconds(THREE_FINGER, 0) > 10
 
 
 @virtual

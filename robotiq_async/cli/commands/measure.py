@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ...hand import Hand
     from ...simulator import SimulatedGripper
     from ...tools.measure.campaigns import Campaign
+    from ...values.model import Model
 
 SPEEDUP = 15.0
 """Speedup of the simulated gripper of sim:// over real time, by default."""
@@ -80,7 +81,7 @@ async def measure_left(
     speedup: float,
     campaign: Campaign,
     measure_run: Callable[[Hand, int, int], Awaitable[int]],
-    seconds_of: Callable[[int], float],
+    seconds_of: Callable[[Model, int], float],
     what: str,
     *,
     prepare: Callable[[SimulatedGripper], None] = lambda _: None,
@@ -104,7 +105,7 @@ async def _carry_out(
     hand: Hand,
     campaign: Campaign,
     measure_run: Callable[[Hand, int, int], Awaitable[int]],
-    seconds_of: Callable[[int], float],
+    seconds_of: Callable[[Model, int], float],
     what: str,
     *,
     bar: bool,
@@ -127,14 +128,15 @@ async def _carry_out(
     with Progress(
         *columns, console=Console(stderr=True), disable=not (bar and sys.stderr.isatty())
     ) as progress:
-        task = progress.add_task(what, total=campaign.runs * sum(map(seconds_of, campaign.left)))
+        seconds = {value: seconds_of(hand.model, value) for value in campaign.left}
+        task = progress.add_task(what, total=campaign.runs * sum(seconds.values()))
 
         readings: list[str] = []
 
         async def run(value: int, number: int) -> int:
             progress.update(task, description=f"{what} {value}, run {number}")
             reading = await measure_run(hand, value, number)
-            progress.advance(task, seconds_of(value))
+            progress.advance(task, seconds[value])
             readings.append(str(reading))
             if number == campaign.runs:
                 row = f"{what} {value}: {', '.join(readings)} {campaign.layout.unit}"
@@ -227,9 +229,11 @@ async def _measure(address: str, campaign: Campaign, fingers: Finger, speedup: f
         return round(1000 * await time_closing(hand, value, fingers, speedup))
 
     output = campaign.path
-    await measure_left(
-        address, speedup, campaign, run, lambda value: expected_seconds(value) / speedup, "speed"
-    )
+
+    def seconds_of(model: Model, value: int) -> float:
+        return expected_seconds(model, value) / speedup
+
+    await measure_left(address, speedup, campaign, run, seconds_of, "speed")
     print(output)
     if plot:
         from ...tools.measure.plots import plot_speed

@@ -124,7 +124,7 @@ async def _measure(
         return reading
 
     await measure_left(
-        address, speedup, campaign, run, lambda _: seconds, "force", prepare=place_scale, bar=bar
+        address, speedup, campaign, run, lambda *_: seconds, "force", prepare=place_scale, bar=bar
     )
     print_files([output, currents_file])
     if plot:

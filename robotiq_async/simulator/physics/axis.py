@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from robotiq_async.values.calibration.motion_profile import GOES_ON_S
 from robotiq_async.values.enums import SPEED_MAX, ObjectStatus
 
 from .course import Course, of_a_jaw, rest, straight
@@ -143,6 +144,10 @@ class Axis:
         self._path = _Path(float(position), ObjectStatus.IN_MOTION)
         self._running = self._peak = 0.0
         self._travelled = 0.0
+        self._moved_at = -math.inf
+        """When it last came to rest."""
+        self._closes = False
+        """Whether the last motion closes."""
         self._contacts = 0
         """Contacts so far: no two of them read the same."""
 
@@ -209,7 +214,7 @@ class Axis:
 
     def arrive(self) -> None:
         """Report the end of the present motion; to be called at :attr:`ends_at`."""
-        self.ends_at = math.inf
+        self._moved_at, self.ends_at = self.ends_at, math.inf
         self.status = self._path.outcome
         self._contacts += self.status.is_contact
 
@@ -239,6 +244,7 @@ class Axis:
         # A new request does not restart the pressing.
         if not (self.is_moving and time >= self._course.presses_at and self._path == before):
             self._follow(self._course_to(time, here, goal))
+        self._closes = self._path.end > here
 
     def _course_to(self, time: float, here: float, goal: Goal) -> Course:
         motion, (end, outcome, _) = self._motion, self._path
@@ -247,11 +253,17 @@ class Axis:
             pressing = motion.pressing_time(rate) if outcome.is_contact else 0.0
             return straight(time, here, end, rate, pressing)
         # An axis on its way takes a new request at once; one that is about to move does not begin again.
-        begin = max(time, self._course.moves_at) if self.is_moving else time + motion.start_s(closing=closing)
+        begin = self._course.moves_at if self.is_moving else time + self._start_s(time, closing=closing)
+        begin = max(time, begin)
         is_stop = not outcome.is_contact and (end <= self.low or end >= self._closed_stop(goal))
         presses = outcome.is_contact or (is_stop and closing)
         early = self._spread.early(self._contacts) if outcome.is_contact else 0.0
         return of_a_jaw(begin, here, end, rate, motion, lands=is_stop, presses=presses, early=early)
+
+    def _start_s(self, time: float, *, closing: bool) -> float:
+        """Seconds until an axis at rest begins to move: none if it goes on in the same direction."""
+        goes_on = closing is self._closes and time - self._moved_at < GOES_ON_S
+        return 0.0 if goes_on else self._motion.start_s(closing=closing)
 
     def _closed_stop(self, goal: Goal) -> int:
         """The count at which the closing motion ends: the stop of a jaw gives with the force."""
@@ -324,6 +336,8 @@ class Axis:
         return 0.0 if end == surface else max(0.0, (self.position(time) - surface) / (end - surface))
 
     def _follow(self, course: Course) -> None:
+        if self.is_moving and course.moves_at > self._course.moves_at:
+            self._moved_at = course.moves_at
         self._travelled += abs(course.origin - self._course.origin)
         self._course = course
         self.ends_at = course.ends_at

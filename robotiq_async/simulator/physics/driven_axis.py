@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 from robotiq_async.values.calibration.motion_profile import PRESSING_S
 from robotiq_async.values.enums import ObjectStatus
+from robotiq_async.values.model import TOLERANCE
 
 from .axis import Axis, Goal, Motor, peak
 from .course import rest
@@ -184,17 +185,21 @@ class DrivenAxis(Axis):
 
     def _plan(self, time: float) -> None:
         assert self._goal is not None, "only a motion with a goal is planned"
-        goal = self._goal
+        goal, is_under_way = self._goal, self.status is ObjectStatus.IN_MOTION and not self._stays
+        target = self.within_stops(goal.position)
+        closing = target > (here := self.position(time))
+        if is_under_way and closing is self._closes:
+            self._moved_at = time  # its drive may have arrived just now
+        way = self._way(time, goal, target, closing=closing)
+        if abs(target - here) > TOLERANCE:  # bodies overshoot a little, and tremble at rest
+            self._closes = closing
         self.ends_at = math.inf
         self.status = ObjectStatus.IN_MOTION
         self._stays = False
-        target = self.within_stops(goal.position)
-        way = self._way(goal, target, closing=target > self.position(time))
-        share = way.rate / self._motion.fastest
-        self._running = self._motor.running(share, closing=target > self.position(time))
+        self._running = self._motor.running(way.rate / self._motion.fastest, closing=closing)
         self._drive.go(target, way, goal.force, clears=goal.clears)
 
-    def _way(self, goal: Goal, target: int, *, closing: bool) -> Way:
+    def _way(self, time: float, goal: Goal, target: int, *, closing: bool) -> Way:
         motion, rate = self._motion, goal.rate_of(self._motion)
         pressing = motion.pressing_time(rate)
         if goal.rate or motion.is_straight:
@@ -202,7 +207,7 @@ class DrivenAxis(Axis):
         at_stop = target in (self.low, self.high)
         return Way(
             rate,
-            motion.start_s(closing=closing),
+            self._start_s(time, closing=closing),
             max(pressing, PRESSING_S),  # bodies take that long to come to rest
             pressing if at_stop and closing else _ARRIVED_S,
             motion.landing if at_stop else 0.0,

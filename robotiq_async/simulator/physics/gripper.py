@@ -56,6 +56,7 @@ class SimulatedGripper(Surroundings):
 
     * A finger that meets something, or tries again, presses for 50 ms with gDT 0 before it reports a contact.
     * A jaw begins a motion late only from rest: on its way it takes a new request at once, and turns at once.
+      Small steps in one direction are one motion if they follow within 0.2 s: no recording has such a stream.
     * An axis within 2 counts of a new request has reached it, and does not move.
     * A failed activation stays at gIMC = 1 with fault 0x0D.
     * gMOD, gGTO and the position echoes follow the request also while reset.

@@ -28,8 +28,8 @@ from ...values.calibration.csv_tables import (
     write_rows,
     write_table,
 )
-from ...values.calibration.scales import closing_time
-from ...values.enums import Finger
+from ...values.calibration.scales import SpeedCalibration
+from ...values.enums import SPEED_MAX, Finger
 from ...values.errors import MeasuringError
 from ...values.model import THREE_FINGER, Model
 
@@ -100,9 +100,10 @@ async def time_closing(hand: Hand, speed: int, fingers: Finger, speedup: float =
     )
 
 
-def expected_seconds(speed: int) -> float:
+def expected_seconds(model: Model, speed: int) -> float:
     """Estimated duration of one run, in the gripper's time: for progress bars."""
-    return closing_time(speed) + closing_time(255) + REST_S
+    closing_time = SpeedCalibration.usual(model).closing_time
+    return closing_time(speed) + closing_time(SPEED_MAX) + REST_S
 
 
 # -- force -------------------------------------------------------------------------------------------------

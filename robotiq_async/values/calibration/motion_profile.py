@@ -6,12 +6,12 @@ the simulator moves by it.
 
 # Theory of operation
 #
-# A motion of a jaw is: a start, during which nothing moves; the way, at a constant rate; before an end stop a
-# landing at the slowest rate; and at a part, and at the closed stop, the time for which it presses until the
-# end is reported. Each is a straight line in time. Of the shapes that were tried on the recordings this one
-# came within 4.4 % of every row at the speeds 0, 128 and 255, and within 5.6 % at 64; a constant acceleration
-# within 9 %, the manual's speeds alone within 50 %. It describes one gripper and is no law: with one row left
-# out, that row was predicted within 2.9 % on average, and 7.7 % at worst.
+# A motion of a jaw is: from a rest a start, during which nothing moves; the way, at a constant rate; before
+# an end stop a landing at the slowest rate; and at a part, and at the closed stop, the time for which it
+# presses until the end is reported. Each is a straight line in time. Of the shapes that were tried on the
+# recordings this one came within 4.4 % of every row at the speeds 0, 128 and 255, and within 5.6 % at 64; a
+# constant acceleration within 9 %, the manual's speeds alone within 50 %. It describes one gripper and is no
+# law: with one row left out, that row was predicted within 2.9 % on average, and 7.7 % at worst.
 
 from __future__ import annotations
 
@@ -24,6 +24,10 @@ from ..model import TWO_FINGER_85, Model
 
 PRESSING_S: Final = 0.05
 """Seconds for which a finger of a 3-Finger presses before it reports a contact: no source gives them."""
+
+GOES_ON_S: Final = 0.2
+"""Seconds of rest within which an axis that goes on in the same direction needs no start: an assumption. The
+recorded motions were strokes to and fro, and none tells about a stream of small steps."""
 
 # One 2F-85 read 225 closed at force 0 and speed 0, 226 at higher speeds and at force 30, another one 228 at
 # 64, and 230 from 80 on.
@@ -45,7 +49,7 @@ class MotionProfile:
         source: of the figures, for people.
         runs: recorded motions behind them; 0 for an estimate.
         rates: counts a second on the way, at each speed value 0..255.
-        start_closing_s: seconds from a request to the first motion, if it closes.
+        start_closing_s: seconds from a request at rest to the first motion, if it closes.
         start_opening_s: the same if it opens.
         landing: counts before an end stop that it travels at the slowest rate.
         pressing: counts; for the time of so many it presses before a contact, or the closed stop, is
