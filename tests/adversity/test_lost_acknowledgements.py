@@ -80,9 +80,18 @@ class Cell:
         """Look at what is_moving says of fingers that move, until cancelled."""
         while True:
             with suppress(RobotiqError):
-                if self.world.gripper.is_moving and not self.world.hand.is_moving:
+                if self._is_on_its_way() and not self.world.hand.is_moving:
                     self.doubts.append(self.world.loop.time())
             await asyncio.sleep(LOOK_S)
+
+    def _is_on_its_way(self) -> bool:
+        """Whether a finger moves: not over the last counts to its request, where a late gDT shows rest."""
+        gripper = self.world.gripper
+        is_there = (
+            axis in gripper.holds or gripper.model.has_reached(gripper.target(axis), gripper.position(axis))
+            for axis in gripper.model.axes
+        )
+        return gripper.is_moving and not all(is_there)
 
     async def until_back(self) -> None:
         """Wait for the link, if the hand has one."""

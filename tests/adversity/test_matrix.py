@@ -108,10 +108,15 @@ WITH_HABIT = {
     "write-spacing": {
         # The other client's write comes too soon after ours, and is the one that is forgotten.
         **{(link, "moving", "foreign 128"): "done → RUNNING_IDLE" for link in ("tcp", "rtu", "urcap")},
-        # The stop comes too soon after the command. No answer is in time, so it cannot be written again.
+        # The stop comes too soon after the command. No status can be read, so it cannot be written again.
         **{
-            (link, "stopping", f"multiplexer {wait}for 60"): "done, fingers went on → SHUTDOWN"
-            for link, wait in (("tcp", ""), ("tcp", "0.5 "), ("urcap", ""))
+            (link, "stopping", f"{trouble} for 60"): "done, fingers went on → SHUTDOWN"
+            for link, trouble in (
+                ("tcp", "multiplexer"),
+                ("tcp", "multiplexer 0.5"),
+                ("tcp", "function-3-only"),
+                ("urcap", "multiplexer"),
+            )
         },
     },
     # Such a stop takes longer, and so sees the fault.
