@@ -1,4 +1,4 @@
-"""The arguments of motions, described once: each call's docstring gets an ``Args:`` section by its signature.
+"""The arguments of a hand, described once: each call's docstring gets an ``Args:`` section by its signature.
 
 A parameter that has no description here is a KeyError when the module of the call is imported.
 """
@@ -13,6 +13,7 @@ from typing import Any, Final, TypeVar
 F = TypeVar("F", bound=Callable[..., Any])
 
 WIDTH: Final = 96
+SECTIONS: Final = "Args:\n"  # the first of those of a constructor
 STAYS: Final = (
     "It stays with the axes, also after a call that was cancelled or superseded: give it where it matters."
 )
@@ -33,6 +34,20 @@ ARGUMENTS: Final = {
     "timeout": "seconds above 0; None for twice the expected time plus 2 s, by the speeds at the call. A "
     "move that is slowed down afterwards needs one of its own.",
     "at_least": "the contacts that make a grasp, 1 .. the number of axes; None for all of them.",
+    "activate": "False writes nothing: a gripper that is reset stays in RESET.",
+    "wait": "seconds to keep trying while nothing answers, 0..86400, counted while the event loop runs, for "
+    "a gripper that is switched on later than the program. Its fingers may MOVE long after the call then.",
+    "halt": "False disconnects and leaves the fingers as they are; for programs that only look.",
+    "keep_grip": "whether a grip stays in force; None for the hand's own ``keep_grip``.",
+    "recovery": "seconds above 0 for all of it, while the event loop runs; None for 90.",
+    "buffer": "items that are kept for a slow reader, 1..1000000.",
+    "requests": "items that are kept for a slow reader, 1..1000000; None loses none.",
+    "lost_after": "seconds, 0.01..3600; None waits for as long as the hand runs.",
+    "watched": "the axes that are watched, a :class:`Finger` mask or the same integer, 1..15.",
+    "since": "the status to begin with, ``result.status`` of a grasp or a move; None for the newest one.",
+    "slip": "counts that an axis in contact may move without an event, 1..255.",
+    "states": "one or more; the first that the hand is in ends the wait.",
+    "waiting": "seconds above 0, while the event loop runs; None waits for as long as the hand runs.",
 }
 
 
@@ -40,9 +55,8 @@ def describes_arguments(**same: str) -> Callable[[F], F]:
     """Add the section to a method. ``value="position"`` describes the parameter value as a position."""
 
     def describe(call: F) -> F:
-        code = call.__code__
-        names = code.co_varnames[1 : code.co_argcount + code.co_kwonlyargcount]
         if call.__doc__ is not None:  # python -OO has none
+            _, *names = inspect.signature(call).parameters
             call.__doc__ = with_arguments(call.__doc__, names, same)
         return call
 
@@ -63,3 +77,8 @@ def with_arguments(text: str, names: Iterable[str], same: Mapping[str, str]) -> 
     section = "\n".join(("Args:", *lines))
     before, raises, after = inspect.cleandoc(text).partition("\n\nRaises:")
     return f"{before}\n\n{section}{raises}{after}"
+
+
+def with_arguments_of(text: str, other: str) -> str:
+    """The docstring of a class that is made as another: with that one's sections."""
+    return f"{inspect.cleandoc(text)}\n\n{SECTIONS}{inspect.cleandoc(other).partition(SECTIONS)[2]}"

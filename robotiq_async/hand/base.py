@@ -74,6 +74,7 @@ class Hand(Kind):
     if not TYPE_CHECKING:  # type checkers report the mistake themselves
         __enter__ = __exit__ = refuse_with  # Python looks for both before it calls the first
 
+    @describes_arguments()
     async def start(self, activate: bool = True, *, wait: float = 0.0) -> None:
         """Connect, read the status, activate a gripper that is reset, and poll from then on.
 
@@ -84,12 +85,6 @@ class Hand(Kind):
 
         A failed or cancelled start leaves nothing running and takes back an activation that it began. A hand
         that was stopped can be started again.
-
-        Args:
-            activate: False writes nothing: a gripper that is reset stays in RESET.
-            wait: seconds to keep trying while nothing answers, 0..86400, counted while the event loop runs,
-                for a gripper that is switched on later than the program starts. Its fingers may MOVE long
-                after the call then.
 
         Raises:
             InvalidStateError: this hand is started already, or another one owns the gripper.
@@ -108,6 +103,7 @@ class Hand(Kind):
         with self._naming:
             await self._start(activate, wait)
 
+    @describes_arguments()
     async def stop(self, *, halt: bool = True, keep_grip: bool | None = None) -> None:
         """Stop the fingers (rGTO = 0), keep the activation, disconnect. Idempotent.
 
@@ -129,10 +125,6 @@ class Hand(Kind):
         the last status and before the disconnection is not seen. What a real gripper does with a part, either
         way, is not known. A gripper that is not polled may lose its activation, and the part: it is in RESET
         then.
-
-        Args:
-            halt: False disconnects and leaves the fingers as they are; for programs that only look.
-            keep_grip: whether a grip stays in force; None for the hand's own ``keep_grip``.
         """
         check_flag("halt", halt)
         keeps = self._keeps_grip(keep_grip)
@@ -415,14 +407,14 @@ class Hand(Kind):
         with self._naming:
             await self._atr()
 
+    @describes_arguments(timeout="recovery")
     async def recover(self, timeout: float | None = None) -> None:
         """Clear the present fault and make the gripper active again.
 
         A minor or unknown fault, and an activation, reset or release that runs, are waited for. After a major
         fault the gripper is reset and activated. So is a gripper that makes no progress for 5 s while it
         waits for its activation (0x05, as after an emergency stop) or releases, at most twice. A reset DROPS
-        the part, and an activation MOVES the fingers. The ``timeout`` is for all of it, in seconds
-        while the event loop runs; None for 90 s.
+        the part, and an activation MOVES the fingers.
 
         Raises:
             StateTimeoutError: not active in time, with the fault that lasts, or not after two resets.
@@ -498,16 +490,16 @@ class Hand(Kind):
     def statistics(self) -> Statistics:
         """Figures of the polling since the last start."""
 
+    @describes_arguments()
     def statuses(self, buffer: int = 1, *, lost_after: float | None = None) -> Stream[RobotiqStatus]:
         """Every status from now on, in order, for one reader.
 
-        A slow reader costs only itself: the stream keeps the newest ``buffer`` statuses, 1..1000000, and its
-        ``missed`` counts the others. Opened before the start it waits for it, in the same event loop. It ends
-        after :meth:`stop`, and raises RobotiqConnectionError when the hand gives up on its link. While the
-        link is down it waits; a control loop passes ``lost_after``, 0.01..3600 s: when no status has come for
-        that time since the last one, or since the opening, it raises ConnectionLostError, also if the event
-        loop was held up for that time. It may be read on, unless the hand has given up: then it is in
-        SHUTDOWN.
+        A slow reader costs only itself: the stream keeps the newest ``buffer`` statuses, and its ``missed``
+        counts the others. Opened before the start it waits for it, in the same event loop. It ends after
+        :meth:`stop`, and raises RobotiqConnectionError when the hand gives up on its link. While the link is
+        down it waits; a control loop passes ``lost_after``: when no status has come for that time since the
+        last one, or since the opening, it raises ConnectionLostError, also if the event loop was held up for
+        that time. It may be read on, unless the hand has given up: then it is in SHUTDOWN.
         """
         kept, limit = check_buffer(buffer), check_limit("lost_after", lost_after)
         return self._opened(self._channels.statuses, kept, limit)
@@ -516,11 +508,13 @@ class Hand(Kind):
         """Every change of state from now on, none lost, for one reader. Ends as :meth:`statuses` does."""
         return self._opened(self._channels.transitions, None)
 
+    @describes_arguments(buffer="requests")
     def requests(self, buffer: int | None = None) -> Stream[SentRequest]:
         """Every request written from now on, as :meth:`statuses`; a ``buffer`` of None loses none."""
         kept = None if buffer is None else check_buffer(buffer)
         return self._opened(self._channels.requests, kept)
 
+    @describes_arguments(fingers="watched")
     def grip_events(
         self,
         fingers: Finger | int = Finger.ABC,
@@ -533,11 +527,6 @@ class Hand(Kind):
         For one reader; ends as :meth:`statuses` does. Changes while the link is down are reported when it
         is back. The events follow the gripper's reports, and a contact latches: a part that is pulled out
         is noticed once its finger closes further, by the manual only when the force is raised.
-
-        Args:
-            fingers: the axes that are watched.
-            since: the status to begin with, ``result.status`` of a grasp or a move; None for the newest one.
-            slip: counts that an axis in contact may move without an event, 1..255.
         """
         watch = GripWatch(self.model.mask(fingers), since=since, slip=slip)
         self._check_may_listen()
@@ -545,10 +534,9 @@ class Hand(Kind):
             watch.see(self._newest_status)
         return self._channels.statuses.derive(watch.see)
 
+    @describes_arguments(timeout="waiting")
     async def wait_for_state(self, *states: State, timeout: float | None = None) -> State:
         """Wait until the hand is in one of these states, if only for a moment, and return that state.
-
-        The ``timeout`` counts while the event loop runs; None waits for as long as the hand runs.
 
         Raises:
             StateTimeoutError: not reached in time.

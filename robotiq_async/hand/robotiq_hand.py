@@ -280,8 +280,11 @@ class RobotiqHand(Hand):
         """Drop the requests that were not sent, except holds and halts: for a client that has lost control.
 
         A speed or a force that is not written yet would take effect under the next client. Calls that wait
-        for what is dropped raise MoveSupersededError with ``why``. What was sent continues: :meth:`hold`
-        ends it. A hand that does not run has nothing to drop.
+        for what is dropped raise MoveSupersededError. What was sent continues: :meth:`hold` ends it. A hand
+        that does not run has nothing to drop.
+
+        Args:
+            why: the text of that error.
         """
         if self._session is not None and not self._session.is_over:
             self._session.check_loop("hand.drop_requests()")

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Generic, Self, TypeVar
 
+from ..hand.arguments import with_arguments_of
 from ..hand.grip_watch import SLIP_COUNTS
 from ..hand.robotiq_hand import RobotiqHand as AsyncRobotiqHand
 from ..hand.run import refuse_copy
@@ -83,9 +84,11 @@ class Stream(Generic[T]):
 
 
 def _documented_as(original: type) -> Callable[[K], K]:
-    """Copy the docstrings of public methods and properties from those of the same name."""
+    """Copy the docstrings of public methods and properties from those of the same name, and the options'."""
 
     def copy(kind: K) -> K:
+        if kind.__doc__ and original.__doc__:  # python -OO has none
+            kind.__doc__ = with_arguments_of(kind.__doc__, original.__doc__)
         for name, member in vars(kind).items():
             if not name.startswith("_"):
                 member.__doc__ = getattr(original, name).__doc__

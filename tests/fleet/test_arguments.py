@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import pytest
-
 from robotiq_async.fleet import RemoteHand
-from tests.hand.test_arguments import MOTIONS, assert_constructor_describes, assert_describes
+from tests.hand.test_arguments import assert_calls_describe, assert_constructor_describes
 
 
-@pytest.mark.parametrize("name", MOTIONS)
-def test_a_motion_describes_what_it_takes(name: str) -> None:
-    assert_describes(getattr(RemoteHand, name))
+def test_its_calls_describe_what_they_take() -> None:
+    assert_calls_describe(RemoteHand)
 
 
 def test_the_constructor_describes_what_it_takes() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 
@@ -13,9 +13,8 @@ from robotiq_async.hand.arguments import ARGUMENTS, describes_arguments
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
 from robotiq_async.sync import RobotiqHand as BlockingHand
 
-MOTIONS = ("set_position", "set_speed", "set_force", "command", "move", "open", "close", "grasp", "hold")
 HANDS = {"async": RobotiqHand, "blocking": BlockingHand}
-CONSTRUCTORS = (RobotiqHand, SimulatedGripper, SimulatorServer, SerialSimulatorServer)
+CONSTRUCTORS = (*HANDS.values(), SimulatedGripper, SimulatorServer, SerialSimulatorServer)
 
 
 def described(text: str | None) -> list[str]:
@@ -24,9 +23,19 @@ def described(text: str | None) -> list[str]:
     return re.findall(r"^    (\w+): ", section[1], re.MULTILINE) if section else []
 
 
-def assert_describes(call: Callable[..., object]) -> None:
-    parameters = [each for each in inspect.signature(call).parameters if each != "self"]
-    assert described(call.__doc__) == parameters != []
+def calls(kind: type) -> Iterator[tuple[str, Callable[..., object]]]:
+    """The public calls of a hand that take something."""
+    for name, call in inspect.getmembers(kind, inspect.isfunction):
+        if not name.startswith("_") and len(inspect.signature(call).parameters) > 1:
+            yield name, call
+
+
+def assert_calls_describe(kind: type) -> None:
+    found = dict(calls(kind))
+    assert {"start", "stop", "move", "grasp", "command", "hold", "recover", "wait_for_state"} <= found.keys()
+    for name, call in found.items():
+        _, *parameters = inspect.signature(call).parameters
+        assert described(call.__doc__) == parameters, name
 
 
 def assert_constructor_describes(kind: type) -> None:
@@ -35,12 +44,11 @@ def assert_constructor_describes(kind: type) -> None:
 
 
 @pytest.mark.parametrize("hand", HANDS)
-@pytest.mark.parametrize("name", MOTIONS)
-def test_a_motion_describes_what_it_takes(hand: str, name: str) -> None:
-    assert_describes(getattr(HANDS[hand], name))
+def test_a_call_describes_what_it_takes(hand: str) -> None:
+    assert_calls_describe(HANDS[hand])
 
 
-@pytest.mark.parametrize("kind", CONSTRUCTORS)
+@pytest.mark.parametrize("kind", CONSTRUCTORS, ids=lambda kind: f"{kind.__module__}.{kind.__name__}")
 def test_a_constructor_describes_what_it_takes(kind: type) -> None:
     assert_constructor_describes(kind)
 
