@@ -9,7 +9,7 @@ import sysconfig
 from pathlib import Path
 from typing import Final
 
-from .check import missing, problems
+from .check import missing, problems, unlisted
 from .pages import ROOT, described, stage
 from .versions import collect
 
@@ -33,7 +33,9 @@ def main() -> int:
         return build.returncode
     # Its links are absolute, and where the site will be is not known.
     (BUILT / "404.html").unlink()
-    found = [*problems(BUILT), *missing(BUILT, described())]
+    names = [name for page in described().values() for name in page]
+    listed = unlisted((BUILT / "objects.inv").read_bytes(), names)
+    found = [*problems(BUILT), *missing(BUILT, described()), *listed]
     for line in found:
         print(line, file=sys.stderr)
     if found:

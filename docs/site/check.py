@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from html.parser import HTMLParser
 from pathlib import Path
@@ -124,3 +125,10 @@ def missing(site: Path, wanted: Mapping[str, Iterable[str]]) -> Iterator[str]:
         file = site / place
         has = _Page(file.read_text(encoding="utf-8")).anchors if file.is_file() else set()
         yield from (f"{place}: nothing about {each}" for each in anchors if each not in has)
+
+
+def unlisted(inventory: bytes, names: Iterable[str]) -> Iterator[str]:
+    """Which names Sphinx would not find: ``objects.inv`` has four lines of head, and the rest compressed."""
+    lines = zlib.decompress(inventory.split(b"\n", 4)[4]).decode().splitlines()
+    known = {line.partition(" ")[0] for line in lines}
+    yield from (f"objects.inv: nothing about {name}" for name in names if name not in known)

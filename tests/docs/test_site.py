@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pkgutil
 import re
+import zlib
 from pathlib import Path
 
 import pytest
@@ -222,6 +223,13 @@ def test_an_empty_site_is_a_problem(tmp_path: Path) -> None:
 def test_a_name_that_the_api_does_not_describe_is_found(site: Path) -> None:
     wanted = {"index.html": ["b", "c"], "gone.html": ["d"]}
     assert [*check.missing(site, wanted)] == ["index.html: nothing about c", "gone.html: nothing about d"]
+
+
+def test_a_name_that_sphinx_would_not_find_is_found() -> None:
+    listed = b"# Sphinx inventory version 2\n# Project: a\n# Version: 1\n# zlib\n" + zlib.compress(
+        b"a.B py:class 1 api.html#$ -\na.B.c py:method 1 api.html#$ -\n"
+    )
+    assert [*check.unlisted(listed, ["a.B", "a.D"])] == ["objects.inv: nothing about a.D"]
 
 
 # -- versions ----------------------------------------------------------------------------------------------
