@@ -24,7 +24,7 @@ class Patience:
         self, hand: RobotiqHand, seconds: float, name: str = "seconds", fresh: float = FRESH_S
     ) -> None:
         self._hand = hand
-        self.seconds = check_seconds(name, seconds, 0.05, 3600.0)
+        self.seconds: float = check_seconds(name, seconds, 0.05, 3600.0)
         self._fresh = fresh
 
     def status(self, seconds: float | None = None) -> RobotiqStatus:

@@ -44,7 +44,7 @@ class Limit:
     """
 
     def __init__(self, seconds: float | None = None, *, shield: bool = False) -> None:
-        self.is_over = False
+        self.is_over: bool = False
         self._loop: Final = asyncio.get_running_loop()
         self._is_shield: Final = shield
         self._scope: anyio.CancelScope | None = None

@@ -54,10 +54,10 @@ class Tick:
         self._step = resolution_of(self._loop)
         self.interval: Final = max(interval, _STEPS * self._step)
         self.time: Final = clock_of(self._loop)
-        self.due = 0.0
-        self.late = 0.0
-        self.longest_late = 0.0
-        self.held_up_at = -math.inf
+        self.due: float = 0.0
+        self.late: float = 0.0
+        self.longest_late: float = 0.0
+        self.held_up_at: float = -math.inf
         self._late = 0.0  # the longest delay since the last wait
         self._passed = 0
         self._hurried = False

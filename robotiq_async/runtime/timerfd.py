@@ -47,7 +47,7 @@ elif sys.platform == "linux":
 
         def __init__(self) -> None:
             # TFD_NONBLOCK and TFD_CLOEXEC are those of open(2).
-            self.descriptor = _checked(
+            self.descriptor: int = _checked(
                 _libc.timerfd_create(time.CLOCK_MONOTONIC, os.O_NONBLOCK | os.O_CLOEXEC)
             )
             self._time = _Itimerspec()

@@ -65,8 +65,8 @@ class Operator:
             ValueError: speed or force is outside 0..255.
         """
         self.hand = hand
-        self.speed = check_byte("speed", speed)
-        self.force = check_byte("force", force)
+        self.speed: int = check_byte("speed", speed)
+        self.force: int = check_byte("force", force)
         self._requests = hand.requests(1)
         self._asking = 0
         """Number of unfinished motions that this person has requested."""

@@ -101,7 +101,7 @@ class Viewer:
 
     def __init__(self, hand: Hand, *, host: str = LOOPBACK, port: int = PORT) -> None:
         self.host = host
-        self.port = check_int("port", port, 0, 65535)
+        self.port: int = check_int("port", port, 0, 65535)
         self._hand = hand
         self._feed = Feed(hand, self._publish)
         self._server: WebSocketServer

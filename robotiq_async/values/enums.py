@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import operator
+from collections.abc import Callable
 from enum import Enum, IntEnum, IntFlag
-from typing import Final, Self
+from typing import ClassVar, Final, Self
 
 
 class Finger(IntFlag):
@@ -281,7 +282,7 @@ class State(Enum):
     """
 
     # Members compare by identity. Enum hashes the name, which is too slow for a lookup at every poll.
-    __hash__ = object.__hash__
+    __hash__: ClassVar[Callable[[object], int]] = object.__hash__
 
     DISCONNECTED = "disconnected"
     """No link: before the first status, or while it is being opened again."""
@@ -315,7 +316,7 @@ class Trigger(Enum):
     release, while one drives the fingers or is about to: only a reset ends it.
     """
 
-    __hash__ = object.__hash__  # see State
+    __hash__: ClassVar[Callable[[object], int]] = object.__hash__  # see State
 
     ASK_START = "start()"
     ASK_ACTIVATE = "activate()"

@@ -105,7 +105,7 @@ class InvalidStateError(RobotiqStateError):
         self, message: str, state: State, allowed: Iterable[State] = (), *, advice: str = ""
     ) -> None:
         self.state = state
-        self.allowed = frozenset(allowed)
+        self.allowed: frozenset[State] = frozenset(allowed)
         super().__init__(message, advice=advice)
 
 
@@ -226,6 +226,6 @@ class NotAllStoppedError(RobotiqError):
     """
 
     def __init__(self, message: str, outcomes: Mapping[Any, str], unreached: Iterable[str] = ()) -> None:
-        self.outcomes = dict(outcomes)
-        self.unreached = tuple(unreached)
+        self.outcomes: dict[Any, str] = dict(outcomes)
+        self.unreached: tuple[str, ...] = tuple(unreached)
         super().__init__(message)

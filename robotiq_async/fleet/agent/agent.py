@@ -63,7 +63,7 @@ class Agent:
         """
         self._suspended = asleep or _suspended
         self._suspended_s = self._suspended()
-        self.epoch = secrets.randbits(EPOCH_BITS)
+        self.epoch: int = secrets.randbits(EPOCH_BITS)
         self._bus = bus
         self._records = records or NoRecords()
         self._window = window
@@ -72,7 +72,7 @@ class Agent:
         self._conflicts: dict[str, LimitedLog] = {}
         """Warnings by gripper, limited: a token of another agent may come and go thousands of times."""
         self._prefix = f"{ROOT}/{site}/{host}"
-        self.hands = {
+        self.hands: dict[str, ServedHand] = {
             name: ServedHand(
                 GripperName(site, host, name),
                 hand,

@@ -41,10 +41,10 @@ class Job:
     def __init__(self, name: str, call: Call, query: Query) -> None:
         self.name = name
         self.call = call
-        self.queries = [query]
+        self.queries: list[Query] = [query]
         self.answer: bytes | None = None
         self.task: asyncio.Task[MoveResult | None] | None = None
-        self.reason = ""
+        self.reason: str = ""
         self.asked = asked_of(name, call.arguments)
         self.is_shown = False
         self.was_refused = False

@@ -45,7 +45,7 @@ class Lease:
         self.window = window
         self.runs: tuple[int, ...] = (run,)
         self._changed = changed
-        self.number = 0
+        self.number: int = 0
         self.holder: Holder | None = None
         self._proven = 0.0
         self._awake_since = 0.0

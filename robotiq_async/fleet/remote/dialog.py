@@ -102,7 +102,7 @@ class Dialog:
     ) -> None:
         """``before`` is the last run; ``receive`` takes the status of an answer, and when it was asked."""
         self.name = name
-        self.loop = asyncio.get_running_loop()
+        self.loop: asyncio.AbstractEventLoop = asyncio.get_running_loop()
         self.mirror = mirror
         self.log = mirror.log
         self.lease = ClientLease(str(name))
@@ -111,10 +111,10 @@ class Dialog:
         self.number: int = 0
         if before is not None and before.process == self.process:
             self.client, self.number = before.client, before.number
-        self.window = WINDOW_S
+        self.window: float = WINDOW_S
         self.settings = Settings()
-        self.is_over = False
-        self.has_ended = False
+        self.is_over: bool = False
+        self.has_ended: bool = False
         self._bus = bus
         self._receive = receive
         self._tasks: set[asyncio.Task[Any]] = set()

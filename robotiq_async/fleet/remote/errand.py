@@ -99,8 +99,8 @@ class Errand:
         self.verb = verb
         self.timeout = timeout
         self.urgency = urgency
-        self.was_empty = False
-        self.status = b""
+        self.was_empty: bool = False
+        self.status: bytes = b""
         self._name = name
         self._agents = agents
         self._resend, self._came_early = resend, came_early

@@ -27,11 +27,11 @@ class ClientLease:
     """
 
     def __init__(self, name: str) -> None:
-        self.is_held = False
-        self.returns = False
-        self.is_over = False
-        self.number = 0
-        self.run = 0
+        self.is_held: bool = False
+        self.returns: bool = False
+        self.is_over: bool = False
+        self.number: int = 0
+        self.run: int = 0
         self.lost: ControlLostError | None = None
         self._name = name
 

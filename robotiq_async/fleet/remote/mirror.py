@@ -90,11 +90,11 @@ class Mirror:
         self.clock = AgentClock()
         self.newest: StatusMessage | None = None
         self.status: RobotiqStatus | None = None
-        self.state = State.DISCONNECTED
-        self.is_silent = True
-        self.events = 0
-        self.misrouted = 0
-        self.received_at = 0.0
+        self.state: State = State.DISCONNECTED
+        self.is_silent: bool = True
+        self.events: int = 0
+        self.misrouted: int = 0
+        self.received_at: float = 0.0
         self.points: Points = ()
         self._strokes: dict[Model, Stroke] = {}  # made of the points
         self._mark = mark

@@ -67,8 +67,8 @@ class Connection:
         Belongs to the loop of the hand; other threads may read its attributes.
         """
         self.hand = hand
-        self.takes_commands = False
-        self.stops = 0
+        self.takes_commands: bool = False
+        self.stops: int = 0
         self._operator = Operator(hand, speed=settings.speed, force=settings.force)
         self._pending_stop = PendingStop(hand)
         self._goals = GoalRunner(hand, lost=lambda axes: self._pending_stop.schedule(lambda: hand.hold(axes)))

@@ -81,9 +81,9 @@ class MotorDrive:
         self.position = float(model.stroke.open_reading)
         if axis is Finger.SCISSOR:
             self.position = (first + last) / 2
-        self.travel = 0.0
-        self.outcome = ObjectStatus.IN_MOTION
-        self.clears = False
+        self.travel: float = 0.0
+        self.outcome: ObjectStatus = ObjectStatus.IN_MOTION
+        self.clears: bool = False
         self._target = self._aim = self._reference = self._farthest = self.position
         self._sign = 1.0
         self._way = Way(0.0)

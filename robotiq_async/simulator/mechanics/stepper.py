@@ -39,7 +39,7 @@ class Stepper:
     def __init__(
         self, world: World, lock: threading.Lock, clock: Callable[[], float], speedup: float
     ) -> None:
-        self.steps = 0
+        self.steps: int = 0
         self.seen = world.look()
         self.orders: deque[Callable[[], None]] = deque()
         self._world = world
@@ -104,7 +104,7 @@ class OrderedDrive:
     """
 
     def __init__(self, drive: Drive, orders: deque[Callable[[], None]]) -> None:
-        self.taken = 0
+        self.taken: int = 0
         self._given = 0
         self._drive = drive
         self._orders = orders

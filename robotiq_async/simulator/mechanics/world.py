@@ -72,7 +72,7 @@ class World:
         self._is_aside = self._is_taken = False
         if self._model.nkey:
             mujoco.mj_resetDataKeyframe(self._model, self._data, 0)
-        self.drives = {axis: self._drive(model, axis) for axis in model.axes}
+        self.drives: dict[Finger, MotorDrive] = {axis: self._drive(model, axis) for axis in model.axes}
         self._motors = tuple(self.drives.values())
         for drive in self._motors:
             put_at(self._model, self._data, [drive.index], drive.share)

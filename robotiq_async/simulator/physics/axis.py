@@ -127,9 +127,9 @@ class Axis:
         self, position: int, low: int, high: int, motor: Motor, spread: Spread, motion: MotionProfile
     ) -> None:
         self.low = low
-        self.high = high
-        self.status = ObjectStatus.IN_MOTION
-        self.ends_at = math.inf
+        self.high: int = high
+        self.status: ObjectStatus = ObjectStatus.IN_MOTION
+        self.ends_at: float = math.inf
         self.in_closing: Obstacle | None = None
         self.in_opening: Obstacle | None = None
         self._motor = motor

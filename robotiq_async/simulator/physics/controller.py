@@ -149,11 +149,11 @@ class Controller:
         self.habits = habits
         self._at_rest = Request.from_registers(ZEROS, model)
         self.request = self._obeyed = self._at_rest
-        self.progress = Initialization.RESET
+        self.progress: Initialization = Initialization.RESET
         self.faults = PresentFaults()
-        self.fail_activation = False
+        self.fail_activation: bool = False
         self.controller_fault = 0
-        self.is_asleep = False
+        self.is_asleep: bool = False
         self._is_stopped = False
         """Whether the emergency stop is pressed."""
         self._resets_needed = 0

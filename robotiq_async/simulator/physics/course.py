@@ -41,9 +41,9 @@ class Course:
     ) -> None:
         self._knots = knots
         self.moves_at, self.origin = knots[0]
-        self.end = knots[-1].position
-        self.presses_at = presses_at
-        self.ends_at = ends_at
+        self.end: float = knots[-1].position
+        self.presses_at: float = presses_at
+        self.ends_at: float = ends_at
 
     def position(self, time: float) -> float:
         begin, at_begin = self._knots[0]

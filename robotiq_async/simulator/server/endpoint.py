@@ -49,12 +49,12 @@ class SimulatorEndpoint(ABC):
     """The Modbus functions that are served without any trouble."""
 
     def __init__(self, gripper: SimulatedGripper | None) -> None:
-        self.gripper = SimulatedGripper(habits=own_habits(THREE_FINGER)) if gripper is None else gripper
+        self.gripper: SimulatedGripper = gripper or SimulatedGripper(habits=own_habits(THREE_FINGER))
         self.policy: ReplyPolicy = unchanged
         self.fault_injector = FaultInjector(self)
         self.connections: list[Connection] = []
         self.failure: PhysicsError | None = None
-        self.failed = asyncio.Event()
+        self.failed: asyncio.Event = asyncio.Event()
         self._bank = RegisterBank(self.gripper, self.fault_injector)
         self._is_running = False
         self._left_over: deque[bytes] = deque(maxlen=_MOST_LEFT_OVER)

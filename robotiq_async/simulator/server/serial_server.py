@@ -23,7 +23,7 @@ import importlib.util
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, ClassVar, Final
 
 from pymodbus.transport.serialtransport import create_serial_connection
 
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from ..physics.gripper import SimulatedGripper
+    from ..troubles.trouble import Link
 
 
 BAUD: Final = 115200
@@ -75,7 +76,7 @@ class _RtuEndpoint(SimulatorEndpoint):
         others: the servers of the other grippers at this line, by unit id, each with troubles of its own.
     """
 
-    functions = RTU_FUNCTIONS
+    functions: ClassVar[frozenset[int]] = RTU_FUNCTIONS
     paced: bool
     device_id: int
     reply_silence = REPLY_SILENCE_S
@@ -134,7 +135,7 @@ class LineNeighbour(_RtuEndpoint):
         self.link = server.link  # type: ignore[misc]  # that of its server
         super().__init__(gripper)
         self.device_id = device_id
-        self.paced = server.paced
+        self.paced: bool = server.paced
         self._server = server
 
     @property
@@ -191,7 +192,7 @@ class SerialSimulatorServer(_RtuEndpoint):
     has it; no source covers a real gripper's answer to a broadcast.
     """
 
-    link = "rtu"
+    link: ClassVar[Link] = "rtu"
 
     def __init__(
         self,
@@ -217,9 +218,9 @@ class SerialSimulatorServer(_RtuEndpoint):
             ValueError: device_id is outside 1..247, or another gripper has it.
         """
         super().__init__(gripper)
-        self.device_id = check_int("device_id", device_id, 1, 247)
+        self.device_id: int = check_int("device_id", device_id, 1, 247)
         self._port = port
-        self.paced = check_flag("paced", paced)
+        self.paced: bool = check_flag("paced", paced)
         self._share(others)
 
     @property
@@ -265,7 +266,7 @@ class RtuOverTcpSimulatorServer(_RtuEndpoint, SimulatorServer):
     line behind. Requests sent without waiting are lost if the line cannot take them.
     """
 
-    link = "rtu+tcp"
+    link: ClassVar[Link] = "rtu+tcp"
 
     def __init__(
         self,
@@ -291,9 +292,9 @@ class RtuOverTcpSimulatorServer(_RtuEndpoint, SimulatorServer):
             TypeError: port or device_id is not an int, or paced is not a bool.
             ValueError: port is outside 0..65535, device_id outside 1..247, or another gripper has it.
         """
-        self.device_id = check_int("device_id", device_id, 1, 247)
+        self.device_id: int = check_int("device_id", device_id, 1, 247)
         super().__init__(gripper, host=host, port=port, device_id=self.device_id)
-        self.paced = check_flag("paced", paced)
+        self.paced: bool = check_flag("paced", paced)
         self._share(others)
 
     @property

@@ -32,7 +32,7 @@ class SimulatorServer(SimulatorEndpoint):
     """
 
     link: ClassVar[Link] = "tcp"
-    functions = TCP_FUNCTIONS
+    functions: ClassVar[frozenset[int]] = TCP_FUNCTIONS
 
     def __init__(
         self,

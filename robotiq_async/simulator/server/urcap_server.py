@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, ClassVar, Final
 
 from robotiq_async.values import registers as reg
 from robotiq_async.values.checks import check_int
@@ -21,6 +21,8 @@ from .tcp_server import SimulatorServer
 
 if TYPE_CHECKING:
     from robotiq_async.values.registers import Field
+
+    from ..troubles.trouble import Link
 
 UNREADABLE: Final = "?"
 """The value of a variable that the controller cannot read, as in an emergency stop (ur_rtde's client)."""
@@ -89,7 +91,7 @@ class UrcapSimulatorServer(SimulatorServer):
     it: no source says.
     """
 
-    link = "urcap"
+    link: ClassVar[Link] = "urcap"
 
     def __init__(
         self,

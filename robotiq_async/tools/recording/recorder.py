@@ -113,8 +113,8 @@ class Recorder:
         if ros2 and is_table(path):
             raise ValueError(f"ros2 is for MCAP files, and {path} is a table")
         self.path = Path(path)
-        self.recorded = 0
-        self.saved = 0
+        self.recorded: int = 0
+        self.saved: int = 0
         self._hand = hand
         self._feed = Feed(hand, self._take)
         self._outbox = Outbox()

@@ -37,7 +37,7 @@ class Recording:
     """Takes frames, and cleans their texts; a task writes them to the disk in threads."""
 
     def __init__(self, folder: Path, clean: Callable[[str], str], model: Model) -> None:
-        self.failure = ""  # why writing has ended; empty while it runs
+        self.failure: str = ""  # why writing has ended; empty while it runs
         self._file = FileIO(folder / NAME, "x")
         self._outbox = Outbox()
         self._format = McapFile(self._outbox, name="verify", address="")

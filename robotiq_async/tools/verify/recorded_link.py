@@ -46,8 +46,8 @@ class RecordedLink:
         self.link = link
         self.written: Request | None = None  # the last image that was written; None before the first
         self.shown: RobotiqStatus | None = None  # the last status that was read; None before the first
-        self.asked = 0.0  # the loop's time at which that read was sent
-        self.wrote = -math.inf  # the loop's time at which the last write was sent
+        self.asked: float = 0.0  # the loop's time at which that read was sent
+        self.wrote: float = -math.inf  # the loop's time at which the last write was sent
         self._keep = keep
         self._echoes: deque[tuple[float, Echo]] = deque(maxlen=2000)
 

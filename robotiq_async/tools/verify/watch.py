@@ -62,7 +62,7 @@ class Rest:
         self._loop = asyncio.get_running_loop()
         self._axes = axes
         self.positions: list[int] = []
-        self.moved_at = self._loop.time()
+        self.moved_at: float = self._loop.time()
 
     def lasts(self, status: RobotiqStatus, seconds: float) -> bool:
         """Take in a status; returns whether no axis has moved for some seconds."""

@@ -108,7 +108,7 @@ class PageCommands:
         self._answer = answer
         self._tasks: dict[str, set[asyncio.Task[str]]] = {}
         self._halts: set[asyncio.Task[str]] = set()
-        self.is_ending = False  # whether all commands but halts are refused
+        self.is_ending: bool = False  # whether all commands but halts are refused
 
     @property
     def under_way(self) -> bool:

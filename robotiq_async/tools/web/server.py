@@ -143,8 +143,8 @@ class PageServer:
             raise ValueError("operators must be those of the hands, in their order")
         if settings.control != bool(operators):
             raise ValueError("control needs operators, and operators need control")
-        self.updates = [HandUpdates(hand) for hand in hands]
-        self.url = ""
+        self.updates: list[HandUpdates] = [HandUpdates(hand) for hand in hands]
+        self.url: str = ""
         self.pages = 0
         self._settings = settings
         self._commands = PageCommands(operators, self._answer)

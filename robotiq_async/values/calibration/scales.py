@@ -325,8 +325,9 @@ class Figures:
             lowest.setdefault(figures[value], value)
         self._figures = sorted(lowest)
         self._values = [lowest[figure] for figure in self._figures]
-        self.low, self.high = self._figures[0], self._figures[-1]
-        self.limits = outwards(min((self.low, *accepted)), max((self.high, *accepted)))
+        self.low: float = self._figures[0]
+        self.high: float = self._figures[-1]
+        self.limits: tuple[float, float] = outwards(min((self.low, *accepted)), max((self.high, *accepted)))
 
     def nearest(self, wanted: float) -> int:
         """The value with the closest figure, the lowest of several."""

@@ -48,7 +48,7 @@ class Heartbeat:
     """The time that one browser has sent back."""
 
     def __init__(self) -> None:
-        self.is_lost = False  # whether the browser counts as out of touch
+        self.is_lost: bool = False  # whether the browser counts as out of touch
         self._newest = monotonic()
         self._has_been_here = False
         self._came_back_at: float | None = None

@@ -124,7 +124,7 @@ class Mirror:
         speed: int = DEFAULT_SPEED,
         force: int = DEFAULT_FORCE,
     ) -> None:
-        self.hands = [HandMirror(index, address) for index, address in enumerate(addresses)]
+        self.hands: list[HandMirror] = [HandMirror(index, address) for index, address in enumerate(addresses)]
         self.control = control
         self.speed = speed
         self.force = force

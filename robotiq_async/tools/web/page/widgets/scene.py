@@ -177,7 +177,7 @@ class Drawing:
     def __init__(self, kind: Model, *, compact: bool) -> None:
         model = hand_model(kind)
         self.kind, self.model = kind, model
-        self.ghost = None if compact else Figure(model, ghost=True)
+        self.ghost: Figure | None = None if compact else Figure(model, ghost=True)
         self.figure = Figure(model, ghost=False)
         with self.figure.root:
             # A cylinder of three.js lies along y, that of a 3-Finger's bar along z.
