@@ -69,6 +69,17 @@ async def test_what_was_not_begun_and_what_may_have_been(here: Lab, hand: Remote
 
 
 @inside(lab)
+async def test_the_last_512_are_kept(here: Lab, hand: RemoteHand) -> None:
+    first = call_of(hand, value=3, fingers=1)
+    answer = await repeated(here, "cmd/set_speed", first)
+    for _ in range(511):
+        await repeated(here, "cmd/command", call_of(hand, axes={"8": {"speed": 5}}))
+    assert await repeated(here, "cmd/set_speed", first) == answer
+    await repeated(here, "cmd/command", call_of(hand, axes={"8": {"speed": 5}}))
+    assert await repeated(here, "cmd/set_speed", first) != answer
+
+
+@inside(lab)
 async def test_what_the_gripper_did_not_take_was_not_begun(here: Lab, hand: RemoteHand) -> None:
     await hand.reset()
     refused = await repeated(here, "cmd/set_speed", call_of(hand, value=3, fingers=1))

@@ -166,13 +166,24 @@ async def test_a_new_holder_changes_no_grip(here: Lab, hand: RemoteHand) -> None
 async def test_what_was_acknowledged_is_kept_however_its_move_ended(here: Lab, hand: RemoteHand) -> None:
     with pytest.raises(MoveTimeoutError):
         await hand.move(140, A, speed=0, force=200, timeout=0.2)
-    async with here.client("other", control=False) as other:
-        await other.take()
+    await hand.stop()  # and it has forgotten it
+    async with here.client("other") as other:
         await other.move(20, A, force=7)
-        await other.release()
-    await hand.acquire()
+    await hand.start()
     await hand.set_position(30, A)
     assert Request.from_registers(here.gripper.request_registers).axes[0].force == 200
+
+
+@inside(lab)
+async def test_nothing_is_restored_while_one_client_stays_the_last_holder(
+    here: Lab, hand: RemoteHand
+) -> None:
+    await hand.set_force(10, A)
+    await here.local.set_force(99, A)  # by a program of the agent's host
+    await hand.release()
+    await hand.acquire()
+    await hand.set_position(30, A)
+    assert Request.from_registers(here.gripper.request_registers).axes[0].force == 99
 
 
 def of_settings(here: World) -> list[Fields]:
