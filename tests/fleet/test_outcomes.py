@@ -80,6 +80,21 @@ async def test_the_last_512_are_kept(here: Lab, hand: RemoteHand) -> None:
 
 
 @inside(lab)
+async def test_an_answer_belongs_to_one_client_and_one_lease(here: Lab, hand: RemoteHand) -> None:
+    call = call_of(hand, value=3, fingers=1)
+    first = await repeated(here, "cmd/set_speed", call)
+    stranger = await repeated(here, "cmd/set_speed", replace(call, client="stranger"))
+    assert stranger.error is not None
+    assert stranger.error["kind"] == "ControlLostError"
+    await hand.release()
+    await hand.acquire()
+    again = await repeated(here, "cmd/set_speed", replace(call, lease=here.lease))
+    assert again.error is not None
+    assert "a later request overtook this one" in again.error["message"]
+    assert await repeated(here, "cmd/set_speed", call) == first
+
+
+@inside(lab)
 async def test_what_the_gripper_did_not_take_was_not_begun(here: Lab, hand: RemoteHand) -> None:
     await hand.reset()
     refused = await repeated(here, "cmd/set_speed", call_of(hand, value=3, fingers=1))
