@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Final
 
 from robotiq_async import ReconnectPolicy, RobotiqHand
-from robotiq_async.control.state_machine import SEQUENCES, TABLE, Verdict
+from robotiq_async.control.state_machine import MOVES, SEQUENCES, TABLE, Verdict
 from robotiq_async.values import registers
 from robotiq_async.values.enums import (
     Fault,
@@ -63,6 +63,12 @@ def _purpose(name: str) -> str:
 
 
 # -- states --------------------------------------------------------------------------------------------
+
+
+def inhibit() -> str:
+    """The calls that an inhibit refuses."""
+    except_for = {Trigger.ASK_COMMAND: "; one that sets nothing but a speed passes"}
+    return "\n".join(f"- {each.value}{except_for.get(each, '')}" for each in Trigger if each in MOVES)
 
 
 FAMILIES: Final = {
@@ -279,7 +285,7 @@ def _plain(text: str) -> str:
 
 PAGES: Final[dict[str, dict[str, Callable[[], str]]]] = {
     "architecture.md": {"layers": layers},
-    "state-machine.md": {"diagram": diagram, "asked": asked},
+    "state-machine.md": {"diagram": diagram, "asked": asked, "inhibit": inhibit},
     "registers.md": {
         "request": request_fields,
         "status": status_fields,

@@ -52,6 +52,7 @@ from .values.errors import (
     ConnectionLostError,
     GripperFaultError,
     InvalidStateError,
+    MotionInhibitedError,
     MoveSupersededError,
     MoveTimeoutError,
     NotActivatedError,
@@ -66,6 +67,7 @@ from .values.errors import (
 )
 from .values.events import SentRequest, Transition
 from .values.grip import GraspResult, GripChange, GripEvent
+from .values.inhibit import Inhibit
 from .values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
 from .values.move_result import MoveResult
 from .values.statistics import Statistics
@@ -96,10 +98,12 @@ __all__ = [
     "GripChange",
     "GripEvent",
     "GripperFaultError",
+    "Inhibit",
     "Initialization",
     "InvalidStateError",
     "Mode",
     "Model",
+    "MotionInhibitedError",
     "MoveResult",
     "MoveSupersededError",
     "MoveTimeoutError",

@@ -14,6 +14,7 @@ from typing import Any
 from robotiq_async import (
     Fault,
     Finger,
+    Inhibit,
     InvalidStateError,
     MoveResult,
     NotStartedError,
@@ -42,6 +43,7 @@ class FakeHand(Hand):
         self._state = State.DISCONNECTED
         self._request = Request(activate=True, go=True, axes=(AxisRequest(speed=128, force=64),) * 4)
         self._fault = Fault.NONE
+        self._inhibited: Inhibit | None = None
         self._last: RobotiqStatus | None = None
 
     def fail(self, fault: Fault) -> None:
@@ -92,6 +94,17 @@ class FakeHand(Hand):
 
     async def _halt(self) -> None:
         self._write(go=False)
+
+    async def _inhibit(self, inhibit: Inhibit) -> None:
+        self._inhibited = self._inhibited or inhibit
+        await self._halt()
+
+    async def _permit(self, who: str) -> None:
+        self._inhibited = None
+
+    @property
+    def inhibited(self) -> Inhibit | None:
+        return self._inhibited
 
     async def _activate(self) -> None:
         self._write(activate=True, go=False)

@@ -36,6 +36,8 @@ EXTRAS = {
     "Convention": "what numbers of learning stacks are turned by, for open_fraction=",
     "Units": "type of RobotiqHand.units",
     "GraspResult": "what RobotiqHand.grasp() gives",
+    "Inhibit": "type of RobotiqHand.inhibited",
+    "MotionInhibitedError": "what motions raise after a person's halt",
     "Part": "type of RobotiqHand.part",
     "GripEvent": "what RobotiqHand.grip_events() gives",
     "GripChange": "type of GripEvent.change",

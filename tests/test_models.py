@@ -34,7 +34,7 @@ from robotiq_async import (
 from robotiq_async.cli.output.lines import status_line
 from robotiq_async.link.address import parse_address
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, UrcapSimulatorServer
-from robotiq_async.tools.actions import ACTIONS
+from robotiq_async.tools.actions import ACTIONS, Operator
 from robotiq_async.tools.measure.campaigns import grasp, time_closing
 from robotiq_async.tools.recording.recorder import Recorder
 from robotiq_async.tools.recording.recordings import read_recording
@@ -511,7 +511,7 @@ def test_a_page_shows_the_axis_that_there_is() -> None:
 async def test_calls_that_need_three_fingers_say_so() -> None:
     async with RobotiqHand("sim://?model=2f85&speedup=20") as hand:
         with pytest.raises(RobotiqStateError, match="a 2F-85 has no scissor"):
-            await ACTIONS["wide"].run(hand)
+            await ACTIONS["wide"].run(Operator(hand))
         with pytest.raises(MeasuringError, match="a 2F-85 has one axis"):
             await grasp(hand, 100, 100)
 

@@ -49,13 +49,15 @@ def members(kind: type) -> dict[str, object]:
 def test_every_hand_has_the_public_members_of_hand() -> None:
     """Except for members of the process that owns the link, and those that need a lease."""
     shared = members(Hand).keys()
-    assert members(RobotiqHand).keys() - shared == {"add_listener", "assume", "drop_requests", "options"}
+    assert members(RobotiqHand).keys() - shared == {
+        *("add_listener", "assume", "drop_requests", "options", "resume_inhibit")
+    }
     assert members(RemoteHand).keys() - shared == {"acquire", "take", "release", "is_in_control"}
 
 
 @pytest.mark.parametrize("kind", [RobotiqHand, RemoteHand])
 def test_a_kind_of_hand_leaves_checks_and_promises_to_hand(kind: type) -> None:
-    supplied = {"state", "statistics"}
+    supplied = {"inhibited", "state", "statistics"}
     assert members(Hand).keys() & vars(kind).keys() == supplied
     assert inspect.isabstract(Hand)
 

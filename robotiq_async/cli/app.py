@@ -14,7 +14,7 @@ from .. import __version__
 from .commands.agent import agent
 from .commands.demo import demo
 from .commands.doctor import doctor
-from .commands.fleet import fleet, halt, keys
+from .commands.fleet import fleet, halt, keys, permit
 from .commands.measure import speed
 from .commands.measure_force import force
 from .commands.measure_stroke import stroke
@@ -89,6 +89,7 @@ def _fleet() -> App:
     app = _app("fleet", fleet.__doc__ or "")
     app.default(fleet)
     _add(app, halt)
+    _add(app, permit)
     _add(app, keys)
     return app
 

@@ -40,10 +40,10 @@ def make_hand(
         return RobotiqHand(address, **link.options(), poll_interval=poll_interval, speed=speed, force=force)
 
 
-def make_operator(address: str, link: Link, *, speed: int, force: int) -> Operator:
-    """The operator of a hand that is not started."""
+def make_operator(address: str, link: Link, who: str, *, speed: int, force: int) -> Operator:
+    """The operator of a hand that is not started; ``who`` is a person at the monitor or the page."""
     hand = make_hand(address, link, speed=speed, force=force, control=None)
-    return Operator(hand, speed=speed, force=force)
+    return Operator(hand, who=who, speed=speed, force=force)
 
 
 @asynccontextmanager

@@ -18,6 +18,7 @@ from ..values.enums import NO_AXES, Fault, Finger, State, StopLevel, Trigger
 from ..values.errors import (
     ConnectionLostError,
     GripperFaultError,
+    MotionInhibitedError,
     MoveSupersededError,
     NotActivatedError,
     NotStartedError,
@@ -102,7 +103,8 @@ class Controller:
     # Each call raises the error by which the state machine refuses it. A refusal changes nothing.
 
     def command(self, command: Command, waiter: Waiter[None] | None = None) -> None:
-        self.machine.ask(Trigger.ASK_COMMAND, self.status)
+        presses = command.position is not None or command.force is not None
+        self.machine.ask(Trigger.ASK_COMMAND, self.status, presses=presses)
         self._requests.command(command, waiter)
         self._update_state(Trigger.ASK_COMMAND)
 
@@ -144,7 +146,11 @@ class Controller:
         if not self.machine.ask(Trigger.ASK_HALT, self.status):
             waiter.set_result(None)
             return
-        self._requests.supersede(Finger.ALL, "a halt stopped the fingers")
+        if self.machine.inhibited is None:
+            self._requests.supersede(Finger.ALL, "a halt stopped the fingers")
+        else:  # a force that was not sent would tighten a grip
+            ended = MotionInhibitedError(self.machine.inhibited)
+            self._requests.end(self._requests.drop(holds=False), ended)
         if self._stop is None or self._stop.is_delivered:  # a new halt is sent again
             self._stop = Stop(StopLevel.HALT, self._stop)
         self._stop.add(waiter)
@@ -159,7 +165,12 @@ class Controller:
         """Begin a reset, unless one is about to be sent; ASK_HALT or HALT_RESETS if a halt asks for it."""
         if self.machine.ask(trigger, self.status):
             who = "reset" if trigger is Trigger.ASK_RESET else "halt"
-            self._begin_reset(trigger, MoveSupersededError(f"a {who} took over"))
+            ended = MoveSupersededError(f"a {who} took over")
+            self._begin_reset(trigger, self.machine.taken_over(ended))
+
+    def hold_when_back(self) -> None:
+        """The link is down: once it is back, what this hand moves is held."""
+        self._requests.merge_hold(Finger.ALL, "motion was inhibited while the link was down")
 
     def release(self) -> None:
         """Begin an automatic release. Of a gripper that is reset it would raise rACT and activate it."""
@@ -345,7 +356,7 @@ class Controller:
                 return
             self._note_news(before, condition, status)
             is_reset = condition in (Trigger.SEEN_RESET, Trigger.SEEN_STRANDED)
-            if before is None and is_reset and self.activates:
+            if before is None and is_reset and self.activates and self.machine.inhibited is None:
                 self._begin(Trigger.ACTIVATES)
                 return
         if condition is Trigger.SEEN_READY:

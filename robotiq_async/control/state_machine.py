@@ -4,6 +4,9 @@ Every state has an entry for every trigger: the next state, IGNORED where there 
 error that the caller gets. A refusal changes nothing. What a status shows is never refused. The table comes
 from three rules and 18 entries, which are what differs.
 
+Beside the state stands a condition that a person sets, :class:`Inhibit`. While it does, all that may move an
+axis or make it press is refused, whatever the state.
+
 The state follows from what the hand does and what the gripper shows; the controller works it out, and the
 table has what it may be. DO_ states and RUNNING_CC last from the call until the acknowledgement, so the last
 state before DISCONNECTED names the write that may be lost; DO_SHUTDOWN lasts until the hand has stopped. The
@@ -23,10 +26,12 @@ from ..values.errors import (
     ConnectionLostError,
     GripperFaultError,
     InvalidStateError,
+    MotionInhibitedError,
     NotActivatedError,
     NotStartedError,
     RobotiqError,
 )
+from ..values.inhibit import Inhibit
 from ..values.status import RobotiqStatus
 
 
@@ -134,6 +139,9 @@ SEQUENCES: Final = frozenset(
 )
 """The states of an activation, a release and a reset. Clearing rGTO ends none of these."""
 
+MOVES: Final = frozenset({Trigger.ASK_COMMAND, Trigger.ASK_ACTIVATE, Trigger.ASK_RELEASE})
+"""What an inhibit refuses. Of a command a speed alone passes; HALT, HOLD, RESET and STOP always do."""
+
 
 def states_allowing(trigger: Trigger) -> frozenset[State]:
     return frozenset(state for state, row in TABLE.items() if row[trigger] not in _REFUSALS)
@@ -149,13 +157,41 @@ class StateMachine:
         self.changed = changed  # called with source, target and trigger after each change
         self.why_down: object = None  # why the link is down, for the error of what is refused then
         self.state = State.DISCONNECTED  # only show() sets it
+        self.inhibited: Inhibit | None = None  # only inhibit() and permit() set it; outlasts runs
 
-    def ask(self, trigger: Trigger, status: RobotiqStatus | None = None) -> bool:
-        """Whether there is anything to do for what is asked. Raises the error if the table refuses it."""
+    def ask(self, trigger: Trigger, status: RobotiqStatus | None = None, *, presses: bool = True) -> bool:
+        """Whether there is anything to do for what is asked. Raises the error if the table refuses it.
+
+        ``presses`` is False for a command that neither moves an axis nor makes it press more.
+        """
+        if presses and trigger in MOVES:
+            self.check_permitted()
         answer = TABLE[self.state][trigger]
         if answer in _REFUSALS:
             raise refusal(trigger, self.state, status, self.why_down)
         return answer is not Verdict.IGNORED
+
+    def inhibit(self, inhibit: Inhibit) -> None:
+        """Refuse what may move or press from here on. The first reason stays."""
+        if self.inhibited is None:
+            self.inhibited = inhibit
+            self.log.warning("%s; a person permits it again", inhibit)
+
+    def permit(self, who: str) -> None:
+        """Refuse nothing more. What was refused is forgotten."""
+        inhibit, self.inhibited = self.inhibited, None
+        if inhibit is not None:
+            by = f" by {who}" if who else ""
+            self.log.warning("motion is permitted again%s; it was inhibited: %s", by, inhibit.reason)
+
+    def check_permitted(self) -> None:
+        """Raise MotionInhibitedError while a person has it inhibited."""
+        if self.inhibited is not None:
+            raise MotionInhibitedError(self.inhibited)
+
+    def taken_over(self, otherwise: RobotiqError) -> RobotiqError:
+        """The error for those whom a halt or a reset ends: an inhibit, or ``otherwise``."""
+        return otherwise if self.inhibited is None else MotionInhibitedError(self.inhibited)
 
     def show(self, target: State, trigger: Trigger) -> None:
         source = self.state

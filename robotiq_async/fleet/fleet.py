@@ -24,7 +24,7 @@ from .remote.errand import NoAnswerError
 from .remote.mirror import AgentClock, Mirror
 from .remote.remote_hand import RemoteHand
 from .wire.names import ROOT, GripperName, check_name
-from .wire.values import reading, words
+from .wire.values import read_inhibit, reading, words
 
 LOOK_S: Final = 0.5  # seconds to wait for the tokens of agents
 LOOK_AGAIN_S: Final = 0.1  # seconds until the next look for agents, during a halt
@@ -44,6 +44,7 @@ class Member:
         fault: the fault that the gripper reports; None if unknown.
         is_moving: whether an axis moves.
         holder: label of the client that commands it; None if no client does.
+        inhibited: why motion is refused, and who has stopped it; empty if it is permitted.
         problem: why the agent cannot reach the gripper; empty if it can.
         address: of the gripper, as its agent reaches it.
         seen_at: time of the agent's last read of the gripper, in monotonic seconds of this process; None if
@@ -58,6 +59,7 @@ class Member:
     fault: Fault | None = None
     is_moving: bool = False
     holder: str | None = None
+    inhibited: str = ""
     problem: str = ""
     address: str = ""
     seen_at: float | None = field(default=None, compare=False)
@@ -153,8 +155,11 @@ class Fleet:
         """
         return RemoteHand(str(name), control=control, bus=self._entered())
 
-    async def halt_all(self) -> Mapping[GripperName, str]:
+    async def halt_all(self, inhibit: str = "") -> Mapping[GripperName, str]:
         """Halt every gripper that is or was there; returns "stopped" for each.
+
+        With a reason to ``inhibit``, motion of each is refused from then on until a person permits it
+        again, as by :meth:`Hand.inhibit`.
 
         It is no safety function: a network may be down when it is needed. A gripper that does not answer is
         tried for 2 s. For 2 s after the fleet was entered, it waits for agents whose links come up late. If
@@ -174,7 +179,7 @@ class Fleet:
                 await self._discover()
                 for name, member in self._members.items():
                     if (name, member.agents) not in halting:
-                        work = halt(bus, name, member.agents)
+                        work = halt(bus, name, member.agents, inhibit)
                         halting[name, member.agents] = asyncio.ensure_future(work)
                 if now() - self._entered_at >= SETTLE_S:
                     break
@@ -247,21 +252,28 @@ def _report(outcomes: Mapping[GripperName, str], unreached: Sequence[str]) -> st
     return "; ".join(parts)
 
 
-async def halt(bus: Bus, name: GripperName, agents: int) -> str:
+async def halt(bus: Bus, name: GripperName, agents: int, inhibit: str = "") -> str:
     """Halt a gripper; returns "stopped", or "no answer" or "refused" with the reason. Raises no such error.
 
     All ``agents`` that serve it must confirm that it has stopped.
     """
     dialog = Dialog(name, bus, Mirror(name.mark))
     try:
-        await dialog.halt(agents)
+        answer = await dialog.halt(agents, {"inhibit": inhibit} if inhibit else None)
     except NoAnswerError as error:
         return error.why
     except (RobotiqError, TypeError, ValueError) as error:
         return f"refused: {error}"
     finally:
         await dialog.close()
+    if inhibit and "inhibited" not in answer:
+        return "stopped, but not inhibited: its agent is older"
     return STOPPED
+
+
+def _inhibited(fields: Mapping[str, Any]) -> str:
+    inhibit = read_inhibit(fields.get("inhibited"))
+    return "" if inhibit is None else str(inhibit)
 
 
 @dataclass(slots=True)
@@ -294,6 +306,7 @@ class Summaries:
                 "fault": None if fault is None else model_of(fields.get("model")).fault(fault),
                 "is_moving": bool(fields["is_moving"]),
                 "holder": None if fields["holder"] is None else words(fields["holder"]),
+                "inhibited": _inhibited(fields),
                 "problem": words(fields["problem"]),
                 "address": words(fields["address"]),
             }

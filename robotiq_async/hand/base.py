@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from abc import abstractmethod
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
@@ -14,9 +15,10 @@ from ..values.amounts import LABELS, OPENINGS, RATES, force_of, needed, position
 from ..values.calibration import Units
 from ..values.checks import check_flag, check_optional_byte, check_seconds, check_timeout
 from ..values.enums import CLOSED, OPEN, Finger, State
-from ..values.errors import ConnectionLostError, NotStartedError
+from ..values.errors import NotStartedError
 from ..values.events import SentRequest, Transition
 from ..values.grip import GraspResult, GripEvent, check_at_least
+from ..values.inhibit import Inhibit
 from ..values.model import Model
 from ..values.move_result import MoveResult
 from ..values.statistics import Statistics
@@ -44,8 +46,7 @@ class Hand(Kind):
     refused outside their range. One amount is given once: counts and millimetres together are a TypeError.
 
     A stop, a halt, a hold, a reset or a command ends the calls that it supersedes. Their callers hear of it
-    when its write has left, or at once if that is not expected within 50 ms: what they do then may hold up
-    the loop.
+    when its write has left, or at once if that takes 50 ms: what they do then may hold up the loop.
 
     Timestamps are monotonic seconds of this process, wherever the gripper is. No motion is ever sent twice.
 
@@ -94,6 +95,7 @@ class Hand(Kind):
             RobotiqConnectionError: something answers, but not a gripper; or the link went down again.
             GripperFaultError: the activation ended in a fault.
             NotActivatedError: the gripper was reset during the activation.
+            MotionInhibitedError: the gripper is reset, and a person has inhibited motion.
             ActivationTimeoutError: the activation was not finished in time, or reported nothing but fault
                 0x05 for 5 s, as with a pressed emergency stop.
         """
@@ -362,6 +364,34 @@ class Hand(Kind):
         with self._naming:
             await self._halt()
 
+    async def inhibit(self, reason: str, *, who: str = "") -> None:
+        """Halt for a person, and refuse what may move or press until a person calls :meth:`permit`.
+
+        After :meth:`halt` the next command goes on; after this every motion, force, activation, release and
+        recovery raises MotionInhibitedError, and so do calls that wait for one. It outlasts lost links,
+        :meth:`stop` and :meth:`start`; again, it halts again, and the first reason stays. Whatever it raises,
+        motion is inhibited; what moves while the link is down is held once it is back. No emergency stop.
+
+        Args:
+            reason: for people, 1..200 printable characters.
+            who: who or what has asked; 0..200.
+
+        Raises:
+            TypeError, ValueError: of the arguments; nothing is inhibited.
+            RobotiqError: what :meth:`halt` raises: the fingers MAY STILL MOVE.
+        """
+        with self._naming:
+            await self._inhibit(Inhibit(reason, who, time.time()))
+
+    async def permit(self, *, who: str = "") -> None:
+        """Permit motion after :meth:`inhibit`; nothing moves. For a person, and not for a program's loop.
+
+        ``who`` is for the log. A hand on another host raises RobotiqError without an answer.
+        """
+        Inhibit("permitted", who, 0.0)  # checks it
+        with self._naming:
+            await self._permit(who)
+
     # -- activation, faults ----------------------------------------------------------------------------
 
     async def activate(self) -> None:
@@ -487,6 +517,11 @@ class Hand(Kind):
 
     @property
     @abstractmethod
+    def inhibited(self) -> Inhibit | None:
+        """Why motion is refused, since when, and by whom; None while it is permitted."""
+
+    @property
+    @abstractmethod
     def statistics(self) -> Statistics:
         """Figures of the polling since the last start."""
 
@@ -550,11 +585,3 @@ class Hand(Kind):
         with self._naming:
             self._check_running()
             return await self._wait_for_state(states, limit)
-
-    def _current_status(self) -> RobotiqStatus:
-        with self._naming:
-            self._check_running()
-            status = self.status
-            if self.state is State.DISCONNECTED:
-                raise ConnectionLostError("the link to the gripper is down: what it does is not known")
-            return status

@@ -13,6 +13,7 @@ from ..values.calibration import Units
 from ..values.checks import check_flag
 from ..values.enums import Finger, State
 from ..values.errors import ConnectionLostError, NotStartedError
+from ..values.inhibit import Inhibit
 from ..values.model import THREE_FINGER, Model
 from ..values.move_result import MoveResult
 from ..values.status import RobotiqStatus
@@ -90,6 +91,12 @@ class Kind(ABC):
     async def _halt(self) -> None: ...
 
     @abstractmethod
+    async def _inhibit(self, inhibit: Inhibit) -> None: ...
+
+    @abstractmethod
+    async def _permit(self, who: str) -> None: ...
+
+    @abstractmethod
     async def _activate(self) -> None: ...
 
     @abstractmethod
@@ -118,6 +125,15 @@ class Kind(ABC):
         """Refuse another loop than that of a run, also one that was closed under it, and of readers."""
         self._check_loop("hand.start()")
         self._channels.check_loop(loop)
+
+    def _current_status(self) -> RobotiqStatus:
+        with self._naming:
+            self._check_running()
+            if (status := self._newest_status) is None:
+                raise NotStartedError("no status has been read yet: start the hand first")
+            if self.state is State.DISCONNECTED:
+                raise ConnectionLostError("the link to the gripper is down: what it does is not known")
+            return status
 
     def _check_may_listen(self) -> None:
         """Refuse another thread or loop while the hand runs: neither streams nor listeners are locked."""

@@ -53,6 +53,7 @@ from ..values.errors import (
     StateTimeoutError,
 )
 from ..values.events import SentRequest, Transition
+from ..values.inhibit import Inhibit
 from ..values.model import Model
 from ..values.move_result import MoveResult
 from ..values.statistics import Counters, Statistics
@@ -254,6 +255,31 @@ class RobotiqHand(Hand):
         session = self._asked()
         await session.answered(lambda waiter: session.controller.hold(axes, waiter))
 
+    async def _inhibit(self, inhibit: Inhibit) -> None:
+        session = self._session
+        if session is None or session.is_over:
+            self._machine.inhibit(inhibit)  # it counts from the next start on
+            return
+        session.check_loop("the hand")
+        self._machine.inhibit(inhibit)
+        if self.state is State.DISCONNECTED:
+            session.controller.hold_when_back()
+        await self._halt()
+
+    async def _permit(self, who: str) -> None:
+        if self._session is not None and not self._session.is_over:
+            self._session.check_loop("the hand")
+        self._machine.permit(who)
+
+    @property
+    def inhibited(self) -> Inhibit | None:
+        """Why motion is refused, since when, and by whom; None while it is permitted."""
+        return self._machine.inhibited
+
+    def resume_inhibit(self, inhibit: Inhibit) -> None:
+        """Continue an inhibit of an earlier process, before the start. Sends nothing; the first one stays."""
+        self._machine.inhibit(inhibit)
+
     async def _halt(self) -> None:
         session = self._asked()
         if self.state in SEQUENCES:
@@ -294,6 +320,7 @@ class RobotiqHand(Hand):
 
     async def _activate(self) -> None:
         session = self._asked()
+        self._machine.check_permitted()
         if self.state in RUNNING:
             return
         under_way = self.state in (State.DO_ACTIVATION, State.WF_ACTIVATION)
@@ -322,7 +349,9 @@ class RobotiqHand(Hand):
             ask=session.controller.release,
             failing={
                 **dict.fromkeys(ended, lambda: NotActivatedError("the gripper was reset during the release")),
-                State.DO_RESET: lambda: InvalidStateError("a reset or a halt took over", State.DO_RESET),
+                State.DO_RESET: lambda: self._machine.taken_over(
+                    InvalidStateError("a reset or a halt took over", State.DO_RESET)
+                ),
             },
             what="the automatic release was not finished",
         )
@@ -330,6 +359,7 @@ class RobotiqHand(Hand):
     async def _recover(self, timeout: float | None) -> None:
         limit = timeout or RECOVER_TIMEOUT_S
         self._asked()
+        self._machine.check_permitted()
         watch, resets = StallWatch(self._channels.listeners, self._machine), 0
         with Limit(limit), watch as stall:
             while self.state not in RUNNING:
@@ -380,6 +410,7 @@ class RobotiqHand(Hand):
 
     async def _recover_step(self) -> None:
         session, state = self._asked(), self.state
+        self._machine.check_permitted()
         if state is State.RESET:
             await self.activate()
         elif state is State.ATR_DONE or (state is State.FAULT and self._needs_reset):

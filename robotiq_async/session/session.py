@@ -268,17 +268,20 @@ class Session:
             NotActivatedError: the gripper was reset during it, or reset() or halt() took over.
             ActivationTimeoutError: not finished within the activation timeout, or stalled.
             InvalidStateError: it is refused during a reset or a release.
+            MotionInhibitedError: a person has stopped the hand.
             ConnectionLostError: the link is or went down.
             NotStartedError: the hand was stopped.
         """
         if ask is None and self.machine.state not in SEQUENCES:
+            if self.machine.state is State.RESET:  # not begun, because a person has inhibited it
+                self.machine.check_permitted()
             return
         faulty = () if ask is not None or self.controller.is_busy else (State.FAULT, State.ATR_DONE)
         failing: Failing = {
             State.FAULT: self._fault,
             State.ATR_DONE: self._fault,
             State.RESET: lambda: NotActivatedError("the gripper was reset during the activation"),
-            State.DO_RESET: lambda: NotActivatedError("a reset or a halt took over"),
+            State.DO_RESET: lambda: self.machine.taken_over(NotActivatedError("a reset or a halt took over")),
         }
         try:
             watch = StallWatch(self._channels.listeners, self.machine)

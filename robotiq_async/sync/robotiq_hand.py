@@ -26,6 +26,7 @@ from ..values.calibration import ForceCalibration, SpeedCalibration, Units
 from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED, Finger, State
 from ..values.events import SentRequest, Transition
 from ..values.grip import GraspResult, GripEvent
+from ..values.inhibit import Inhibit
 from ..values.model import Model
 from ..values.move_result import MoveResult
 from ..values.statistics import Statistics
@@ -348,6 +349,12 @@ class RobotiqHand:
     def halt(self) -> None:
         self._caller.wait(lambda: self._inner.halt())
 
+    def inhibit(self, reason: str, *, who: str = "") -> None:
+        self._caller.wait(lambda: self._inner.inhibit(reason, who=who))
+
+    def permit(self, *, who: str = "") -> None:
+        self._caller.wait(lambda: self._inner.permit(who=who))
+
     # -- activation, faults ----------------------------------------------------------------------------
 
     def activate(self) -> None:
@@ -403,6 +410,13 @@ class RobotiqHand:
     @property
     def is_moving(self) -> bool:
         return self._inner.is_moving
+
+    @property
+    def inhibited(self) -> Inhibit | None:
+        return self._inner.inhibited
+
+    def resume_inhibit(self, inhibit: Inhibit) -> None:
+        self._inner.resume_inhibit(inhibit)
 
     @property
     def statistics(self) -> Statistics:

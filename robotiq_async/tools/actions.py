@@ -28,6 +28,9 @@ from ..values.enums import (
 from ..values.errors import MoveSupersededError, NotStartedError, RobotiqStateError
 from ..values.move_result import MoveResult
 
+HALTED: Final = "HALT was pressed"
+"""The reason of a person's halt."""
+STAYS: Final = "motion is refused until a person permits it"
 CANCELS_RECOVERY: Final = frozenset({"halt", "reset", "release"})
 """Actions that cancel a recovery which waits for a fault to clear."""
 
@@ -38,7 +41,7 @@ class Action:
 
     name: str  # one word
     what: str  # a short description
-    run: Callable[[Hand], Awaitable[str]]  # carries it out; returns a short description of the outcome
+    run: Callable[[Operator], Awaitable[str]]  # carries it out; returns a short description of the outcome
     moves: bool = True  # whether fingers move, or may let go
     warning: str = ""  # a consequence that may surprise; a person must confirm it first
 
@@ -48,15 +51,20 @@ class Operator:
 
     Attributes:
         hand: the hand.
+        who: the person's place, as the others hear of it: a halt from there stays, as :meth:`Hand.inhibit`.
+            Empty for a program, whose halt does not.
         speed: of all axes, 0..255, as last set by this person.
         force: of all axes, 0..255, as last set by this person.
     """
 
-    def __init__(self, hand: Hand, *, speed: int = DEFAULT_SPEED, force: int = DEFAULT_FORCE) -> None:
+    def __init__(
+        self, hand: Hand, *, who: str = "", speed: int = DEFAULT_SPEED, force: int = DEFAULT_FORCE
+    ) -> None:
         """Listen to the requests of the hand; nothing is written.
 
         Args:
             hand: started before or after.
+            who: the place of a person who halts for good; empty for a program.
             speed: of the hand's constructor.
             force: of the hand's constructor.
 
@@ -65,6 +73,7 @@ class Operator:
             ValueError: speed or force is outside 0..255.
         """
         self.hand = hand
+        self.who = who
         self.speed: int = check_byte("speed", speed)
         self.force: int = check_byte("force", force)
         self._requests = hand.requests(1)
@@ -93,13 +102,13 @@ class Operator:
             for recovery in self._recoveries:
                 recovery.cancel()
         if not action.moves:
-            return await action.run(self.hand)
+            return await action.run(self)
         with self._counted():
-            return await (self._recover(action) if action.name == "recover" else action.run(self.hand))
+            return await (self._recover(action) if action.name == "recover" else action.run(self))
 
     async def _recover(self, action: Action) -> str:
         """Recover. While it waits for a fault to clear, another action cancels it."""
-        work = asyncio.ensure_future(action.run(self.hand))
+        work = asyncio.ensure_future(action.run(self))
         self._recoveries.add(work)
         try:
             await asyncio.wait({work})
@@ -211,24 +220,25 @@ def describe(result: MoveResult) -> str:
     return f"{', '.join(ends)}; {result.duration:.2f} s"
 
 
-async def _open(hand: Hand) -> str:
-    return describe(await hand.open())
+async def _open(operator: Operator) -> str:
+    return describe(await operator.hand.open())
 
 
-async def _close(hand: Hand) -> str:
-    return describe(await hand.close())
+async def _close(operator: Operator) -> str:
+    return describe(await operator.hand.close())
 
 
-def _done(call: Callable[[Hand], Awaitable[None]], outcome: str) -> Callable[[Hand], Awaitable[str]]:
-    async def run(hand: Hand) -> str:
-        await call(hand)
+def _done(call: Callable[[Hand], Awaitable[None]], outcome: str) -> Callable[[Operator], Awaitable[str]]:
+    async def run(operator: Operator) -> str:
+        await call(operator.hand)
         return outcome
 
     return run
 
 
-def _width(position: int) -> Callable[[Hand], Awaitable[str]]:
-    async def run(hand: Hand) -> str:
+def _width(position: int) -> Callable[[Operator], Awaitable[str]]:
+    async def run(operator: Operator) -> str:
+        hand = operator.hand
         if Finger.SCISSOR not in hand.model.all_axes:
             raise RobotiqStateError(f"a {hand.model.title} has no scissor")
         return describe(await hand.move(position, Finger.SCISSOR))
@@ -236,9 +246,16 @@ def _width(position: int) -> Callable[[Hand], Awaitable[str]]:
     return run
 
 
-async def _halt(hand: Hand) -> str:
-    await hand.halt()
-    return "every axis has stopped" + (": the gripper is reset" if hand.state is State.RESET else "")
+async def _halt(operator: Operator) -> str:
+    hand = operator.hand
+    await (hand.inhibit(HALTED, who=operator.who) if operator.who else hand.halt())
+    words = "every axis has stopped" + (": the gripper is reset" if hand.state is State.RESET else "")
+    return f"{words}; {STAYS}" if operator.who else words
+
+
+async def _permit(operator: Operator) -> str:
+    await operator.hand.permit(who=operator.who)
+    return "motion is permitted again"
 
 
 _ALL: Final = (
@@ -248,6 +265,13 @@ _ALL: Final = (
     Action("normal", "B and C as usual", _width(WIDTH_NORMAL)),
     Action("pinch", "B and C together", _width(WIDTH_PINCH)),
     Action("halt", "stop every axis", _halt, moves=False),
+    Action(
+        "permit",
+        "permit motion after a halt",
+        _permit,
+        moves=False,
+        warning="Look at the gripper first: a program may MOVE its fingers at once.",
+    ),
     Action(
         "activate",
         "activate the gripper",

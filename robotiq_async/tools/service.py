@@ -37,6 +37,7 @@ from ..runtime.signals import INSIST_S, ending_signals, pass_on
 from ..sync import RobotiqHand as BlockingHand
 from ..values.enums import Fault, Finger, State, names_of
 from ..values.errors import NotStartedError
+from ..values.inhibit import Inhibit
 from ..values.status import RobotiqStatus
 
 FRESH_S: Final = 1.0
@@ -54,6 +55,7 @@ class Health:
         fault: the gripper's fault in the newest status.
         holds: the fingers that hold a part by the newest status, as its ``part`` says.
         problem: the reason why the hand takes no motion commands now, in a sentence; empty if it does.
+        inhibited: why a person has it refuse motion; None if none has.
     """
 
     name: str
@@ -62,6 +64,7 @@ class Health:
     fault: Fault
     holds: Finger
     problem: str
+    inhibited: Inhibit | None = None
 
     @property
     def is_ready(self) -> bool:
@@ -81,6 +84,7 @@ class Health:
             "severity": self.fault.severity.name,
             "description": self.fault.description,
             "holds": names_of(self.holds),
+            "inhibited": None if self.inhibited is None else self.inhibited.as_dict(),
         }
 
 
@@ -98,7 +102,8 @@ def health(hand: Hand | BlockingHand) -> Health:
         age,
         Fault.NONE if status is None else status.fault,
         Finger(0) if part is None else part.holds,
-        _problem(hand.state, age, status),
+        "; ".join(filter(None, (_problem(hand.state, age, status), str(hand.inhibited or "")))),
+        hand.inhibited,
     )
 
 

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final
+from typing import Any, Final
 
 from ..values.enums import Finger, ObjectStatus, State, Trigger
-from ..values.errors import GripperFaultError, InvalidStateError, NotActivatedError, RobotiqError
+from ..values.errors import (
+    GripperFaultError,
+    InvalidStateError,
+    MotionInhibitedError,
+    NotActivatedError,
+    RobotiqError,
+)
 from ..values.model import Model
 from ..values.status import NO_REQUEST
 
@@ -54,11 +60,20 @@ def axis_name(axis: Finger, model: Model) -> str:
     return JAW_NAME if len(model.axes) == 1 else str(axis.name)
 
 
+def inhibit_words(fields: Mapping[str, Any]) -> str:
+    """The event of an inhibit that was set or lifted."""
+    by = f" ({fields['who']})" if fields["who"] else ""
+    what = "motion is refused" if fields["inhibited"] else "motion is permitted again, after"
+    return f"{what}: {fields['reason']}{by}"
+
+
 def refusal_words(error: RobotiqError, hints: Mapping[State, str]) -> str:
     """The reason for a refusal, and the key or button that helps: of the hints, that of the state.
 
     The advice of the error is for programs, and left out.
     """
+    if isinstance(error, MotionInhibitedError):
+        return f"{error.message}; permit it first"
     if isinstance(error, NotActivatedError):
         return f"{error.message}; {hints[State.RESET]}"
     if isinstance(error, GripperFaultError):

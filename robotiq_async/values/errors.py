@@ -12,6 +12,7 @@
     |   +-- StateTimeoutError (TimeoutError)    a state that was never reached
     |   +-- MoveTimeoutError (TimeoutError)     .status
     |   +-- MoveSupersededError                 another command took over an axis of this move
+    |   +-- MotionInhibitedError                a person stopped the hand; .reason, .who and .since
     |   +-- ControlLostError                    on another host: this hand does not hold the lease
     |   +-- NotAllowedError                     on another host: the fleet's access rules forbid it
     +-- RobotiqConnectionError (ConnectionError)
@@ -38,6 +39,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Self
 
 from .enums import Fault, State
+from .inhibit import Inhibit
 
 if TYPE_CHECKING:
     from .status import RobotiqStatus
@@ -147,6 +149,24 @@ class MoveTimeoutError(RobotiqStateError, TimeoutError):
 
 class MoveSupersededError(RobotiqStateError):
     """Another command took over an axis of this move; its other axes run on."""
+
+
+class MotionInhibitedError(RobotiqStateError):
+    """A person stopped the hand, and motion is refused until a person permits it again.
+
+    Attributes:
+        reason: the reason that was given.
+        who: who has asked for it; may be empty.
+        since: seconds since 1970.
+    """
+
+    def __init__(self, inhibit: Inhibit) -> None:
+        self.reason = inhibit.reason
+        self.who = inhibit.who
+        self.since = inhibit.since
+        super().__init__(
+            str(inhibit), advice="a person permits it again: on the page, in the monitor, by fleet permit"
+        )
 
 
 class ControlLostError(RobotiqStateError):

@@ -174,6 +174,12 @@ async def test_a_list_and_a_halt(shell: Shell, agent: Process, gripper: Served) 
     assert halted.out == f"{ADDRESS}  stopped\n"
     (await shell.finish(moving)).assert_failed(1, "halted")
     assert not gripper.gripper.is_moving
+    refused = await shell.run("move", "255", "--yes", ADDRESS)
+    refused.assert_failed(1, "motion is inhibited: fleet halt")
+    (await shell.run("fleet", "permit", ADDRESS)).assert_failed(2, "--yes")
+    permitted = await shell.run("fleet", "permit", "--yes", ADDRESS)
+    permitted.assert_succeeded()
+    assert permitted.out.startswith(f"{ADDRESS}  permitted; motion is inhibited: fleet halt")
 
 
 def test_a_halt_that_reaches_no_gripper_fails(call: Call, endpoint: str) -> None:

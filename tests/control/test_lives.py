@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robotiq_async import Finger, State
+from robotiq_async import Finger, Inhibit, State
 from robotiq_async.control.ledger import WINDOW_S
 from robotiq_async.control.motion import Move
 from robotiq_async.control.state_machine import RUNNING, SEQUENCES
@@ -46,6 +46,7 @@ KINDS: Final = {
     "link": (*OURS, "lose", "lose"),
     "fault": (*OURS, "fault", "clear", "reset", "activate", "release"),
     "foreign": (*OURS, "foreign", "foreign"),
+    "person": (*OURS, "place", "forget", "lose", "fault", "clear", "reset", "inhibit", "inhibit", "permit"),
     "all": (
         *OURS,
         *("place", "forget", "lose", "fault", "clear", "reset", "activate", "release"),
@@ -116,6 +117,8 @@ class Life:
         """The axes without any request to move, with the travel of each."""
         self.given_up = NO_AXES
         """The axes whose last request was to stand: a hold, a halt, or the end of a cancelled move."""
+        self.halted: Outcome | None = None
+        """A person's halt that has not been answered."""
         self.disturbed = -math.inf
         """The time at which something else than a request of ours moved an axis, or could."""
 
@@ -187,6 +190,14 @@ class Life:
                 else:
                     self.calls.append(scan.halt())
                     self.stand(Finger.ALL)
+            case "inhibit":
+                scan.machine.inhibit(Inhibit("a person", "", 0.0))
+                self.happen("halt", step)
+                self.halted = None if scan.state in SEQUENCES else self.calls[-1]
+            case "permit":
+                scan.machine.permit("")
+                self.halted = None
+                self.stays.clear()  # what held something may press on with the next command
             case "place":
                 gripper.place_object(axes, 20 + position * 210 // 255)
                 scan.parts.forget(axes)
@@ -259,6 +270,8 @@ class Life:
             if forgets:  # a hold may be among what it has forgotten, and is not sent again
                 self.given_up = NO_AXES
             travels = self.scan.travels()
+            if self.halted is not None and self.halted.answers == [None]:  # nothing moves from here on
+                self.halted, self.stays = None, {**travels, **self.stays}
             assert all(travels[axis] == travel for axis, travel in self.stays.items()), "nobody asked it"
 
     def end(self, *, keep_grip: bool) -> None:

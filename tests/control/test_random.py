@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from robotiq_async import JAW, Finger, MoveResult, ObjectStatus, State
+from robotiq_async import JAW, Finger, Inhibit, MotionInhibitedError, MoveResult, ObjectStatus, State
 from robotiq_async.control.motion import Move
 from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.values.model import THREE_FINGER, TOLERANCE, TWO_FINGER_85, Model
@@ -42,6 +43,9 @@ class RandomUse(RuleBasedStateMachine):
         """Axes that were ever addressed by a position since the last activation."""
         self.travel = {axis: self.scan.gripper.travel(axis) for axis in self.model.axes}
         self.outcomes: list[tuple[Move | None, Outcome]] = []
+        self.halted: Outcome | None = None
+        """The newest halt of a person; ``still`` has the travels when it was answered."""
+        self.still: object = None
 
     def teardown(self) -> None:
         """Whatever went before, a stop that keeps a grip leaves nothing moving."""
@@ -55,19 +59,23 @@ class RandomUse(RuleBasedStateMachine):
     def running(self) -> bool:
         return self.scan.state in RUNNING
 
+    @property
+    def takes_motions(self) -> bool:
+        return self.running and self.scan.machine.inhibited is None
+
     def ask(self, axes: Finger, position: int) -> None:
         self.asked |= {axis for axis in self.model.axes if axis in axes}
         self.scan.ask(axes, position)
 
     @rule(axes=masks, position=values, speed=st.none() | values)
-    @precondition(lambda self: self.running)
+    @precondition(lambda self: self.takes_motions)
     def move(self, axes: Finger, position: int, speed: int | None) -> None:
         axes = axes & self.model.all_axes or JAW
         self.ask(axes, position)
         self.outcomes.append(self.scan.move(position, axes, speed=speed))
 
     @rule(axes=masks, position=st.none() | values, force=values)
-    @precondition(lambda self: self.running)
+    @precondition(lambda self: self.takes_motions)
     def command(self, axes: Finger, position: int | None, force: int) -> None:
         axes = axes & self.model.all_axes or JAW
         if position is not None:
@@ -95,6 +103,42 @@ class RandomUse(RuleBasedStateMachine):
     def halt(self) -> None:
         self.outcomes.append((None, self.scan.halt()))
 
+    @rule()
+    @precondition(lambda self: self.running)
+    def inhibit(self) -> None:
+        """A person halts: from the answer on nothing moves, whatever is asked."""
+        self.scan.machine.inhibit(Inhibit("a person", "", 0.0))
+        self.halted = self.scan.halt()
+        self.outcomes.append((None, self.halted))
+
+    @rule(axes=masks, position=values, force=st.none() | values)
+    @precondition(lambda self: self.running and not self.takes_motions)
+    def ask_in_vain(self, axes: Finger, position: int, force: int | None) -> None:
+        axes = axes & self.model.all_axes or JAW
+        for refused in (
+            lambda: self.scan.move(position, axes, force=force),
+            lambda: self.scan.command(axes, position=position),
+            lambda: self.scan.command(axes, force=position),
+            self.scan.controller.activate,
+        ):
+            with pytest.raises(MotionInhibitedError):
+                refused()
+        self.outcomes.append((None, self.scan.command(axes, speed=position)))
+
+    @rule()
+    @precondition(lambda self: self.scan.machine.inhibited is not None)
+    def permit(self) -> None:
+        self.scan.machine.permit("")
+        self.halted, self.still = None, None
+
+    @invariant()
+    def nothing_moves_while_it_is_inhibited(self) -> None:
+        halted = getattr(self, "halted", None)
+        if halted is not None and self.still is None and halted.answers == [None]:
+            self.still = self.scan.travels()
+        if halted is not None and self.still is not None:
+            assert self.scan.travels() == self.still, "it moved while it was inhibited"
+
     @rule(seconds=st.sampled_from([0.005, 0.01, 0.05, 0.3, 3.0]))
     def wait(self, seconds: float) -> None:
         self.scan.run(seconds)
@@ -106,7 +150,7 @@ class RandomUse(RuleBasedStateMachine):
         self.scan.parts.forget(axes)
 
     @rule(axes=masks, position=st.integers(20, 230), force=values)
-    @precondition(lambda self: self.running)
+    @precondition(lambda self: self.takes_motions)
     def grip(self, axes: Finger, position: int, force: int) -> None:
         axes = axes & self.model.all_axes or JAW
         self.scan.gripper.place_object(axes, position)
@@ -151,7 +195,10 @@ class RandomUse(RuleBasedStateMachine):
     @precondition(lambda self: self.running)
     def everything_comes_to_rest(self) -> None:
         self.scan.step()  # an object taken away sets axes in motion without a command
-        self.scan.until(lambda: not self.scan.gripper.is_moving, 60, WAITS_S)
+        # Behind a halt a move is still to be sent.
+        self.scan.until(
+            lambda: not (self.scan.gripper.is_moving or self.scan.controller.is_moving), 60, WAITS_S
+        )
         wait(self.scan, 0.6)  # what has no echo is given half a second to act
         assert not self.scan.gripper.is_moving
         assert not self.scan.controller.is_moving

@@ -9,7 +9,7 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any, Final
 
-from robotiq_async import Finger, MoveResult, ObjectStatus, RobotiqHand, State, Transition, Trigger
+from robotiq_async import Finger, Inhibit, MoveResult, ObjectStatus, RobotiqHand, State, Transition, Trigger
 from robotiq_async.fleet import GripperName
 from robotiq_async.fleet.agent.agent_file import AgentSettings, read_agent_file
 from robotiq_async.fleet.agent.publisher import AT_ONCE, KEPT, HandPublisher
@@ -75,6 +75,7 @@ def parsed(what: dict[str, Any]) -> dict[str, Any]:
     return {"mark": NAME.mark, "epoch": EPOCH, "events": [what], "status": MESSAGE.pack().hex()}
 
 
+INHIBIT: Final = Inhibit("the guard is open", "PLC, bob@desk:4711", 1790000000.5)
 BEGUN: Final = Transition(State.RUNNING_IDLE, State.RUNNING_CC, Trigger.ASK_COMMAND, 811.5)
 MOVE: Final = call(7, position=100, fingers=1, speed=None, force=None, timeout=None)
 EXAMPLES: Final = [
@@ -82,6 +83,7 @@ EXAMPLES: Final = [
     event(39, request_fields(SentRequest(IMAGE, 811.53125, acknowledged=True))),
     event(40, {"kind": "lease", "number": 3, "holder": LABEL, "reason": "granted"}),
     event(41, {"kind": "conflict", "key": NAME.key("alive", "77")}),
+    event(42, {"kind": "inhibit", "stamp": 812.4375, "inhibited": INHIBIT.as_dict()}),
     json.loads(MOVE.pack()),
     json.loads(Answer(NAME.base, 7, EPOCH, result_fields(RESULT)).pack()),
     json.loads(

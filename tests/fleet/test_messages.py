@@ -17,6 +17,8 @@ from hypothesis import strategies as st
 from robotiq_async import (
     Fault,
     Finger,
+    Inhibit,
+    MotionInhibitedError,
     MoveResult,
     ObjectStatus,
     RobotiqStatus,
@@ -251,6 +253,8 @@ def an(kind: type[Exception]) -> Exception:
         return ConnectFailedError("tcp://10.0.0.1:502", "refused")
     if kind is ControlLostError:
         return ControlLostError("gone", "taken")
+    if kind is MotionInhibitedError:
+        return MotionInhibitedError(Inhibit("HALT was pressed", "the page", 5.5))
     return kind("why")
 
 

@@ -140,6 +140,9 @@ class MemoryRecords:
     def read(self, name: GripperName) -> dict[str, Any] | None:
         return self.records.get(name)
 
+    def read_inhibit(self, name: GripperName) -> object:
+        return self.records.get(name, {}).get("inhibited")
+
     def keep(self, name: GripperName, record: dict[str, Any]) -> None:
         self.records[name] = json.loads(json.dumps(record))
 

@@ -87,10 +87,26 @@ async def settled(gripper: SimulatedGripper) -> int:
 async def test_an_inactive_node_takes_a_halt_and_nothing_else(
     inactive: Connection, gripper: SimulatedGripper
 ) -> None:
-    others = set(COMMANDS) - {"halt"}
+    others = set(COMMANDS) - {"halt", "inhibit", "permit"}
     await refuses("the node is not active", *map(inactive.command, others), begin(inactive))
     assert not gripper.writes
     assert await inactive.command("halt")
+
+
+async def test_an_inhibit_stays_until_a_person_permits(
+    connection: Connection, gripper: SimulatedGripper
+) -> None:
+    goal = await moving(connection)
+    assert "motion is refused" in await connection.command("inhibit")
+    await goal
+    at = await settled(gripper)
+    await refuses("HALT was pressed.*call ~/permit", begin(connection))
+    shown = json.loads(status_text(connection.hand, takes_commands=True))
+    assert shown["inhibited"]["reason"] == "HALT was pressed"
+    assert diagnose(connection.hand, now())[1].level is Level.WARN
+    assert await settled(gripper) == at
+    assert await connection.command("permit")
+    assert (await begin(connection)).ending is Ending.SUCCEEDED
 
 
 async def test_opening_permitting_and_closing_activate_nothing(
@@ -327,7 +343,10 @@ async def test_diagnoses_of_a_fault(
     status = RobotiqStatus.from_registers(
         text["registers"], timestamp=text["timestamp"], sequence=text["sequence"]
     )
-    assert text == {"state": "FAULT", "connected": True, "takes_commands": True} | status.as_dict()
+    assert (
+        text
+        == {"state": "FAULT", "connected": True, "takes_commands": True, "inhibited": None} | status.as_dict()
+    )
     assert text["fault"] == fault.name
 
 
@@ -337,7 +356,7 @@ async def test_without_a_link_nothing_is_known(connection: Connection, server: S
     assert link.level is Level.ERROR
     assert (gripper.level, gripper.message, gripper.values) == (Level.STALE, "unknown: the link is down", {})
     shown = json.loads(status_text(connection.hand, takes_commands=False))
-    assert shown == {"state": "DISCONNECTED", "connected": False, "takes_commands": False}
+    assert shown == {"state": "DISCONNECTED", "connected": False, "takes_commands": False, "inhibited": None}
     fresh = RobotiqHand("tcp://192.0.2.1")
     assert diagnose(fresh, 0.0)[1].level is Level.STALE
     assert "fault" not in json.loads(status_text(fresh, takes_commands=False))

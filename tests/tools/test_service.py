@@ -249,6 +249,7 @@ async def test_health_in_every_condition(server: SimulatorServer) -> None:
             "severity": "NONE",
             "description": Fault.NONE.description,
             "holds": [],
+            "inhibited": None,
         }
         await hand.start()
         found = health(hand)

@@ -21,6 +21,7 @@ TREE = {
     "StateTimeoutError": "RobotiqStateError TimeoutError",
     "MoveTimeoutError": "RobotiqStateError TimeoutError",
     "MoveSupersededError": "RobotiqStateError",
+    "MotionInhibitedError": "RobotiqStateError",
     "RobotiqConnectionError": "RobotiqError ConnectionError",
     "ConnectFailedError": "RobotiqConnectionError",
     "ConnectionLostError": "RobotiqConnectionError",

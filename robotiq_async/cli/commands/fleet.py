@@ -13,7 +13,8 @@ from cyclopts import Parameter
 
 from ...runtime.clock import now
 from ...runtime.log import printable
-from ..arguments import Flag, need
+from ..arguments import Flag, Yes, need
+from ..consent import consent
 from ..failures import CommandError, UsageError, normal_end, usage
 
 if TYPE_CHECKING:
@@ -71,10 +72,12 @@ async def fleet(
 
 
 async def halt(site: Site = None, /) -> None:
-    """Stop every gripper of a site now, without a question. Clients that command lose the lease.
+    """Stop every gripper of a site now, without a question, and refuse motion from then on.
 
-    Prints the outcome for each, and exits with 1 unless all were seen to stop and every
-    endpoint was reached. It is no safety function: a network may be down when it is needed.
+    It stays: clients that command lose the lease, and no gripper moves until a person permits
+    it, with fleet permit or on a page. Prints the outcome for each, and exits with 1 unless all
+    were seen to stop and every endpoint was reached. It is no safety function: a network may be
+    down when it is needed.
 
     For example:
 
@@ -89,13 +92,43 @@ async def halt(site: Site = None, /) -> None:
         seen = Fleet(site)
     async with seen:
         try:
-            outcomes = await seen.halt_all()
+            outcomes = await seen.halt_all("fleet halt")
         except NotAllStoppedError as error:
             for name, how in error.outcomes.items():
                 print(f"{name}  {printable(how)}")
             raise
     for name, how in outcomes.items():
         print(f"{name}  {how}")
+
+
+async def permit(*addresses: str, yes: Yes = False) -> None:
+    """Permit motion again after a halt, of the grippers that are named. Look at them first.
+
+    Nothing moves by it, but a program may move the fingers at once: it asks, and without a
+    terminal needs --yes.
+
+    For example:
+
+        robotiq-async fleet permit zenoh://lab/cell-1/left
+
+    Args:
+        addresses: Grippers on other hosts, zenoh://SITE/HOST/GRIPPER.
+        yes: Do not ask.
+    """
+    need("zenoh", "fleet")
+    from ...link.address import is_remote
+    from ..connect import make_hand
+
+    if not addresses or not all(map(is_remote, addresses)):
+        raise UsageError("name grippers of agents: robotiq-async fleet permit zenoh://SITE/HOST/GRIPPER")
+    hands = [make_hand(address, control=False) for address in addresses]
+    for hand in hands:
+        consent(hand.address, "motion is permitted again: a program may MOVE its fingers at once", yes=yes)
+    for hand in hands:
+        async with hand:
+            inhibit = hand.inhibited
+            await hand.permit()
+        print(f"{hand.address}  {'was not inhibited' if inhibit is None else f'permitted; {inhibit}'}")
 
 
 async def _watch(seen: Fleet, show: Callable[[Member], None]) -> None:
@@ -110,7 +143,8 @@ async def _watch(seen: Fleet, show: Callable[[Member], None]) -> None:
 def _print_row(member: Member) -> None:
     state = "gone" if not member.is_there else "?" if member.state is None else member.state.name
     fault = "-" if not member.fault else member.fault.name
-    problem = f"{member.agents} AGENTS  " * (member.agents > 1) + member.problem
+    problem = f"{member.agents} AGENTS  " * (member.agents > 1)
+    problem += "; ".join(filter(None, (member.inhibited, member.problem)))
     age = "-" if member.seen_at is None else f"{now() - member.seen_at:.1f} s"
     words = f"{age} {problem}".rstrip()
     row = _ROW.format(str(member.name), state, fault, member.holder or "-", words)
@@ -127,6 +161,7 @@ def _print_object(member: Member) -> None:
         "fault_code": None if member.fault is None else int(member.fault),
         "is_moving": member.is_moving,
         "holder": member.holder,
+        "inhibited": member.inhibited,
         "problem": member.problem,
         "gripper": member.address,
         "age": None if member.seen_at is None else round(now() - member.seen_at, 3),

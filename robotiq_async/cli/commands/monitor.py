@@ -109,7 +109,7 @@ async def _screen(address: str, link: Link, speed: int, force: int) -> None:
     from ..connect import make_operator
     from ..tui.screen import Monitor
 
-    operator = make_operator(address, link, speed=speed, force=force)
+    operator = make_operator(address, link, "the monitor", speed=speed, force=force)
     await operator.hand.start(activate=False)
     screen, words = None, ""
     try:

@@ -76,7 +76,7 @@ async def web(
     from ..output.messages import forwarded_warnings
 
     shown = addresses or ("sim://",)
-    operators = [make_operator(each, link, speed=speed, force=force) for each in shown]
+    operators = [make_operator(each, link, "the page", speed=speed, force=force) for each in shown]
     with usage():
         settings = PageSettings(
             host=host,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from ...runtime.concurrency import in_a_thread, write_all
 from ...tools.recording.feed import Timeline, compact
 from ...tools.recording.payloads import Fields, is_command
-from ...tools.wording import JAW_NAME
+from ...tools.wording import JAW_NAME, inhibit_words
 from ...values.enums import Finger, State, Trigger
 from ...values.status import NO_REQUEST, RobotiqStatus
 from .messages import forwarded_warnings
@@ -79,6 +79,8 @@ def event_line(fields: Fields) -> str:
     if fields["kind"] == "mark":
         values = (f"{name}={value}" for name, value in fields["values"].items())
         return f"mark     {' '.join([fields['label'] or '(end)', *values])}"
+    if fields["kind"] == "inhibit":
+        return f"inhibit  {inhibit_words(fields)}"
     if fields["kind"] == "fault":
         return f"fault    0x{fields['fault_code']:02X} {fields['fault']}: {fields['description']}"
     trigger = fields["trigger"]
@@ -113,7 +115,7 @@ BUFFER: Final = 4000
 """Statuses kept for a slow reader: 20 s."""
 JSON_INTERVAL_S: Final = 0.02
 WATCH_INTERVAL_S: Final = 0.1
-EVENTS: Final = ("transition", "fault", "log")
+EVENTS: Final = ("transition", "fault", "inhibit", "log")
 
 Formatter = Callable[[list[Fields]], list[str]]
 

@@ -76,6 +76,7 @@ class Monitor(App[None]):
         ("r", "act('reset')", "reset"),
         ("l", "act('release')", "release"),
         ("v", "act('recover')", "recover"),
+        ("m", "act('permit')", "permit"),
         ("p", "position", "position"),
         ("plus,equals_sign", f"speed({STEP})", "faster"),
         ("minus", f"speed(-{STEP})", "slower"),
@@ -145,6 +146,8 @@ class Monitor(App[None]):
             if isinstance(each, RobotiqStatus):
                 self._newest = each
                 peaks = {axis: max(peak, _milliampere(each, axis)) for axis, peak in peaks.items()}
+            elif each["kind"] == "inhibit":
+                self.write_log(event_line(each), "bold red" if each["inhibited"] else "bold", at)
             elif each["kind"] == "fault":
                 self.write_log(event_line(each), "bold" if each["fault_code"] else "", at)
             elif words := transition_words(each):
@@ -153,7 +156,7 @@ class Monitor(App[None]):
 
     def _paint_state(self) -> None:
         state, age = self._hand.state, now() - self._newest.timestamp
-        self._top.show(state_text(title(self._hand), state, self._newest, age))
+        self._top.show(state_text(title(self._hand), state, self._newest, age, self._hand.inhibited))
         self._axes.show_stale(state is State.DISCONNECTED)
 
     def _paint_figures(self) -> None:

@@ -13,13 +13,14 @@ from textual.widgets import Static
 from ...tools.recording.payloads import Fields
 from ...tools.wording import AXIS_WORDS, STATE_WORDS, TRIGGER_WORDS, axis_name
 from ...values.enums import Fault, Finger, ObjectStatus, Severity, State, Trigger
+from ...values.inhibit import Inhibit
 from ...values.model import Model
 from ...values.statistics import Statistics
 from ...values.status import NO_REQUEST, RobotiqStatus
 
 KEYS: Final = """\
 o open  c close  1 wide  2 normal  3 pinch  SPACE halt  + - speed  ] [ force
-a activate  r reset  l release  v recover  p position of axes         q quit"""
+a activate  r reset  l release  v recover  p position  m permit       q quit"""
 
 HINTS: Final = {
     State.FAULT: "v does what it needs",
@@ -152,7 +153,9 @@ def sparkline(values: Sequence[int], width: int) -> str:
     return "".join(bars).rjust(width)
 
 
-def state_text(address: str, state: State, status: RobotiqStatus, age: float) -> Text:
+def state_text(
+    address: str, state: State, status: RobotiqStatus, age: float, inhibit: Inhibit | None = None
+) -> Text:
     """Two lines: the state of the hand, and the fault of the gripper; ``age`` is in seconds."""
     lost = state is State.DISCONNECTED
     colours = "white on red" if lost else "black on green" if state in _CALM else "black on yellow"
@@ -163,6 +166,9 @@ def state_text(address: str, state: State, status: RobotiqStatus, age: float) ->
         text.append("; ".join(filter(None, (f"  {_doing(state, status)}", HINTS.get(state)))))
     text.append(f"  {address}\n", "dim")
     fault = status.fault
+    if inhibit is not None:
+        text.append(f" {str(inhibit).upper()} ", "bold white on red")
+        text.append("  m permits it  ", "bold")
     if fault is Fault.NONE:
         text.append("no fault", "dim")
     else:

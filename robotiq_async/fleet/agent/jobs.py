@@ -15,7 +15,7 @@ from ...values.move_result import MoveResult
 from ..network.bus import Query
 from ..wire.envelope import Answer, Call, failure
 from ..wire.settings import asked_of, is_in, moved_by
-from ..wire.values import result_fields
+from ..wire.values import Fields, result_fields
 from .publisher import HandPublisher
 
 KEPT: Final = 512
@@ -36,6 +36,7 @@ class Job:
         asked: the positions, speeds and forces that it asks for.
         is_shown: whether the gripper has acknowledged an image with all of them.
         was_refused: whether the hand raised at once, before anything could be written.
+        says: makes what its answer has besides the result.
     """
 
     def __init__(self, name: str, call: Call, query: Query) -> None:
@@ -48,6 +49,7 @@ class Job:
         self.asked = asked_of(name, call.arguments)
         self.is_shown = False
         self.was_refused = False
+        self.says: Callable[[], Fields] = dict
 
     @property
     def key(self) -> Key:
@@ -166,7 +168,7 @@ class Jobs:
         if isinstance(error, Exception):
             answer = failure(call, self._epoch, error, begun)
         else:
-            value = result_fields(task.result()) or {}
+            value = {**(result_fields(task.result()) or {}), **job.says()}
             answer = Answer(call.to, call.number, self._epoch, value, begun=begun)
         if error is not None or is_done:
             self._ended(job, error is None)

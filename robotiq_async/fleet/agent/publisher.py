@@ -21,7 +21,7 @@ from ..control.lease import Lease
 from ..network.bus import Bus, Urgency
 from ..wire.names import GripperName
 from ..wire.status_message import StatusMessage
-from ..wire.values import Fields, request_fields, transition_fields
+from ..wire.values import Fields, inhibit_fields, request_fields, transition_fields
 
 KEPT: Final = 2000
 """Events that are kept for clients that missed them: some seconds of a loop that commands at 200 Hz."""
@@ -65,6 +65,14 @@ class HandPublisher:
         self._sent_at = now()
         self._send(json.dumps({**self._head(), "events": [event], "status": status}).encode())
 
+    def add_inhibit(self) -> None:
+        """Tell whether motion is inhibited now."""
+        self.add({"kind": "inhibit", **self.inhibited()})
+
+    def inhibited(self) -> Fields:
+        """Whether motion is inhibited, and when that was so."""
+        return {"stamp": now(), "inhibited": inhibit_fields(self._hand.inhibited)}
+
     def events_since(self, index: int) -> list[Fields]:
         """The next events after a number, as many as are kept and fit into an answer."""
         return list(islice((event for event in self._events if event["index"] > index), AT_ONCE))
@@ -104,6 +112,7 @@ class HandPublisher:
         return {
             **self._head(),
             "to": self._name.base,
+            **self.inhibited(),
             "stamp": stamp,
             "age": None if status is None else stamp - status.timestamp,
             "address": self._hand.address,

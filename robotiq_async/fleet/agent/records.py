@@ -1,8 +1,11 @@
-"""Records: which clients may reacquire the lease automatically, kept over a restart of the agent.
+"""Records: who may reacquire the lease automatically, and inhibits, kept over a restart of the agent.
 
 A person halts the gripper, then the agent is killed and restarted. The client that commanded before, and did
 not receive that halt, reacquires the lease automatically; the new run of the agent must refuse it, and needs
 the record for that. Without a record no client may reacquire automatically.
+
+An inhibit that a person has set counts until a person lifts it, so its record counts after a restart of the
+machine, too: an outdated one can only refuse motion.
 """
 
 from __future__ import annotations
@@ -29,6 +32,9 @@ class Records(Protocol):
     def read(self, name: GripperName) -> Fields | None:
         """The record of a gripper; None if it is not known for certain."""
 
+    def read_inhibit(self, name: GripperName) -> object:
+        """The inhibit in the record of a gripper, whenever it was written; None for none."""
+
     def keep(self, name: GripperName, record: Fields) -> None:
         """Replace the record of a gripper; never blocks."""
 
@@ -41,6 +47,8 @@ class NoRecords:
 
     def read(self, name: GripperName) -> Fields | None:  # noqa: ARG002
         return None
+
+    def read_inhibit(self, name: GripperName) -> object: ...
 
     def keep(self, name: GripperName, record: Fields) -> None: ...
 
@@ -63,13 +71,18 @@ class FileRecords:
     def read(self, name: GripperName) -> Fields | None:
         if not os.access(self._folder, os.W_OK):
             return None  # may be outdated: the run before this one could not replace it
+        record = self._stored(name)
+        return record if self._boot and record.get("boot") == self._boot else None
+
+    def read_inhibit(self, name: GripperName) -> object:
+        return self._stored(name).get("inhibited")
+
+    def _stored(self, name: GripperName) -> Fields:
         try:
             record = json.loads(self._path(name).read_bytes())
         except (OSError, ValueError, RecursionError):
-            return None
-        return (
-            record if isinstance(record, dict) and self._boot and record.get("boot") == self._boot else None
-        )
+            return {}
+        return record if isinstance(record, dict) else {}
 
     def keep(self, name: GripperName, record: Fields) -> None:
         self._newest[name] = json.dumps({"boot": self._boot, **record}).encode()
@@ -93,8 +106,8 @@ class FileRecords:
         if error is not None and not self._has_failed:
             self._has_failed = True
             log.warning(
-                "%s: after a restart no client reacquires the lease automatically, and FLEET.toml's "
-                "speeds and forces count",
+                "%s: after a restart no client reacquires the lease automatically, FLEET.toml's speeds and "
+                "forces count, and motion is not inhibited",
                 error,
             )
         if name in self._newest:

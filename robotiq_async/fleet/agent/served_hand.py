@@ -5,8 +5,8 @@
 # receive() decides on each message at once, in the event loop: is it meant for this gripper and this run of
 # the agent, has the lease expired by now, and may its sender do that?
 #
-#   info, halt   any client; the halt also while the agent ends
-#   lease        acquire a free one, take it from its holder, renew or release one's own
+#   info, halt   any client; the halt also while the agent ends. It may inhibit motion, in the same turn
+#   lease        acquire a free one, take it from its holder, renew or release one's own; permit motion again
 #   cmd/NAME     the holder alone, in order, with a fresh stamp of the agent (Admission)
 #
 # Work that takes time is a task in Requests, which gives each repetition of its message the same answer.
@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from contextlib import suppress
 from dataclasses import replace
 from inspect import signature
@@ -36,6 +37,7 @@ from ...values.amounts import UNITS
 from ...values.checks import check_byte, check_mask
 from ...values.enums import Finger
 from ...values.errors import AgentError, ControlLostError, RobotiqConnectionError, RobotiqError
+from ...values.inhibit import LONGEST, Inhibit
 from ...values.move_result import MoveResult
 from ..control.admission import Admission
 from ..control.lease import Lease
@@ -43,7 +45,7 @@ from ..network.bus import Bus, Query
 from ..wire.envelope import Answer, Call, failure, unpack_call
 from ..wire.names import GripperName
 from ..wire.settings import moved_by, read_settings, settings_of
-from ..wire.values import Fields
+from ..wire.values import Fields, inhibit_fields, read_inhibit, words
 from .jobs import Job, Jobs, Work, label_of
 from .kept_settings import KeptSettings
 from .publisher import HandPublisher
@@ -90,10 +92,14 @@ class ServedHand:
                 self._settings.resume(record["settings"])
             except (AttributeError, KeyError, TypeError, ValueError) as error:
                 self._log.warning("the record of the gripper cannot be read: %r", error)
+        if (kept := self._records.read_inhibit(self.name)) is not None:
+            self._hand.resume_inhibit(_inhibit_kept(kept))
         self._keep_record()
 
     def _keep_record(self) -> None:
-        self._records.keep(self.name, {**self._lease.record, "settings": self._settings.record})
+        inhibited = inhibit_fields(self._hand.inhibited)
+        record = {**self._lease.record, "settings": self._settings.record, "inhibited": inhibited}
+        self._records.keep(self.name, record)
 
     async def run(self) -> None:
         """Keep the hand running, with or without its gripper, until cancelled; then stop the fingers."""
@@ -219,6 +225,10 @@ class ServedHand:
         elif what == "release":
             self._release(call, query)
             return None
+        elif what == "permit":
+            self._admission.check_fresh(call, now())
+            self._begin_to_permit(call, query)
+            return None
         else:
             raise AgentError(f"unknown lease request {what!r}")
         return {
@@ -330,18 +340,42 @@ class ServedHand:
 
     def _halt(self, call: Call, query: Query) -> None:
         # Accepted from any client, in any state, and never treated as a repetition.
+        inhibit = _inhibit_asked(call)
+        if inhibit is not None:
+            self._hand.resume_inhibit(inhibit)  # in this turn: what is admitted from here on is refused
         self._lease.intervene(call.client, "halted")
         if self._admission.is_of_holder(call):
             self._admission.bar(call)
         else:
             # Otherwise a control loop of the holder would move the fingers again within 10 ms.
             self.end_lease("halted", label_of(call))
-        self._jobs.start(Job("halt", call, query), self._stop_now())
+        job = Job("halt", call, query)
+        if inhibit is not None:
+            job.says = self.publisher.inhibited
+            self._inhibit_changed()
+        self._jobs.start(job, self._stop_now(inhibit))
 
-    async def _stop_now(self) -> None:
+    def _inhibit_changed(self) -> None:
+        self._keep_record()
+        self.publisher.add_inhibit()
+
+    def _begin_to_permit(self, call: Call, query: Query) -> None:
+        who = _signed(call)
+
+        async def permit() -> None:
+            await self._hand.permit(who=who)
+            self._inhibit_changed()
+            await self._records.kept()
+
+        job = Job("permit", call, query)
+        job.says = self.publisher.inhibited
+        self._jobs.begin(job, permit())
+
+    async def _stop_now(self, inhibit: Inhibit | None) -> None:
         # While the agent ends, the hand is being stopped anyway: wait for that stop and check its outcome.
         if not self._is_ending:
-            await self._hand.halt()
+            # Of several reasons the first one stays.
+            await (self._hand.halt() if inhibit is None else self._hand.inhibit(inhibit.reason))
             await self._records.kept()
             return
         await self._hand.stop(keep_grip=False)
@@ -410,3 +444,32 @@ class ServedHand:
             # The cancellation may have overtaken the command: refuse it when it arrives.
             self._admission.bar(Call(call.to, call.client, number=int(call.arguments.get("number", 0))))
         self._reply(query, Answer(call.to, call.number, self._epoch, {}))
+
+
+def _inhibit_asked(call: Call) -> Inhibit | None:
+    """The inhibit that a halt asks for; None for a halt alone. Nothing malformed keeps it from halting."""
+    reason = call.arguments.get("inhibit")
+    if reason is None:
+        return None
+    return Inhibit(_short(reason) or "a halt", _signed(call), time.time())
+
+
+def _inhibit_kept(record: object) -> Inhibit:
+    """An inhibit of the run before. One that cannot be read counts as well."""
+    try:
+        return read_inhibit(record) or _UNREADABLE  # type: ignore[arg-type]
+    except (AttributeError, KeyError, TypeError, ValueError):
+        return _UNREADABLE
+
+
+_UNREADABLE: Final = Inhibit("the record of an inhibit cannot be read", "", 0.0)
+
+
+def _signed(call: Call) -> str:
+    """Who asks: what the client says, and its label."""
+    who = _short(call.arguments.get("who", ""))
+    return _short(f"{who}, {label_of(call)}" if who else label_of(call))
+
+
+def _short(text: object) -> str:
+    return words(str(text))[:LONGEST]

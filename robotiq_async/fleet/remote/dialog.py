@@ -210,9 +210,9 @@ class Dialog:
 
     # -- halts and cancellations -----------------------------------------------------------------------
 
-    def halt(self, agents: int = 1) -> asyncio.Task[Any]:
+    def halt(self, agents: int = 1, arguments: Fields | None = None) -> asyncio.Task[Any]:
         """Halt the gripper, until so many agents have confirmed it; the request is sent within this call."""
-        call = self.call({"label": label()})
+        call = self.call({"label": label(), **(arguments or {})})
         errand = self.post(call, "halt", timeout=HALT_S, urgency=Urgency.STOP, agents=agents)
         return self._noted(self._halts, self.spawn(self.answer(errand)))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Final
@@ -10,12 +11,13 @@ from ...runtime.log import Log, log
 from ...session.streams import Channels
 from ...values.enums import State, Trigger
 from ...values.events import Transition
+from ...values.inhibit import Inhibit
 from ...values.model import Model
 from ...values.status import RobotiqStatus
 from ...values.stroke import Points, Stroke, check_points
 from ..control.lease import WINDOW_S
 from ..wire.status_message import StatusMessage
-from ..wire.values import Fields, read_request, read_transition, reading
+from ..wire.values import Fields, read_inhibit, read_request, read_transition, reading
 
 _RUNS: Final = 16  # runs of an agent whose clocks are kept
 DRIFT: Final = 200e-6  # drift between two clocks at most, in seconds per second
@@ -75,6 +77,7 @@ class Mirror:
         misrouted: messages about another gripper, which were dropped.
         received_at: arrival of the last current message.
         points: of the agent's stroke, measured on the gripper; empty for nominal openings.
+        inhibited: why the agent refuses motion; None while it does not.
     """
 
     def __init__(
@@ -96,6 +99,9 @@ class Mirror:
         self.misrouted: int = 0
         self.received_at: float = 0.0
         self.points: Points = ()
+        self.inhibited: Inhibit | None = None
+        self._inhibit_stamp = -math.inf
+        """The agent's time of the newest word about it: a summary may be older than an answer."""
         self._strokes: dict[Model, Stroke] = {}  # made of the points
         self._mark = mark
         self._channels = channels or Channels()
@@ -216,6 +222,11 @@ class Mirror:
             self.points = points
             self._strokes.clear()
 
+    def receive_inhibit(self, told: Mapping[str, Any]) -> None:
+        """Take over whether motion is inhibited; an older agent does not say."""
+        if "inhibited" in told and (stamp := float(told["stamp"])) >= self._inhibit_stamp:
+            self.inhibited, self._inhibit_stamp = read_inhibit(told["inhibited"]), stamp
+
     def _stroke(self, model: Model) -> Stroke | None:
         if self.points and model not in self._strokes:
             self._strokes[model] = model.stroke.measured(self.points)
@@ -245,6 +256,7 @@ class Mirror:
         while len(self._clocks) > _RUNS:
             del self._clocks[next(iter(self._clocks))]
         self.newest = None
+        self._inhibit_stamp = -math.inf
         self.events = message.events
         self._events_state = as_seen_from_here(message.state)
         self._base = self.next_sequence if message.sequence < self.next_sequence else 0
@@ -278,6 +290,8 @@ class Mirror:
         with reading("an event"):
             if event["kind"] == "transition":
                 self._apply(read_transition(event, self.clock))
+            elif event["kind"] == "inhibit":
+                self.receive_inhibit(event)
             elif event["kind"] == "request":
                 sent = read_request(event, self.clock)
                 self._channels.requests.push(replace(sent, timestamp=self._in_order(sent.timestamp)))

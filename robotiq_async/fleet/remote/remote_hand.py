@@ -16,12 +16,15 @@ from ...values.calibration import ForceCalibration, SpeedCalibration
 from ...values.checks import check_flag, check_seconds
 from ...values.enums import Finger, State, StopLevel, Trigger
 from ...values.errors import (
+    AgentError,
     InvalidStateError,
+    MotionInhibitedError,
     NotAllowedError,
     NotStartedError,
     RobotiqConnectionError,
     StateTimeoutError,
 )
+from ...values.inhibit import Inhibit
 from ...values.model import THREE_FINGER
 from ...values.move_result import MoveResult
 from ...values.statistics import Counters, Statistics
@@ -30,7 +33,7 @@ from ...values.stroke import Points
 from ..network.bus import Bus
 from ..network.route import parse_remote_address
 from ..wire.values import Fields, read_result, reading
-from .dialog import no_answer_as_lost_connection
+from .dialog import label, no_answer_as_lost_connection
 from .session import CONNECT_S, RemoteSession
 
 COMMAND_S: Final = 5.0  # seconds for commands that end with the acknowledgment of the gripper
@@ -57,6 +60,8 @@ class RemoteHand(Hand):
       after :meth:`command` has returned, the refusal is logged.
     * :meth:`halt` needs no lease and is repeated until it is answered. If another client commands the
       gripper, it loses the lease. ConnectionLostError means no answer within 2 s: the fingers MAY STILL MOVE.
+    * :meth:`inhibit` and :meth:`permit` are the agent's, for all its clients: they need a started hand and no
+      lease. The inhibit outlasts leases, and restarts of the agent.
     * Millimetres and fractions follow the ``stroke`` of the agent's hand. What is sent are counts.
     * :attr:`state` is DISCONNECTED also while the agent is silent; that is a transition, too. Some statuses
       may be missing, and :meth:`grip_events` follows those that arrived.
@@ -221,6 +226,8 @@ class RemoteHand(Hand):
     def _command(self, axes: Finger, position: int | None, speed: int | None, force: int | None) -> None:
         session = self._running_session()
         session.check_control()
+        if (inhibit := self.inhibited) is not None and (position is not None or force is not None):
+            raise MotionInhibitedError(inhibit)
         if self.state not in RUNNING:
             raise refusal(Trigger.ASK_COMMAND, self.state, session.mirror.status)
         changes = {"position": position, "speed": speed, "force": force}
@@ -246,13 +253,38 @@ class RemoteHand(Hand):
     async def _hold(self, axes: Finger) -> None:
         await self._ask("hold", {"fingers": int(axes)}, COMMAND_S)
 
+    async def _inhibit(self, inhibit: Inhibit) -> None:
+        arguments = {"inhibit": inhibit.reason, "who": inhibit.who}
+        self._take_over_inhibit(await self._halted(arguments))
+
+    async def _permit(self, who: str) -> None:
+        session = self._running_session()
+        arguments = {"what": "permit", "label": label(), "who": who}
+        with no_answer_as_lost_connection():
+            self._take_over_inhibit(await session.dialog.ask("lease", arguments, timeout=COMMAND_S))
+
+    def _take_over_inhibit(self, answer: Fields) -> None:
+        if "inhibited" not in answer:
+            raise AgentError(f"{self._gripper}: its agent is older: it halts, and inhibits nothing")
+        assert self._session is not None, "it has answered"
+        with reading("an inhibit"):
+            self._session.mirror.receive_inhibit(answer)
+
+    @property
+    def inhibited(self) -> Inhibit | None:
+        """Why the agent refuses motion, since when, and by whom; None while it does not, or is not known."""
+        return None if self._session is None else self._session.mirror.inhibited
+
     async def _halt(self) -> None:
+        await self._halted()
+
+    async def _halted(self, arguments: Fields | None = None) -> Fields:
         session = self._running_session()
         session.dialog.clear()
-        halting = session.dialog.halt()
+        halting = session.dialog.halt(arguments=arguments)
         try:
             with no_answer_as_lost_connection():
-                await asyncio.shield(halting)
+                answer: Fields = await asyncio.shield(halting)
         except asyncio.CancelledError:
             if not halting.cancelled():
                 # The halt continues. Its error is retrieved, or asyncio would log that it never was.
@@ -260,6 +292,7 @@ class RemoteHand(Hand):
             elif session.is_over:
                 raise NotStartedError("the hand was stopped") from None
             raise
+        return answer
 
     async def _activate(self) -> None:
         await self._ask("activate", {}, SEQUENCE_S)

@@ -141,6 +141,7 @@ class RemoteSession:
             self.dialog.set_window(info["window"])
             self.statistics = read_statistics(info["statistics"])
             self.mirror.receive_points(info)
+            self.mirror.receive_inhibit(info)
         return True
 
     async def _give_up(self) -> None:
@@ -270,6 +271,7 @@ class RemoteSession:
         if "statistics" in fields:
             self.statistics = read_statistics(fields["statistics"])
             self.mirror.receive_points(fields)
+            self.mirror.receive_inhibit(fields)
             return
         if self._receive_status(bytes.fromhex(fields["status"]), in_turn=True):
             self.mirror.receive_events(fields["events"])

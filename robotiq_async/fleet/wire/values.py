@@ -20,11 +20,13 @@ from ...values.errors import (
     ControlLostError,
     GripperFaultError,
     InvalidStateError,
+    MotionInhibitedError,
     MoveTimeoutError,
     ProtocolError,
     RobotiqError,
 )
 from ...values.events import SentRequest, Transition
+from ...values.inhibit import Inhibit
 from ...values.model import model_of
 from ...values.move_result import MoveResult
 from ...values.request import Request
@@ -39,7 +41,7 @@ _KINDS: Final = {
     for name, kind in vars(errors).items()
     if isinstance(kind, type) and issubclass(kind, RobotiqError) and kind is not errors.NotAllStoppedError
 } | {"TypeError": TypeError, "ValueError": ValueError}
-_WORDS: Final = ("address", "reason")  # attributes of errors that are text
+_PLAIN: Final = ("address", "reason", "who", "since")  # attributes of errors that JSON has as they are
 
 
 @contextmanager
@@ -100,7 +102,7 @@ def error_fields(error: Exception) -> Fields:
         fields["fault"] = fault.value
     if status is not None:
         fields["status"] = status_fields(status)
-    for name in _WORDS:
+    for name in _PLAIN:
         if hasattr(error, name):
             fields[name] = getattr(error, name)
     if isinstance(error, RobotiqError) and error.advice:
@@ -115,6 +117,17 @@ def read_error(fields: Fields, clock: Clock) -> Exception:
             return _error(fields, clock)
     except ProtocolError as unreadable:
         return unreadable
+
+
+def inhibit_fields(inhibit: Inhibit | None) -> Fields | None:
+    return None if inhibit is None else inhibit.as_dict()
+
+
+def read_inhibit(fields: Mapping[str, Any] | None) -> Inhibit | None:
+    """Decode an inhibit, or the lack of one."""
+    if fields is None:
+        return None
+    return Inhibit(words(fields["reason"]), words(fields["who"]), float(fields["since"]))
 
 
 def _error(fields: Fields, clock: Clock) -> Exception:
@@ -136,6 +149,8 @@ def _error(fields: Fields, clock: Clock) -> Exception:
         known["address"] = words(fields["address"])
     if issubclass(kind, ControlLostError):
         known["reason"] = words(fields["reason"])
+    if issubclass(kind, MotionInhibitedError):
+        known |= {name: words(fields[name]) for name in ("reason", "who")} | {"since": float(fields["since"])}
     if issubclass(kind, RobotiqError) and "advice" in fields:
         known["advice"] = words(fields["advice"])
     vars(error).update(known)

@@ -40,8 +40,10 @@ from ..translation.joints import Targets
 from ..translation.settings import Settings
 from .goals import GoalRunner, Outcome
 
-COMMANDS: Final = ("activate", "reset", "halt", "recover", "release")
+COMMANDS: Final = ("activate", "reset", "halt", "recover", "release", "inhibit", "permit")
 """Names of the services, and of the actions that they carry out."""
+PERSON: Final = "~/inhibit"
+"""Who asks, in what others hear of an inhibit."""
 MOST_CALLS: Final = 16  # commands that run at a time, without halts, which are always accepted
 
 
@@ -70,6 +72,7 @@ class Connection:
         self.takes_commands: bool = False
         self.stops: int = 0
         self._operator = Operator(hand, speed=settings.speed, force=settings.force)
+        self._person = Operator(hand, who=PERSON, speed=settings.speed, force=settings.force)
         self._pending_stop = PendingStop(hand)
         self._goals = GoalRunner(hand, lost=lambda axes: self._pending_stop.schedule(lambda: hand.hold(axes)))
         self._calls: set[asyncio.Task[str]] = set()
@@ -126,11 +129,14 @@ class Connection:
         """Carry out one of :data:`COMMANDS`; returns its outcome as a text.
 
         Raises:
-            RefusedError: the node is not active, too many commands run, or a stop took over.
+            RefusedError: the node is not active, too many commands run, or a stop took over; never for a
+                halt, an inhibit or a permit.
             RobotiqError: the command failed.
         """
-        if name == "halt":
-            return await self._stop("a halt took over")
+        if name in ("halt", "inhibit"):
+            return await self._stop(f"a {name} took over", for_good=name == "inhibit")
+        if name == "permit":
+            return await self._person.act(ACTIONS[name])
         self._check_active()
         self._check_stopped()
         if len(self._calls) >= MOST_CALLS:
@@ -184,11 +190,11 @@ class Connection:
 
     # -- stops -----------------------------------------------------------------------------------------
 
-    async def _stop(self, reason: str) -> str:
+    async def _stop(self, reason: str, *, for_good: bool = False) -> str:
         self._end_all(reason)
         self._stopping += 1
         try:
-            return await self._operator.act(ACTIONS["halt"])
+            return await (self._person if for_good else self._operator).act(ACTIONS["halt"])
         finally:
             self._stopping -= 1
 

@@ -82,6 +82,9 @@ def _gripper(hand: Hand) -> Diagnosis:
     words = hand.state.name if level is Level.OK else status.fault.description
     if text := status.controller_fault_text:
         level, words = Level.ERROR, f"{words}; {text}"
+    if hand.inhibited is not None:
+        level, words = max(level, Level.WARN), f"{words}; {hand.inhibited}"
+        values["inhibited"] = hand.inhibited.reason
     return Diagnosis("gripper", level, words, values)
 
 
@@ -94,6 +97,7 @@ def status_text(hand: Hand, *, takes_commands: bool) -> str:
         "state": hand.state.name,
         "connected": is_connected(hand),
         "takes_commands": takes_commands,
+        "inhibited": None if hand.inhibited is None else hand.inhibited.as_dict(),
     }
     status = _newest(hand)
     if status is not None and is_connected(hand):
@@ -116,6 +120,8 @@ def is_connected(hand: Hand) -> bool:
 def why_not(hand: Hand) -> str | None:
     """The reason why the hand accepts no goal now; None if it does."""
     state = hand.state
+    if hand.inhibited is not None:
+        return f"{hand.inhibited}: look at the gripper, then call ~/permit"
     if state in RUNNING:
         return None
     if not is_connected(hand):

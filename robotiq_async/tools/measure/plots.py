@@ -274,6 +274,8 @@ def _event(fields: dict[str, Any]) -> tuple[str, bool] | None:
     is_fault = fields["kind"] == "fault"
     if fields["kind"] == "mark":
         return (_short(printable(fields["label"])) or "end of mark"), False
+    if fields["kind"] == "inhibit":
+        return ("inhibited" if fields["inhibited"] else "permitted"), fields["inhibited"]
     name = _short(printable(fields["fault"] if is_fault else fields["target"]))
     return "fault cleared" if name == "NONE" else name, is_fault
 

@@ -1,7 +1,7 @@
 """Everything about a hand as messages on four topics, for recordings and for viewers.
 
 ``/gripper/status`` (every poll), ``/gripper/command`` (every request that was written) and ``/gripper/event``
-(transitions and faults) are JSON with a JSON Schema; ``/joint_states`` is as ROS 2 encodes it.
+(transitions, faults, inhibits) are JSON with a JSON Schema; ``/joint_states`` is as ROS 2 encodes it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ...values.model import THREE_FINGER
 from ...values.status import RobotiqStatus
 from ..description.joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
 from ..description.kinematics import joint_angles, joint_names, joint_velocities
-from .payloads import SCHEMAS, Fields, efforts, fault_event, mark_fields, transition_fields
+from .payloads import SCHEMAS, Fields, InhibitEvents, efforts, fault_event, mark_fields, transition_fields
 
 BUFFER: Final = 100_000
 """Statuses kept while the event loop is busy with something else: minutes."""
@@ -115,6 +115,7 @@ class Feed:
         self._model = THREE_FINGER
         self._encoder = JointStateEncoder()
         self._before: list[RobotiqStatus] = []
+        self._inhibits = InhibitEvents(hand)
         self._epoch = 0.0
         self._counts = {COMMAND: 0, EVENT: 0}
         self._sources: tuple[_Source, ...] = (
@@ -179,6 +180,8 @@ class Feed:
         self._publish(Message(STATUS, stamp, data, status.sequence))
         if event := fault_event(status, next(reversed(self._before), None)):
             self._publish_json(EVENT, status.timestamp, event)
+        for event in self._inhibits.new(status.timestamp):
+            self._publish_json(EVENT, status.timestamp, event)
         self._publish_joints(status)
 
     def _publish_joints(self, status: RobotiqStatus) -> None:
@@ -207,6 +210,7 @@ class Timeline:
     def __init__(self, hand: Hand, buffer: int) -> None:
         self._hand, self._buffer = hand, buffer
         self._before: RobotiqStatus | None = None
+        self._inhibits = InhibitEvents(hand)
         self.open()
 
     def open(self) -> None:
@@ -233,3 +237,5 @@ class Timeline:
             if event := fault_event(each, self._before):
                 yield at, event
             self._before = each
+        for event in self._inhibits.new(now()):
+            yield offset + event["timestamp"], event

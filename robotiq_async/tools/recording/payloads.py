@@ -6,7 +6,7 @@ Statuses and requests have the JSON form of their ``as_dict()``.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -15,6 +15,7 @@ from ...values.checks import repr_of
 from ...values.enums import JAW, Fault, Finger, State
 from ...values.errors import NotStartedError
 from ...values.events import Transition
+from ...values.inhibit import Inhibit
 from ...values.model import THREE_FINGER
 from ...values.status import RobotiqStatus
 from ..description.kinematics import FINGER_NAMES
@@ -82,12 +83,15 @@ SCHEMAS: Final = {
         **_for_each_axis(position=INTEGER, speed=INTEGER, force=INTEGER),
     ),
     "event": object_schema(
-        kind={"type": "string", "enum": ["state", "transition", "fault", "mark"]},
+        kind={"type": "string", "enum": ["state", "transition", "fault", "inhibit", "mark"]},
         timestamp=NUMBER,
         source=STRING,
         target=STRING,
         trigger=STRING,
         **_FAULT,
+        inhibited=_BOOLEAN,
+        reason=STRING,
+        who=STRING,
         label=STRING,
         values={"type": "object", "additionalProperties": True},
     ),
@@ -95,6 +99,7 @@ SCHEMAS: Final = {
         name=STRING,
         address=STRING,
         state=STRING,
+        inhibited=STRING,
         age=NUMBER,
         **_FAULT,
         polls=INTEGER,
@@ -173,6 +178,25 @@ def fault_event(status: RobotiqStatus, before: RobotiqStatus | None) -> Fields |
     return {"kind": "fault", "timestamp": status.timestamp, **_in_words(status.fault)}
 
 
+class InhibitEvents:
+    """The events for an inhibit that a person has set or lifted."""
+
+    def __init__(self, hand: Hand) -> None:
+        self._hand = hand
+        self._before: Inhibit | None = None
+
+    def new(self, timestamp: float) -> Iterator[Fields]:
+        """The event since the last look, if any; an inhibit from before the first one counts."""
+        before, now = self._before, self._hand.inhibited
+        if before == now:
+            return
+        self._before = now
+        named = now or before
+        assert named is not None, "one of them is"
+        what = {"inhibited": now is not None, "reason": named.reason, "who": named.who}
+        yield {"kind": "inhibit", "timestamp": timestamp, **what}
+
+
 def _in_words(fault: Fault) -> Fields:
     return {
         "fault": fault.name,
@@ -193,6 +217,7 @@ def reading_fields(hand: Hand) -> Fields:
         "name": hand.name,
         "address": hand.address,
         "state": hand.state.name,
+        "inhibited": str(hand.inhibited or ""),
         **status.as_dict(),
         **_in_words(status.fault),
     }
@@ -207,6 +232,7 @@ def state_fields(hand: Hand, now: float) -> Fields:
         "name": hand.name,
         "address": hand.address,
         "state": hand.state.name,
+        "inhibited": str(hand.inhibited or ""),
         **hand.statistics.as_dict(),
     }
     try:

@@ -85,6 +85,7 @@ class HandUpdates:
             "hand": index,
             "state": self.hand.state.name,
             "problem": self.problem,
+            "inhibited": None if self.hand.inhibited is None else self.hand.inhibited.as_dict(),
             "peaks": self._peaks,
             "events": list(self._events),
             **self._newest(),

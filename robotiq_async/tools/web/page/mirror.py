@@ -12,6 +12,7 @@ from time import monotonic
 from typing import Any, Final
 
 from ....values.enums import DEFAULT_FORCE, DEFAULT_SPEED, State
+from ....values.inhibit import Inhibit
 from ....values.model import THREE_FINGER, Model, model_of
 from ....values.status import RobotiqStatus
 from ....values.stroke import Points, Stroke
@@ -53,6 +54,7 @@ class HandMirror:
     parts: tuple[Shape, ...] = ()  # the same, of what stands before the gripper
     age: float = 0.0  # seconds since the status was read, at the last update
     problem: str = ""  # why the hand could not be started; empty if it was
+    inhibited: Inhibit | None = None  # why a person has the hand refuse motion
     statistics: dict[str, Any] = field(default_factory=dict)  # the newest
     samples: deque[Sample] = field(default_factory=deque)  # of the last 30 s
     events: deque[tuple[int, dict[str, Any]]] = field(default_factory=lambda: deque(maxlen=EVENTS))
@@ -73,6 +75,8 @@ class HandMirror:
     def hear(self, update: dict[str, Any]) -> None:
         """Take in an update."""
         self.state, self.problem = State[update["state"]], update["problem"]
+        told = update["inhibited"]
+        self.inhibited = None if told is None else Inhibit(**told)
         if "registers" in update:
             model = model_of(update["model"])
             self.status = RobotiqStatus.from_registers(
@@ -84,8 +88,8 @@ class HandMirror:
                 has_current=update["has_current"],
             )
             self.age = update["age"]
-            told = update["bodies"]
-            self.joints, self.parts = (None, ()) if told is None else joints_and_parts(told)
+            bodies = update["bodies"]
+            self.joints, self.parts = (None, ()) if bodies is None else joints_and_parts(bodies)
         self.statistics = update.get("statistics", self.statistics)
         for event in update["events"]:
             self.event_count += 1

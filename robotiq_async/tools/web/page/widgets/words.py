@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from .....values.enums import JAW, Fault, Finger, Severity, State
 from .....values.status import NO_REQUEST
-from ....wording import AXIS_WORDS, JAW_NAME, STATE_WORDS
+from ....wording import AXIS_WORDS, JAW_NAME, STATE_WORDS, inhibit_words
 from ..mirror import HandMirror
 
 NAMES: Final = tuple("scissor" if axis is Finger.SCISSOR else str(axis.name) for axis in Finger.ALL)
@@ -75,6 +75,8 @@ def event_words(event: dict[str, Any]) -> str:
     """An event as a line."""
     if event["kind"] == "fault":
         return timed(f"fault 0x{event['fault_code']:02X}: {event['description']}", event["time"])
+    if event["kind"] == "inhibit":
+        return timed(inhibit_words(event), event["time"])
     words = STATE_WORDS[State[event["target"]]]
     return timed(f"{words}  ({event['source']} to {event['target']})", event["time"])
 

@@ -1,0 +1,51 @@
+"""Inhibit: that motion is refused, until a person permits it again."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+from .checks import as_float, repr_of
+
+LONGEST: Final = 200  # characters of a reason, and of who gave it
+
+
+@dataclass(frozen=True, slots=True)
+class Inhibit:
+    """Motion of a hand is refused, until a person permits it again.
+
+    Attributes:
+        reason: for people, 1..200 printable characters.
+        who: who or what has asked for it, 0..200 printable characters; empty if that was not said.
+        since: seconds since 1970, as it may outlive a process.
+
+    Raises:
+        TypeError: reason or who is not a str, or since no number.
+        ValueError: one of them is too short, too long or not printable.
+    """
+
+    reason: str
+    who: str
+    since: float
+
+    def __post_init__(self) -> None:
+        """Check the fields."""
+        _check("reason", self.reason, 1)
+        _check("who", self.who, 0)
+        if as_float(self.since) is None:
+            raise TypeError(f"since must be seconds since 1970, got {repr_of(self.since)}")
+
+    def as_dict(self) -> dict[str, Any]:
+        """The fields in types that JSON accepts."""
+        return asdict(self)
+
+    def __str__(self) -> str:
+        """``motion is inhibited: the guard is open (PLC)``."""
+        return f"motion is inhibited: {self.reason}" + (f" ({self.who})" if self.who else "")
+
+
+def _check(name: str, value: object, least: int) -> None:
+    if not isinstance(value, str):
+        raise TypeError(f"{name} must be a str, got {repr_of(value)}")
+    if not least <= len(value) <= LONGEST or not value.isprintable():
+        raise ValueError(f"{name} must be {least}..{LONGEST} printable characters, got {value[:300]!r}")

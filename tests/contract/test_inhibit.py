@@ -1,0 +1,169 @@
+"""A person's halt stays: nothing asked before or during it moves a finger, until a person permits it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+
+import pytest
+
+from robotiq_async import Fault, MotionInhibitedError, RobotiqError, State
+from robotiq_async.hand import Hand
+from tests.contract.bench import A, Bench, at_rest, contract, ended
+from tests.virtual import until
+
+REASON, WHO = "HALT was pressed", "the page"
+MOVES: dict[str, Callable[[Hand], Awaitable[object]]] = {
+    "move": lambda hand: hand.move(200),
+    "open": lambda hand: hand.open(),
+    "close": lambda hand: hand.close(),
+    "grasp": lambda hand: hand.grasp(),
+    "set_position": lambda hand: hand.set_position(200),
+    "set_force": lambda hand: hand.set_force(255),
+    "activate": lambda hand: hand.activate(),
+    "atr": lambda hand: hand.atr(),
+    "recover": lambda hand: hand.recover(),
+}
+"""What may move or press."""
+
+
+async def stays(here: Bench, seconds: float = 0.5) -> None:
+    """Nothing moves for a while."""
+    travels = here.travels
+    await asyncio.sleep(seconds)
+    assert here.travels == travels
+
+
+async def refused(work: Awaitable[object]) -> MotionInhibitedError:
+    with pytest.raises(MotionInhibitedError, match="HALT was pressed") as caught:
+        await work
+    return caught.value
+
+
+@contract
+async def test_what_may_move_or_press_is_refused_and_the_rest_passes(here: Bench, hand: Hand) -> None:
+    assert hand.inhibited is None
+    await hand.inhibit(REASON, who=WHO)
+    writes = here.writes
+    for call in MOVES.values():
+        error = await refused(call(hand))
+        assert error.reason == REASON
+        assert error.who.startswith(WHO)
+        assert error.since > 1e9
+    with pytest.raises(MotionInhibitedError):
+        hand.command(position=200)
+    with pytest.raises(MotionInhibitedError):
+        hand.command(force=255)
+    await asyncio.sleep(0.1)
+    assert here.writes == writes
+    await hand.inhibit("another reason")
+    await hand.halt()
+    await hand.hold()
+    await hand.set_speed(7)
+    hand.command(speed=9)
+    await until(lambda: here.last_write.axes[0].speed == 9)
+    await hand.reset()
+    assert hand.state is State.RESET
+    await refused(hand.activate())
+    assert hand.inhibited is not None
+    assert hand.inhibited.reason == REASON  # the first one stays
+    await stays(here)
+    await hand.permit(who=WHO)
+    assert hand.inhibited is None
+    await hand.activate()
+    assert (await hand.move(100, A)).reached == A
+
+
+@contract
+async def test_calls_that_wait_end_with_it(here: Bench, hand: Hand) -> None:
+    moving = await here.moving(hand.move(255, speed=0))
+    tightening = asyncio.create_task(hand.set_force(90))
+    await asyncio.sleep(0)
+    await hand.inhibit(REASON)
+    assert not here.gripper.is_moving
+    assert isinstance(await ended(moving), MotionInhibitedError)
+    assert isinstance(await ended(tightening), MotionInhibitedError)
+    await stays(here)
+    assert not here.last_write.go
+
+
+@contract
+async def test_commands_that_are_not_sent_yet_are_dropped(here: Bench, hand: Hand) -> None:
+    await hand.set_force(3)
+    hand.command(position=255, force=90)
+    await hand.inhibit(REASON)
+    await stays(here)
+    await hand.set_speed(9)
+    assert not here.last_write.go
+    assert here.last_write.axes[0].force == 3
+    await stays(here)
+
+
+@contract(active=False)
+async def test_an_activation_ends_in_reset_and_a_recovery_does_not_go_on(here: Bench, hand: Hand) -> None:
+    recovering = await here.moving(hand.recover())
+    activating = asyncio.create_task(hand.activate())
+    await asyncio.sleep(0.02)
+    await hand.inhibit(REASON)
+    assert hand.state is State.RESET
+    assert isinstance(await ended(recovering), MotionInhibitedError)
+    assert isinstance(await ended(activating), MotionInhibitedError)
+    await stays(here)
+    await refused(hand.recover())
+
+
+@contract
+async def test_a_recovery_that_waits_for_a_fault_ends(here: Bench, hand: Hand) -> None:
+    here.gripper.inject_fault(Fault.COMMUNICATION_NOT_READY)
+    await hand.wait_for_state(State.FAULT)
+    recovering = asyncio.create_task(hand.recover())
+    await asyncio.sleep(0.1)
+    await hand.inhibit(REASON)
+    assert isinstance(await ended(recovering), MotionInhibitedError)
+
+
+@contract
+async def test_it_outlasts_the_link_and_a_restart_and_adoption_stays_passive(here: Bench, hand: Hand) -> None:
+    await hand.inhibit(REASON)
+    await here.unplug(hand)
+    await here.plug(hand)
+    await refused(hand.move(200))
+    await hand.stop()
+    writes = here.writes
+    await hand.start()  # an active gripper is adopted
+    assert here.writes == writes
+    assert hand.inhibited is not None
+    await refused(hand.move(200))
+    await hand.stop()
+    await asyncio.sleep(0.1)
+    here.gripper.write(0, [0] * 8)
+    await asyncio.sleep(0.2)
+    await refused(hand.start())  # a reset one is not activated
+    await stays(here)
+
+
+@contract
+async def test_while_the_link_is_down_what_moves_is_held_once_it_is_back(here: Bench, hand: Hand) -> None:
+    await hand.set_position(255)
+    await hand.set_speed(0)
+    await here.moves()
+    await here.unplug(hand)
+    with pytest.raises(RobotiqError):  # the fingers may still move
+        await hand.inhibit(REASON)
+    await until(lambda: hand.inhibited is not None)
+    await here.plug(hand)
+    await until(lambda: not here.gripper.is_moving)
+    await at_rest(hand)
+    assert here.gripper.position(A) < 240
+
+
+@contract
+async def test_the_reason_is_for_people(here: Bench, hand: Hand) -> None:
+    for bad in ("", "two\nlines", "x" * 201):
+        with pytest.raises(ValueError, match="reason must be"):
+            await hand.inhibit(bad)
+    with pytest.raises(TypeError, match="reason must be a str"):
+        await hand.inhibit(3)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="who must be"):
+        await hand.permit(who="x" * 201)
+    assert hand.inhibited is None

@@ -1,0 +1,135 @@
+"""An inhibit at an agent: for all clients, over leases and its own restart; by a fleet's halt."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+
+import pytest
+
+from robotiq_async import Finger, Inhibit, MotionInhibitedError, RobotiqError
+from robotiq_async.fleet.agent import records
+from robotiq_async.fleet.agent.records import FileRecords
+from robotiq_async.fleet.fleet import Fleet
+from robotiq_async.fleet.remote.remote_hand import RemoteHand
+from robotiq_async.values.errors import AgentError, ControlLostError, NotAllStoppedError
+from tests.fleet.cell import move_slowly
+from tests.fleet.lab import LEFT, Between, Lab, lab
+from tests.fleet.world import World, world
+from tests.virtual import inside, until
+
+
+@inside(lab)
+async def test_a_halt_of_the_fleet_stays_for_every_client_until_a_person_permits(here: Lab) -> None:
+    async with here.client("holder") as hand, here.client("person", control=False) as person:
+        moving = await here.moving(hand)
+        async with Fleet("lab", bus=here.network.bus("console")) as fleet:
+            assert list((await fleet.halt_all("fleet halt")).values()) == ["stopped"]
+            await until(lambda: fleet.members[LEFT].inhibited.startswith("motion is inhibited: fleet halt ("))
+        with pytest.raises(ControlLostError, match="halted"):
+            await moving
+        await hand.acquire()
+        await until(lambda: hand.inhibited is not None)
+        for work in (hand.move(9), hand.recover(), hand.set_force(200)):
+            with pytest.raises(MotionInhibitedError, match="fleet halt"):
+                await work
+        with pytest.raises(MotionInhibitedError, match="fleet halt"):
+            hand.command(position=9)
+        hand.command(speed=9)
+        assert not here.gripper.is_moving
+        await person.permit(who="the foreman")
+        assert person.inhibited is None
+        await until(lambda: hand.inhibited is None)
+        await hand.move(30, Finger.A)
+
+
+@inside(world)
+async def test_it_outlives_leases_and_the_agent(here: World) -> None:
+    """The agent is killed, and the next one reads what it has left."""
+    await move_slowly(here)
+    await here.other.do(here.other.hand.inhibit("the guard is open", who="PLC"))
+    assert not here.gripper.is_moving
+    here.kill(here.agent.host)
+    await here.start_agent("next agent")
+    await asyncio.sleep(2)
+    inhibit = here.holder.hand.inhibited
+    assert inhibit is not None
+    assert inhibit.reason == "the guard is open"
+    assert inhibit.who.startswith("PLC, ")
+    await here.holder.do(here.holder.hand.acquire())
+    with pytest.raises(MotionInhibitedError, match="the guard is open"):
+        await here.holder.do(here.holder.hand.move(0, Finger.A))
+    await here.other.do(here.other.hand.permit())
+    here.kill(here.agent.host)
+    await here.start_agent("third agent")
+    await asyncio.sleep(2)
+    assert here.holder.hand.inhibited is None
+    await here.holder.do(here.holder.hand.acquire())
+    await here.holder.do(here.holder.hand.move(0, Finger.A))
+
+
+@inside(lab)
+async def test_nothing_malformed_keeps_it_from_halting(here: Lab) -> None:
+    """Whatever a program of others calls the reason, the fingers stop, and stay."""
+    async with here.client("holder") as hand:
+        await here.moving(hand)
+        dialog = hand._session.dialog  # type: ignore[union-attr]
+        await dialog.halt(arguments={"inhibit": ["\x1b[2J" * 400], "who": 7})
+        assert not here.gripper.is_moving
+        inhibit = here.local.inhibited
+        assert inhibit is not None
+        assert inhibit.reason.isprintable()
+
+
+class Older(Between):
+    """The agent of an older version: it does not know the word."""
+
+    def ask(self, key: str, payload: bytes, **how: object) -> object:
+        fields = json.loads(payload)
+        fields.get("arguments", {}).pop("inhibit", None)
+        return self._bus.ask(key, json.dumps(fields).encode(), **how)  # type: ignore[arg-type]
+
+
+@inside(lab)
+async def test_an_older_agent_halts_and_the_caller_hears_that_it_inhibits_nothing(here: Lab) -> None:
+    async with RemoteHand(str(LEFT), bus=Older(here.network.bus("new"))) as hand:  # type: ignore[arg-type]
+        await here.moving(hand)
+        with pytest.raises(AgentError, match="older"):
+            await hand.inhibit("HALT")
+        assert not here.gripper.is_moving
+        assert hand.inhibited is None
+    async with Fleet("lab", bus=Older(here.network.bus("console"))) as fleet:  # type: ignore[arg-type]
+        with pytest.raises(NotAllStoppedError, match="not inhibited: its agent is older"):
+            await fleet.halt_all("fleet halt")
+
+
+async def test_its_record_counts_after_a_restart_of_the_machine(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The record of a lease does not: it may be outdated. An outdated inhibit only refuses."""
+    one, inhibit = FileRecords(tmp_path), Inhibit("the guard is open", "", 1.0)
+    one.keep(LEFT, {"number": 3, "inhibited": inhibit.as_dict()})
+    await one.kept()
+    boot = tmp_path / "boot"
+    boot.write_text("another")
+    monkeypatch.setattr(records, "_BOOT", boot)
+    later = FileRecords(tmp_path)
+    assert later.read(LEFT) is None
+    assert later.read_inhibit(LEFT) == inhibit.as_dict()
+
+
+@pytest.mark.parametrize("record", ["?", {"reason": 3}, {"reason": "", "who": "", "since": "x"}])
+@inside(world)
+async def test_an_inhibit_that_cannot_be_read_counts(here: World, record: object) -> None:
+    here.kill(here.agent.host)
+    here.records.records[LEFT] = {"inhibited": record}
+    await here.start_agent("next agent")
+    await asyncio.sleep(2)
+    with pytest.raises(RobotiqError, match="cannot be read"):
+        await here.other.do(_moved(here.other.hand))
+
+
+async def _moved(hand: RemoteHand) -> None:
+    await hand.take()
+    await hand.move(9)
