@@ -83,7 +83,7 @@ pythons: $(RELEASE)/.complete  ## Test the core on other Pythons (PYTHONS="3.12 
 canary: $(RELEASE)/.complete  ## Test with the newest of all dependencies, in an environment that is thrown away (PYMODBUS="pymodbus>=4.0.0.dev0")
 	@PYMODBUS="$(PYMODBUS)" $(RELEASE)/bin/python -m tests.release.canary
 
-soak: $(STAMP)  ## Move a MODEL=3f under random faults for MINUTES=30 over LINK=tcp (rtu, urcap), and print figures
+soak: $(STAMP)  ## Move a MODEL=3f under random faults for MINUTES=30 over LINK=tcp (rtu, urcap, tunnel), and print figures
 	@$(BIN)/python -m tests.adversity.soak --minutes $(MINUTES) --link $(LINK) --model $(MODEL) --hands $(HANDS)
 
 habits: $(STAMP)  ## Everything under fault once more, with HABITS="status-lag; silence-fault; write-spacing"

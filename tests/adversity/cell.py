@@ -258,6 +258,13 @@ def cells_of_a_urcap() -> Iterator[Cell]:
         )
 
 
+def cells_of_a_tunnel() -> Iterator[Cell]:
+    """Every cell of a jaw through a tunnel that differs from a jaw on a serial line."""
+    for troubles, outcomes in _rows("## Through a tunnel"):
+        for trouble in words_in(troubles):
+            yield from (Cell(trouble, "tunnel", phase, ends) for phase, (ends, _) in outcomes)
+
+
 def section(heading: str) -> str:
     """The section of a heading, its lines joined."""
     text = read("under-fault.md").partition(f"\n{heading}\n")[2].partition("\n#")[0]

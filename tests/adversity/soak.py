@@ -24,9 +24,9 @@ from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
-from robotiq_async import JAW, Finger, Model, MoveResult, RobotiqError, RobotiqHand, State
+from robotiq_async import JAW, Finger, Model, MoveResult, RobotiqError, RobotiqHand, State, Tunnel
 from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.link.line import LONGEST_HUSH_S
 from robotiq_async.session.options import RESPONSE_TIMEOUT_S
@@ -35,7 +35,17 @@ from robotiq_async.values.model import MODELS, THREE_FINGER, model_of
 from robotiq_async.values.registers import RTU_REGISTERS
 from tests.adversity.fuzz import resident
 from tests.adversity.watch import LoopWatch, WriteWatch, check
-from tests.adversity.world import MODEL, RtuServer, Server, StampedGripper, TcpServer, UrcapServer, World
+from tests.adversity.world import (
+    MODEL,
+    RtuServer,
+    Server,
+    StampedGripper,
+    TcpServer,
+    ToolServer,
+    UrcapServer,
+    World,
+    tunnel_through_an_arm,
+)
 from tests.serial_line import SerialLine
 
 SPEEDUP = 5.0
@@ -63,6 +73,11 @@ TROUBLES = [
     *(Trouble(kind) for kind in ("echo", "strict-silence")),
 ]
 """Troubles; those that fit the link and the gripper happen."""
+SERVERS: Final[dict[str, type[TcpServer | UrcapServer | ToolServer]]] = {
+    "tcp": TcpServer,
+    "urcap": UrcapServer,
+    "tunnel": ToolServer,
+}
 MOVES_EVERYTHING = ("foreign", "release")
 OF_A_SCISSOR = "interference"
 
@@ -283,9 +298,12 @@ async def started(
         unit = RTU_REGISTERS.device_id + number
         server = RtuServer(line.fars[number], gripper, device_id=unit)
     else:
-        server = UrcapServer(gripper) if link == "urcap" else TcpServer(gripper)
-    async with server:
-        address = server.address if line is None else f"rtu://{line.near}"
+        server = SERVERS[link](gripper)
+    async with contextlib.AsyncExitStack() as stack:
+        await stack.enter_async_context(server)
+        address: str | Tunnel = server.address if line is None else f"rtu://{line.near}"
+        if link == "tunnel":
+            address = await stack.enter_async_context(tunnel_through_an_arm(server))
         async with RobotiqHand(address, model=gripper.model, device_id=unit) as hand:
             world = World(gripper, server, None, hand)
             watching = asyncio.create_task(world.watch())
@@ -341,9 +359,9 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=30.0, help="how long (default: 30)")
     parser.add_argument(
         "--link",
-        choices=("tcp", "rtu", "urcap"),
+        choices=("rtu", *SERVERS),
         default="tcp",
-        help="Modbus TCP, a pseudo terminal, or the text port of a UR",
+        help="Modbus TCP, a pseudo terminal, the text port of a UR, or a tunnel through an arm",
     )
     parser.add_argument("--hands", type=int, default=1, help="how many; on rtu they share the line")
     parser.add_argument("--model", type=model_of, default=MODEL, help=f"one of {', '.join(MODELS)}")

@@ -12,7 +12,7 @@ from __future__ import annotations
 import contextlib
 import os
 from collections import Counter, defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import pytest
 
@@ -20,7 +20,7 @@ from robotiq_async import Finger
 from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values.model import TWO_FINGER_85, Model
 from robotiq_async.values.registers import REGISTER_COUNT
-from tests.adversity.cell import Cell, cells, cells_of_a_urcap, outcome
+from tests.adversity.cell import Cell, cells, cells_of_a_tunnel, cells_of_a_urcap, outcome
 from tests.adversity.phases import PHASES
 from tests.adversity.world import HABITS, MODEL, HeldLoopError, world
 from tests.virtual import run
@@ -153,7 +153,19 @@ def ends_alike_on_a_jaw(cell: Cell) -> bool:
     return expected(cell, TWO_FINGER_85) == cell.outcome
 
 
+def through_a_tunnel() -> Iterator[Cell]:
+    """Every cell of a trouble of the bytes, at a jaw."""
+    own = {(cell.trouble, cell.phase): cell for cell in cells_of_a_tunnel()}
+    for cell in EVERY:
+        kind = kind_of(cell)
+        is_of_bytes = kind in ("silence", "echo") or (kind in KINDS and KINDS[kind].corruption is not None)
+        if cell.link == "rtu" and is_of_bytes:
+            as_on_a_line = cell._replace(link="tunnel", outcome=expected(cell, TWO_FINGER_85))
+            yield own.get((cell.trouble, cell.phase), as_on_a_line)
+
+
 CELLS = in_turn(EVERY)
+THROUGH_A_TUNNEL = in_turn(through_a_tunnel())
 OF_A_URCAP = in_turn(cells_of_a_urcap())
 
 
@@ -211,6 +223,11 @@ def test_row_of_a_urcap(row: list[Cell]) -> None:
     assert tried_in_turn(row, TWO_FINGER_85) == {cell.phase.name: usual(cell) for cell in row}
 
 
+@pytest.mark.parametrize("row", in_rows(THROUGH_A_TUNNEL).values(), ids=in_rows(THROUGH_A_TUNNEL))
+def test_row_through_a_tunnel(row: list[Cell]) -> None:
+    assert tried_in_turn(row, TWO_FINGER_85) == {cell.phase.name: cell.outcome for cell in row}
+
+
 def test_every_kind_of_trouble_is_in_the_table() -> None:
     assert {cell.trouble.split()[0] for cell in [*CELLS, *OF_A_URCAP]} - {"line"} == set(KINDS)
     assert {IN_EVERY_PHASE, *TROUBLES_OF_A_JAW} <= {cell.trouble for cell in EVERY}
@@ -218,7 +235,11 @@ def test_every_kind_of_trouble_is_in_the_table() -> None:
 
 @pytest.mark.parametrize(
     ("chosen", "every"),
-    [([*CELLS, *filter(ends_alike_on_a_jaw, OF_A_JAW)], EVERY), (OF_A_URCAP, [*cells_of_a_urcap()])],
+    [
+        ([*CELLS, *filter(ends_alike_on_a_jaw, OF_A_JAW)], EVERY),
+        (OF_A_URCAP, [*cells_of_a_urcap()]),
+        (THROUGH_A_TUNNEL, [*through_a_tunnel()]),
+    ],
 )
 def test_every_outcome_is_tried_in_every_phase_and_every_trouble_in_some(
     chosen: list[Cell], every: list[Cell]

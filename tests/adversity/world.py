@@ -6,15 +6,17 @@ import asyncio
 import os
 from bisect import bisect_left, bisect_right
 from collections.abc import AsyncIterator, Callable, Sequence
-from contextlib import asynccontextmanager, suppress
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
 
-from robotiq_async import JAW, Finger, RobotiqConnectionError, RobotiqHand, RobotiqStatus, State
+from robotiq_async import JAW, Finger, RobotiqConnectionError, RobotiqHand, RobotiqStatus, State, Tunnel
+from robotiq_async.link.address import parse_address
 from robotiq_async.link.urcap import lines
 from robotiq_async.simulator import (
+    RtuOverTcpSimulatorServer,
     SerialSimulatorServer,
     SimulatedGripper,
     SimulatorServer,
@@ -27,6 +29,7 @@ from robotiq_async.simulator.troubles.fault_injector import FaultInjector
 from robotiq_async.values.model import Model, model_of
 from robotiq_async.values.registers import Registers, gFLT, gIMC
 from robotiq_async.values.request import Request
+from tests.arms import DoosanController, ToolLine, tunnel_of
 from tests.grippers import activate_beforehand
 from tests.virtual import VirtualLoop
 from tests.virtual_line import VirtualLine
@@ -117,6 +120,10 @@ class RtuServer(Heard, SerialSimulatorServer):
     pass
 
 
+class ToolServer(Heard, RtuOverTcpSimulatorServer):
+    """The gripper at the tool of an arm."""
+
+
 class UrcapServer(Heard, UrcapSimulatorServer):
     """Keeps what it has answered, for there is no room for a number in the variables.
 
@@ -144,7 +151,7 @@ class UrcapServer(Heard, UrcapSimulatorServer):
         return said
 
 
-Server = TcpServer | RtuServer | UrcapServer
+Server = TcpServer | RtuServer | ToolServer | UrcapServer
 
 
 @dataclass
@@ -261,6 +268,13 @@ class World:
 
 
 @asynccontextmanager
+async def tunnel_through_an_arm(server: Server) -> AsyncIterator[Tunnel]:
+    """The tunnel to a gripper at an arm's tool: that which carries the bytes as they are."""
+    async with DoosanController(ToolLine(parse_address(server.address).port)) as arm:
+        yield tunnel_of("Doosan", "127.0.0.1", arm.port)
+
+
+@asynccontextmanager
 async def world(
     link: str = "tcp",
     *,
@@ -272,7 +286,7 @@ async def world(
     """A world whose gripper was just switched on, and a hand that is not started.
 
     Args:
-        link: tcp, rtu, or urcap for a jaw.
+        link: tcp, rtu, tunnel, or urcap for a jaw.
         monkeypatch: for rtu, where the fake serial ports are put in place.
         speedup: of the gripper.
         model: of the gripper, and of the hand.
@@ -282,6 +296,7 @@ async def world(
     gripper = StampedGripper(loop.time, speedup=speedup, device_cycle=0.005 * speedup, model=model)
     line: VirtualLine | None = None
     server: Server
+    address: str | Tunnel
     if link == "rtu":
         assert monkeypatch is not None
         line = VirtualLine(monkeypatch)
@@ -289,8 +304,11 @@ async def world(
     elif link == "urcap":
         server, address = UrcapServer(gripper), ""
     else:
-        server, address = TcpServer(gripper), ""
-    async with server:
+        server, address = ToolServer(gripper) if link == "tunnel" else TcpServer(gripper), ""
+    async with AsyncExitStack() as stack:
+        await stack.enter_async_context(server)
+        if link == "tunnel":
+            address = await stack.enter_async_context(tunnel_through_an_arm(server))
         # Every phase and every trouble lasts for many polls; more of them reveal no more and take longer.
         options = {"poll_interval": 0.03, "model": model} | options
         if any(habit.kind == "function-3-only" for habit in HABITS):
