@@ -79,8 +79,8 @@ class Controller:
     ) -> None:
         self.machine: Final = machine
         self.status: RobotiqStatus | None = None  # the newest; None before the first
-        self.activates = False  # whether a gripper that is found reset is activated
-        self.foreign_commands = 0  # how often another client was seen to command the gripper
+        self.activates: bool = False  # whether a gripper that is found reset is activated
+        self.foreign_commands: int = 0  # how often another client was seen to command the gripper
         self._ledger: Final = Ledger(speed, force, model, machine.log, left and left.ledger, assumed)
         self._closing_time: Final = closing_time  # seconds of a full closing at a speed
         # Seconds from sending a write to the next one: a gripper may acknowledge one that comes sooner and

@@ -96,7 +96,7 @@ class Evidence:
     def __init__(self, log: Log | None = None) -> None:
         self.status: RobotiqStatus | None = None
         self.condition: Trigger | None = None  # what it shows; None while the link is down
-        self.passed = 0  # how often 0x09 has gone without having lasted
+        self.passed: int = 0  # how often 0x09 has gone without having lasted
         self._log: Final = log
         # When the reads in a row that have shown it were asked for: all, and those since the last silence.
         self._row: Final[list[float]] = []

@@ -76,9 +76,9 @@ class Ledger:
         self.match: Entry | None = None  # the one that the newest status shows
         # When that was asked for. It may show the state of that time, however late a busy loop reads the
         # reply; so the age of a write is measured by this.
-        self.now = Moment(0.0, 0)
-        self.ours = NO_AXES  # the axes that may move because of us: we gave them their position
-        self.unrested = NO_AXES  # those not known to have come to rest under their last request
+        self.now: Moment = Moment(0.0, 0)
+        self.ours: Finger = NO_AXES  # the axes that may move because of us: we gave them their position
+        self.unrested: Finger = NO_AXES  # those not known to have come to rest under their last request
         self.contacts: Final[Contacts] = Contacts() if before is None else before.contacts
         self.limits: Final = Limits(log)
         self._delay = 0.0  # seconds from sending to acting, at least, of the newest write that showed

@@ -69,7 +69,7 @@ class OpenRequests:
     """Commands, holds and moves. Halts belong to their stop."""
 
     def __init__(self, log: Log = log) -> None:
-        self.pending = Pending()  # for the next write
+        self.pending: Pending = Pending()  # for the next write
         self.calls: list[Call] = []  # those that wait for their answer
         self._sent = Pending()  # in the write in flight
         # The move that an axis follows, until something else takes the axis over. A failed move counts as

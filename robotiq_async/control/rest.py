@@ -148,7 +148,7 @@ class Contacts:
 
     def __init__(self) -> None:
         self._shown: dict[Finger, RobotiqStatus] = {}  # by axis, the newest status that shows it in contact
-        self.open = NO_AXES
+        self.open: Finger = NO_AXES
 
     def __bool__(self) -> bool:
         return bool(self._shown)

@@ -154,9 +154,10 @@ class StateMachine:
         self, changed: Callable[[State, State, Trigger], None] = lambda *_: None, *, log: Log = log
     ) -> None:
         self.log = log
-        self.changed = changed  # called with source, target and trigger after each change
+        # Called with source, target and trigger after each change.
+        self.changed: Callable[[State, State, Trigger], None] = changed
         self.why_down: object = None  # why the link is down, for the error of what is refused then
-        self.state = State.DISCONNECTED  # only show() sets it
+        self.state: State = State.DISCONNECTED  # only show() sets it
         self.inhibited: Inhibit | None = None  # only inhibit() and permit() set it; outlasts runs
 
     def ask(self, trigger: Trigger, status: RobotiqStatus | None = None, *, presses: bool = True) -> bool:

@@ -62,7 +62,7 @@ class GripperService:
         self._patience = Patience(hand, PATIENCE_S)
         self._widths = Convention("polymetis", open=hand.units.mm(0) / 1000, closed=0.0)
         self._fingers = [axis for axis in hand.model.axes if axis is not Finger.SCISSOR]
-        self.is_ready = threading.Event()
+        self.is_ready: threading.Event = threading.Event()
         """Whether the gripper is active, so that a Goto need not wait."""
 
     @property

@@ -71,10 +71,10 @@ class Dialogues:
         log: Log,
     ) -> None:
         """``make`` makes the exchange of a request (unit and PDU) in the form of the line."""
-        self.line = line
-        self.repeats = 0
+        self.line: Line = line
+        self.repeats: int = 0
         self.serves_23: bool | None = registers.write_function == 23 and (True if registers.is_sure else None)
-        self.has_served_23 = False
+        self.has_served_23: bool = False
         self._map: Final = registers
         self._make: Final = make
         self._usual: Final = Timing(response_timeout)

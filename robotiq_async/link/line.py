@@ -115,10 +115,10 @@ class Line:
         ``shares`` the line may have several users at a time.
         """
         self.state, self.why = CLOSED, None
-        self.forgives = address.is_rtu
-        self.keeps_silence = address.kind == "rtu"
-        self.silence = Silence(address.line.character_s)
-        self.echo = Echo()
+        self.forgives: bool = address.is_rtu
+        self.keeps_silence: bool = address.kind == "rtu"
+        self.silence: Silence = Silence(address.line.character_s)
+        self.echo: Echo = Echo()
         self.address: Final = address
         self._wire: Final = wire or wire_to(address)
         self._stray: Final = stray

@@ -35,8 +35,8 @@ class Silence:
     def __init__(self, character_s: float) -> None:
         """Begin with the short silence; ``character_s`` is what a character takes on the line, in seconds."""
         self.short_s: Final = SHORT_CHARACTERS * character_s
-        self.heard = -math.inf
-        self.is_long = False
+        self.heard: float = -math.inf
+        self.is_long: bool = False
 
     def hear(self, now: float) -> None:
         """Bytes have arrived."""

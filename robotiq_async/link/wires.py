@@ -113,7 +113,7 @@ class _ClientWire:
 
     def __init__(self, address: Address) -> None:
         self._address = address
-        self.may_echo = address.is_rtu
+        self.may_echo: bool = address.is_rtu
 
     def close(self) -> None:
         client, self._client = self._client, None

@@ -24,7 +24,7 @@ class Ending:
     """
 
     def __init__(self, level: StopLevel, log: Log) -> None:
-        self.level = level
+        self.level: StopLevel = level
         self._log: Final = log
         self._limit: Final = Limit(STOP_S, shield=True)
 

@@ -41,7 +41,7 @@ class Publisher:
 
     def __init__(self, channels: Channels, controller: Controller) -> None:
         self.numbers: Final = channels.numbers
-        self.has_to_tell = False
+        self.has_to_tell: bool = False
         self._channels: Final = channels
         self._controller: Final = controller
         self._loop: Final = asyncio.get_running_loop()

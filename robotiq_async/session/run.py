@@ -99,7 +99,7 @@ class Run:
 
     def __init__(self, parts: Parts, ended: Callable[[], None] = lambda: None) -> None:
         """``ended`` is called once, in the turn of the loop in which the run ends."""
-        self.state = RunState.CONNECTING
+        self.state: RunState = RunState.CONNECTING
         self.connected: Final[asyncio.Future[None]] = asyncio.get_running_loop().create_future()
         self.down: Down | None = None
         self.failure: BaseException | None = None

@@ -87,8 +87,8 @@ class Session:
         self._channels = channels
         self._waiters = StateWaiters()
         self._progress = ActivationProgress(self._loop, options.log)
-        self.counters = Counters()
-        self.controller = Controller(
+        self.counters: Counters = Counters()
+        self.controller: Controller = Controller(
             machine,
             options.speed,
             options.force,
@@ -106,7 +106,7 @@ class Session:
             self._claims.release(self)
             raise
         parts = Parts(link, self.controller, self.counters, self._publisher, options)
-        self.run = Run(parts, self._end)
+        self.run: Run = Run(parts, self._end)
         channels.reopen(self._loop)
         machine.begin(self._on_transition)
         machine.show(State.DISCONNECTED, Trigger.ASK_START)

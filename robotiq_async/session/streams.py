@@ -90,7 +90,7 @@ class Intake(Generic[T]):
     """
 
     def __init__(self, buffer: int | None, kept: set[Intake[Any]]) -> None:
-        self.missed = 0
+        self.missed: int = 0
         self._loop: asyncio.AbstractEventLoop | None = None
         """The loop of the hand, while it runs: items come from there."""
         self._kept: Final = kept
@@ -386,8 +386,8 @@ class Channels:
     """
 
     def __init__(self, log: Log = log) -> None:
-        self.numbers = itertools.count()
-        self.listeners = Listeners(log)
+        self.numbers: itertools.count[int] = itertools.count()
+        self.listeners: Listeners = Listeners(log)
         self.statuses: Channel[RobotiqStatus] = Channel(self.listeners)
         self.transitions: Channel[Transition] = Channel(self.listeners)
         self.requests: Channel[SentRequest] = Channel(self.listeners)

@@ -14,7 +14,7 @@ from ...values.events import SentRequest
 from ...values.move_result import MoveResult
 from ..network.bus import Query
 from ..wire.envelope import Answer, Call, failure
-from ..wire.settings import asked_of, is_in, moved_by
+from ..wire.settings import Setting, asked_of, is_in, moved_by
 from ..wire.values import Fields, result_fields
 from .publisher import HandPublisher
 
@@ -46,7 +46,7 @@ class Job:
         self.answer: bytes | None = None
         self.task: asyncio.Task[MoveResult | None] | None = None
         self.reason: str = ""
-        self.asked = asked_of(name, call.arguments)
+        self.asked: dict[Setting, int] = asked_of(name, call.arguments)
         self.is_shown = False
         self.was_refused = False
         self.says: Callable[[], Fields] = dict

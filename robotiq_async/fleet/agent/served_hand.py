@@ -75,7 +75,7 @@ class ServedHand:
         self._lease = Lease(window, epoch, self._keep_record)
         self._settings = KeptSettings(hand, self._keep_record)
         self._admission = Admission(name.base, epoch, self._lease)
-        self.publisher = HandPublisher(name, hand, bus, epoch, self._lease)
+        self.publisher: HandPublisher = HandPublisher(name, hand, bus, epoch, self._lease)
         self._jobs = Jobs(self.publisher, epoch, self._log, self._job_ended)
         self._commanded = Finger(0)  # axes that the holder has commanded: they are held when its lease ends
         self._to_hold = Finger(0)

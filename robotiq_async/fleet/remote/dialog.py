@@ -105,14 +105,14 @@ class Dialog:
         self.loop: asyncio.AbstractEventLoop = asyncio.get_running_loop()
         self.mirror = mirror
         self.log = mirror.log
-        self.lease = ClientLease(str(name))
+        self.lease: ClientLease = ClientLease(str(name))
         self.process: int = os.getpid()
         self.client: str = secrets.token_hex(8)
         self.number: int = 0
         if before is not None and before.process == self.process:
             self.client, self.number = before.client, before.number
         self.window: float = WINDOW_S
-        self.settings = Settings()
+        self.settings: Settings = Settings()
         self.is_over: bool = False
         self.has_ended: bool = False
         self._bus = bus

@@ -16,7 +16,7 @@ from ...runtime.limit import Limit
 from ...values.errors import AgentError, ConnectionLostError, RobotiqError
 from ..network.bus import Reply, Urgency
 from ..wire.envelope import Answer, Call, unpack_answer
-from ..wire.settings import asked_of
+from ..wire.settings import Setting, asked_of
 
 REPEAT_S: Final = 0.25  # seconds without an answer before a request is repeated: longer than a round trip
 REPEAT_SLOWLY_S: Final = 1.0
@@ -109,7 +109,7 @@ class Errand:
         self._said: Answer | RobotiqError | None = None  # by that
         self._in_doubt: Answer | RobotiqError | None = None
         """What is the outcome when the time is over."""
-        self.asked = asked_of(verb.removeprefix("cmd/"), call.arguments)
+        self.asked: dict[Setting, int] = asked_of(verb.removeprefix("cmd/"), call.arguments)
         self._loop = asyncio.get_running_loop()
         self._limit = Limit(timeout)
         self._strays = 0
@@ -118,7 +118,7 @@ class Errand:
         self.begin()
 
     def begin(self) -> None:
-        self.asked_at = now()
+        self.asked_at: float = now()
         self.answered: asyncio.Future[Answer | RobotiqError | None] = self._loop.create_future()
 
     @property

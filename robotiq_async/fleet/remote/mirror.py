@@ -90,7 +90,7 @@ class Mirror:
     ) -> None:
         """Call ``entered`` with each state. State and sequences continue from the mirror ``before``."""
         self.log = log
-        self.clock = AgentClock()
+        self.clock: AgentClock = AgentClock()
         self.newest: StatusMessage | None = None
         self.status: RobotiqStatus | None = None
         self.state: State = State.DISCONNECTED

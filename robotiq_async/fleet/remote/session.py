@@ -80,12 +80,12 @@ class RemoteSession:
         before: Dialog | None,
     ) -> None:
         """Subscribe to the gripper. The channels outlive the run; ``before`` is the last one's dialog."""
-        self.waiters = StateWaiters()
+        self.waiters: StateWaiters = StateWaiters()
         mirror = None if before is None else before.mirror
-        self.mirror = Mirror(name.mark, channels, self.waiters.reached, mirror, Log(str(name)))
-        self.dialog = Dialog(name, bus, self.mirror, before, receive=self._receive_answer)
-        self.agents = Agents(name, bus, self.dialog.lease.doubt)
-        self.keeper = LeaseKeeper(self.dialog, self.agents)
+        self.mirror: Mirror = Mirror(name.mark, channels, self.waiters.reached, mirror, Log(str(name)))
+        self.dialog: Dialog = Dialog(name, bus, self.mirror, before, receive=self._receive_answer)
+        self.agents: Agents = Agents(name, bus, self.dialog.lease.doubt)
+        self.keeper: LeaseKeeper = LeaseKeeper(self.dialog, self.agents)
         self.statistics: Statistics = Counters().snapshot(0)
         self._bus = bus
         self._channels = channels

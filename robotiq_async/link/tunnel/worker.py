@@ -134,7 +134,7 @@ class Call:
         self._what: Final = what
         self.done: Final = done
         self.is_last: Final = is_last
-        self.is_given_up = False
+        self.is_given_up: bool = False
         self.task: asyncio.Task[Any] | None = None  # the task that runs the call, once it has begun
         self.result: Any = None
         self.error: BaseException | None = None

@@ -145,7 +145,7 @@ class UrcapTransport:
         ``gripper`` is the one of several that the connection is about (SID); with None the URCap chooses.
         Timeouts are in seconds; that of a response is the time for a whole status, and for a write.
         """
-        self.has_current = False
+        self.has_current: bool = False
         self._log: Final = log
         self._address: Final = address
         self._gripper: Final = gripper

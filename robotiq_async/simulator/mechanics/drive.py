@@ -78,7 +78,7 @@ class MotorDrive:
         self._stiffness = gain * abs(self._scale)
         """Force of the servo for each count."""
         self._gain, self._damping = gain, damping
-        self.position = float(model.stroke.open_reading)
+        self.position: float = float(model.stroke.open_reading)
         if axis is Finger.SCISSOR:
             self.position = (first + last) / 2
         self.travel: float = 0.0

@@ -79,7 +79,7 @@ class World:
         mujoco.mj_forward(self._model, self._data)
         if not (np.isfinite(self._data.qpos).all() and np.isfinite(self._data.qacc).all()):
             raise ValueError(f"physics: {scene.file!r:.100} has a place or a mass that is not finite")
-        self.time = float(self._data.time)
+        self.time: float = float(self._data.time)
         root = root_of(self._model)
         self.root: str = self._model.body(root).name.removeprefix(OURS)
         base = self._model.body_rootid[root]  # of a robot that drives about, perhaps

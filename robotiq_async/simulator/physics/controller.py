@@ -148,9 +148,10 @@ class Controller:
         self._nowhere: control.Goals = (None,) * len(model.axes)
         self.habits = habits
         self._at_rest = Request.from_registers(ZEROS, model)
-        self.request = self._obeyed = self._at_rest
+        self.request: Request = self._at_rest
+        self._obeyed = self.request
         self.progress: Initialization = Initialization.RESET
-        self.faults = PresentFaults()
+        self.faults: PresentFaults = PresentFaults()
         self.fail_activation: bool = False
         self.controller_fault = 0
         self.is_asleep: bool = False

@@ -40,6 +40,8 @@ class Course:
         self, knots: tuple[Knot, ...], *, presses_at: float = math.inf, ends_at: float = math.inf
     ) -> None:
         self._knots = knots
+        self.moves_at: float
+        self.origin: float
         self.moves_at, self.origin = knots[0]
         self.end: float = knots[-1].position
         self.presses_at: float = presses_at

@@ -48,8 +48,8 @@ class PresentFaults:
         self._weigh()
 
     def _weigh(self) -> None:
-        self.worst = max(self._ends, key=lambda fault: _RANK[fault.severity], default=Fault.NONE)
-        self.changes_at = min(self._escalates_at, min(self._ends.values(), default=math.inf))
+        self.worst: Fault = max(self._ends, key=lambda fault: _RANK[fault.severity], default=Fault.NONE)
+        self.changes_at: float = min(self._escalates_at, min(self._ends.values(), default=math.inf))
 
     @property
     def stops_scissor(self) -> bool:

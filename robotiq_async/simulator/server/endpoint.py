@@ -51,7 +51,7 @@ class SimulatorEndpoint(ABC):
     def __init__(self, gripper: SimulatedGripper | None) -> None:
         self.gripper: SimulatedGripper = gripper or SimulatedGripper(habits=own_habits(THREE_FINGER))
         self.policy: ReplyPolicy = unchanged
-        self.fault_injector = FaultInjector(self)
+        self.fault_injector: FaultInjector = FaultInjector(self)
         self.connections: list[Connection] = []
         self.failure: PhysicsError | None = None
         self.failed: asyncio.Event = asyncio.Event()

@@ -210,14 +210,15 @@ class FaultInjector:
         served = [int(trouble.amount) for trouble in self._lasting("registers")]
         waits = [trouble.amount for trouble in self._lasting("idle-reset")]
         spacings = [trouble.amount for trouble in self._lasting("one-by-one")]
-        self.is_multiplexed = bool(self._lasting("multiplexer"))
-        self.refused_functions = frozenset(refusing[trouble.kind] for trouble in self._lasting(*refusing))
-        self.reads_only_with_function_3 = bool(self._lasting("function-3-only"))
-        self.echoes = bool(self._lasting("echo"))
-        self.strict_silence = max(silences, default=0.0)
-        self.served_registers = min(served, default=REGISTER_COUNT)
-        self.set_spacing = max(spacings, default=0.0)
-        self.is_unreadable = bool(self._lasting("unreadable"))
+        self.is_multiplexed: bool = bool(self._lasting("multiplexer"))
+        refused = (refusing[trouble.kind] for trouble in self._lasting(*refusing))
+        self.refused_functions: frozenset[int] = frozenset(refused)
+        self.reads_only_with_function_3: bool = bool(self._lasting("function-3-only"))
+        self.echoes: bool = bool(self._lasting("echo"))
+        self.strict_silence: float = max(silences, default=0.0)
+        self.served_registers: int = min(served, default=REGISTER_COUNT)
+        self.set_spacing: float = max(spacings, default=0.0)
+        self.is_unreadable: bool = bool(self._lasting("unreadable"))
         self._idle_after = min(waits, default=None)
 
     # Called by the simulator.

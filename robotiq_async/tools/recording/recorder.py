@@ -112,7 +112,7 @@ class Recorder:
             raise TypeError(f"hand must be a hand, got {hand!r}")
         if ros2 and is_table(path):
             raise ValueError(f"ros2 is for MCAP files, and {path} is a table")
-        self.path = Path(path)
+        self.path: Path = Path(path)
         self.recorded: int = 0
         self.saved: int = 0
         self._hand = hand

@@ -92,7 +92,7 @@ class Runner:
             save: is called with the report after each stage, and before each that writes; nothing moves then.
                 An OSError ends the run.
         """
-        self.report = Report(plan.address.kind, model_of(plan.address.model), label=plan.label)
+        self.report: Report = Report(plan.address.kind, model_of(plan.address.model), label=plan.label)
         self._plan = plan
         self._person = person
         self._tape = tape

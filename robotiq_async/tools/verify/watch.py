@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final, Protocol
 
 from ...values.enums import Fault, Finger
+from ...values.model import Model
 from ...values.request import Request
 from ...values.status import RobotiqStatus
 from .catalogue import EndError
@@ -83,7 +84,7 @@ class Watch:
         self.needs_active = True  # whether the gripper must be active
         self.allows_faults = False  # whether the stage expects faults
         self.last: RobotiqStatus | None = None  # the newest status
-        self.model = link.model  # of the gripper
+        self.model: Model = link.model  # of the gripper
         self._link = link
         self._person = person
         self._interval = interval
