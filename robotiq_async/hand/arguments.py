@@ -39,6 +39,8 @@ ARGUMENTS: Final = {
     "a gripper that is switched on later than the program. Its fingers may MOVE long after the call then.",
     "halt": "False disconnects and leaves the fingers as they are; for programs that only look.",
     "keep_grip": "whether a grip stays in force; None for the hand's own ``keep_grip``.",
+    "reason": "for people, 1..200 printable characters.",
+    "whose": "who or what has asked, for the log; 0..200 printable characters.",
     "recovery": "seconds above 0 for all of it, while the event loop runs; None for 90.",
     "buffer": "items that are kept for a slow reader, 1..1000000.",
     "requests": "items that are kept for a slow reader, 1..1000000; None loses none.",

@@ -364,6 +364,7 @@ class Hand(Kind):
         with self._naming:
             await self._halt()
 
+    @describes_arguments(who="whose")
     async def inhibit(self, reason: str, *, who: str = "") -> None:
         """Halt for a person, and refuse what may move or press until a person calls :meth:`permit`.
 
@@ -372,10 +373,6 @@ class Hand(Kind):
         :meth:`stop` and :meth:`start`; again, it halts again, and the first reason stays. Whatever it raises,
         motion is inhibited; what moves while the link is down is held once it is back. No emergency stop.
 
-        Args:
-            reason: for people, 1..200 printable characters.
-            who: who or what has asked; 0..200.
-
         Raises:
             TypeError, ValueError: of the arguments; nothing is inhibited.
             RobotiqError: what :meth:`halt` raises: the fingers MAY STILL MOVE.
@@ -383,10 +380,11 @@ class Hand(Kind):
         with self._naming:
             await self._inhibit(Inhibit(reason, who, time.time()))
 
+    @describes_arguments(who="whose")
     async def permit(self, *, who: str = "") -> None:
         """Permit motion after :meth:`inhibit`; nothing moves. For a person, and not for a program's loop.
 
-        ``who`` is for the log. A hand on another host raises RobotiqError without an answer.
+        A hand on another host raises RobotiqError without an answer.
         """
         Inhibit("permitted", who, 0.0)  # checks it
         with self._naming:

@@ -277,7 +277,11 @@ class RobotiqHand(Hand):
         return self._machine.inhibited
 
     def resume_inhibit(self, inhibit: Inhibit) -> None:
-        """Continue an inhibit of an earlier process, before the start. Sends nothing; the first one stays."""
+        """Continue an inhibit of an earlier process, before the start. Sends nothing; the first one stays.
+
+        Args:
+            inhibit: its reason, who asked, and when.
+        """
         self._machine.inhibit(inhibit)
 
     async def _halt(self) -> None:
