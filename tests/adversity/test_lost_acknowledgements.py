@@ -67,7 +67,7 @@ class Cell:
         server, usual = self.world.server, self.world.server.policy
 
         def policy(frame: bytes) -> Iterable[tuple[float, bytes]] | None:
-            reply = server.as_reply(frame)
+            reply = corruption.reply_on(server.link, frame)
             if not reply.is_to_a_write:
                 return usual(frame)
             server.policy = usual

@@ -24,7 +24,9 @@ from robotiq_async.simulator import (
     parse_troubles,
 )
 from robotiq_async.simulator.server.framing import Frame
-from robotiq_async.simulator.server.urcap_server import UNREADABLE
+from robotiq_async.simulator.server.responder import Responder, TcpResponder
+from robotiq_async.simulator.server.serial_server import RtuResponder
+from robotiq_async.simulator.server.urcap_server import UNREADABLE, UrcapResponder
 from robotiq_async.simulator.troubles.fault_injector import FaultInjector
 from robotiq_async.values.model import Model, model_of
 from robotiq_async.values.registers import Registers, gFLT, gIMC
@@ -90,13 +92,9 @@ def stamp_of(status: RobotiqStatus) -> int:
 
 
 class Heard:
-    """Notes when each request for this gripper came in; has the habits that are asked for."""
+    """Has the habits that are asked for, and tells what its responder has noted."""
 
-    def __init__(self, *arguments: Any, **options: Any) -> None:
-        super().__init__(*arguments, **options)
-        self.heard: list[float] = []
-        self.asked = asyncio.Event()
-        """Set as soon as the first has come, before it is answered."""
+    _responder: Any
 
     async def start(self) -> None:
         await super().start()  # type: ignore[misc]
@@ -104,20 +102,43 @@ class Heard:
         for habit in HABITS:
             await injector.begin(habit)
 
+    @property
+    def heard(self) -> list[float]:
+        """When each request for this gripper came in."""
+        times: list[float] = self._responder.heard
+        return times
+
+    @property
+    def asked(self) -> asyncio.Event:
+        """Set as soon as the first has come, before it is answered."""
+        event: asyncio.Event = self._responder.asked
+        return event
+
+
+class Hears(Responder):
+    """Notes when each request for this gripper came in."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.heard: list[float] = []
+        self.asked = asyncio.Event()
+
     def take(self, inbox: bytearray) -> Frame | None:
-        frame: Frame | None = super().take(inbox)  # type: ignore[misc]
-        if frame is not None and self._is_meant(frame.unit):  # type: ignore[attr-defined]
+        frame = super().take(inbox)  # type: ignore[safe-super]
+        if frame is not None and self._is_meant(frame.unit):
             self.heard.append(asyncio.get_running_loop().time())
             self.asked.set()
         return frame
 
 
 class TcpServer(Heard, SimulatorServer):
-    pass
+    class _responds(Hears, TcpResponder):  # noqa: N801  # as the server names it
+        pass
 
 
 class RtuServer(Heard, SerialSimulatorServer):
-    pass
+    class _responds(Hears, RtuResponder):  # noqa: N801
+        pass
 
 
 class ToolServer(Heard, RtuOverTcpSimulatorServer):
@@ -125,30 +146,43 @@ class ToolServer(Heard, RtuOverTcpSimulatorServer):
 
 
 class UrcapServer(Heard, UrcapSimulatorServer):
-    """Keeps what it has answered, for there is no room for a number in the variables.
+    class _responds(Hears, UrcapResponder):  # noqa: N801
+        """Keeps what it has answered, for there is no room for a number in the variables."""
 
-    Attributes:
-        given: when a variable was read, its name and its value.
-        motions: the lines that set a motion going; the gripper sees each variable alone if they are taken so.
-        was_spaced: whether variables of a SET were taken one by one.
-    """
+        def __init__(self, *arguments: Any) -> None:
+            super().__init__(*arguments)
+            self.given: list[tuple[float, str, int]] = []
+            self.motions: list[bytes] = []
+            self.was_spaced = False
 
-    def __init__(self, *arguments: Any, **options: Any) -> None:
-        super().__init__(*arguments, **options)
-        self.given: list[tuple[float, str, int]] = []
-        self.motions: list[bytes] = []
-        self.was_spaced = False
+        def answer(self, frame: Frame) -> bytes:
+            said = super().answer(frame)
+            self.was_spaced |= self.fault_injector.set_spacing > 0
+            if frame.pdu.startswith(b"GET "):
+                name, value = said.decode().split()
+                if value != UNREADABLE:
+                    self.given.append((asyncio.get_running_loop().time(), name, int(value)))
+            elif frame.pdu.endswith(b" GTO 1"):
+                self.motions.append(frame.pdu)
+            return said
 
-    def answer(self, frame: Frame) -> bytes:
-        said = super().answer(frame)
-        self.was_spaced |= self.fault_injector.set_spacing > 0
-        if frame.pdu.startswith(b"GET "):
-            name, value = said.decode().split()
-            if value != UNREADABLE:
-                self.given.append((asyncio.get_running_loop().time(), name, int(value)))
-        elif frame.pdu.endswith(b" GTO 1"):
-            self.motions.append(frame.pdu)
-        return said
+    @property
+    def given(self) -> list[tuple[float, str, int]]:
+        """When a variable was read, its name and its value."""
+        values: list[tuple[float, str, int]] = self._responder.given
+        return values
+
+    @property
+    def motions(self) -> list[bytes]:
+        """The lines that set a motion going; the gripper sees each variable alone if they are taken so."""
+        lines: list[bytes] = self._responder.motions
+        return lines
+
+    @property
+    def was_spaced(self) -> bool:
+        """Whether variables of a SET were taken one by one."""
+        spaced: bool = self._responder.was_spaced
+        return spaced
 
 
 Server = TcpServer | RtuServer | ToolServer | UrcapServer

@@ -12,6 +12,7 @@ import pytest
 
 from robotiq_async import ConnectionLostError, Finger, RobotiqHand
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, parse_troubles
+from robotiq_async.simulator.server.serial_server import RtuResponder
 from robotiq_async.values.model import model_of
 from robotiq_async.values.request import Request
 from tests.grippers import activate_beforehand
@@ -225,8 +226,9 @@ class Refusing(SerialSimulatorServer):
 
     functions = SerialSimulatorServer.functions - {BOTH}
 
-    def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
-        return self.fault_injector.deliver(reply)
+    class _responds(RtuResponder):  # noqa: N801  # as the server names it
+        def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
+            return self.fault_injector.deliver(reply)
 
 
 REFUSAL = 0x80 | BOTH

@@ -23,6 +23,7 @@ from robotiq_async import (
 )
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble, UrcapSimulatorServer
 from robotiq_async.simulator.server.framing import Frame
+from robotiq_async.simulator.server.urcap_server import UrcapResponder
 from robotiq_async.simulator.troubles.corruption import unchanged
 from tests.grippers import activate_beforehand, until_moving
 from tests.virtual import until
@@ -33,8 +34,9 @@ pytestmark = pytest.mark.virtual_time
 class OldUrcapServer(UrcapSimulatorServer):
     """A port that does not know COU, and says so."""
 
-    def answer(self, frame: Frame) -> bytes:
-        return b"?" if frame.pdu == b"GET COU" else super().answer(frame)
+    class _responds(UrcapResponder):  # noqa: N801  # as the server names it
+        def answer(self, frame: Frame) -> bytes:
+            return b"?" if frame.pdu == b"GET COU" else super().answer(frame)
 
 
 @asynccontextmanager

@@ -220,13 +220,13 @@ async def test_a_request_that_waits_for_its_turn_at_a_power_cut_is_not_answered(
     server: SerialSimulatorServer, client: Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked = asyncio.Event()
-    take = server.take
+    take = server._responder.take
 
     def taken(inbox: bytearray) -> Frame | None:
         asked.set()
         return take(inbox)
 
-    monkeypatch.setattr(server, "take", taken)
+    monkeypatch.setattr(server._responder, "take", taken)
     await client.say(READ + READ)
     await asked.wait()
     server.gripper.power_off()

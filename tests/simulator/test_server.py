@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
+from robotiq_async.simulator import (
+    RtuOverTcpSimulatorServer,
+    SerialSimulatorServer,
+    SimulatedGripper,
+    SimulatorServer,
+    Trouble,
+    UrcapSimulatorServer,
+)
 from robotiq_async.simulator.troubles.corruption import unchanged
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.request import AxisRequest, Request
@@ -442,3 +449,26 @@ async def test_cancelled_while_a_trouble_ends_clients_are_let_in_and_the_server_
     await server.stop()
     with pytest.raises(ConnectionRefusedError):
         await asyncio.open_connection("127.0.0.1", server.port)
+
+
+# What it shows.
+
+ALL = {
+    *("start", "stop", "is_running", "address", "gripper", "policy", "fault_injector", "link", "functions"),
+    *("connections", "failure", "failed", "cut", "refuse", "accept"),
+}
+ON_TCP, ON_A_LINE = {"port", "power_cycle"}, {"port", "device_id", "paced", "reply_silence", "others"}
+
+
+@pytest.mark.parametrize(
+    ("kind", "names"),
+    [
+        (SimulatorServer, ALL | ON_TCP),
+        (UrcapSimulatorServer, ALL | ON_TCP),
+        (RtuOverTcpSimulatorServer, ALL | ON_TCP | ON_A_LINE),
+        (SerialSimulatorServer, ALL | ON_A_LINE),
+    ],
+)
+def test_a_server_shows_what_its_users_call_and_no_more(kind: type, names: set[str]) -> None:
+    shown = {*dir(kind), *kind.__annotations__, "gripper", "policy", "fault_injector"}
+    assert {name for name in shown if not name.startswith("_")} - names == set()

@@ -1,4 +1,4 @@
-"""One client of a simulator: answers its requests one by one, and sends replies by a policy."""
+"""The connection to one client: passes on its requests one by one, and sends the replies."""
 
 from __future__ import annotations
 
@@ -6,15 +6,13 @@ import asyncio
 import socket
 import struct
 from collections import deque
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
 from ..physics.driven_axis import PhysicsError
-from .framing import BadFrameError, Frame
+from .framing import BadFrameError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from ..physics.gripper import SimulatedGripper
+    from .responder import Responder
 
 MOST_WAITING: Final = 1000
 """Replies that wait to be sent later; while there are so many, no more requests are taken."""
@@ -24,50 +22,17 @@ _LINGER_NOT: Final = struct.pack("ii", 1, 0)
 """SO_LINGER on, for no time at all: closing the socket then resets the connection."""
 
 
-class Server(Protocol):
-    """The server of a gripper, as its connections use it."""
-
-    gripper: SimulatedGripper
-
-    def lets_in(self, client: Connection) -> bool:
-        """Take note of a client that has come; return whether it may stay."""
-
-    def forget(self, client: Connection) -> None:
-        """Take note that a client has gone."""
-
-    def take(self, inbox: bytearray) -> Frame | None:
-        """Cut the next request out of what has arrived; raises BadFrameError."""
-
-    def hears(self, frame: Frame) -> bool:
-        """Whether a request is heard, and meant for this gripper."""
-
-    def answer(self, frame: Frame) -> bytes:
-        """Carry out a request; return the frame of the reply."""
-
-    def fail(self, error: PhysicsError) -> None:
-        """Drop all clients for good."""
-
-    def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
-        """The parts to send for a reply; None to hang up."""
-
-    def undelivered(self, part: bytes) -> None:
-        """Take bytes for a client that is gone."""
-
-    def left_over(self) -> Iterable[bytes]:
-        """Bytes that a new client gets before its first request."""
-
-
 class Connection(asyncio.Protocol):
-    """Answers one request in a turn of the loop, and sends the reply by the server's policy.
+    """Has one request answered in a turn of the loop, and sends the reply as the responder wants it.
 
     Attributes:
         transport: to the client; None before it has come, and once it is gone.
     """
 
-    def __init__(self, server: Server) -> None:
+    def __init__(self, responder: Responder) -> None:
         self.transport: Any = None
         self._loop = asyncio.get_running_loop()
-        self._server = server
+        self._responder = responder
         self._inbox = bytearray()
         self._goes_on = False
         """Whether the next request is answered in the next turn of the loop."""
@@ -83,10 +48,10 @@ class Connection(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self.transport = transport
-        if not self._server.lets_in(self):
+        if not self._responder.lets_in(self):
             self.hang_up(reset=True)
             return
-        for part in self._server.left_over():
+        for part in self._responder.left_over():
             self.pass_on(part)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  # asyncio's
@@ -105,7 +70,7 @@ class Connection(asyncio.Protocol):
         self._answer_next()
 
     def _send(self, reply: bytes) -> None:
-        parts = self._server.deliver(reply)
+        parts = self._responder.deliver(reply)
         if parts is None:
             self.hang_up()
             return
@@ -120,7 +85,7 @@ class Connection(asyncio.Protocol):
 
     def pass_on(self, part: bytes) -> None:
         if not self.is_active():
-            self._server.undelivered(part)
+            self._responder.undelivered(part)
         elif part:
             self.transport.write(part)
 
@@ -135,7 +100,7 @@ class Connection(asyncio.Protocol):
 
     def _leave(self) -> None:
         self.transport = None
-        self._server.forget(self)
+        self._responder.forget(self)
 
     def _go_on(self) -> None:
         self._goes_on = False
@@ -147,24 +112,24 @@ class Connection(asyncio.Protocol):
         A thousand requests at once do not hold up the loop: each turn answers one. A gripper without power
         does not even receive them.
         """
-        if not self._server.gripper.is_powered:
+        if not self._responder.gripper.is_powered:
             self._inbox.clear()
         while not self._goes_on and not self._is_full and self.is_active():
             try:
-                frame = self._server.take(self._inbox)
+                frame = self._responder.take(self._inbox)
             except BadFrameError:
                 self.hang_up()
                 return
             if frame is None:
                 break
-            if self._server.hears(frame):
+            if self._responder.hears(frame):
                 if self._inbox:
                     self._goes_on = True
                     self._loop.call_soon(self._go_on)
                 try:
-                    reply = self._server.answer(frame)
+                    reply = self._responder.answer(frame)
                 except PhysicsError as error:
-                    self._server.fail(error)
+                    self._responder.fail(error)
                     return
                 self._send(reply)
                 break

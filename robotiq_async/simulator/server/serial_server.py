@@ -34,6 +34,7 @@ from ..functions import RTU_FUNCTIONS
 from .connection import MOST_UNREAD, Connection
 from .endpoint import SimulatorEndpoint
 from .framing import BROADCAST, Frame, begins_with_frame, rtu_reply, take_rtu
+from .responder import ModbusResponder, Responder
 from .tcp_server import SimulatorServer
 
 if TYPE_CHECKING:
@@ -66,6 +67,26 @@ MOST_UNSENT: Final = 4096
 """The most unread bytes on the line; further replies are lost."""
 
 
+class RtuResponder(ModbusResponder):
+    """Answers the frames of Modbus RTU to one unit, and carries out broadcasts."""
+
+    _unit: int
+
+    def take(self, inbox: bytearray) -> Frame | None:
+        return take_rtu(inbox, self._unit)
+
+    def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
+        """The parts to send for a reply; none for an exception, and none to a broadcast."""
+        is_exception = bool(reply[1] & 0x80)
+        return () if is_exception or reply[0] == BROADCAST else super().deliver(reply)
+
+    def _is_meant(self, unit: int) -> bool:
+        return unit in (BROADCAST, self._unit)
+
+    def _reply(self, frame: Frame, pdu: bytes) -> bytes:
+        return rtu_reply(frame, pdu)
+
+
 class _RtuEndpoint(SimulatorEndpoint):
     """The common part of servers for RTU frames, over any carrier.
 
@@ -77,6 +98,7 @@ class _RtuEndpoint(SimulatorEndpoint):
     """
 
     functions: ClassVar[frozenset[int]] = RTU_FUNCTIONS
+    _responds: ClassVar[type[Responder]] = RtuResponder
     paced: bool
     device_id: int
     reply_silence = REPLY_SILENCE_S
@@ -99,33 +121,18 @@ class _RtuEndpoint(SimulatorEndpoint):
         for each in self.others.values():
             await each.stop()
 
-    def take(self, inbox: bytearray) -> Frame | None:
-        """Cut the next request to this gripper out of what has arrived."""
-        return take_rtu(inbox, self.device_id)
-
-    def _is_meant(self, unit: int) -> bool:
-        return unit in (BROADCAST, self.device_id)
-
     def _share(self, others: Mapping[int, SimulatedGripper]) -> None:
         units = [check_int("a unit id of others", unit, 1, 247) for unit in others]
         if self.device_id in units:
             raise ValueError(f"each gripper at a line needs a unit id of its own, got {self.device_id} twice")
         self.others = {unit: LineNeighbour(self, others[unit], unit) for unit in units}
 
-    def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
-        """The parts to send for a reply; none for an exception, and none to a broadcast."""
-        is_exception = bool(reply[1] & 0x80)
-        return () if is_exception or reply[0] == BROADCAST else super().deliver(reply)
-
-    def _reply(self, frame: Frame, pdu: bytes) -> bytes:
-        return rtu_reply(frame, pdu)
-
     def _connection(self) -> asyncio.Protocol:
         ends = [each._end() for each in (self, *self.others.values())]  # noqa: SLF001  # of the same kind
         return LineEnd(ends) if self.others else ends[0]
 
     def _end(self) -> SerialConnection:
-        return SerialConnection(self, self.reply_silence if self.paced else None, self.device_id)
+        return SerialConnection(self._responder, self.reply_silence if self.paced else None, self.device_id)
 
 
 class LineNeighbour(_RtuEndpoint):
@@ -133,7 +140,7 @@ class LineNeighbour(_RtuEndpoint):
 
     def __init__(self, server: _RtuEndpoint, gripper: SimulatedGripper, device_id: int) -> None:
         self.link = server.link  # type: ignore[misc]  # that of its server
-        super().__init__(gripper)
+        super().__init__(gripper, device_id)
         self.device_id = device_id
         self.paced: bool = server.paced
         self._server = server
@@ -217,8 +224,8 @@ class SerialSimulatorServer(_RtuEndpoint):
             TypeError: device_id is not an int, or paced is not a bool.
             ValueError: device_id is outside 1..247, or another gripper has it.
         """
-        super().__init__(gripper)
         self.device_id: int = check_int("device_id", device_id, 1, 247)
+        super().__init__(gripper, self.device_id)
         self._port = port
         self.paced: bool = check_flag("paced", paced)
         self._share(others)
@@ -348,12 +355,12 @@ class SerialConnection(Connection):
         others: the ends of other grippers at the same place of the line.
     """
 
-    def __init__(self, endpoint: SimulatorEndpoint, reply_silence: float | None, unit: int) -> None:
+    def __init__(self, responder: Responder, reply_silence: float | None, unit: int) -> None:
         """Make a connection with the time of its bytes; None for one where they take none."""
-        super().__init__(endpoint)
+        super().__init__(responder)
         self.others: list[SerialConnection] = []
         self._unit = unit
-        self._line = endpoint.fault_injector
+        self._line = responder.fault_injector
         self._wire = None if reply_silence is None else WireTime(reply_silence)
         self._heard_at = 0.0
         self._sent_at = -math.inf

@@ -12,7 +12,7 @@ from ..functions import TCP_FUNCTIONS
 from ..troubles.trouble import Trouble
 from .connection import Connection
 from .endpoint import SimulatorEndpoint
-from .framing import Frame, take_tcp, tcp_reply
+from .responder import Responder, TcpResponder
 
 if TYPE_CHECKING:
     from ..physics.gripper import SimulatedGripper
@@ -33,6 +33,7 @@ class SimulatorServer(SimulatorEndpoint):
 
     link: ClassVar[Link] = "tcp"
     functions: ClassVar[frozenset[int]] = TCP_FUNCTIONS
+    _responds: ClassVar[type[Responder]] = TcpResponder
 
     def __init__(
         self,
@@ -54,8 +55,8 @@ class SimulatorServer(SimulatorEndpoint):
             TypeError: port or device_id is not an int.
             ValueError: port is outside 0..65535, or device_id outside 0..255.
         """
-        super().__init__(gripper)
-        self._device_id = None if device_id is None else check_int("device_id", device_id, 0, 255)
+        unit = None if device_id is None else check_int("device_id", device_id, 0, 255)
+        super().__init__(gripper, unit)
         self._host = host
         self._port = check_int("port", port, 0, 65535)
 
@@ -79,7 +80,7 @@ class SimulatorServer(SimulatorEndpoint):
             RuntimeError: the server is not running.
         """
         self._check_running()
-        self._hang_up(reset=reset)
+        self._responder.hang_up(reset=reset)
 
     def refuse(self) -> None:
         """Refuse new connections until :meth:`accept`; those that exist stay.
@@ -119,18 +120,8 @@ class SimulatorServer(SimulatorEndpoint):
         async with self.fault_injector.making(Trouble("power-cut")):
             await asyncio.sleep(seconds / self.gripper.speedup)
 
-    def take(self, inbox: bytearray) -> Frame | None:
-        """Cut the next request out of what has arrived."""
-        return take_tcp(inbox)
-
-    def _is_meant(self, unit: int) -> bool:
-        return self._device_id in (None, unit)
-
-    def _reply(self, frame: Frame, pdu: bytes) -> bytes:
-        return tcp_reply(frame, pdu)
-
     def _connection(self) -> asyncio.Protocol:
-        return Connection(self)
+        return Connection(self._responder)
 
     def _close(self) -> None:
         self._listener.close()

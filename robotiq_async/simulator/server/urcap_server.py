@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, ClassVar, Final
 
 from robotiq_async.values import registers as reg
@@ -14,14 +13,17 @@ from robotiq_async.values.registers import RTU_REGISTERS
 
 from ..physics.driven_axis import PhysicsError
 from ..physics.gripper import SimulatedGripper
-from ..troubles.corruption import Reply, TextReply
 from ..troubles.like_hardware import own_habits
 from .framing import BadFrameError, Frame
+from .responder import Responder
 from .tcp_server import SimulatorServer
 
 if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable
+
     from robotiq_async.values.registers import Field
 
+    from ..troubles.fault_injector import FaultInjector
     from ..troubles.trouble import Link
 
 UNREADABLE: Final = "?"
@@ -78,54 +80,21 @@ class _RefusedError(Exception):
     """A line that is not understood."""
 
 
-class UrcapSimulatorServer(SimulatorServer):
-    """Serves a simulated jaw as Robotiq's URCap on a UR controller does, to any number of clients.
-
-    A line is ``GET NAME`` or ``SET NAME VALUE NAME VALUE ...``. The answer to a GET ends with an end of line,
-    the ``ack`` of a SET without one, as clients want it that ran on hardware. Several lines may come in one
-    write. A ``GET NAME`` without an end of line is answered by the bare value, as the vendor's script has it;
-    so is the beginning of a longer line that comes in pieces, if it is one. All variables of a SET take
-    effect at once, unless the trouble ``one-by-one`` spaces them: then the ``ack`` comes before the first.
-    Other lines are answered by a question mark. With the trouble ``lost-set`` a SET is acknowledged in vain;
-    with ``unreadable`` a question mark is the value of each variable of the gripper, and a SET still reaches
-    it: no source says.
-    """
-
-    link: ClassVar[Link] = "urcap"
+class UrcapResponder(Responder):
+    """Answers the lines of the text port."""
 
     def __init__(
         self,
-        gripper: SimulatedGripper | None = None,
-        *,
-        host: str = "127.0.0.1",
-        port: int = 0,
-        device_id: int = RTU_REGISTERS.device_id,
+        gripper: SimulatedGripper,
+        fault_injector: FaultInjector,
+        functions: Collection[int],
+        unit: int | None,
     ) -> None:
-        """A server that is not started; needs no running loop.
-
-        Args:
-            gripper: the device that answers; None for a new 2F-85.
-            host: address to listen on.
-            port: TCP port, 0 for any free one; the URCap's is 63352.
-            device_id: the only gripper that can be chosen (SID).
-
-        Raises:
-            TypeError: port or device_id is not an int.
-            ValueError: port is outside 0..65535, device_id outside 1..247, or the gripper is a 3-Finger.
-        """
-        jaw = gripper or SimulatedGripper(model=TWO_FINGER_85, habits=own_habits(TWO_FINGER_85))
-        if len(jaw.model.axes) > 1:
-            raise ValueError(f"a URCap has a 2F-85, 2F-140 or Hand-E, got a {jaw.model.title}")
-        super().__init__(jaw, host=host, port=port, device_id=check_int("device_id", device_id, 1, 247))
+        super().__init__(gripper, fault_injector, functions, unit)
         self._waiting: deque[tuple[Field, int]] = deque()
         """Variables that were set and are not taken yet."""
         self._taking: asyncio.TimerHandle | None = None
         """The timer of the next of them."""
-
-    @property
-    def address(self) -> str:
-        """The address for :class:`~robotiq_async.RobotiqHand`."""
-        return f"urcap://{self._host}:{self._port}{self._query}"
 
     def take(self, inbox: bytearray) -> Frame | None:
         """Cut the next line out of what has arrived."""
@@ -158,10 +127,6 @@ class UrcapSimulatorServer(SimulatorServer):
                 return self._set(words[::2], words[1::2])
         return REFUSED
 
-    def as_reply(self, frame: bytes) -> Reply:
-        """An answer in the form for troubles."""
-        return TextReply(frame, serial=False)
-
     def _is_meant(self, unit: int) -> bool:  # noqa: ARG002  # lines have none
         return True
 
@@ -171,7 +136,7 @@ class UrcapSimulatorServer(SimulatorServer):
     def _shown(self, name: str) -> str:
         """The value of a variable as it is shown."""
         if name == "SID":
-            return f"[{self._device_id or 0}]"
+            return f"[{self._unit or 0}]"
         if name in _ABOUT:
             return _ABOUT[name]
         if self.fault_injector.is_unreadable:
@@ -182,8 +147,8 @@ class UrcapSimulatorServer(SimulatorServer):
             value = _REQUEST[name].read(self.gripper.request_registers)
         return f"{value:0{_DIGITS.get(name, 1)}}"
 
-    def _close(self) -> None:
-        super()._close()
+    def close(self) -> None:
+        super().close()
         self._take_no_more()
 
     def _set(self, names: list[str], values: list[str]) -> bytes:
@@ -208,11 +173,8 @@ class UrcapSimulatorServer(SimulatorServer):
         if not (value.isascii() and value.isdigit() and len(value) <= 3):
             raise _RefusedError
         number = int(value)
-        if name == "SID":
-            is_known = number == self._device_id
-        else:
-            is_known = field is not None and number < 1 << field.width
-        if not is_known:
+        is_value = field is not None and number < 1 << field.width
+        if not (number == self._unit if name == "SID" else is_value):
             raise _RefusedError
         return field, number
 
@@ -246,3 +208,50 @@ class UrcapSimulatorServer(SimulatorServer):
         if self._taking is not None:
             self._taking.cancel()
             self._taking = None
+
+
+class UrcapSimulatorServer(SimulatorServer):
+    """Serves a simulated jaw as Robotiq's URCap on a UR controller does, to any number of clients.
+
+    A line is ``GET NAME`` or ``SET NAME VALUE NAME VALUE ...``. The answer to a GET ends with an end of line,
+    the ``ack`` of a SET without one, as clients want it that ran on hardware. Several lines may come in one
+    write. A ``GET NAME`` without an end of line is answered by the bare value, as the vendor's script has it;
+    so is the beginning of a longer line that comes in pieces, if it is one. All variables of a SET take
+    effect at once, unless the trouble ``one-by-one`` spaces them: then the ``ack`` comes before the first.
+    Other lines are answered by a question mark. With the trouble ``lost-set`` a SET is acknowledged in vain;
+    with ``unreadable`` a question mark is the value of each variable of the gripper, and a SET still reaches
+    it: no source says.
+    """
+
+    link: ClassVar[Link] = "urcap"
+    _responds: ClassVar[type[Responder]] = UrcapResponder
+
+    def __init__(
+        self,
+        gripper: SimulatedGripper | None = None,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        device_id: int = RTU_REGISTERS.device_id,
+    ) -> None:
+        """A server that is not started; needs no running loop.
+
+        Args:
+            gripper: the device that answers; None for a new 2F-85.
+            host: address to listen on.
+            port: TCP port, 0 for any free one; the URCap's is 63352.
+            device_id: the only gripper that can be chosen (SID).
+
+        Raises:
+            TypeError: port or device_id is not an int.
+            ValueError: port is outside 0..65535, device_id outside 1..247, or the gripper is a 3-Finger.
+        """
+        jaw = gripper or SimulatedGripper(model=TWO_FINGER_85, habits=own_habits(TWO_FINGER_85))
+        if len(jaw.model.axes) > 1:
+            raise ValueError(f"a URCap has a 2F-85, 2F-140 or Hand-E, got a {jaw.model.title}")
+        super().__init__(jaw, host=host, port=port, device_id=check_int("device_id", device_id, 1, 247))
+
+    @property
+    def address(self) -> str:
+        """The address for :class:`~robotiq_async.RobotiqHand`."""
+        return f"urcap://{self._host}:{self._port}{self._query}"

@@ -82,6 +82,11 @@ class TextReply(Reply):
         return False
 
 
+def reply_on(link: str, frame: bytes) -> Reply:
+    """The frame of a reply on a kind of link."""
+    return TextReply(frame, serial=False) if link == "urcap" else Reply(frame, serial=link != "tcp")
+
+
 Corruption = Callable[[Reply, float], Parts]
 """Makes the bytes to send out of a reply and the value of the trouble (see trouble.py)."""
 

@@ -29,7 +29,7 @@ from robotiq_async.values.registers import REGISTER_COUNT
 from robotiq_async.values.request import AxisRequest, Request
 
 from ..functions import READ_INPUT, READ_WRITE
-from .corruption import Reply, ReplyPolicy
+from .corruption import ReplyPolicy, reply_on
 from .trouble import KINDS, Link, Trouble
 
 if TYPE_CHECKING:
@@ -57,9 +57,6 @@ class Target(Protocol):
 
     async def accept(self) -> None:
         """Accept connections again."""
-
-    def as_reply(self, frame: bytes) -> Reply:
-        """A reply in the form for troubles."""
 
 
 @dataclass(slots=True, eq=False)
@@ -245,7 +242,7 @@ class FaultInjector:
     def deliver(self, frame: bytes) -> Iterable[tuple[float, bytes]] | None:
         """The parts to send for a reply; None to hang up."""
         for ongoing in self._ongoing:
-            parts = ongoing.trouble.corrupt(self._target.as_reply(frame))
+            parts = ongoing.trouble.corrupt(reply_on(self._target.link, frame))
             if parts is not None:
                 self._hit(ongoing)
                 return parts
