@@ -7,10 +7,20 @@ import contextlib
 import json
 import re
 import struct
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import Any, Final, Self
 
-from robotiq_async import Tunnel
+import pytest
+
+from robotiq_async import Tunnel, TunnelPlace
+from robotiq_async.link.address import TUNNELS, parse_address
+from robotiq_async.simulator import RtuOverTcpSimulatorServer, SimulatedGripper
+from robotiq_async.values.model import TWO_FINGER_85
 from tests.docs.pages import DOCS, blocks, read
+from tests.grippers import activate_beforehand
+from tests.installed import install
 from tests.serial_line import with_crc
 
 PAGE: Final = DOCS / "how-to" / "tunnels.md"
@@ -194,3 +204,49 @@ class DoosanController(Arm):
         else:
             said["read"] = (await self._line.read(call["read"])).hex()
         return json.dumps(said).encode() + b"\n"
+
+
+CONTROLLERS: Final[dict[str, type[Arm]]] = {
+    "XArm": XArmController,
+    "Dobot": DobotController,
+    "Doosan": DoosanController,
+}
+"""The arms, by the classes of their tunnels."""
+
+
+@asynccontextmanager
+async def arm_with_jaw(
+    name: str, delay: float = 0.0, device_id: int = 9
+) -> AsyncIterator[tuple[Arm, RtuOverTcpSimulatorServer, Tunnel]]:
+    """An arm with a jaw at its tool, which is active, and the tunnel to it."""
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, model=TWO_FINGER_85, spread=False)
+    await activate_beforehand(gripper)
+    async with RtuOverTcpSimulatorServer(gripper, device_id=device_id) as server:
+        line = ToolLine(parse_address(server.address).port)
+        async with CONTROLLERS[name](line, delay) as there:
+            yield there, server, tunnel_of(name, "127.0.0.1", there.port)
+
+
+# -- the package that gives them schemes ---------------------------------------------------------------------
+
+
+def install_schemes(patch: pytest.MonkeyPatch, folder: Path) -> None:
+    """Install ``xarm://``, ``dobot://`` and ``doosan://``."""
+    install(
+        patch, folder, "arms", TUNNELS, **{name.lower(): f"tests.arms:{name.lower()}" for name in CONTROLLERS}
+    )
+
+
+def xarm(place: TunnelPlace) -> Tunnel:
+    assert place.port is not None
+    return tunnel_of("XArm", place.host, place.port, place.unit)
+
+
+def dobot(place: TunnelPlace) -> Tunnel:
+    assert place.port is not None
+    return tunnel_of("Dobot", place.host, place.port)
+
+
+def doosan(place: TunnelPlace) -> Tunnel:
+    assert place.port is not None
+    return tunnel_of("Doosan", place.host, place.port, place.unit)

@@ -41,6 +41,7 @@ from robotiq_async import (
     Statistics,
     Transition,
     Trigger,
+    TunnelPlace,
     Units,
 )
 from robotiq_async.control.motion import Move
@@ -107,6 +108,7 @@ VALUES: list[object] = [
     AxisRequest(1, 2, 3),
     Part(A, 30.5),
     ReconnectPolicy(give_up_after=3.0),
+    TunnelPlace("arm", 502, 9, {"side": "left"}),
     Simulation(speedup=10.0, object=150),
     Habits(status_lag=0.05),
     Likeness(HAND_E, link="rtu", device_id=9),

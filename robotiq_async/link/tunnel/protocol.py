@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 from ...values.checks import repr_of
+from ...values.frozen_mapping import FrozenMapping
 from ..address import Address, entry_of
 
 
@@ -68,6 +69,9 @@ class TunnelPlace:
     port: int | None = None
     unit: int = 9
     options: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "options", FrozenMapping(self.options))
 
 
 def tunnel_to(address: Address, unit: int) -> Tunnel:

@@ -39,6 +39,14 @@ LOST_PORT: Final = (
     "Is the plug firm? fuser -v DEVICE shows who else has the port: ModemManager, brltty or a terminal."
 )
 
+NO_TUNNEL: Final = (
+    "Is the arm switched on, in this network, and may clients command it? Does its own user interface move "
+    "the gripper?"
+)
+FORWARDING: Final = (
+    " Behind the forwarding of a UR, an earlier client that was cut off may still have the line: stop the "
+    "forwarding in its URCap and start it again."
+)
 DAMAGED: Final = "Replies get lost or damaged: check cable, shield, ground and termination."
 
 
@@ -190,15 +198,19 @@ async def _first_reading(link: Link) -> tuple[RobotiqStatus, float]:
 def _report_port(address: Address, report: Report) -> None:
     if address.is_socket:
         report(Finding(Level.GOOD, "port", f"{address.port} is open"))
+    elif address.scheme:
+        report(Finding(Level.GOOD, "tunnel", "opens"))
 
 
 def _report_no_connection(
     address: Address, error: ConnectFailedError, report: Report, *, is_first: bool
 ) -> None:
-    if not (address.is_socket and is_first):
+    if address.scheme and is_first:
+        report(Finding(Level.BAD, "tunnel", error.args[0], NO_TUNNEL))
+    elif address.is_socket and is_first:
+        report(no_connection(address, error))
+    else:
         report(Finding(Level.BAD, "open", error.args[0], _advice_for_opening(address, str(error))))
-        return
-    report(no_connection(address, error))
 
 
 def no_connection(address: Address, error: ConnectFailedError) -> Finding:
@@ -257,7 +269,7 @@ def _advice_for_silence(address: Address, error: RobotiqConnectionError, echoes:
             "(--device-id), A and B (swapped?), and the rate that the gateway has."
         )
     if address.is_rtu and isinstance(error, ResponseTimeoutError | ProtocolError):
-        return _advice_for_a_line(error, echoes)
+        return _advice_for_a_line(address, error, echoes)
     if isinstance(error, ResponseTimeoutError):
         return (
             "Connected, but no unit answers: another device, the gripper's fieldbus is not Modbus, or it "
@@ -270,14 +282,20 @@ def _advice_for_silence(address: Address, error: RobotiqConnectionError, echoes:
     return f"It closes the connection when asked. {ALONE}, or not speak Modbus."
 
 
-def _advice_for_a_line(error: RobotiqConnectionError, echoes: bool) -> str:
+def _advice_for_a_line(address: Address, error: RobotiqConnectionError, echoes: bool) -> str:
     """Advice for a serial line on which no gripper answers. A line has nothing but its bytes."""
     if isinstance(error, ResponseTimeoutError):
+        if address.scheme:
+            return (
+                "The arm answers, and the gripper does not: check the voltage and the rate that the arm "
+                "gives its tool (24 V, 115200 baud, 8N1), unit id (--device-id), and whether a program of "
+                "the arm has the line."
+            )
         heard = "The line echoes what is sent, and nothing else answers" if echoes else "Nothing answers"
         return (
             f"{heard}: check the gripper's power, A and B (swapped?), its rate (?baud=) and unit id "
             "(--device-id), and whether another program has the line. At a UR the tool I/O must belong to "
-            "the user, and Robotiq's URCap be off."
+            f"the user, and Robotiq's URCap be off.{FORWARDING if address.kind == 'rtu+tcp' else ''}"
         )
     if "refuses" in str(error):
         return (

@@ -43,7 +43,8 @@ async def find_urcap(address: Address, gripper: int | None, report: Report) -> L
     report(Finding(Level.GOOD, "URCap", "answers"))
     if gripper is not None:
         report(Finding(Level.GOOD, "gripper id", f"{gripper} was chosen"))
-    report(Finding(Level.GOOD, "current", "none: this port does not tell what the motor draws"))
+    current = "COU" if link.has_current else "none: this port does not tell what the motor draws"
+    report(Finding(Level.GOOD, "current", current))
     report_silence(status, report)
     return link
 
