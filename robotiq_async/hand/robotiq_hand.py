@@ -27,6 +27,7 @@ from typing import Final, Literal
 from ..control.pending import Command
 from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
 from ..link.tunnel.protocol import Tunnel
+from ..runtime.clock import now
 from ..runtime.limit import Limit
 from ..session.options import (
     ACTIVATION_TIMEOUT_S,
@@ -364,7 +365,7 @@ class RobotiqHand(Hand):
         limit = timeout or RECOVER_TIMEOUT_S
         self._asked()
         self._machine.check_permitted()
-        watch, resets = StallWatch(self._channels.listeners, self._machine), 0
+        watch, resets, began = StallWatch(self._channels.listeners, self._machine), 0, now()
         with Limit(limit), watch as stall:
             while self.state not in RUNNING:
                 with stall.ends_early() as step:
@@ -372,6 +373,7 @@ class RobotiqHand(Hand):
                 if step.cancelled_caught:
                     self._check_worth_a_reset(resets)
                     resets = await self._reset_until_shown(resets)
+            self._options.log.info("recovered in %.1f s", now() - began)
             return
         raise self._not_active(limit)
 

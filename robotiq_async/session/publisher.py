@@ -28,6 +28,7 @@ from typing import Any, Final
 from ..control.controller import Controller
 from ..values.events import SentRequest, Transition
 from ..values.status import RobotiqStatus
+from .news import BITS, FaultNews
 from .streams import Channel, Channels
 
 
@@ -40,6 +41,7 @@ class Publisher:
     """
 
     def __init__(self, channels: Channels, controller: Controller) -> None:
+        self._news: Final = FaultNews(controller.machine)
         self.numbers: Final = channels.numbers
         self.has_to_tell: bool = False
         self._channels: Final = channels
@@ -50,6 +52,7 @@ class Publisher:
 
     def note(self, change: Transition, wake: Callable[[], None] | None) -> None:
         """Note a change of state, to be published after the present call; ``wake`` is called before that."""
+        self._news.reached(change)
         self._queue.append((self._channels.transitions, change, wake))
 
     def publish_changes(self) -> None:
@@ -62,6 +65,8 @@ class Publisher:
 
     def publish_status(self, status: RobotiqStatus) -> None:
         """Publish a status after the changes that it has led to."""
+        if status.registers[1] & BITS != self._news.shown:
+            self._news.see(status)
         if self._queue or self._is_held_back:
             self._queue.append((self._channels.statuses, status, None))
             self.publish_changes()

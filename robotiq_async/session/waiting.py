@@ -9,7 +9,7 @@ from typing import Final, Self
 
 import anyio
 
-from ..control.state_machine import StateMachine
+from ..control.state_machine import RUNNING, StateMachine
 from ..runtime.log import Log
 from ..values.checks import repr_of
 from ..values.enums import Severity, State
@@ -146,6 +146,8 @@ class ActivationProgress:
         elif self._timer is not None:
             self._timer.cancel()
             self._timer = None
+            if state in RUNNING:
+                self._log.info("activated in %.1f s", self._loop.time() - self._since)
 
     def _wait(self) -> None:
         self._timer = self._loop.call_later(TOLD_EVERY_S, self._tell)

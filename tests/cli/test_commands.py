@@ -61,7 +61,12 @@ def test_status_as_json(call: Call, there: SimulatorServer) -> None:
     )
     # It may still be activating.
     assert reading["state"] in ("RUNNING_IDLE", "WF_ACTIVATION")
-    hand = {"name": there.address, "address": there.address, "state": reading["state"]}
+    hand = {
+        "name": there.address,
+        "address": there.address,
+        "state": reading["state"],
+        "inhibited": "",
+    }
     assert reading == hand | {"severity": "NONE", "description": "no fault"} | status.as_dict()
     assert reading["A"]["axis_state"] == "NO_REQUEST", "it was never asked for anything"
 

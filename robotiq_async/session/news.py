@@ -1,0 +1,79 @@
+"""FaultNews: what the log says of a gripper's faults, and of a reset, once each.
+
+A fault is logged when the hand counts it as one: a passing 0x09 is none. A reset is logged, whoever it was,
+once the gripper has been active in this run: what it held may have fallen.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from ..control.state_machine import RUNNING, StateMachine
+from ..values.enums import Fault, Severity, State
+from ..values.events import Transition
+from ..values.status import RobotiqStatus
+
+BITS: Final = 0xFF00  # of the second register: gFLT, and kFLT of the controller before a jaw
+_FAULTY: Final = frozenset({State.FAULT, State.ATR_DONE, State.WF_ATR})
+_HELD: Final = "the fingers are held, and nothing resumes when it clears"
+DOES: Final = {
+    Severity.PRIORITY: "the action is delayed or ignored: see what was asked too early",
+    Severity.MINOR: f"{_HELD}; free what blocks, recover() waits for it",
+    Severity.MAJOR: "the fingers stop, a part stays held until the reset; free what blocks, then recover() "
+    "resets and activates: it DROPS the part and MOVES the fingers",
+}
+"""What the fingers do in a fault, and what helps."""
+UNKNOWN: Final = f"{_HELD}; no manual names it: recover() waits, reset() may clear it and DROPS the part"
+OTHERS: Final = {
+    Fault.AUTOMATIC_RELEASE: "all axes OPEN slowly, what they hold DROPS; halt() ends it, by a reset",
+    Fault.AUTOMATIC_RELEASE_DONE: "what was held has DROPPED; recover() activates it: the fingers MOVE",
+}
+"""The same of single faults."""
+OF_A_RESET: Final = "what it held may have fallen; activate() or recover() MOVES its fingers"
+
+
+class FaultNews:
+    """Logs faults and resets.
+
+    Attributes:
+        shown: the bits of the fault that has been dealt with.
+    """
+
+    def __init__(self, machine: StateMachine) -> None:
+        self.shown = 0
+        self._machine = machine
+        self._fault = Fault.NONE  # logged last
+        self._controller_fault = 0
+        self._was_active = False
+
+    def see(self, status: RobotiqStatus) -> None:
+        """A status shows other bits than those that have been dealt with."""
+        fault, log = status.fault, self._machine.log
+        if fault.is_serious and self._machine.state not in _FAULTY:
+            return  # it may pass; the next status asks again
+        self.shown = status.registers[1] & BITS
+        if fault is not self._fault:
+            self._fault = fault
+            if fault is not Fault.NONE:
+                say = log.warning if fault.is_serious else log.info
+                say("%s fault %s", fault.severity.value, fault_words(fault))
+        if status.controller_fault != self._controller_fault:
+            self._controller_fault = status.controller_fault
+            if status.controller_fault:
+                log.warning("%s; look at it before the gripper", status.controller_fault_text)
+
+    def reached(self, change: Transition) -> None:
+        """The state has changed."""
+        if change.target in RUNNING:
+            self._was_active = True
+        elif change.target is State.RESET and self._was_active:
+            self._was_active = False
+            is_ours = change.source is State.WF_RESET
+            who = "by this program" if is_ours else "by another client or for lack of power"
+            self._machine.log.warning("the gripper is back in RESET, %s; %s", who, OF_A_RESET)
+
+
+def fault_words(fault: Fault) -> str:
+    """Code, name and description of a fault, what the fingers do, and what helps."""
+    does = OTHERS.get(fault) or (DOES[fault.severity] if fault.is_known else UNKNOWN)
+    return f"0x{int(fault):02X} {fault.name}: {fault.description}; {does}"
