@@ -284,6 +284,11 @@ class _Run:
     newest: float = -math.inf
     clock: AgentClock = field(default_factory=AgentClock)
 
+    def is_overtaken(self, stamp: float) -> bool:
+        """Whether a newer stamp has come before this one."""
+        newest, self.newest = self.newest, max(self.newest, stamp)
+        return stamp < newest
+
 
 class Summaries:
     """Reads summaries, and drops those that were overtaken."""
@@ -312,9 +317,8 @@ class Summaries:
             }
             run = self._run_of(name, int(fields["epoch"]))
         run.clock.receive(stamp, arrival)
-        if stamp < run.newest:
+        if run.is_overtaken(stamp):
             return None
-        run.newest = stamp
         return name, what | {"seen_at": None if age is None else run.clock(seen)}
 
     def _run_of(self, name: GripperName, epoch: int) -> _Run:

@@ -183,7 +183,7 @@ def _after_fork() -> None:
 
 
 def _at_exit() -> None:
-    LOOP_THREAD.is_closing = True
+    LOOP_THREAD.close()
     _stop_all()
 
 

@@ -58,6 +58,10 @@ class LoopThread:
         self._starting = threading.Lock()  # taken only by loop threads, which Ctrl-C cannot interrupt
         self._server: _Server | None = None
 
+    def close(self) -> None:
+        """The program ends: no hand may start any more."""
+        self.is_closing = True
+
     @property
     def is_running(self) -> bool:
         """Whether there is a loop now."""
@@ -171,7 +175,7 @@ class LoopThread:
 
     def _give_up(self, call: _Call[Any], interrupted: Function[None] | None) -> None:
         """Cancel a call whose caller was interrupted, and wait for its end."""
-        call.is_given_up = True
+        call.give_up()
         server, settled = self._server, SimpleQueue[None]()
         if server is None:
             call.forget()
@@ -255,6 +259,10 @@ class _Call(Generic[T]):
     def begin(self) -> None:
         self._task = asyncio.get_running_loop().create_task(self._run())
         self._task.add_done_callback(self._ended.put)
+
+    def give_up(self) -> None:
+        """Its caller was interrupted."""
+        self.is_given_up = True
 
     def refuse(self) -> None:
         self._ended.put(None)

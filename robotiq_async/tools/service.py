@@ -143,6 +143,10 @@ class Signals:
     def __init__(self) -> None:
         self.received = 0
 
+    def note(self, number: int) -> None:
+        """A signal has come."""
+        self.received = self.received or number
+
 
 @asynccontextmanager
 async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator[Signals]:
@@ -191,7 +195,8 @@ async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator
     def handle(number: int, frame: FrameType | None) -> None:
         nonlocal insist_at
         if not signals.received:
-            signals.received, insist_at = number, time.monotonic() + INSIST_S
+            signals.note(number)
+            insist_at = time.monotonic() + INSIST_S
             # A signal interrupts the loop anywhere: a stop has to begin in a turn of its own.
             with suppress(RuntimeError):  # the loop was closed
                 loop.call_soon_threadsafe(begin, number)

@@ -20,7 +20,13 @@ TOLD = ("__cause__", "__doc__")
 """What Python lets only be set from outside."""
 FOREIGN = {"client.ctx", "transport"}
 """Objects of pymodbus and asyncio that link/wires.py sets up."""
-MODULES = sorted(path for room in ("session", "hand", "link") for path in (PACKAGE / room).rglob("*.py"))
+SIMULATED = {"gripper", "self._target.gripper", "line", "error"}
+"""A simulated gripper and its line, whose properties users set, too; an error that is read from the wire."""
+ROOMS = (
+    *("session", "hand", "link", "fleet", "sync", "simulator/server", "simulator/troubles"),
+    *("tools/recording", "tools/doctor", "tools/measure", "tools/description"),
+)
+ALONE = ("tools/service.py", "tools/metrics.py", "tools/viewer.py", "tools/actions.py", "tools/wording.py")
 
 
 def stored(node: ast.AST) -> Iterator[ast.Attribute]:
@@ -29,11 +35,17 @@ def stored(node: ast.AST) -> Iterator[ast.Attribute]:
             yield each
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: f"{path.parent.name}-{path.stem}")
-def test_no_class_changes_the_fields_of_another(path: Path) -> None:
-    fields = stored(ast.parse(path.read_text(encoding="utf-8")))
-    owners = {(ast.unparse(each.value), each.attr) for each in fields}
-    assert not {(owner, name) for owner, name in owners if owner not in {"self", *FOREIGN}}
+def test_no_class_changes_the_fields_of_another() -> None:
+    modules = [PACKAGE / each for each in ALONE]
+    for room in ROOMS:
+        modules += (PACKAGE / room).rglob("*.py")
+    changed = {
+        f"{path.relative_to(PACKAGE)}: {ast.unparse(each)}"
+        for path in modules
+        for each in stored(ast.parse(path.read_text(encoding="utf-8")))
+        if ast.unparse(each.value) not in {"self", *FOREIGN, *SIMULATED}
+    }
+    assert not changed
 
 
 @pytest.mark.parametrize("kind", [Poller, Run, Session, Ending])

@@ -12,6 +12,7 @@ from ...values.enums import Finger
 from ...values.errors import AgentError, ControlLostError, RobotiqError
 from ...values.events import SentRequest
 from ...values.move_result import MoveResult
+from ...values.request import Request
 from ..network.bus import Query
 from ..wire.envelope import Answer, Call, failure
 from ..wire.settings import Setting, asked_of, is_in, moved_by
@@ -39,7 +40,7 @@ class Job:
         says: makes what its answer has besides the result.
     """
 
-    def __init__(self, name: str, call: Call, query: Query) -> None:
+    def __init__(self, name: str, call: Call, query: Query, says: Callable[[], Fields] = dict) -> None:
         self.name = name
         self.call = call
         self.queries: list[Query] = [query]
@@ -49,7 +50,7 @@ class Job:
         self.asked: dict[Setting, int] = asked_of(name, call.arguments)
         self.is_shown = False
         self.was_refused = False
-        self.says: Callable[[], Fields] = dict
+        self.says: Callable[[], Fields] = says
 
     @property
     def key(self) -> Key:
@@ -60,6 +61,26 @@ class Job:
         """Whether it has ended in an error, and was not cancelled."""
         task = self.task
         return task is not None and task.done() and not task.cancelled() and task.exception() is not None
+
+    def run(self, task: asyncio.Task[MoveResult | None]) -> None:
+        """Its task has begun."""
+        self.task = task
+        # Right after the first step of the task, before anything can be written.
+        asyncio.get_running_loop().call_soon(self._look_whether_refused)
+
+    def _look_whether_refused(self) -> None:
+        self.was_refused = self.has_failed
+
+    def observe(self, request: Request) -> None:
+        """An image was acknowledged."""
+        self.is_shown = self.is_shown or (bool(self.asked) and is_in(self.asked, request))
+
+    def reply(self, answer: bytes, status: bytes) -> None:
+        """Answer it, and each of its repetitions."""
+        self.answer = answer
+        for query in self.queries:
+            query.reply(answer, status)
+        self.queries.clear()
 
     def cancel(self, reason: str = "") -> None:
         if self.task is not None and not self.task.done():
@@ -108,11 +129,10 @@ class Jobs:
 
     def start(self, job: Job, work: Work) -> None:
         """Carry out a request without keeping it: each repetition is carried out, too."""
-        job.task = task = self.spawn(work)
+        task = self.spawn(work)
         # Not in the task itself: a task that is cancelled before its first turn never runs.
         task.add_done_callback(lambda task: self._finish(job, task))
-        # Runs right after the first step of the task, before anything can be written.
-        asyncio.get_running_loop().call_soon(lambda: setattr(job, "was_refused", job.has_failed))
+        job.run(task)
 
     def repeat(self, job: Job, query: Query) -> None:
         self._log.debug("request %d was repeated", job.call.number)
@@ -137,7 +157,7 @@ class Jobs:
     def observe(self, what: object) -> None:
         if isinstance(what, SentRequest) and what.acknowledged:
             for job in self._open.values():
-                job.is_shown = job.is_shown or (bool(job.asked) and is_in(job.asked, what.request))
+                job.observe(what.request)
 
     def spawn(self, work: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
         task = asyncio.get_running_loop().create_task(work)
@@ -172,10 +192,7 @@ class Jobs:
             answer = Answer(call.to, call.number, self._epoch, value, begun=begun)
         if error is not None or is_done:
             self._ended(job, error is None)
-        job.answer = answer.pack()
-        for query in job.queries:
-            query.reply(job.answer, self._publisher.status_message())
-        job.queries.clear()
+        job.reply(answer.pack(), self._publisher.status_message())
 
     def _forget(self) -> None:
         # The oldest that is answered: a repetition of one that runs must not be carried out twice.

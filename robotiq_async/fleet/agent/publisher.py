@@ -48,6 +48,10 @@ class HandPublisher:
         self._count = 0
         self._sent_at = 0.0
 
+    def note_problem(self, why: str) -> None:
+        """The gripper cannot be reached, for this reason; empty if it can."""
+        self.problem = why
+
     def observe(self, what: RobotiqStatus | Transition | SentRequest) -> None:
         if isinstance(what, RobotiqStatus):
             self.send_status()

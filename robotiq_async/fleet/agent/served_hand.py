@@ -132,7 +132,7 @@ class ServedHand:
         try:
             self._hand.assume(self._settings.in_gripper)
             await self._hand.start(activate=False)
-            self.publisher.problem = ""
+            self.publisher.note_problem("")
             await self._hold_what_moves()
             async for transition in self._hand.transitions():
                 if transition.target in RUNNING and self._to_hold:
@@ -140,7 +140,7 @@ class ServedHand:
         except RobotiqError as error:
             if error.message != self.publisher.problem:
                 self._log.warning("%s", error.message)
-            self.publisher.problem = error.message
+            self.publisher.note_problem(error.message)
             await self._hand.stop(halt=False)
             await asyncio.sleep(RETRY_S)
 
@@ -349,9 +349,8 @@ class ServedHand:
         else:
             # Otherwise a control loop of the holder would move the fingers again within 10 ms.
             self.end_lease("halted", label_of(call))
-        job = Job("halt", call, query)
+        job = Job("halt", call, query, dict if inhibit is None else self.publisher.inhibited)
         if inhibit is not None:
-            job.says = self.publisher.inhibited
             self._inhibit_changed()
         self._jobs.start(job, self._stop_now(inhibit))
 
@@ -367,9 +366,7 @@ class ServedHand:
             self._inhibit_changed()
             await self._records.kept()
 
-        job = Job("permit", call, query)
-        job.says = self.publisher.inhibited
-        self._jobs.begin(job, permit())
+        self._jobs.begin(Job("permit", call, query, self.publisher.inhibited), permit())
 
     async def _stop_now(self, inhibit: Inhibit | None) -> None:
         # While the agent ends, the hand is being stopped anyway: wait for that stop and check its outcome.

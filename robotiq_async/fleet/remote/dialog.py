@@ -199,8 +199,7 @@ class Dialog:
                 raise
             raise AgentError(f"{self.name}: its agent does not understand {errand.verb}: {error}") from error
         except MoveTimeoutError as error:
-            error.status = self.mirror.renumbered(error.status)
-            raise
+            raise MoveTimeoutError(error.message, self.mirror.renumbered(error.status)) from None
         except ControlLostError as error:
             if errand.verb != "lease":
                 self.check_running()  # the lease was given back at the end of the run

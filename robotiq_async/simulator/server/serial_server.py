@@ -163,7 +163,7 @@ class LineEnd(asyncio.Protocol):
     def __init__(self, ends: list[SerialConnection]) -> None:
         self._ends = ends
         for end in ends:
-            end.others = [each for each in ends if each is not end]
+            end.share([each for each in ends if each is not end])
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         for each in self._ends:
@@ -349,16 +349,13 @@ class WireTime:
 
 
 class SerialConnection(Connection):
-    """The other end of a serial line, which has no connections, no packets and no flow control.
-
-    Attributes:
-        others: the ends of other grippers at the same place of the line.
-    """
+    """The other end of a serial line, which has no connections, no packets and no flow control."""
 
     def __init__(self, responder: Responder, reply_silence: float | None, unit: int) -> None:
         """Make a connection with the time of its bytes; None for one where they take none."""
         super().__init__(responder)
-        self.others: list[SerialConnection] = []
+        self._others: list[SerialConnection] = []
+        """The ends of other grippers at the same place of the line."""
         self._unit = unit
         self._line = responder.fault_injector
         self._wire = None if reply_silence is None else WireTime(reply_silence)
@@ -367,6 +364,10 @@ class SerialConnection(Connection):
         """The time at which the last bytes of a reply were put on the line."""
         self._unsent = 0
         """Bytes sent since the line had taken all of them."""
+
+    def share(self, others: list[SerialConnection]) -> None:
+        """The line has more ends at this place."""
+        self._others = others
 
     def data_received(self, data: bytes) -> None:
         """Take bytes from the line, once they have come; more than it can carry for long is lost."""
@@ -417,7 +418,7 @@ class SerialConnection(Connection):
             self._unsent += len(part)
             self._sent_at = self._loop.time()
             super().pass_on(part)
-            for each in self.others:
+            for each in self._others:
                 each.overhear(part)
 
     def _regulate(self) -> None:

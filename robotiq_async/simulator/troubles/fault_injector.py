@@ -73,6 +73,10 @@ class Ongoing:
     hits: int = 0
     over: asyncio.Event = field(default_factory=asyncio.Event)
 
+    def hit(self) -> None:
+        """It has met a request or a reply."""
+        self.hits += 1
+
 
 class FaultInjector:
     """Applies troubles to one simulator. Troubles may overlap.
@@ -258,7 +262,7 @@ class FaultInjector:
 
     def _hit(self, ongoing: Ongoing) -> None:
         """Count a hit of a trouble; it is over if it was for once."""
-        ongoing.hits += 1
+        ongoing.hit()
         if ongoing.trouble.duration == 0:
             self._forget(ongoing)
 

@@ -148,6 +148,10 @@ class Recovered:
     messages: int = 0
     is_whole: bool = False
 
+    def _note(self, record: McapRecord) -> None:
+        self.messages += isinstance(record, Message)
+        self.is_whole |= isinstance(record, Footer)
+
 
 def read_recording(path: Path | str) -> Iterator[Entry]:
     """Iterate over the messages of a recording. A truncated one ends with a warning.
@@ -217,11 +221,9 @@ def _copy(records: Iterator[McapRecord], writer: Writer, found: Recovered, path:
         elif isinstance(record, Message):
             channel = channels[record.channel_id]
             writer.add_message(channel, record.log_time, record.data, record.publish_time, record.sequence)
-            found.messages += 1
         elif isinstance(record, Metadata):
             writer.add_metadata(record.name, record.metadata)
-        elif isinstance(record, Footer):
-            found.is_whole = True
+        found._note(record)  # noqa: SLF001  # of this module
 
 
 class _Known(dict[int, T]):
