@@ -142,7 +142,7 @@ def test_rtu_over_tcp(call: Call, beside: Callable[..., Beside]) -> None:
     call("status", address.removeprefix("rtu+")).assert_failed(1, "no device answers")
 
 
-def test_urcap(call: Call, beside: Callable[..., Beside]) -> None:
+def test_urcap(call: Call, beside: Callable[..., Beside], tmp_path: Path) -> None:
     address = beside("simulate", "--urcap", "--model", "2f85", "--port", "0").read_line()
     assert re.fullmatch(r"urcap://127\.0\.0\.1:[0-9]+\?model=2f85", address)
     shown = call("status", address)
@@ -153,7 +153,9 @@ def test_urcap(call: Call, beside: Callable[..., Beside]) -> None:
     call("status", "--device-id", "2", address).assert_failed(1, "the URCap does not choose gripper 2")
     call("status", "--read-function", "3", address).assert_failed(2, "read_function is an option of Modbus")
     call("status", address.removesuffix("?model=2f85")).assert_failed(2, "name it, as in urcap://")
-    call("verify", address, "--up-to", "0", "--yes-to", "0").assert_failed(2, "doctor is for this address")
+    verify = ("--up-to", "0", "--yes-to", "0", "--report", str(tmp_path / "report"))
+    call("verify", address, *verify).assert_succeeded()
+    call("verify", address.removesuffix("?model=2f85"), *verify).assert_failed(2, "name it, as in urcap://")
 
 
 @pytest.mark.parametrize(

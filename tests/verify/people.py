@@ -9,7 +9,13 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from typing import Any
 
 from robotiq_async.link.address import parse_address
-from robotiq_async.simulator import RtuOverTcpSimulatorServer, SimulatedGripper, SimulatorServer, Trouble
+from robotiq_async.simulator import (
+    RtuOverTcpSimulatorServer,
+    SimulatedGripper,
+    SimulatorServer,
+    Trouble,
+    UrcapSimulatorServer,
+)
 from robotiq_async.tools.verify import ENTER, Lengths, Plan, Report, Runner, Verdict
 from robotiq_async.tools.verify.catalogue import LAST, checks_of
 from robotiq_async.tools.verify.recorded_link import Frame
@@ -131,11 +137,14 @@ class Helper:
 
 @contextlib.asynccontextmanager
 async def served(
-    *troubles: str, active: bool = False, serial: bool = False, **options: Any
+    *troubles: str, active: bool = False, serial: bool = False, urcap: bool = False, **options: Any
 ) -> AsyncIterator[SimulatorServer]:
-    """A gripper in the loop's time, on TCP or on a paced serial line, with what goes wrong all the time."""
+    """A gripper in the loop's time, with what goes wrong all the time.
+
+    It is on TCP, on a paced serial line, or behind a URCap.
+    """
     gripper = SimulatedGripper(asyncio.get_running_loop().time, **options)
-    make = RtuOverTcpSimulatorServer if serial else SimulatorServer
+    make = UrcapSimulatorServer if urcap else RtuOverTcpSimulatorServer if serial else SimulatorServer
     async with make(gripper) as server:
         if active:
             await activate_beforehand(gripper)
@@ -151,13 +160,13 @@ async def verified(
     roll: Roll | None = None,
     *,
     save: Callable[[Report], Awaitable[None] | None] = lambda _: None,
+    address: str = "",
     **plan: Any,
 ) -> Report:
-    """A run to its end."""
+    """A run to its end; at another address than that of the server if one is given."""
     wanted: dict[str, Any] = {"last": LAST, "lengths": SHORT} | plan
-    runner = Runner(
-        Plan(parse_address(server.address), **wanted), helper or Helper(server), roll or Roll(), save
-    )
+    there = parse_address(address or server.address)
+    runner = Runner(Plan(there, **wanted), helper or Helper(server), roll or Roll(), save)
     async with asyncio.timeout(3600):
         return await runner.run()
 

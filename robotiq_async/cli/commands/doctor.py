@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ...link.address import is_remote, parse_address
-from ...link.registers import check_urcap, registers_of
+from ...link.registers import registers_of
 from ...runtime.log import printable
+from ...session.options import HandOptions
 from ..addresses import full_address, gripper_words
 from ..arguments import Address, Unit, need
 from ..failures import CommandError, UsageError, usage
@@ -60,8 +61,8 @@ async def doctor(
         with usage():
             parsed = parse_address(address)
             registers_of(parsed, device_id=device_id)
-            if parsed.kind == "urcap":
-                check_urcap(parsed, {})
+            if parsed.kind != "sim":
+                HandOptions(address, device_id=device_id)  # whatever a hand refuses
     print(gripper_words(address), flush=True)
     if is_remote(address):
         await examine_remote(address, report)

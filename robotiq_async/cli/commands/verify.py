@@ -14,6 +14,7 @@ from cyclopts import Parameter
 
 from ...link.address import is_remote, parse_address
 from ...runtime.concurrency import wait_shielded
+from ...session.options import HandOptions
 from ...values.model import model_of
 from ..addresses import gripper_words
 from ..arguments import Address, Stage, need
@@ -86,8 +87,8 @@ async def verify(
         parsed = parse_address(address)
         if model is not None:
             parsed = replace(parsed, model=model_of(model))
-    if parsed.kind == "urcap":
-        raise UsageError("verify tries registers, which a URCap does not have: doctor is for this address")
+        if parsed.kind != "sim":
+            HandOptions(str(parsed))  # whatever a hand refuses
     need("mcap", "record")
     from ...tools.verify import Plan
     from ...tools.verify.files import Folder

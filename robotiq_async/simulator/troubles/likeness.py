@@ -79,7 +79,7 @@ class Likeness:
 
     Attributes:
         model: of the gripper.
-        link: "tcp", "rtu" or "rtu+tcp".
+        link: "tcp", "rtu", "rtu+tcp", "urcap" or "tunnel".
         device_id: the unit id that answered; None if the report has none.
         habits: its habits.
         motion: its motion in time; None for the usual one.
@@ -159,7 +159,7 @@ class Likeness:
             await server.fault_injector.begin(trouble)
         if self.exchange_s is None:
             return
-        if server.link != "tcp":
+        if server.link in ("rtu", "rtu+tcp"):
             count = self.model.rtu.count
             # A read has 8 bytes, and its reply 5 beside the registers.
             rest = self.exchange_s - (13 + 2 * count) * _BYTE_S - _TIMERS_S

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Final
 
 from ...link.address import Address
 from ...link.modbus import ModbusTransport
+from ...link.transport import Link
+from ...link.urcap.transport import UrcapTransport
 from ...session.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S
 from ...values.enums import Finger
 from ...values.model import Model, model_of
@@ -37,13 +40,14 @@ class Lengths:
 class Bench:
     """The gripper under test and its surroundings."""
 
-    address: Address  # of the gripper; tcp, rtu or rtu+tcp
+    address: Address  # of the gripper; any but sim
     person: Person  # beside it
     keep: Callable[[Frame], None]  # takes every frame
     lengths: Lengths = field(default_factory=Lengths)  # of the long checks
     checks: dict[str, Check] = field(default_factory=dict)  # the results so far, by name
     link: RecordedLink = field(init=False)  # to the gripper, once it has been found
-    registers: RegisterMap | None = None  # of the gripper, once it has been found
+    is_found: bool = False  # whether there is a link to it
+    registers: RegisterMap | None = None  # of the gripper, once it has been found; None for a URCap's
     found: RobotiqStatus | None = None  # the first status
     spacing: float = SPACING_S  # seconds from one write to the next; stage 2 may raise it
     is_active: bool = False  # whether it was active at the end of the last stage
@@ -62,16 +66,20 @@ class Bench:
         return "finger A" if len(self.fingers) > 1 else "the jaw"
 
     def another_link(
-        self, registers: RegisterMap, keep: Callable[[Frame], None] | None = None
+        self, registers: RegisterMap | None = None, keep: Callable[[Frame], None] | None = None
     ) -> RecordedLink:
-        """Another link, not opened; its frames are kept with the others unless ``keep`` is given."""
-        transport = ModbusTransport(
-            self.address,
-            replace(registers, write_function=23, is_sure=True),  # function 23 is what is examined
-            connect_timeout=CONNECT_S,
-            response_timeout=RESPONSE_TIMEOUT_S,
-        )
-        return RecordedLink(transport, keep or self.keep, self.model)
+        """Another link, not opened.
+
+        ``registers`` are those of the gripper unless given. Its frames are kept with the others unless
+        ``keep`` is given.
+        """
+        there = registers or self.registers
+        make: Callable[..., Link] = partial(UrcapTransport, self.address)
+        if there is not None:  # function 23 is what is examined
+            sure = replace(there, write_function=23, is_sure=True)
+            make = partial(ModbusTransport, self.address, sure)
+        link = make(connect_timeout=CONNECT_S, response_timeout=RESPONSE_TIMEOUT_S)
+        return RecordedLink(link, keep or self.keep, self.model)
 
     @property
     def interval(self) -> float:

@@ -19,15 +19,24 @@ class Assumption(NamedTuple):
     is_safety: bool = False  # whether the run ends when it does not hold
     of_several: bool = False  # whether it is about several axes, and so not about a jaw
     of_lines: bool = False  # whether it is about serial lines alone
+    of_registers: bool = False  # whether it is about registers, and so not about the variables of a URCap
     of_jaws: bool = False  # whether it is about a jaw alone
 
+
+TCP: Final = "tcp"
+URCAP: Final = "urcap"
+"""Kinds of links: those of addresses."""
 
 CATALOGUE: Final[dict[str, Assumption]] = {
     "host.timer": Assumption(0, "This computer's timers are at most 1 ms late."),
     "host.adapter": Assumption(0, "A USB adapter passes on what it hears within 2 ms."),
-    "read.registers": Assumption(1, "Unit id, function and registers are the defaults of the link."),
-    "read.others": Assumption(1, "There are registers at the addresses of the manual, and nowhere else."),
-    "read.counts": Assumption(1, "One to eight registers can be read at once."),
+    "read.registers": Assumption(
+        1, "Unit id, function and registers are the defaults of the link.", of_registers=True
+    ),
+    "read.others": Assumption(
+        1, "There are registers at the addresses of the manual, and nowhere else.", of_registers=True
+    ),
+    "read.counts": Assumption(1, "One to eight registers can be read at once.", of_registers=True),
     "read.round_trip": Assumption(1, "A status is read within the usual poll interval."),
     "read.silence": Assumption(1, "The first read after a silence shows no fault."),
     "read.idle": Assumption(1, "It answers after a minute of silence, and is still activated."),
@@ -83,14 +92,27 @@ CATALOGUE: Final[dict[str, Assumption]] = {
 
 
 def checks_of(model: Model, link: str) -> dict[str, Assumption]:
-    """The assumptions about a model on a kind of link ("tcp", "rtu" or "rtu+tcp"), by name."""
-    several, is_line = len(model.axes) > 1, link != "tcp"
+    """The assumptions about a model on a kind of link, by name."""
+    several, without = len(model.axes) > 1, left_out(link)
     return {
         name: each
         for name, each in CATALOGUE.items()
-        if (several or not each.of_several) and (is_line or not each.of_lines)
-        if not (several and each.of_jaws)
+        if (several or not each.of_several) and not (several and each.of_jaws)
+        if name not in without
     }
+
+
+def left_out(link: str) -> dict[str, str]:
+    """The assumptions that cannot be checked on a kind of link, by name, and why."""
+    found = {}
+    for name, each in CATALOGUE.items():
+        if each.of_registers and link == URCAP:
+            found[name] = "the text port has variables and no registers"
+        elif each.of_lines and link == URCAP:
+            found[name] = "the text port has no functions of Modbus"
+        elif each.of_lines and link == TCP:
+            found[name] = "it is about serial lines"
+    return found
 
 
 LAST: Final = 9  # the last stage

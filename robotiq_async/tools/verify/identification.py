@@ -12,8 +12,9 @@ from ...values.model import names_that_fit, why_stranger
 from ...values.status import RobotiqStatus
 from ..doctor.answer import STRANGER, find_gripper
 from ..doctor.findings import Finding, GiveUpError
+from ..doctor.urcap import find_urcap
 from .bench import Bench
-from .catalogue import EndError
+from .catalogue import URCAP, EndError
 from .watch import LASTING, describe
 
 WATCH_S: Final = 2.0  # seconds of watching for another client, and for motion
@@ -24,16 +25,20 @@ async def find(bench: Bench) -> None:
     """Find the gripper, and open the link to it."""
     findings: list[Finding] = []
     try:
-        answering = await find_gripper(bench.address, registers_of(bench.address), findings.append)
+        if bench.address.kind == URCAP:
+            link = await find_urcap(bench.address, None, findings.append)
+        else:
+            link, bench.registers = await find_gripper(
+                bench.address, registers_of(bench.address), findings.append
+            )
     except GiveUpError:
         last = findings[-1]
         end = "" if last.found.endswith("?") else "."
         # A stranger answers; in all other cases nothing does.
         why = "refused" if last.what == STRANGER else "link"
         raise EndError(why, f"{last.what}: {last.found}{end} {last.advice}") from None
-    await answering.link.close()
-    bench.registers = answering.registers
-    bench.link = bench.another_link(answering.registers)
+    await link.close()
+    bench.link, bench.is_found = bench.another_link(), True
     await asyncio.sleep(0.5)  # for a gateway that serves one client to see that the other has gone
     await bench.link.open()
     statuses = [await bench.link.read() for _ in range(LASTING)]

@@ -72,7 +72,9 @@ class RecordedLink:
         ended = loop.time()
         self._keep(Frame(began, ended, "status", registers))
         self.asked = began
-        self.shown = RobotiqStatus.from_registers(registers, timestamp=ended, model=self.model)
+        self.shown = RobotiqStatus.from_registers(
+            registers, timestamp=ended, model=self.model, has_current=self.link.has_current
+        )
         return self.shown
 
     async def write(self, request: Request) -> float:

@@ -10,7 +10,7 @@ from ...runtime.version import __version__
 from ...values.model import THREE_FINGER, Model
 from ...values.registers import RegisterMap
 from ...values.status import RobotiqStatus
-from .catalogue import CATALOGUE, ENDINGS, HARMLESS, LAST, Check, Verdict, checks_of
+from .catalogue import CATALOGUE, ENDINGS, HARMLESS, LAST, Check, Verdict, checks_of, left_out
 
 T = TypeVar("T")
 
@@ -21,7 +21,7 @@ SCHEMA: Final = 1  # version of the fields in report.json; docs/hardware.md desc
 class Report:
     """A run, during it and after it."""
 
-    link: str  # "tcp", "rtu" or "rtu+tcp"
+    link: str  # "tcp", "rtu", "rtu+tcp", "urcap" or "tunnel"
     model: Model = THREE_FINGER  # of the gripper
     stages: list[int] = field(default_factory=list)  # those that have come to their end
     entered: list[int] = field(default_factory=list)  # those that have begun
@@ -43,6 +43,12 @@ class Report:
         for name, assumption in checks_of(self.model, self.link).items():
             if assumption.stage in self.entered and name not in self.checks:
                 self.checks[name] = Check(name, Verdict.INCONCLUSIVE, "not reached")
+
+    @property
+    def left_out(self) -> dict[str, str]:
+        """The checks of stages that have begun which this link cannot have, by name, and why."""
+        without = left_out(self.link).items()
+        return {name: why for name, why in without if CATALOGUE[name].stage in self.entered}
 
     @property
     def differing(self) -> list[Check]:
@@ -93,6 +99,7 @@ class Report:
             "last": self.last and list(self.last.registers),
             "options": self.options,
             "checks": [self.checks[name].as_dict() for name in CATALOGUE if name in self.checks],
+            "left_out": self.left_out,
         }
 
 
@@ -218,6 +225,9 @@ def page(report: Report, pictures: tuple[str, ...] = (), why_none: str = "") -> 
     ]
     table = ["## Checks", "", "| stage | check | assumed | | found |", "| -- | -- | -- | -- | -- |"]
     table += [_row(report.checks[name]) for name in CATALOGUE if name in report.checks]
+    if report.left_out:
+        table += ["", "Left out on this link:", ""]
+        table += [f"- `{name}`: {why}" for name, why in report.left_out.items()]
     shown = [f"\n![{name}]({name})" for name in pictures] or (
         [f"\nNo pictures: {why_none}."] if why_none else []
     )

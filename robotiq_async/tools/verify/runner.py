@@ -57,7 +57,7 @@ class Tape(Protocol):
 class Plan:
     """Parameters of a run."""
 
-    address: Address  # the gripper; tcp, rtu or rtu+tcp
+    address: Address  # the gripper; any but sim
     first: int = 0  # the stage to begin with
     last: int = LAST  # the last stage
     agreed: int = -1  # the last stage that runs without asking; -1 for none, at most 2
@@ -98,7 +98,6 @@ class Runner:
         self._tape = tape
         self._save = save
         self._bench = Bench(plan.address, person, tape.keep, plan.lengths, self.report.checks)
-        self._is_found = False
 
     async def run(self) -> Report:
         """Go through the stages. Whatever happens, the fingers of a stage that moves are stopped first.
@@ -120,7 +119,7 @@ class Runner:
             raise
         finally:
             report.complete()
-            if self._is_found:
+            if self._bench.is_found:
                 closing = asyncio.ensure_future(self._bench.link.close())
                 with suppress(asyncio.CancelledError):
                     await wait_shielded(closing)
@@ -129,7 +128,7 @@ class Runner:
     async def _do(self, stage: Stage) -> None:
         image = await self._look_first(stage)
         await self._ask(stage)
-        if stage.number == 1 and not self._is_found:
+        if stage.number == 1 and not self._bench.is_found:
             await self._find()
         self.report.entered.append(stage.number)
         if stage.number >= HARMLESS:
@@ -162,7 +161,7 @@ class Runner:
         """Check that the stage may begin; returns the image that stops everything now."""
         if stage.number < HARMLESS:
             return Request(model=self._bench.model)
-        if not self._is_found:
+        if not self._bench.is_found:
             await self._find()
         status = await check_before_writing(self._bench)
         self._person.tell(f"The gripper is {describe(status)}.")
@@ -194,7 +193,6 @@ class Runner:
         finally:
             self.report.registers = self._bench.registers
             self.report.found = self._bench.found
-            self._is_found = self._bench.registers is not None
         assert self._bench.found is not None
         self._bench.link.expect(self._bench.found.echo)
 

@@ -49,7 +49,8 @@ async def host(bench: Bench) -> None:
 
 def _adapter(bench: Bench) -> None:
     if bench.address.kind != "rtu":
-        bench.as_assumed("host.adapter", "no adapter: the link is a socket")
+        what = "the line is the arm's" if bench.address.kind == "tunnel" else "the link is a socket"
+        bench.as_assumed("host.adapter", f"no adapter: {what}")
         return
     kept = latency_timer(bench.address.host)
     if kept is None:
@@ -73,9 +74,10 @@ QUANTILES: Final = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99, 1.0)
 
 
 async def reading(bench: Bench) -> None:
-    _registers(bench)
-    await _others(bench)
-    await _counts(bench)
+    if bench.registers is not None:
+        _registers(bench)
+        await _others(bench)
+        await _counts(bench)
     await _round_trip(bench)
     await _connections(bench)
     await _silence(bench)
@@ -222,7 +224,6 @@ async def _trips(link: RecordedLink, count: int, period: float) -> list[float]:
 
 
 async def _connections(bench: Bench) -> None:
-    assert bench.registers is not None
     if bench.address.kind == "rtu":
         bench.as_assumed("read.connections", "a serial port has one owner", connections=1)
         return
@@ -230,7 +231,7 @@ async def _connections(bench: Bench) -> None:
     why = ""
     try:
         for _ in range(OTHERS):
-            others.append(bench.another_link(bench.registers))
+            others.append(bench.another_link())
             await others[-1].open()
             await others[-1].read()
             await bench.link.read()

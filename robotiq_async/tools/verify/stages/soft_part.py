@@ -112,8 +112,11 @@ def _judge_contact(bench: Bench, held: RobotiqStatus) -> None:
         bench.as_assumed("soft.contact", words)
     else:
         bench.inconclusive("soft.contact", f"no finger touched anything: {words}")
-    drawn = max(held.current_ma(finger) or 0 for finger in bench.fingers)
-    if not held.contacts:
+    currents = [held.current_ma(finger) for finger in bench.fingers]
+    drawn = max(current or 0 for current in currents)
+    if None in currents:
+        bench.inconclusive("soft.current", "this text port does not tell the current")
+    elif not held.contacts:
         bench.inconclusive("soft.current", "nothing was held")
     else:
         words = f"up to {drawn} mA while it is held" if drawn else "0 mA while it is held"
