@@ -16,7 +16,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from robotiq_async.fleet.network.bus import PendingQuery, Query, Reply, Undo, Urgency, is_any, is_any_key
+from robotiq_async.fleet.network.bus import (
+    Kind,
+    PendingQuery,
+    Query,
+    Reply,
+    Undo,
+    Urgency,
+    is_any,
+    is_request,
+)
 from tests.fleet.hosts import Host
 
 T = TypeVar("T")
@@ -277,10 +286,11 @@ class MemoryBus:
         self,
         expression: str,
         handler: Callable[[Query], None],
-        allows: Callable[[str], bool] = is_any_key,
+        sort: Callable[[str, bytes], Kind | None] = is_request,
     ) -> Undo:
         return _entered(
-            self.queryables, (expression, lambda query: handler(query) if allows(query.key) else None)
+            self.queryables,
+            (expression, lambda query: handler(query) if sort(query.key, query.payload) else None),
         )
 
     def ask(

@@ -15,13 +15,12 @@ from zenoh.handlers import Callback
 
 from robotiq_async import RobotiqHand
 from robotiq_async.fleet.agent.agent import Agent
-from robotiq_async.fleet.network.bus import Query, Urgency
+from robotiq_async.fleet.network.bus import Kind, Query, Urgency
 from robotiq_async.fleet.network.configuration import (
     agent_configuration,
     client_configuration,
     session_configuration,
 )
-from robotiq_async.fleet.network.mailbox import Kind
 from robotiq_async.fleet.network.zenoh_bus import ZenohBus, open_bus
 from tests.fleet.lab import LEFT, serving
 

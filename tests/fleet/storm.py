@@ -14,8 +14,10 @@ import functools
 import json
 import random
 import sys
-from collections import Counter
+from bisect import bisect_left, bisect_right
+from collections import Counter, defaultdict
 from collections.abc import Awaitable, Callable
+from operator import attrgetter
 from typing import Any, Final, NamedTuple
 
 from robotiq_async import Finger, RobotiqError
@@ -221,11 +223,14 @@ class Storm:
     def wrong(self, what: str, images: list[Image]) -> tuple[list[str], float]:
         """Changes that were neither asked for just now nor restored; and how late the latest was."""
         own = [note for note in self.notes if what in note.asked]
+        of_value: defaultdict[int, list[float]] = defaultdict(list)
+        for note in own:
+            of_value[note.asked[what]].append(note.begun)
         wrong, latest, before = [], 0.0, USUAL[what]
         for image in images:
             value = getattr(image, what)
             if value != before:
-                asked = [n.begun for n in own if n.asked[what] == value and n.begun <= image.at]
+                asked = [begun for begun in of_value[value] if begun <= image.at]
                 late = image.at - asked[-1] if asked else float("inf")
                 if late <= NONE_LATE_S:
                     latest = max(latest, late)
@@ -251,9 +256,9 @@ class Storm:
         return last | ({USUAL[what]} if not any(note.outcome == "done" for note in rivals) else set())
 
     def is_false(self, note: Note, images: list[Image]) -> bool:
-        at_end = [image for image in images if image.at <= note.end]
-        was_there = [image for image in images if image.at < note.begun][-1:]
-        since = [image for image in at_end if image.at >= note.begun]
+        begun = bisect_left(images, note.begun, key=attrgetter("at"))
+        was_there = images[begun - 1 : begun] if begun else []
+        since = images[begun : bisect_right(images, note.end, key=attrgetter("at"))]
         if note.word in ("done", "had begun"):
             return not any(self.is_shown(note, image) for image in (*was_there, *since))
         if note.word == "nothing was done":
@@ -262,7 +267,7 @@ class Storm:
                 n.begun for n in self.notes if n.begun > note.begun and n.asked.items() & note.asked.items()
             ]
             until = min([note.end + 5.0, *again])
-            near = [image for image in images if note.begun <= image.at < until]
+            near = images[begun : bisect_left(images, until, key=attrgetter("at"))]
             is_certain = "speed" in note.asked or "force" in note.asked
             return (
                 is_certain

@@ -280,7 +280,7 @@ def test_the_memory_is_bounded() -> None:
 def test_each_client_has_its_own_budget() -> None:
     questions = Questions(lambda: 1.0)
     for who, left in (("one", EACH), ("one", 0), ("two", EACH)):
-        assert sum(questions.allow(LEFT.question(who)) for _ in range(FLOOD)) == left
+        assert sum(questions.sort(LEFT.question(who), b"") is not None for _ in range(FLOOD)) == left
 
 
 def test_dropped_questions_are_logged_now_and_then(caplog: pytest.LogCaptureFixture) -> None:
@@ -288,10 +288,10 @@ def test_dropped_questions_are_logged_now_and_then(caplog: pytest.LogCaptureFixt
     questions = Questions(lambda: at)
     with caplog.at_level(logging.WARNING):
         for _ in range(3000):  # for 15 s
-            questions.allow("")
+            questions.sort("", b"")
             at += 0.005
         for _ in range(FLOOD):
-            questions.allow("")
+            questions.sort("", b"")
     assert caplog.text.count("requests for information were dropped: a client sends too many") == 2
 
 

@@ -10,12 +10,12 @@ from functools import partial
 
 import pytest
 
+from robotiq_async.fleet.network.bus import Kind
 from robotiq_async.fleet.network.mailbox import (
     GATHER_S,
     MOST,
     MOST_REPLIES,
     TURN_S,
-    Kind,
     Mailbox,
     ReplySender,
 )

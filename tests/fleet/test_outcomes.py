@@ -12,8 +12,8 @@ import pytest
 from robotiq_async import Finger, MoveTimeoutError, RobotiqError
 from robotiq_async.fleet import AgentError, ControlLostError
 from robotiq_async.fleet.agent.jobs import KEPT
-from robotiq_async.fleet.network.bus import Urgency
-from robotiq_async.fleet.network.mailbox import MOST_QUESTIONS, SHARE, Kind, Mailbox
+from robotiq_async.fleet.network.bus import Kind, Urgency
+from robotiq_async.fleet.network.mailbox import MOST_QUESTIONS, SHARE, Mailbox
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import Answer, Call
 from robotiq_async.fleet.wire.status_message import SIZE
@@ -172,25 +172,41 @@ async def test_an_agent_of_version_1_is_refused_with_a_sentence() -> None:
 
 
 def test_questions_come_last_and_get_a_share() -> None:
-    async def ask() -> tuple[list[str], float]:
+    """So do the requests of those who do not command, while somebody does."""
+
+    async def ask(last: Kind) -> tuple[list[str], float]:
         mailbox, done = Mailbox(), []
 
         def work(what: str) -> None:
             time.sleep(0.002)
             done.append(what)
 
-        accepted = [mailbox.put(lambda: work("question"), Kind.QUESTION) for _ in range(MOST_QUESTIONS + 1)]
+        accepted = [mailbox.put(lambda: work("last"), last) for _ in range(MOST_QUESTIONS + 1)]
         assert accepted == [True] * MOST_QUESTIONS + [False]
         mailbox.put(lambda: work("command"), Kind.REQUEST)
         mailbox.put(lambda: work("halt"), Kind.HALT)
         begun = time.perf_counter()
-        while len(done) < 12:  # noqa: ASYNC110
+        while len(done) < 8:  # noqa: ASYNC110
             await asyncio.sleep(0.001)
-        return done, 10 * 0.002 / (time.perf_counter() - begun)
+        return done, 6 * 0.002 / (time.perf_counter() - begun)
 
-    done, share = asyncio.run(ask())
-    assert done[:3] == ["halt", "command", "question"]
-    assert share < 1.5 * SHARE
+    for last in (Kind.QUESTION, Kind.OTHERS):
+        done, share = asyncio.run(ask(last))
+        assert done[:3] == ["halt", "command", "last"]
+        assert share < 1.5 * SHARE
+
+
+@inside(lab)
+async def test_whoever_commands_does_not_wait_for_the_requests_of_others(
+    here: Lab, reader: RemoteHand
+) -> None:
+    ask = Call(LEFT.base, "stranger").pack()
+    verbs = ("lease", "cmd/move")
+    sort = here.agent._sort
+    assert {sort(LEFT.key(verb), ask) for verb in verbs} == {Kind.REQUEST}, "nobody does"
+    await reader.acquire()
+    assert {sort(LEFT.key(verb), ask) for verb in verbs} == {Kind.OTHERS}
+    assert {sort(LEFT.key(verb), call_of(reader).pack()) for verb in verbs} == {Kind.REQUEST}
 
 
 @inside(lab)

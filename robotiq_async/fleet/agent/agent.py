@@ -17,7 +17,7 @@ from ...values.errors import AgentError
 from ..control.budget import Budget
 from ..control.lease import WINDOW_S
 from ..limited_log import EVERY_S, LimitedLog
-from ..network.bus import Bus, Query, Undo
+from ..network.bus import Bus, Kind, Query, Undo
 from ..wire.envelope import Call, failure
 from ..wire.names import ROOT, GripperName
 from .records import NoRecords, Records
@@ -106,14 +106,17 @@ class Agent:
                 each.resume()
             undo.append(self._bus.watch(f"{self._prefix}/*/alive/*", self._report_conflict))
             questions = Questions(loop.time)
-            undo += [
-                self._bus.serve(f"{self._prefix}/*/{key}", self._receive, questions.allow)
+            sorts: dict[str, Callable[[str, bytes], Kind | None]] = {
+                "halt": lambda *_: Kind.HALT,
+                "lease": self._sort,
+                "cmd/*": self._sort,
+                "info/*": questions.sort,
                 # Clients of version 1 ask there: they are told that this is another one.
-                for key in ("info/*", "info")
-            ]
+                "info": questions.sort,
+            }
             undo += [
-                self._bus.serve(f"{self._prefix}/*/{verb}", self._receive)
-                for verb in ("lease", "halt", "cmd/*")
+                self._bus.serve(f"{self._prefix}/*/{verb}", self._receive, sort)
+                for verb, sort in sorts.items()
             ]
             ready()
             async with asyncio.TaskGroup() as group:
@@ -177,6 +180,11 @@ class Agent:
             if is_logged and name.gripper in self.hands:
                 self.hands[name.gripper].publisher.add({"kind": "conflict", "key": key})
 
+    def _sort(self, key: str, payload: bytes) -> Kind:
+        # In a thread of zenoh. Who commands does not wait for the requests of others, which say who they are.
+        served = self.hands.get(key.split("/")[4])
+        return Kind.REQUEST if served is None or served.may_be_of_holder(payload) else Kind.OTHERS
+
     def _receive(self, query: Query) -> None:
         self._look_at_clocks()
         if self._running is not None and self._running.cancelling():
@@ -235,17 +243,17 @@ class Questions:
         self._dropped = 0
         self._report_due = 0.0
 
-    def allow(self, key: str) -> bool:
+    def sort(self, key: str, _payload: bytes) -> Kind | None:
         """Whether to read a question. Its key ends in the client's name: with keys, its certificate's."""
         # Of each gripper, unless the key names several.
         client, now = key.rpartition("/")[2] if "*" in key else key, self._clock()
         with self._lock:
             if self._budget.allows(client, now):
-                return True
+                return Kind.QUESTION
             self._dropped += 1
             if now >= self._report_due:
                 log.warning(
                     "%d requests for information were dropped: a client sends too many", self._dropped
                 )
                 self._dropped, self._report_due = 0, now + EVERY_S
-            return False
+            return None

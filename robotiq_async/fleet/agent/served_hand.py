@@ -153,6 +153,11 @@ class ServedHand:
 
     # -- requests --------------------------------------------------------------------------------------
 
+    def may_be_of_holder(self, payload: bytes) -> bool:
+        """Whether a request may be of the client that commands, if one does. In any thread."""
+        holder = self._lease.holder
+        return holder is None or holder.client.encode() in payload
+
     def receive(self, verb: str, query: Query) -> None:
         try:
             call = unpack_call(query.payload)

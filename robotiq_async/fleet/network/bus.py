@@ -53,8 +53,20 @@ def is_any(_reply: Reply) -> bool:
     return True
 
 
-def is_any_key(_key: str) -> bool:
-    return True
+class Kind(Enum):
+    """Kind of a message, by which it is handled first or last."""
+
+    HALT = "halt"  # before all others
+    ANSWER = "answer"  # to a request of this process: never dropped
+    REQUEST = "request"
+    TELEMETRY = "telemetry"  # may wait 1 ms
+    # These come last, one in a turn, and each kind gets a share of the loop:
+    OTHERS = "others"  # requests of those who do not command, while somebody does
+    QUESTION = "question"  # of anybody
+
+
+def is_request(_key: str, _payload: bytes) -> Kind:
+    return Kind.REQUEST
 
 
 class Bus(Protocol):
@@ -74,14 +86,14 @@ class Bus(Protocol):
         self,
         expression: str,
         handler: Callable[[Query], None],
-        allows: Callable[[str], bool] = is_any_key,
+        sort: Callable[[str, bytes], Kind | None] = is_request,
     ) -> Undo:
         """Call a handler with each request under matching keys. Returns what ends it.
 
         Args:
             expression: the keys.
             handler: called in the event loop.
-            allows: whether to accept a request under this key; others are dropped. Called first, in any
+            sort: the kind of a request with this key and payload; None drops it. Called first, in any
                 thread.
         """
 

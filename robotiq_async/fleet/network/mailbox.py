@@ -9,31 +9,29 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from enum import Enum
 from typing import Final
 
 from ...runtime.log import log
 from ..limited_log import EVERY_S, LimitedLog
+from .bus import Kind
 
 GATHER_S: Final = 0.001
 """Seconds for which telemetry is collected under load, to wake the loop once for all of it."""
 TURN_S: Final = 0.002  # seconds of deliveries in one turn of the loop: the rest of the program must run, too
 MOST: Final = 2000  # Requests and telemetry that may wait. Beyond that they are dropped, as on a full network
-MOST_QUESTIONS: Final = 64  # questions that may wait. Beyond that they are dropped: their clients ask again
-SHARE: Final = 0.2  # of the loop's time, at most, goes to questions while they wait
+MOST_QUESTIONS: Final = 64  # of each kind that comes last. Beyond that they are dropped: clients ask again
+SHARE: Final = 0.1  # of the loop's time, at most, goes to each kind that comes last
 MOST_REPLIES: Final = 1000
 """Replies that may wait. Beyond that the query is dropped, also in this thread: zenoh notifies the client of
 it, which can block for as long. Clients repeat their requests."""
 
 
-class Kind(Enum):
-    """Kind of a delivery."""
+class _Last:
+    """Those of a kind that comes last."""
 
-    HALT = "halt"  # delivered before all others
-    ANSWER = "answer"  # to a request of this process: never dropped
-    REQUEST = "request"
-    TELEMETRY = "telemetry"  # may wait 1 ms
-    QUESTION = "question"  # of anybody: waits for all others, and gets a SHARE of the loop
+    def __init__(self) -> None:
+        self.deliveries: deque[Callable[[], None]] = deque()
+        self.due = 0.0  # when the next may be delivered
 
 
 class Mailbox:
@@ -48,8 +46,7 @@ class Mailbox:
         self._loop = asyncio.get_running_loop()
         self._halts: deque[Callable[[], None]] = deque()
         self._deliveries: deque[Callable[[], None]] = deque()
-        self._questions: deque[Callable[[], None]] = deque()
-        self._question_due = 0.0  # when the next question may be delivered
+        self._last = {Kind.OTHERS: _Last(), Kind.QUESTION: _Last()}
         self._is_due = False
         self._gathering: asyncio.TimerHandle | None = None
         self._opened_at = 0.0
@@ -59,15 +56,17 @@ class Mailbox:
 
     def put(self, delivery: Callable[[], None], kind: Kind) -> bool:
         """Call a function in the loop; thread-safe. False if the mailbox is full: the call is dropped."""
-        own = {Kind.HALT: self._halts, Kind.QUESTION: self._questions}
-        deliveries = own.get(kind, self._deliveries)
-        if kind is not Kind.ANSWER and len(deliveries) >= (MOST_QUESTIONS if kind is Kind.QUESTION else MOST):
-            self._dropped += kind is not Kind.QUESTION
+        last = self._last.get(kind)
+        deliveries = (
+            self._halts if kind is Kind.HALT else self._deliveries if last is None else last.deliveries
+        )
+        if kind is not Kind.ANSWER and len(deliveries) >= (MOST if last is None else MOST_QUESTIONS):
+            self._dropped += last is None
             return False
         deliveries.append(delivery)
-        # Telemetry, and a question, wait for a timer that is already set. Anything else wakes the loop
+        # Telemetry, and what comes last, wait for a timer that is already set. Anything else wakes the loop
         # before that.
-        waits = kind in (Kind.TELEMETRY, Kind.QUESTION)
+        waits = kind is Kind.TELEMETRY or last is not None
         if not self._is_due or (not waits and self._gathering is not None):
             self._is_due = True
             with contextlib.suppress(RuntimeError):  # the loop is closed
@@ -87,26 +86,26 @@ class Mailbox:
             if time.perf_counter() > until:
                 break
         else:
-            self._answer_a_question()
+            for last in self._last.values():
+                self._deliver_one(last)
         # A delivery may have put another one, so _is_due may be set again.
         if (self._halts or self._deliveries) and not self._is_due:
             self._is_due = True
             self._loop.call_soon(self._open)
-        elif self._questions and not self._is_due:
+        elif (due := [last.due for last in self._last.values() if last.deliveries]) and not self._is_due:
             self._is_due = True
-            wait = max(0.0, self._question_due - self._loop.time())
-            self._gathering = self._loop.call_later(wait, self._open)
+            self._gathering = self._loop.call_at(max(min(due), self._opened_at), self._open)
         # Two openings in close succession mean load: collect, instead of waking the loop for each message.
         elif count and not self._is_due and self._opened_at - before < 2 * GATHER_S:
             self._is_due = True
             self._gathering = self._loop.call_later(GATHER_S, self._open)
 
-    def _answer_a_question(self) -> None:
-        # One, and then none for as long as its share demands. Nothing that moves fingers waits for it.
-        if self._questions and self._loop.time() >= self._question_due:
+    def _deliver_one(self, last: _Last) -> None:
+        # And then none for as long as its share demands. Nothing that moves fingers waits for it.
+        if last.deliveries and self._loop.time() >= last.due:
             begun = time.perf_counter()
-            self._deliver(self._questions.popleft())
-            self._question_due = self._loop.time() + (time.perf_counter() - begun) * (1 / SHARE - 1)
+            self._deliver(last.deliveries.popleft())
+            last.due = self._loop.time() + (time.perf_counter() - begun) * (1 / SHARE - 1)
 
     def _deliver(self, delivery: Callable[[], None]) -> None:
         try:

@@ -28,8 +28,8 @@ except ModuleNotFoundError as error:
 from ...runtime.concurrency import in_a_thread
 from ...values.errors import ConnectFailedError
 from ..keys.certificates import common_name
-from .bus import PendingQuery, Query, Reply, Undo, Urgency, is_any, is_any_key
-from .mailbox import Kind, Mailbox, ReplySender
+from .bus import Kind, PendingQuery, Query, Reply, Undo, Urgency, is_any, is_request
+from .mailbox import Mailbox, ReplySender
 
 CLOSE_S: Final = 1.0  # seconds for closing a session
 LAST_ANSWERS_S: Final = 0.2  # seconds to send the answers to requests that are cancelled at the end
@@ -75,11 +75,11 @@ def _drop(query: zenoh.Query) -> None:
 
 
 class _Query:
-    def __init__(self, query: zenoh.Query, reply_sender: ReplySender) -> None:
+    def __init__(self, query: zenoh.Query, key: str, payload: bytes, reply_sender: ReplySender) -> None:
+        self.key = key
+        self.payload = payload
         self._query = query
         self._reply_sender = reply_sender
-        self.key = str(query.key_expr)
-        self.payload = b"" if query.payload is None else query.payload.to_bytes()
 
     def reply(self, payload: bytes, attachment: bytes = b"") -> None:
         query, key = self._query, self.key
@@ -106,7 +106,9 @@ class ZenohBus:
         self._endpoints = endpoints
         self._mailbox = Mailbox()
         # A sender for each kind: clients that do not read their answers delay only those of that kind.
-        self._repliers = {kind: ReplySender() for kind in (Kind.HALT, Kind.REQUEST, Kind.QUESTION)}
+        self._repliers = {
+            kind: ReplySender() for kind in (Kind.HALT, Kind.REQUEST, Kind.OTHERS, Kind.QUESTION)
+        }
         self._dropping = ReplySender()
         self._closing: asyncio.Future[None] | None = None
 
@@ -140,19 +142,14 @@ class ZenohBus:
         self,
         expression: str,
         handler: Callable[[Query], None],
-        allows: Callable[[str], bool] = is_any_key,
+        sort: Callable[[str, bytes], Kind | None] = is_request,
     ) -> Undo:
-        kind = Kind.HALT if expression.endswith("/halt") else Kind.REQUEST
-        if allows is not is_any_key:
-            kind = Kind.QUESTION
-        reply_sender = self._repliers[kind]
-
         def deliver(query: zenoh.Query) -> None:
-            payload = query.payload
-            if (
-                (payload is None or len(payload) <= LONGEST)
-                and allows(str(query.key_expr))
-                and self._mailbox.put(lambda: handler(_Query(query, reply_sender)), kind)
+            payload = b"" if query.payload is None else query.payload.to_bytes()
+            key = str(query.key_expr)
+            kind = sort(key, payload) if len(payload) <= LONGEST else None
+            if kind is not None and self._mailbox.put(
+                lambda: handler(_Query(query, key, payload, self._repliers[kind])), kind
             ):
                 return
             # Dropping notifies the client, and blocks while that does not read, until its link is closed.
