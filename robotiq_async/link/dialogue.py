@@ -243,19 +243,25 @@ class Dialogues:
     def _second(self, first: Outcome) -> Dialogue[bytes]:
         """Read once more on a line that lost or damaged a byte, as USB adapters occasionally do.
 
+        Where others use the line a question is short, so a silent gripper is asked until its time is over.
+
         Raises:
             RobotiqConnectionError: that of the first request, if there is again no clean answer.
         """
-        yield Step.TURN
-        timing = self._repeated(is_long=True)  # the shorter silence may be why there was no answer
-        bad = yield from self._in_step(timing)
-        if bad is None:
-            came_to = yield self._ask(self._poll, timing)
+        until = self.line.now() + self._usual.seconds
+        while True:
+            yield Step.TURN
+            timing = self._repeated(is_long=True)  # the shorter silence may be why there was no answer
+            came_to: Answer | None = yield from self._in_step(timing)
+            if came_to is None:
+                came_to = yield self._ask(self._poll, timing)
             if isinstance(came_to, bytes):
                 self._note_repeat(first.error)
                 return came_to
-            bad = came_to
-        raise first.error from (bad.error if bad else None)
+            assert came_to is not None, "an exchange comes to something"
+            is_asked_again = isinstance(came_to, Silent) and self.line.is_shared
+            if not is_asked_again or self.line.now() > until:
+                raise first.error from came_to.error
 
     def _in_step(self, timing: Timing | None = None) -> Part:
         """Wait for silence, and drop the rest of a damaged reply; then make sure that nothing can come."""
@@ -325,8 +331,9 @@ class Dialogues:
         return self.line.forgives and isinstance(outcome, Noise | Silent)
 
     def _repeated(self, *, is_long: bool = False) -> Timing:
-        """The limits of all that a repeated read takes."""
-        return self._usual._replace(by=self.line.now() + self._repeat_s, is_long=is_long)
+        """The limits of all that a repeated read takes; where others use the line, of each question."""
+        by = math.inf if self.line.is_shared else self.line.now() + self._repeat_s
+        return self._usual._replace(by=by, is_long=is_long)
 
     def _status_in(self, answer: bytes) -> Registers:
         registers = registers_in(answer)
@@ -353,9 +360,12 @@ class Dialogues:
     def _note_unheard(self, outcome: Outcome) -> None:
         """Take the longer silence after a write without an answer: a stop that comes again must be heard.
 
-        The trial at the next opening would cost another response timeout, in which fingers go on.
+        The trial at the next opening would cost another response timeout, in which fingers go on. On a line
+        that others use it takes a short question, and they would pay for a gripper that is dead.
         """
-        if isinstance(outcome, Silent) and self.line.keeps_silence and not self.line.silence.is_long:
+        line = self.line
+        is_ours = line.keeps_silence and not line.is_shared
+        if isinstance(outcome, Silent) and is_ours and not line.silence.is_long:
             self._keep_long_silence(outcome.error)
 
     def _keep_long_silence(self, why: RobotiqConnectionError) -> None:

@@ -57,9 +57,9 @@ class Exchange(ABC):
     def feed(self, data: bytes) -> Answer | None:
         """Take bytes; None while more must come."""
 
-    def late(self, place: object) -> Silent:
-        """The outcome when the reply has not come in time."""
-        return Silent(ResponseTimeoutError(f"{place} did not answer within {self.timing.seconds:g} s"))
+    def late(self, place: object, seconds: float) -> Silent:
+        """The outcome when the reply has not come within so many seconds."""
+        return Silent(ResponseTimeoutError(f"{place} did not answer within {seconds:g} s"))
 
 
 class TcpExchange(Exchange):
@@ -109,11 +109,16 @@ class Echo:
 
 
 class SerialExchange(Exchange):
-    """A request on a serial line; it notes in ``echo`` what it learns."""
+    """A request on a serial line; it notes in ``echo`` what it learns.
 
-    def __init__(self, request: bytes, timing: Timing, echo: Echo) -> None:
+    Where others use the line, too, whole frames of other units are dropped: answers that came too late for
+    their questions.
+    """
+
+    def __init__(self, request: bytes, timing: Timing, echo: Echo, *, has_others: bool = False) -> None:
         super().__init__(frames.serial_frame(request), timing)
         self._echo = echo
+        self._has_others = has_others
         self._expected = frames.expected_reply(request, checksum=frames.CHECKSUM)
 
     def feed(self, data: bytes) -> Answer | None:
@@ -121,6 +126,8 @@ class SerialExchange(Exchange):
         reply = self._received if self._echo.is_on is False else self._without_echo(self._received)
         if isinstance(reply, Noise):
             return reply
+        if self._has_others:
+            reply = frames.after_others(reply, self.frame[0])
         size = self._expected.size
         if len(reply) > size and frames.is_write(self.frame):
             # A floating line makes up a byte when the device stops sending. The write is acknowledged

@@ -166,6 +166,29 @@ class Expected(NamedTuple):
         return f"not the answer: {show(frame)}, expected {show(self.start)}..."
 
 
+def after_others(received: bytes, unit: int) -> bytes:
+    """What has arrived after whole replies of other units than this one; nothing while one is not whole."""
+    while received and received[0] != unit and (size := _reply_size(received)):
+        if len(received) < size:
+            return b""
+        if not FramerRTU.check_CRC(received[: size - 2], int.from_bytes(received[size - 2 : size], "big")):
+            break
+        received = received[size:]
+    return received
+
+
+def _reply_size(received: bytes) -> int:
+    """The bytes of a reply on a serial line by its first three, at the least while they do not suffice."""
+    if len(received) < 3:
+        return 3
+    function, count = received[1:3]
+    if function & 0x7F not in (*_READS, _WRITE, _WRITE_AND_READ):
+        return 0
+    if function & 0x80:
+        return 3 + CHECKSUM
+    return 6 + CHECKSUM if function == _WRITE else 3 + count + CHECKSUM
+
+
 @lru_cache(maxsize=32)  # a poll is always the same
 def expected_reply(request: bytes, *, checksum: int = 0) -> Expected:
     """The reply to a request (unit and PDU) of function 3, 4, 16 or 23, with a checksum of this size."""

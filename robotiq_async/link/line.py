@@ -19,8 +19,8 @@ byte belongs to a frame with a number (TCP) or to an answer with a name (URCap),
 A line may have several users, because grippers with different unit ids can hang on it. The first one opens
 it and the last one closes it. Users take turns, in the order in which they ask for them, so each waits for
 one turn of each other at most. What another one has left on its way must not meet a request: the turn begins
-with waiting for silence then. A gripper that does not answer takes a turn only once in a while (REST_S). When
-the wire ends, it ends for all users.
+with waiting for silence then. A gripper that does not answer takes a short turn, and only once in a while
+(patience.py). When the wire ends, it ends for all users.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ import contextlib
 from collections.abc import Callable, Generator
 from enum import Enum
 from typing import Final, TypeVar
-from weakref import WeakKeyDictionary, WeakSet, WeakValueDictionary
+from weakref import WeakSet, WeakValueDictionary
 
 from ..runtime.limit import Limit
 from ..values.errors import ConnectFailedError, ConnectionLostError, ProtocolError, RobotiqConnectionError
@@ -39,6 +39,7 @@ from .canonical import canonical_address
 from .exchange import Answer, Echo, Exchange
 from .frames import stray
 from .outcome import Lost, Noise, Outcome, Refused, Stray
+from .patience import Patience
 from .silence import Silence
 from .watchdog import Watchdog
 from .wires import Send, Wire, wire_to
@@ -50,9 +51,6 @@ HUSH_S: Final = 0.02
 usual latency timer of FTDI chips)."""
 LONGEST_HUSH_S: Final = 0.1
 """Longest wait for that silence. A gripper that was asked one thing does not talk longer."""
-REST_S: Final = 0.1
-"""From the end of an exchange without a reply to the next turn of its user on a line that others use: time
-for 20 polls of theirs."""
 
 T = TypeVar("T")
 
@@ -127,8 +125,7 @@ class Line:
         self._users: Final[set[object]] = set()
         self._holders: Final[WeakSet[object]] = WeakSet()
         """Those whose line it is, and who open it again after a loss, whether they are users now or not."""
-        self._rests: Final[WeakKeyDictionary[object, float]] = WeakKeyDictionary()
-        """The time of the next turn of a user whose gripper did not answer."""
+        self._patience: Final = Patience()
         self._speaker: object = None
         """Who had the last turn, and has not left since."""
         self._exchange: Exchange | None = None
@@ -146,8 +143,8 @@ class Line:
 
     @property
     def is_shared(self) -> bool:
-        """Whether it has several users now."""
-        return len(self._users) > 1
+        """Whether several have it, be they users now or about to open it again."""
+        return self._shares and len(self._holders) > 1
 
     @property
     def is_held(self) -> bool:
@@ -175,7 +172,7 @@ class Line:
                 await self._connect(seconds)
             self._users.add(user)
             try:
-                if self.address.is_socket and not self.is_shared:
+                if self.address.is_socket and len(self._users) == 1:
                     await self._settle()
             except BaseException:
                 self.leave(user)
@@ -291,7 +288,7 @@ class Line:
 
     async def _take_turn(self, user: object) -> bool:
         """Wait until this user has the line alone; return whether another one has left a reply on its way."""
-        if self.is_shared and (rest := self._rests.get(user, 0.0) - self.now()) > 0:
+        if self.is_shared and (rest := self._patience.until(user) - self.now()) > 0:
             await asyncio.sleep(rest)
         await self._turns.acquire()
         before, self._speaker = self._speaker, user
@@ -311,13 +308,18 @@ class Line:
             assert obstacle is not None
             answer.set_result(obstacle)
             return answer
-        self._exchange, (seconds, by, _) = exchange, exchange.timing
-        self._watchdog.watch(min(self._watchdog.loop.time() + seconds, by))
+        self._exchange = exchange
+        self._watchdog.watch(min(self._watchdog.loop.time() + self._allowed(exchange), exchange.timing.by))
         try:
             self._send(exchange.frame)
         except OSError as error:
             self._close(Lost(ConnectionLostError(f"{self.address}: {error}")))
         return answer
+
+    def _allowed(self, exchange: Exchange) -> float:
+        """The longest time for the answer to a request of this turn, in seconds."""
+        seconds = exchange.timing.seconds
+        return self._patience.seconds(self._speaker, seconds) if self.is_shared else seconds
 
     def _obstacle(self, user: object) -> Outcome | None:
         """What keeps this user from sending."""
@@ -330,8 +332,9 @@ class Line:
 
     async def _hush(self) -> Noise | None:
         """Drop what arrives until the line is silent."""
-        if self.state is CLOSED:
-            return None  # the next request has the reason
+        # Closed, the next request has the reason. Another user may have brought the line in step since.
+        if self.state is CLOSED or (self.state is IN_STEP and self.is_shared):
+            return None
         self._become(HUSHING)
         clock = self._watchdog.clock
         began = clock()
@@ -361,15 +364,18 @@ class Line:
 
     def _on_timeout(self) -> None:
         assert self._exchange is not None, "only an exchange is watched"
+        late = self._exchange.late(self.address, self._allowed(self._exchange))
         if self._shares:
-            self._rests[self._speaker] = self.now() + REST_S
-        self._end(self._exchange.late(self.address))
+            self._patience.missed(self._speaker, self.now())
+        self._end(late)
 
     def _end(self, answer: Answer) -> None:
         """End the exchange in flight."""
         exchange, self._exchange = self._exchange, None
         assert exchange is not None, "in flight"
         if type(answer) is bytes:
+            if self._shares:
+                self._patience.answered(self._speaker)
             if exchange.extra is not None:
                 self._note(exchange.extra)
         elif not isinstance(answer, bytes | Refused) and self.state is not CLOSED:

@@ -79,7 +79,7 @@ class ModbusTransport:
         return TcpExchange(self._number, request, timing)
 
     def _over_a_line(self, request: bytes, timing: Timing) -> Exchange:
-        return SerialExchange(request, timing, self._line.echo)
+        return SerialExchange(request, timing, self._line.echo, has_others=self._shares_line)
 
     @property
     def repeats(self) -> int:

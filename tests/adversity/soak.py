@@ -6,6 +6,7 @@ A hand, a simulated gripper and everything that watches them share one event loo
 seconds two users move axes, cancel, halt and run control loops, while the fault injector cuts, delays,
 corrupts and refuses, and the application holds up the loop now and then. After each cycle everything comes to
 rest and is compared. Several hands do so beside each other, on a serial line with one port for all of them.
+With ``--silent`` others on that line look all the time for grippers that do not answer.
 Exits with 1 when a promise was broken.
 """
 
@@ -21,7 +22,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -29,7 +30,7 @@ from typing import Any, Final
 from robotiq_async import JAW, Finger, Model, MoveResult, RobotiqError, RobotiqHand, State, Tunnel
 from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.link.line import LONGEST_HUSH_S
-from robotiq_async.session.options import RESPONSE_TIMEOUT_S
+from robotiq_async.link.patience import QUESTION_S
 from robotiq_async.simulator import KINDS, Trouble
 from robotiq_async.values.model import MODELS, THREE_FINGER, model_of
 from robotiq_async.values.registers import RTU_REGISTERS
@@ -50,11 +51,12 @@ from tests.serial_line import SerialLine
 
 SPEEDUP = 5.0
 CYCLE_S = (4.0, 12.0)
+FOR_EVER_S = 1e6
 WRITE_S = 1.0
 """Longest write of a hand that has its line alone: a poll without an answer, the repeated read, the write."""
 TURNS = 3
 """The turns of a line that these take. Before each one every other hand may have a turn."""
-TURN_S = LONGEST_HUSH_S + RESPONSE_TIMEOUT_S
+TURN_S = LONGEST_HUSH_S + QUESTION_S
 """Longest turn of a hand whose gripper does not answer."""
 TROUBLES = [
     *(Trouble(kind) for kind in ("drop", "late", "half", "twice", "wrong-function", "wrong-length")),
@@ -71,6 +73,7 @@ TROUBLES = [
     *(Trouble(kind) for kind in ("wrong-checksum", "byte-before", "byte-after")),
     *(Trouble(kind, lasts=0.0) for kind in ("garbled", "seven-bits")),
     *(Trouble(kind) for kind in ("echo", "strict-silence")),
+    *(Trouble(kind) for kind in ("unreadable", "unreadable", "lost-set", "one-by-one")),
 ]
 """Troubles; those that fit the link and the gripper happen."""
 SERVERS: Final[dict[str, type[TcpServer | UrcapServer | ToolServer]]] = {
@@ -267,7 +270,9 @@ class Soak:
 
 
 @contextlib.asynccontextmanager
-async def soaks(link: str, model: Model, hands: int, seed: int, loop: LoopWatch) -> AsyncIterator[list[Soak]]:
+async def soaks(
+    link: str, model: Model, hands: int, silent: int, seed: int, loop: LoopWatch
+) -> AsyncIterator[list[Soak]]:
     """Everything in place, the hands started."""
     async with contextlib.AsyncExitStack() as stack:
         line: SerialLine | None = None
@@ -277,14 +282,25 @@ async def soaks(link: str, model: Model, hands: int, seed: int, loop: LoopWatch)
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(dir=memory)))
             line = stack.enter_context(SerialLine(folder, hands))
         them = []
-        others = hands - 1 if line is not None else 0
+        others = hands + silent - 1 if line is not None else 0
         write_s = WRITE_S + others * TURNS * TURN_S
         for number in range(hands):
             gripper = StampedGripper(speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP, model=model)
             world = await stack.enter_async_context(started(gripper, link, line, number))
             pulled = line if number == 0 else None
             them.append(Soak(world, pulled, random.Random(seed + number), loop, WriteWatch(model), write_s))
+        for number in range(hands, hands + silent):
+            assert line is not None, "others need a line"
+            stack.enter_context(looking(f"rtu://{line.near}", RTU_REGISTERS.device_id + number))
         yield them
+
+
+@contextlib.contextmanager
+def looking(address: str, unit: int) -> Iterator[None]:
+    """A hand that looks for a gripper which is not there."""
+    task = asyncio.ensure_future(RobotiqHand(address, model="2f85", device_id=unit).start(wait=FOR_EVER_S))
+    yield
+    task.cancel()
 
 
 @contextlib.asynccontextmanager
@@ -312,14 +328,16 @@ async def started(
             await asyncio.gather(watching, return_exceptions=True)
 
 
-async def run(minutes: float, link: str, model: Model, hands: int, seed: int, loop: LoopWatch) -> int:
+async def run(
+    minutes: float, link: str, model: Model, hands: int, silent: int, seed: int, loop: LoopWatch
+) -> int:
     """Run it and print the figures as a table.
 
     Returns:
         The exit code.
     """
     began, memory = time.monotonic(), 0
-    async with soaks(link, model, hands, seed, loop) as them:
+    async with soaks(link, model, hands, silent, seed, loop) as them:
         last_word = began
         while time.monotonic() - began < 60 * minutes:
             await asyncio.gather(*(it.cycle() for it in them))
@@ -346,7 +364,8 @@ async def run(minutes: float, link: str, model: Model, hands: int, seed: int, lo
         ("longest hold by library, simulator and checks, ms", f"{1000 * loop.hold.longest:.1f}"),
         ("memory growth in the last three quarters, MiB", f"{(resident() - memory) / 2**20:.1f}"),
     ]
-    head = [(f"{hands} {model.title}, {link}", "figure"), ("--", "--")]
+    beside = f" beside {silent} silent" if silent else ""
+    head = [(f"{hands} {model.title}{beside}, {link}", "figure"), ("--", "--")]
     print("\n".join(f"| {name} | {value} |" for name, value in head + rows))  # noqa: T201
     return 1 if broken else 0
 
@@ -364,11 +383,14 @@ def main() -> int:
         help="Modbus TCP, a pseudo terminal, the text port of a UR, or a tunnel through an arm",
     )
     parser.add_argument("--hands", type=int, default=1, help="how many; on rtu they share the line")
+    parser.add_argument("--silent", type=int, default=0, help="hands on an rtu line without a gripper")
     parser.add_argument("--model", type=model_of, default=MODEL, help=f"one of {', '.join(MODELS)}")
     parser.add_argument("--seed", type=int, default=int(time.time()), help="of everything that is random")
     options = parser.parse_args()
     if options.link == "urcap" and options.model is THREE_FINGER:
         parser.error("a UR has no 3-Finger: --model 2f85, for example")
+    if options.silent and options.link != "rtu":
+        parser.error("--silent needs --link rtu")
     print(f"seed {options.seed}", flush=True)  # noqa: T201
     logging.getLogger("robotiq_async").setLevel(logging.CRITICAL)
     # Most garbage here is that of the checks: it is collected between cycles, when nothing is measured.
@@ -376,9 +398,8 @@ def main() -> int:
     gc.disable()
     loop = LoopWatch()
     with asyncio.Runner(loop_factory=loop.make_loop) as runner:
-        return runner.run(
-            run(options.minutes, options.link, options.model, options.hands, options.seed, loop)
-        )
+        them = options.link, options.model, options.hands, options.silent
+        return runner.run(run(options.minutes, *them, options.seed, loop))
 
 
 if __name__ == "__main__":

@@ -42,6 +42,7 @@ class Place:
     silence = Silence(10 / 115200)
     keeps_silence = False
     forgives = True
+    is_shared = False
 
     def now(self) -> float:
         return 1000.0

@@ -12,8 +12,11 @@ import pytest
 
 from robotiq_async import RobotiqConnectionError
 from robotiq_async.link.modbus import ModbusTransport
+from robotiq_async.link.patience import SOON
 from robotiq_async.values.registers import REGISTER_COUNT, RTU_REGISTERS
 from tests.link.scripted_device import Device, unopened
+from tests.serial_line import with_crc
+from tests.virtual import until
 from tests.virtual_line import VirtualLine
 
 pytestmark = pytest.mark.virtual_time
@@ -50,8 +53,11 @@ async def test_a_late_reply_for_one_does_not_meet_a_write_of_the_other(pair: Pai
     device.late = {RIGHT: 0.01}
     await right.write(IMAGE)
     await reading
+    assert left.is_open
     assert right.is_open
-    assert [request[0] for request in device.requests[:2]] == [LEFT, RIGHT]
+    assert [request[0] for request in device.requests[:4]] == [LEFT] * 3 + [RIGHT], (
+        "it is asked again at once"
+    )
 
 
 async def test_the_rest_of_a_cancelled_exchange_does_not_meet_a_write_of_the_other(
@@ -68,9 +74,7 @@ async def test_the_rest_of_a_cancelled_exchange_does_not_meet_a_write_of_the_oth
     assert right.is_open
 
 
-async def test_a_silent_gripper_leaves_the_line_to_the_other_for_twenty_polls(
-    pair: Pair, device: Device
-) -> None:
+async def test_a_silent_gripper_is_asked_now_and_then(pair: Pair, device: Device) -> None:
     left, right = pair
     device.late[LEFT] = SILENT_S
 
@@ -80,14 +84,32 @@ async def test_a_silent_gripper_leaves_the_line_to_the_other_for_twenty_polls(
             await asyncio.sleep(0.005)
 
     polling = asyncio.create_task(poll())
-    for _ in range(5):
+    for _ in range(12):
         with contextlib.suppress(RobotiqConnectionError):
             await (left.read() if left.is_open else left.open())
     polling.cancel()
     units = [request[0] for request in device.requests]
     tries = [place for place, unit in enumerate(units) if unit == LEFT]
-    assert len(tries) > 5
-    assert all(later - earlier > 15 for earlier, later in pairwise(tries))
+    assert len(tries) > 12
+    assert all(later - earlier > 10 for earlier, later in pairwise(tries[1:])), "for some polls of the other"
+    assert all(later - earlier > 150 for earlier, later in pairwise(tries[SOON:])), "for a second"
+
+
+async def test_an_answer_that_is_too_late_costs_the_other_no_write(pair: Pair, device: Device) -> None:
+    """It comes as a whole, and before the acknowledgement: devices of a gateway answer in order."""
+    left, right = pair
+    device.late[LEFT] = SILENT_S
+    reading = asyncio.create_task(left.read())
+    await asyncio.sleep(0.08)
+    late = with_crc(bytes((LEFT, 3, 6, *range(6))))
+    device.spoil = lambda _: late[:4]
+    writing = asyncio.create_task(right.write(IMAGE))
+    await until(lambda: device.requests[-1][:2] == bytes((RIGHT, 16)))
+    device.send(late[4:] + with_crc(device.requests[-1][:6]))
+    await writing
+    assert right.is_open
+    reading.cancel()
+    await asyncio.wait([reading])
 
 
 async def test_each_request_has_the_line_alone(pair: Pair, device: Device) -> None:

@@ -100,8 +100,8 @@ class Questions(Exchange):
             return Noise(error)
         return lines.stray(self._received) or b""
 
-    def late(self, place: object) -> Silent:
-        return _late(place, self._received, f"GET {self.unanswered}", self.timing.seconds)
+    def late(self, place: object, seconds: float) -> Silent:
+        return _late(place, self._received, f"GET {self.unanswered}", seconds)
 
 
 class Setting(Exchange):
@@ -114,8 +114,8 @@ class Setting(Exchange):
         except ProtocolError as error:
             return Noise(error)
 
-    def late(self, place: object) -> Silent:
-        return _late(place, self._received, self.frame.decode().strip(), self.timing.seconds)
+    def late(self, place: object, seconds: float) -> Silent:
+        return _late(place, self._received, self.frame.decode().strip(), seconds)
 
 
 def _late(place: object, received: bytes, asked: str, seconds: float) -> Silent:

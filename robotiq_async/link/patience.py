@@ -1,0 +1,67 @@
+"""The patience of a line that several use: a silent gripper must not keep the others waiting.
+
+A question has the line until it is answered. On a line that others use, too, it therefore waits for 60 ms at
+most: ten answers of a jaw follow each other in that time. After a miss it waits for 24 ms, and now and then
+for 60 ms again, for a gripper that answers slowly. The silence after it takes another 20 ms. After some
+misses a user rests for a second between two questions, so a silent gripper costs the others 5 % of their
+rate, and 80 ms at a time.
+
+A response timeout that is longer than the usual one means a slow line, and lengthens the questions alike.
+"""
+
+# Misses in a row    The next question waits for    and comes, after the last one,
+#
+# 0                  QUESTION_S                     at once
+# 1                  SHORT_S                        at once
+# 2 to SOON          SHORT_S                        SOON_S later
+# more               SHORT_S                        REST_S later
+# a multiple of 8    QUESTION_S                     REST_S later
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+from weakref import WeakKeyDictionary
+
+USUAL_RESPONSE_S: Final = 0.4
+"""A longer response timeout means a slow line."""
+QUESTION_S: Final = 0.06
+SHORT_S: Final = 0.024
+"""An adapter may keep a reply for 16 ms (the usual latency timer of FTDI chips)."""
+LONG_EVERY: Final = 8
+SOON: Final = 4
+"""Misses of a link that is not lost yet."""
+SOON_S: Final = 0.1
+REST_S: Final = 1.0
+"""A hand that stops has time for one try at least."""
+
+
+class _Silent(NamedTuple):
+    misses: int
+    until: float
+    """The time of the next question."""
+
+
+class Patience:
+    """What each user of a line may take of it. Users are told apart, and forgotten with their objects."""
+
+    def __init__(self) -> None:
+        self._silent: Final[WeakKeyDictionary[object, _Silent]] = WeakKeyDictionary()
+
+    def seconds(self, user: object, response_s: float) -> float:
+        """The longest time for the next answer; ``response_s`` is the response timeout."""
+        misses = self._silent[user].misses if user in self._silent else 0
+        usual = SHORT_S if misses % LONG_EVERY else QUESTION_S
+        return min(response_s, usual * max(1.0, response_s / USUAL_RESPONSE_S))
+
+    def missed(self, user: object, now: float) -> None:
+        """There was no answer."""
+        misses = 1 + (self._silent[user].misses if user in self._silent else 0)
+        rest = 0.0 if misses == 1 else SOON_S if misses <= SOON else REST_S
+        self._silent[user] = _Silent(misses, now + rest)
+
+    def answered(self, user: object) -> None:
+        self._silent.pop(user, None)
+
+    def until(self, user: object) -> float:
+        """The time before which the user leaves the line to others."""
+        return self._silent[user].until if user in self._silent else 0.0
