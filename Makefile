@@ -9,6 +9,7 @@ MINUTES ?= 30
 MODEL ?= 3f
 LINK ?= tcp
 HANDS ?= 1
+SILENT ?= 0
 HABITS ?= status-lag; silence-fault; write-spacing
 DISTROS ?= jazzy kilted
 PYTHONS ?= 3.12 3.13 3.14
@@ -84,7 +85,7 @@ canary: $(RELEASE)/.complete  ## Test with the newest of all dependencies, in an
 	@PYMODBUS="$(PYMODBUS)" $(RELEASE)/bin/python -m tests.release.canary
 
 soak: $(STAMP)  ## Move a MODEL=3f under random faults for MINUTES=30 over LINK=tcp (rtu, urcap, tunnel), and print figures
-	@$(BIN)/python -m tests.adversity.soak --minutes $(MINUTES) --link $(LINK) --model $(MODEL) --hands $(HANDS)
+	@$(BIN)/python -m tests.adversity.soak --minutes $(MINUTES) --link $(LINK) --model $(MODEL) --hands $(HANDS) --silent $(SILENT)
 
 habits: $(STAMP)  ## Everything under fault once more, with HABITS="status-lag; silence-fault; write-spacing"
 	@HABITS="$(HABITS)" $(BIN)/python -m pytest tests/adversity
