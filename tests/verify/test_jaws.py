@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from robotiq_async.values import registers as reg
+from robotiq_async.values.enums import JAW
 from robotiq_async.values.model import TWO_FINGER_85, TWO_FINGER_140
-from tests.verify.people import Helper, assert_as_assumed, differing, served, verified
+from robotiq_async.values.registers import Registers
+from tests.verify.people import FOAM, SHORT, Helper, assert_as_assumed, differing, served, verified
 
 pytestmark = pytest.mark.virtual_time
 
@@ -18,6 +23,25 @@ async def test_ends_that_were_recorded_are_healthy(ends: tuple[int, int]) -> Non
     assert report.checks["stroke.force"].figures == {"least": ends[1] + 1, "greatest": ends[1] + 5}
     figures = report.checks["soft.speed"].figures
     assert 4 <= figures["speed_255"] - figures["speed_0"] <= 9  # type: ignore[operator]
+
+
+async def test_a_contact_that_is_shown_while_the_jaw_goes_on_is_named() -> None:
+    """One 2F-85 showed a contact 13 counts before its end."""
+    async with served(active=True, model=TWO_FINGER_85) as server:
+        gripper, status = server.gripper, server.gripper.status_registers
+
+        def early() -> Registers:
+            registers = status()
+            if reg.gGTO.read(registers) and FOAM - 13 <= gripper.position(JAW) < FOAM + 10:
+                return (registers[0] | 0x8000, *registers[1:])  # gOBJ 2 on the way
+            return registers
+
+        gripper.status_registers = early  # type: ignore[method-assign]
+        report = await verified(server, first=7, last=7, lengths=replace(SHORT, interval=0.01))
+    assert differing(report).keys() == {"soft.standstill"}
+    figures = report.checks["soft.standstill"].figures
+    assert 10 <= figures["counts"] <= 16  # type: ignore[operator]
+    assert figures["seconds"] < 0  # type: ignore[operator]
 
 
 @pytest.mark.parametrize("model", [TWO_FINGER_85, TWO_FINGER_140], ids=str)

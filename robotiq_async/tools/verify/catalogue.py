@@ -73,6 +73,7 @@ CATALOGUE: Final[dict[str, Assumption]] = {
     ),
     "soft.contact": Assumption(7, "A contact while closing is gDT = 2."),
     "soft.current": Assumption(7, "A finger at rest draws no current."),
+    "soft.standstill": Assumption(7, "A finger moves at most 2 counts after gDT shows its contact."),
     "soft.speed": Assumption(
         7, "A part reads at most 10 counts further at full speed than at the slowest.", of_jaws=True
     ),

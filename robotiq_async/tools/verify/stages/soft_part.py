@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from ....values.enums import CLOSED, SPEED_MAX, Finger, ObjectStatus
@@ -10,11 +10,12 @@ from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError, Figure
 from ..motions import MARGIN, are_near, in_place, resting_envelope
-from ..watch import ENTER, Watch
+from ..watch import ENTER, Rest, Watch
 
 SECONDS: Final = 60.0
 CLOSE_S: Final = 15.0
 LEFT_S: Final = 5.0
+STANDS_S: Final = 0.5
 
 PLACE: Final = (
     "Put a block of foam between the fingers, nearly as wide as they open, so that it lies there by itself. "
@@ -25,6 +26,9 @@ AGAIN: Final = "Put the foam back as it lay. Take your hand away. Enter closes t
 GO_OR_SKIP: Final = {ENTER: "done, go on", "s": "skip this"}
 OVERRUN: Final = 10
 """Counts: one 2F-85 read a part at 91 at the slowest speed, and at 96 to 99 at full speed."""
+EARLY: Final = 2
+"""Counts: one 2F-85 showed a contact with or before its last motion in 3 of 9, once by 13 counts, which may
+come from asking for its position first."""
 STAYS: Final = "rGTO has been 0 for some seconds. Is the foam still held?"
 ANSWERS: Final = {"y": "yes, it is held", "n": "no, it is loose or has fallen"}
 
@@ -38,8 +42,10 @@ async def soft_part(bench: Bench) -> None:
     start = await watch.look()
     home = {finger: start.position(finger) for finger in bench.fingers}
     watch.envelope = resting_envelope(start, bench.fingers)
-    held = await _close(bench, watch, start)
+    closing = await _close(bench, watch, start)
+    held = closing.end
     _judge_contact(bench, held)
+    _judge_standstill(bench, closing)
     await watch.write(replace(in_place(held)).with_positions(dict.fromkeys(bench.fingers, CLOSED)))
     left = await watch.watch_for(LEFT_S)
     answer = await person.chooses(STAYS, ANSWERS) if held.contacts else "?"
@@ -71,7 +77,7 @@ async def _at_speed(bench: Bench, home: dict[Finger, int], slowly: RobotiqStatus
     watch = bench.watch(SECONDS)
     start = await watch.look()
     watch.envelope = resting_envelope(start, bench.fingers)
-    held = await _close(bench, watch, start, SPEED_MAX)
+    held = (await _close(bench, watch, start, SPEED_MAX)).end
     if not await bench.person.consents(RELEASE):
         raise EndError("declined", "the jaw was not opened: it is still closed, with rGTO = 0")
     jaw = bench.fingers[0]
@@ -86,20 +92,57 @@ async def _at_speed(bench: Bench, home: dict[Finger, int], slowly: RobotiqStatus
     await _open(bench, home)
 
 
-async def _close(bench: Bench, watch: Watch, start: RobotiqStatus, speed: int = 0) -> RobotiqStatus:
-    """Close, and wait until every finger rests; the status in which all of them have for a while."""
+@dataclass
+class _Closing:
+    """Fingers that close: what gDT shows, beside the time at which they stand.
+
+    Attributes:
+        rest: the standstill by positions.
+        shown: the first of the statuses since which every gDT shows rest; None while one does not.
+        end: the newest status.
+    """
+
+    fingers: tuple[Finger, ...]
+    end: RobotiqStatus
+    shown: RobotiqStatus | None = None
+    rest: Rest = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.rest = Rest(self.fingers)
+
+    def is_over(self, status: RobotiqStatus) -> bool:
+        """Take in a status; returns whether they have stood for a while, and gDT shows it."""
+        stands = self.rest.lasts(status, STANDS_S)
+        moves = any(status.finger_status(finger) is ObjectStatus.IN_MOTION for finger in self.fingers)
+        self.shown, self.end = None if moves else self.shown or status, status
+        return stands and not moves
+
+
+async def _close(bench: Bench, watch: Watch, start: RobotiqStatus, speed: int = 0) -> _Closing:
+    """Close, and wait until every finger rests."""
     image = in_place(start, speed=speed)
     await watch.write(image)
     await watch.write(replace(image, go=True).with_positions(dict.fromkeys(bench.fingers, CLOSED)))
     # gDT just after a write may be from before it.
-    await watch.watch_for(0.3)
-
-    def rest(status: RobotiqStatus) -> bool:
-        return all(status.finger_status(finger) is not ObjectStatus.IN_MOTION for finger in bench.fingers)
-
-    if await watch.until(rest, CLOSE_S) is None:
+    closing = _Closing(bench.fingers, await watch.watch_for(0.3))
+    if await watch.until(closing.is_over, CLOSE_S) is None:
         raise EndError("time", f"the fingers did not come to rest within {CLOSE_S:g} s")
-    return await watch.watch_for(0.5)
+    return closing
+
+
+def _judge_standstill(bench: Bench, closing: _Closing) -> None:
+    """Compare the first contact that was shown with the last motion."""
+    shown, end = closing.shown, closing.end
+    if shown is None or not end.contacts:
+        bench.inconclusive("soft.standstill", "nothing was held")
+        return
+    counts = max(abs(end.position(finger) - shown.position(finger)) for finger in bench.fingers)
+    seconds = shown.timestamp - closing.rest.moved_at
+    when = "before" if seconds < 0 else "after"
+    words = f"gDT showed it {1000 * abs(seconds):.0f} ms {when} the last count; {counts} counts followed"
+    follows = "A width by the result of a grasp is that much too large. Please report this."
+    figures: dict[str, Figure] = {"counts": counts, "seconds": seconds}
+    bench.judge("soft.standstill", counts <= EARLY, words, follows, **figures)
 
 
 def _judge_contact(bench: Bench, held: RobotiqStatus) -> None:
