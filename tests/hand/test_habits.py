@@ -433,6 +433,20 @@ async def test_so_does_the_activation_of_one_that_comes_back_from_a_power_cut(re
     assert [request.activate for request in stopped.written] == [True, False], "taken back on leaving"
 
 
+async def test_a_recovery_in_vain_names_the_fault_of_the_controller() -> None:
+    """In an emergency stop the Universal Controller before a jaw shows why; the gripper alone does not."""
+    stopped = await pressed(Wire(model=TWO_FINGER_85))
+    stopped.gripper.controller_fault = 0x0C
+    hand = RobotiqHand(stopped, model=TWO_FINGER_85, poll_interval=SELDOM_S)
+    await hand.start(activate=False)
+    told = r"its controller reports: emergency stop \(kFLT 0x0C\)"
+    with pytest.raises(StateTimeoutError, match=f"no progress.*; {told}, also after 2 resets"):
+        await hand.recover()
+    with pytest.raises(StateTimeoutError, match=f"not active after .*; {told}.*look at the controller"):
+        await hand.recover(timeout=1)
+    await hand.stop()
+
+
 async def test_activate_ends_soon_as_well_and_recover_goes_on_from_there() -> None:
     stopped = await pressed(Wire(), 1, active=False)
     hand = RobotiqHand(stopped, poll_interval=SELDOM_S)

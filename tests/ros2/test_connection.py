@@ -9,7 +9,16 @@ from collections.abc import AsyncIterator, Awaitable
 
 import pytest
 
-from robotiq_async import Fault, Finger, RobotiqError, RobotiqHand, RobotiqStatus, State, StateTimeoutError
+from robotiq_async import (
+    TWO_FINGER_85,
+    Fault,
+    Finger,
+    RobotiqError,
+    RobotiqHand,
+    RobotiqStatus,
+    State,
+    StateTimeoutError,
+)
 from robotiq_async.ros2.gripper.connection import (
     COMMANDS,
     MOST_CALLS,
@@ -348,6 +357,15 @@ async def test_diagnoses_of_a_fault(
         == {"state": "FAULT", "connected": True, "takes_commands": True, "inhibited": None} | status.as_dict()
     )
     assert text["fault"] == fault.name
+
+
+async def test_the_diagnosis_of_a_controller_with_a_fault() -> None:
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, model=TWO_FINGER_85)
+    gripper.controller_fault = 0x0C
+    async with SimulatorServer(gripper) as server, RobotiqHand(server.address, poll_interval=POLL_S) as hand:
+        _, shown = diagnose(hand, now())
+    assert (shown.level, shown.values["controller fault"]) == (Level.ERROR, "0x0C")
+    assert shown.message == "RUNNING_IDLE; its controller reports: emergency stop (kFLT 0x0C)"
 
 
 async def test_without_a_link_nothing_is_known(connection: Connection, server: SimulatorServer) -> None:

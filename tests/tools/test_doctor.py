@@ -507,6 +507,17 @@ async def test_a_fault(code: int, level: Level, words: str) -> None:
     assert f"0x{code:02X}" in found["fault"].found
 
 
+async def test_the_fault_of_a_controller_is_no_fault_of_the_gripper() -> None:
+    gripper = SimulatedGripper(model=TWO_FINGER_85)
+    gripper.controller_fault = 0x0C
+    async with SimulatorServer(gripper) as server:
+        found = await findings(server.address)
+    assert found["controller"].level is Level.BAD
+    assert found["controller"].found == "its controller reports: emergency stop (kFLT 0x0C)"
+    assert "Look at the controller first" in found["controller"].advice
+    assert found["fault"].level is Level.GOOD
+
+
 async def test_a_gripper_that_has_lost_its_activation_and_keeps_ract() -> None:
     gripper = SimulatedGripper()
     gripper.strand()

@@ -12,8 +12,8 @@ import anyio
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from robotiq_async import Finger, GripperFaultError, MoveSupersededError, RobotiqHand, State
-from robotiq_async.simulator import SimulatedGripper
+from robotiq_async import TWO_FINGER_85, Finger, GripperFaultError, MoveSupersededError, RobotiqHand, State
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.metrics import MOST, serve_metrics
 from tests.patience import patience
 
@@ -87,6 +87,19 @@ async def test_each_hand_has_its_name() -> None:
     assert labels == {"left", right.address}
     samples = [sample for family in families for sample in family.samples]
     assert len({(each.name, *each.labels.items()) for each in samples}) == len(samples)
+
+
+async def test_the_fault_of_a_controller_is_a_figure_of_hands_with_a_status() -> None:
+    gripper = SimulatedGripper(model=TWO_FINGER_85)
+    gripper.controller_fault = 0x0C
+    async with (
+        SimulatorServer(gripper) as server,
+        RobotiqHand(server.address, name="jaw") as jaw,
+        serve_metrics(jaw, RobotiqHand(name="idle"), port=0) as where,
+    ):
+        text = await page(where)
+    lines = [line for line in text.splitlines() if line.startswith("robotiq_controller_fault")]
+    assert lines == ['robotiq_controller_fault{hand="jaw"} 12.0']
 
 
 async def test_connections_that_ask_nothing_use_up_neither_threads_nor_files(hand: RobotiqHand) -> None:
