@@ -45,7 +45,7 @@ smoke: $(STAMP)  ## Try a bit of everything; the first thing to run after a chan
 test-core: $(STAMP)  ## Run the tests of the core: values, control, link, session, hand, simulator, sync (1 minute)
 	@$(BIN)/python -m pytest -rs --numprocesses auto --dist worksteal @tests/core.txt
 
-test: $(STAMP)  ## Run the tests (2.5 minutes); those that need a browser, ROS or other environments are test-web, test-ros2, test-lerobot, test-urcap, test-urdf and pages
+test: $(STAMP)  ## Run the tests (5 minutes); those that need a browser, ROS or other environments are test-web, test-ros2, test-lerobot, test-urcap, test-urdf and pages
 	@$(BIN)/python -m pytest -rs --numprocesses auto --dist worksteal
 
 test-web: $(STAMP)  ## Test the page in a real browser (Debian: chromium, chromium-driver); skipped where there is none
@@ -75,7 +75,7 @@ pages: $(STAMP)  ## Run the code of every page in the environment that the page 
 docs: $(SITE)/.complete  ## Make the documentation site in site/, strictly: no dead links, nothing from other hosts (10 s)
 	@$(SITE)/bin/python -m docs.site
 
-dist: $(RELEASE)/.complete  ## Build sdist and wheel in dist/, and try each in a bare environment (30 s; needs the package index)
+dist: $(RELEASE)/.complete  ## Build sdist and wheels in dist/, and try each in a bare environment (30 s; needs the package index)
 	@$(RELEASE)/bin/python -m tests.release.dist
 
 pythons: $(RELEASE)/.complete  ## Test the core on other Pythons (PYTHONS="3.12 3.13 3.14"); one that cannot be had is named
