@@ -37,12 +37,12 @@ _HELP = """Control a Robotiq 3-Finger, 2F-85, 2F-140 or Hand-E gripper, or a sim
 
 Every command that talks to a gripper takes its address as the last argument, and names it first:
 
-    tcp://192.168.1.11    Modbus TCP; tcp:// and the port (:502) may be left out
-    rtu:///dev/ttyUSB0    Modbus RTU on a serial line (extra serial)
-    rtu+tcp://HOST:PORT   Modbus RTU through a serial server
-    urcap://HOST          the text port of Robotiq's URCap on a UR controller
-    zenoh://lab/cell/left one that an agent on another host serves (extra fleet)
-    sim://                a gripper simulated inside the command
+    tcp://192.168.1.11    Modbus TCP; 192.168.1.11 will do
+    rtu:///dev/ttyUSB0    Modbus RTU on a serial line
+    rtu+tcp://HOST:PORT   Modbus RTU, a serial server
+    urcap://HOST          Robotiq's URCap on a UR
+    zenoh://lab/cell/left an agent on another host
+    sim://                simulated inside the command
 
 A gripper other than the 3-Finger is named at the end: tcp://192.168.1.11?model=2f85 (2f140, hand-e).
 
@@ -53,9 +53,11 @@ What the extras beside cli are for:
     monitor   monitor
     web       web, demo --show
     view      view
-    record    record (not of a table, .csv), replay, export, plot, recover, verify
+    record    record (but not .csv), replay, export,
+              plot, recover, verify
     plot      plot, the pictures of measure
-    fleet     agent, fleet, doctor and all others with zenoh:// addresses
+    fleet     agent, fleet, doctor and all others with
+              zenoh:// addresses
     serial    ports, rtu:// addresses
 
 Nothing here has run on real hardware yet.

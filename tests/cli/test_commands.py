@@ -375,6 +375,17 @@ def test_doctor_finds_nothing_wrong_with_the_simulator(call: Call) -> None:
     assert {line[6:20].strip() for line in lines if line.startswith("warn")} <= {"round trip", "rate"}
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="it has no such terminal")
+async def test_doctor_keeps_its_columns_on_a_terminal() -> None:
+    from tests.cli.terminal import Terminal  # noqa: PLC0415  # not on Windows
+
+    terminal = Terminal("-m", "robotiq_async", "doctor", "tcp://127.0.0.1:1")
+    await terminal.shows(b": see above")
+    assert await terminal.end() == 1
+    _, *found = terminal.out.decode().split("port           1: ")[1].splitlines()
+    assert found[0].startswith(" " * 21), "longer than the 100 columns, and hung"
+
+
 @pytest.mark.parametrize(
     ("address", "why", "found"),
     [

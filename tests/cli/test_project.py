@@ -100,8 +100,17 @@ def test_a_missing_module_names_the_extra_that_brings_it() -> None:
         assert {name, package.get(name, name)} & packages_of(extra), f"{extra} does not bring {name}"
 
 
+def test_the_first_help_fits_60_columns_and_every_example_80() -> None:
+    assert [
+        line for line in str(build().help).splitlines() if line.startswith("    ") and len(line) > 60
+    ] == []
+    for file in (ROOT / "robotiq_async" / "cli" / "commands").rglob("*.py"):
+        examples = re.findall(r"^ {8}(robotiq-async .*)$", file.read_text(encoding="utf-8"), re.MULTILINE)
+        assert [line for line in examples if len(line) + 4 > 80] == [], file
+
+
 def test_the_help_says_which_extra_each_command_needs() -> None:
-    lines = (line.split(maxsplit=1) for line in str(build().help).splitlines())
+    lines = (line.split(maxsplit=1) for line in re.sub(r"\n {6,}", " ", str(build().help)).splitlines())
     advised = {words[0]: words[1] for words in lines if len(words) == 2}
     commands = ROOT / "robotiq_async" / "cli" / "commands"
     for file in commands.rglob("*.py"):

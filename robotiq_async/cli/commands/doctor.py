@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
+import textwrap
 from typing import TYPE_CHECKING
 
 from ...link.address import is_remote, parse_address
@@ -46,9 +49,10 @@ async def doctor(
     bad: list[str] = []
 
     def report(finding: Finding) -> None:
-        print(f"{finding.level.value:<5} {finding.what:<14} {printable(finding.found)}", flush=True)
-        if finding.advice:
-            print(f"{'':<20} {printable(finding.advice)}", flush=True)
+        mark = f"{finding.level.value:<5} {finding.what:<14} "
+        for words in filter(None, (finding.found, finding.advice)):
+            print(_hung(mark, printable(words)), flush=True)
+            mark = " " * len(mark)
         if finding.level is Level.BAD:
             bad.append(finding.what)
 
@@ -73,3 +77,11 @@ async def doctor(
             raise CommandError(str(error)) from error
     if bad:
         raise CommandError(f"{full}: {', '.join(bad)}: see above")
+
+
+def _hung(mark: str, words: str) -> str:
+    """Words after a mark: in lines of the terminal, below each other; a line for anything else that reads."""
+    if not sys.stdout.isatty():
+        return mark + words
+    width, indent = shutil.get_terminal_size().columns, " " * len(mark)
+    return textwrap.fill(words, width, initial_indent=mark, subsequent_indent=indent, break_on_hyphens=False)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 SETTLE_S = 1.5
 """Seconds to collect: agents publish a summary of each gripper once a second."""
-_ROW = "{:<40} {:<14} {:<10} {:<28} {}"
+_ROW = "{:<27} {:<13} {:<6} {:<17} {}"  # 80 columns, unless a name is long
 
 Site = Annotated[str | None, Parameter(help="The site's name; all sites without it.")]
 

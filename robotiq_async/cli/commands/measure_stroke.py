@@ -63,8 +63,8 @@ def stroke(
     For example:
 
         robotiq-async measure stroke "sim://?model=2f85"
-        robotiq-async measure stroke "rtu:///dev/ttyUSB0?model=2f85" --output left.csv
-        robotiq-async status "rtu:///dev/ttyUSB0?model=2f85" --stroke left.csv
+        robotiq-async measure stroke "rtu:///dev/ttyS0?model=2f85" --output my.csv
+        robotiq-async status "rtu:///dev/ttyS0?model=2f85" --stroke my.csv
 
     Args:
         output: The file; it is written when all points are there.

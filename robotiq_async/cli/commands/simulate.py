@@ -88,7 +88,7 @@ async def simulate(
         robotiq-async simulate --serial /dev/pts/3
         robotiq-async simulate --serial /dev/pts/3 --device-id 12
         robotiq-async simulate --rtu-over-tcp --port 54321
-        robotiq-async simulate --rtu-over-tcp --model 2f85 --device-id 9 --model 3f --device-id 12
+        robotiq-async simulate --rtu-over-tcp --device-id 9 --device-id 12
         robotiq-async simulate --like report/report.json
         robotiq-async simulate --urcap --model 2f85 --port 63352
         robotiq-async simulate --trouble "drop at 5 every 10" --trouble "delay 0.02"
