@@ -88,7 +88,7 @@ def _fingers(_type: object, tokens: Sequence[Token]) -> Finger:
         return parse_fingers("--fingers", tokens[0].value)
 
 
-Address = Annotated[
+AddressArgument = Annotated[
     str,
     Parameter(
         help="The gripper: tcp://HOST[:PORT], rtu:///dev/ttyUSB0, rtu+tcp://HOST:PORT, "
@@ -105,12 +105,12 @@ Force = Annotated[Amount | None, _amount("the value", "N", metavar="0..255|N")]
 Byte = Annotated[int, Parameter(converter=_integer("the value", 0, 255), metavar="0..255")]
 Port = Annotated[int, Parameter(converter=_integer("the port", 0, 65535), metavar="0..65535")]
 Unit = Annotated[int, Parameter(converter=_integer("the unit id", 0, 255), metavar="0..255")]
-Units = Annotated[
+UnitIds = Annotated[
     list[int], Parameter(converter=_integers("the unit id", 0, 255), metavar="0..255", negative=())
 ]
-Stage = Annotated[int, Parameter(converter=_integer("the stage", 0, 9), metavar="0..9")]
+StageNumber = Annotated[int, Parameter(converter=_integer("the stage", 0, 9), metavar="0..9")]
 Runs = Annotated[int, Parameter(converter=_integer("the runs", 1, 100), metavar="N")]
-Step = Annotated[int, Parameter(converter=_integer("the step", 1, 255), metavar="N")]
+StepCounts = Annotated[int, Parameter(converter=_integer("the step", 1, 255), metavar="N")]
 PointCount = Annotated[int, Parameter(converter=_integer("the points", 2, 50), metavar="N")]
 Fingers = Annotated[
     Finger,
@@ -151,7 +151,7 @@ _Arguments: Any = make_dataclass(
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Link(_Arguments):  # type: ignore[misc]  # made from the table of options
+class LinkOptions(_Arguments):  # type: ignore[misc]  # made from the table of options
     """Options of the link for a gripper with unusual settings; the command doctor finds them."""
 
     def options(self) -> dict[str, Any]:
@@ -159,4 +159,4 @@ class Link(_Arguments):  # type: ignore[misc]  # made from the table of options
         return asdict(self)
 
 
-USUAL: Final = Link()
+USUAL: Final = LinkOptions()

@@ -11,13 +11,13 @@ from ..link.address import is_remote
 from ..session.options import POLL_INTERVAL_S
 from ..tools.actions import Operator
 from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED
-from .arguments import USUAL, Link, need
+from .arguments import USUAL, LinkOptions, need
 from .failures import UsageError, usage
 
 
 def make_hand(
     address: str,
-    link: Link = USUAL,
+    link: LinkOptions = USUAL,
     *,
     poll_interval: float = POLL_INTERVAL_S,
     speed: int = DEFAULT_SPEED,
@@ -40,7 +40,7 @@ def make_hand(
         return RobotiqHand(address, **link.options(), poll_interval=poll_interval, speed=speed, force=force)
 
 
-def make_operator(address: str, link: Link, who: str, *, speed: int, force: int) -> Operator:
+def make_operator(address: str, link: LinkOptions, who: str, *, speed: int, force: int) -> Operator:
     """The operator of a hand that is not started; ``who`` is a person at the monitor or the page."""
     hand = make_hand(address, link, speed=speed, force=force, control=None)
     return Operator(hand, who=who, speed=speed, force=force)
@@ -48,7 +48,7 @@ def make_operator(address: str, link: Link, who: str, *, speed: int, force: int)
 
 @asynccontextmanager
 async def connected(
-    address: str, link: Link = USUAL, *, halt: bool, keep_grip: bool = False
+    address: str, link: LinkOptions = USUAL, *, halt: bool, keep_grip: bool = False
 ) -> AsyncIterator[Hand]:
     """A started hand; nothing has been written to the gripper.
 

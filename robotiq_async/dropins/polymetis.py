@@ -38,7 +38,7 @@ from ..values.enums import Finger, State
 from ..values.errors import GripperFaultError, RobotiqConnectionError, RobotiqError
 from ..values.status import RobotiqStatus
 from .patience import Patience
-from .protobuf import Field, decoded, encoded
+from .protobuf import FieldValue, decoded, encoded
 
 try:
     import grpc
@@ -128,7 +128,7 @@ def _abort(context: Any, code: grpc.StatusCode, error: Exception) -> NoReturn:  
     raise AssertionError("abort() raises") from error
 
 
-def _number(asked: dict[int, Field], number: int) -> float:
+def _number(asked: dict[int, FieldValue], number: int) -> float:
     value = asked.get(number, 0.0)
     if isinstance(value, bytes) or not math.isfinite(value):
         raise ValueError(f"field {number} must be a finite number, got {value!r}")

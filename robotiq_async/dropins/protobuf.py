@@ -9,12 +9,12 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator, Mapping
 
-Field = float | bytes
+FieldValue = float | bytes
 """A float, an int or a bool; bytes of a text or of a message inside."""
 VARINT, EIGHT_BYTES, BYTES, FOUR_BYTES = 0, 1, 2, 5
 
 
-def encoded(fields: Mapping[int, Field]) -> bytes:
+def encoded(fields: Mapping[int, FieldValue]) -> bytes:
     """A message of fields by their numbers; an int is written as one, a float with single precision."""
     out = bytearray()
     for number, value in fields.items():
@@ -27,7 +27,7 @@ def encoded(fields: Mapping[int, Field]) -> bytes:
     return bytes(out)
 
 
-def decoded(message: bytes) -> dict[int, Field]:
+def decoded(message: bytes) -> dict[int, FieldValue]:
     """The fields of a message by their numbers; the last of several counts, and doubles are passed over.
 
     Raises:
@@ -39,7 +39,7 @@ def decoded(message: bytes) -> dict[int, Field]:
         raise ValueError(f"a message of {len(message)} bytes is cut off") from None
 
 
-def _fields(message: bytes) -> Iterator[tuple[int, Field]]:
+def _fields(message: bytes) -> Iterator[tuple[int, FieldValue]]:
     at = 0
     while at < len(message):
         key, at = _read_varint(message, at)

@@ -25,11 +25,11 @@ from ..values.statistics import Statistics
 from ..values.status import Part, RobotiqStatus
 from .arguments import describes_arguments
 from .grip_watch import SLIP_COUNTS, GripWatch
-from .kind import Kind
+from .kind import HandKind
 from .run import refuse_with
 
 
-class Hand(Kind):
+class Hand(HandKind):
     """One gripper, with the calls that every hand has.
 
     Use a hand with ``async with``, or call :meth:`start` and :meth:`stop`. A hand belongs to the event loop

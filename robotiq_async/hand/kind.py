@@ -22,7 +22,7 @@ from .run import NamesErrors, PresentRun, refuse_copy
 T = TypeVar("T")
 
 
-class Kind(ABC):
+class HandKind(ABC):
     """The inside of a hand; :class:`~robotiq_async.hand.Hand` has its calls, and the steps for a new kind."""
 
     _session: PresentRun | None = None

@@ -42,7 +42,7 @@ SOON_S: Final = 0.0025
 STOP: Final = NextWrite(wait=0.0, is_urgent=True, is_command=False, is_stop=True)  # its first write
 
 
-class Step(Enum):
+class CycleStep(Enum):
     """A step of a cycle."""
 
     READ = "read the status"
@@ -51,7 +51,7 @@ class Step(Enum):
     WRITE_AND_READ = "write, and read in the same exchange where link and request allow that"
 
 
-def next_step(write: NextWrite, reads: int, age: float, *, is_stale: bool, is_slow: bool) -> Step | None:
+def next_step(write: NextWrite, reads: int, age: float, *, is_stale: bool, is_slow: bool) -> CycleStep | None:
     """The next step of a cycle that has something to write; None if that must wait for another cycle.
 
     Args:
@@ -65,18 +65,18 @@ def next_step(write: NextWrite, reads: int, age: float, *, is_stale: bool, is_sl
         if write.wait > SOON_S:
             return None
         if write.wait:
-            return Step.WAIT
+            return CycleStep.WAIT
         if not is_stale:
-            return Step.WRITE_AND_READ
-        return Step.READ if reads < READS else Step.WRITE
+            return CycleStep.WRITE_AND_READ
+        return CycleStep.READ if reads < READS else CycleStep.WRITE
     if is_stale:
-        return Step.READ
+        return CycleStep.READ
     if write.is_urgent and write.wait <= LONGEST_SPACING_S:
-        return Step.WAIT if write.wait else Step.WRITE
+        return CycleStep.WAIT if write.wait else CycleStep.WRITE
     is_fresh = write.wait <= SOON_S and age + write.wait <= FRESH_S
     if is_slow and write.is_command and is_fresh:
-        return Step.WAIT if write.wait else Step.WRITE_AND_READ
-    return Step.READ
+        return CycleStep.WAIT if write.wait else CycleStep.WRITE_AND_READ
+    return CycleStep.READ
 
 
 def begins_at_once(write: NextWrite, *, is_slow: bool) -> bool:

@@ -24,13 +24,13 @@ from ..values.registers import Registers
 from ..values.request import Request
 from ..values.statistics import Counters
 from ..values.status import RobotiqStatus
-from .cycle import Step, begins_at_once, next_step
+from .cycle import CycleStep, begins_at_once, next_step
 from .late_polls import LATE_S, LatePolls
 from .options import HandOptions
 from .publisher import Publisher
 
 
-class Parts(NamedTuple):
+class RunParts(NamedTuple):
     """The parts of a run; its poller works with the same."""
 
     link: Link
@@ -47,7 +47,7 @@ class Poller:
         tick: the tick of the cycles.
     """
 
-    def __init__(self, parts: Parts) -> None:
+    def __init__(self, parts: RunParts) -> None:
         link, self._controller, self._counters, self._publisher, options = parts
         self._link: Final = link
         self._cyclic: Final = link if isinstance(link, CyclicLink) else None
@@ -113,23 +113,23 @@ class Poller:
 
     async def cycle(self) -> None:
         """Read, decide and write, in the order that cycle.py has for it."""
-        reads, step = 0, Step.READ
+        reads, step = 0, CycleStep.READ
         while True:
             write = self._controller.next_write(self.tick.time())
-            if write is None or step is Step.WRITE:
+            if write is None or step is CycleStep.WRITE:
                 if reads:
                     return  # most cycles end here
-                step = Step.READ
+                step = CycleStep.READ
             elif (planned := self._plan(write, reads)) is None:
                 return
-            elif planned is Step.WRITE_AND_READ:
+            elif planned is CycleStep.WRITE_AND_READ:
                 if not await self._write_and_read(write) and not reads:
                     await self.read()  # it shows the echo; a later command begins the next cycle
                 return
-            elif (step := planned) is Step.WAIT:
+            elif (step := planned) is CycleStep.WAIT:
                 await asyncio.sleep(write.wait)
                 continue
-            if step is Step.READ:
+            if step is CycleStep.READ:
                 await self._stop_or_read()
                 reads += 1
             else:
@@ -137,7 +137,7 @@ class Poller:
                 if reads:
                     return
 
-    def _plan(self, write: NextWrite, reads: int) -> Step | None:
+    def _plan(self, write: NextWrite, reads: int) -> CycleStep | None:
         age = self.tick.time() - self._asked
         return next_step(write, reads, age, is_stale=self._is_stale(), is_slow=self._is_slow)
 

@@ -49,7 +49,7 @@ from ..values.errors import (
 from .cycle import STOP
 from .ending import IN_FLIGHT_S, Ending
 from .opening import Opener
-from .poller import Parts, Poller
+from .poller import Poller, RunParts
 
 # anyio loads its backend at its first use, which would hold up the loop for some 20 ms when a hand starts.
 # The name of the backend is not documented; if it changes, it only costs those 20 ms.
@@ -97,7 +97,7 @@ class Run:
         failure: what has ended the run, unless that was a stop.
     """
 
-    def __init__(self, parts: Parts, ended: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, parts: RunParts, ended: Callable[[], None] = lambda: None) -> None:
         """``ended`` is called once, in the turn of the loop in which the run ends."""
         self.state: RunState = RunState.CONNECTING
         self.connected: Final[asyncio.Future[None]] = asyncio.get_running_loop().create_future()

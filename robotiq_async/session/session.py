@@ -46,7 +46,7 @@ from ..values.statistics import Counters
 from ..values.status import RobotiqStatus
 from .gripper_link import Claims
 from .options import HandOptions
-from .poller import Parts
+from .poller import RunParts
 from .publisher import Publisher
 from .run import Run, RunState
 from .streams import Channels
@@ -105,7 +105,7 @@ class Session:
         except BaseException:
             self._claims.release(self)
             raise
-        parts = Parts(link, self.controller, self.counters, self._publisher, options)
+        parts = RunParts(link, self.controller, self.counters, self._publisher, options)
         self.run: Run = Run(parts, self._end)
         channels.reopen(self._loop)
         machine.begin(self._on_transition)

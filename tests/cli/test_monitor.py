@@ -22,7 +22,7 @@ from robotiq_async import (
     RobotiqStatus,
     State,
 )
-from robotiq_async.cli.tui.asking import NO, Question, Target
+from robotiq_async.cli.tui.asking import NO, Question, TargetQuestion
 from robotiq_async.cli.tui.screen import Monitor
 from robotiq_async.cli.tui.widgets import HINTS, Axes, position_bar, sparkline
 from robotiq_async.control.state_machine import refusal
@@ -327,7 +327,7 @@ async def test_a_position_that_is_not_entered_moves_nothing(active: Operator) ->
 def test_a_position_is_in_its_range() -> None:
     """A digit that would leave it is not taken, and is not moved to its end either."""
     moved: list[tuple[Finger, int]] = []
-    target = Target(THREE_FINGER, lambda axes, position: moved.append((axes, position)))
+    target = TargetQuestion(THREE_FINGER, lambda axes, position: moved.append((axes, position)))
     for key in ("a", "b", "2", "5", "6", "x", "²"):
         assert not target.press(key)
     assert "position 25_" in target.text.plain

@@ -23,12 +23,12 @@ from robotiq_async.ros2.gripper.connection import (
     COMMANDS,
     MOST_CALLS,
     PENDING_S,
-    Connection,
+    GripperConnection,
     PendingStop,
     RefusedError,
 )
-from robotiq_async.ros2.gripper.goals import Ending, Outcome
-from robotiq_async.ros2.translation.diagnosis import Level, diagnose, status_text
+from robotiq_async.ros2.gripper.goals import GoalEnding, GoalOutcome
+from robotiq_async.ros2.translation.diagnosis import DiagnosticLevel, diagnose, status_text
 from robotiq_async.ros2.translation.joints import Targets
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
 from robotiq_async.runtime.clock import now
@@ -54,27 +54,27 @@ async def gripper() -> SimulatedGripper:
 
 
 @pytest.fixture
-async def inactive(server: SimulatorServer) -> AsyncIterator[Connection]:
+async def inactive(server: SimulatorServer) -> AsyncIterator[GripperConnection]:
     """The connection of a node that was configured."""
-    connection = Connection(RobotiqHand(server.address, poll_interval=POLL_S), SETTINGS)
+    connection = GripperConnection(RobotiqHand(server.address, poll_interval=POLL_S), SETTINGS)
     await connection.open()
     yield connection
     await connection.close("the end")
 
 
 @pytest.fixture
-async def connection(inactive: Connection) -> Connection:
+async def connection(inactive: GripperConnection) -> GripperConnection:
     """The connection of an active node, at an active gripper."""
     await inactive.permit()
     await inactive.command("activate")
     return inactive
 
 
-def begin(connection: Connection, key: bytes = b"1") -> asyncio.Task[Outcome]:
+def begin(connection: GripperConnection, key: bytes = b"1") -> asyncio.Task[GoalOutcome]:
     return asyncio.create_task(connection.run_goal(key, CLOSE, SETTINGS, lambda: None, connection.stops))
 
 
-async def moving(connection: Connection) -> asyncio.Task[Outcome]:
+async def moving(connection: GripperConnection) -> asyncio.Task[GoalOutcome]:
     """A goal whose fingers have begun to move."""
     goal = begin(connection)
     await shows(connection.hand, lambda status: status.position(Finger.A) > 40)
@@ -94,7 +94,7 @@ async def settled(gripper: SimulatedGripper) -> int:
 
 
 async def test_an_inactive_node_takes_a_halt_and_nothing_else(
-    inactive: Connection, gripper: SimulatedGripper
+    inactive: GripperConnection, gripper: SimulatedGripper
 ) -> None:
     others = set(COMMANDS) - {"halt", "inhibit", "permit"}
     await refuses("the node is not active", *map(inactive.command, others), begin(inactive))
@@ -103,7 +103,7 @@ async def test_an_inactive_node_takes_a_halt_and_nothing_else(
 
 
 async def test_an_inhibit_stays_until_a_person_permits(
-    connection: Connection, gripper: SimulatedGripper
+    connection: GripperConnection, gripper: SimulatedGripper
 ) -> None:
     goal = await moving(connection)
     assert "motion is refused" in await connection.command("inhibit")
@@ -112,14 +112,14 @@ async def test_an_inhibit_stays_until_a_person_permits(
     await refuses("HALT was pressed.*call ~/permit", begin(connection))
     shown = json.loads(status_text(connection.hand, takes_commands=True))
     assert shown["inhibited"]["reason"] == "HALT was pressed"
-    assert diagnose(connection.hand, now())[1].level is Level.WARN
+    assert diagnose(connection.hand, now())[1].level is DiagnosticLevel.WARN
     assert await settled(gripper) == at
     assert await connection.command("permit")
-    assert (await begin(connection)).ending is Ending.SUCCEEDED
+    assert (await begin(connection)).ending is GoalEnding.SUCCEEDED
 
 
 async def test_opening_permitting_and_closing_activate_nothing(
-    inactive: Connection, gripper: SimulatedGripper
+    inactive: GripperConnection, gripper: SimulatedGripper
 ) -> None:
     await inactive.permit()
     await inactive.close("the end")
@@ -131,7 +131,7 @@ async def test_opening_permitting_and_closing_activate_nothing(
 async def test_a_node_that_was_never_active_leaves_the_fingers_alone(
     server: SimulatorServer, gripper: SimulatedGripper, opened: bool
 ) -> None:
-    connection = Connection(RobotiqHand(server.address), SETTINGS)
+    connection = GripperConnection(RobotiqHand(server.address), SETTINGS)
     if opened:
         await connection.open()
     await connection.close("the end")
@@ -146,17 +146,17 @@ async def test_a_node_that_was_never_active_does_not_halt_what_another_client_ha
 ) -> None:
     await activate_beforehand(gripper)
     writes = len(gripper.writes)
-    connection = Connection(RobotiqHand(server.address), SETTINGS)
+    connection = GripperConnection(RobotiqHand(server.address), SETTINGS)
     await connection.open()
     await connection.close("the end")
     assert len(gripper.writes) == writes
 
 
 async def test_any_hand_will_do() -> None:
-    connection = Connection(FakeHand(), SETTINGS)
+    connection = GripperConnection(FakeHand(), SETTINGS)
     await connection.open()
     await connection.permit()
-    assert (await begin(connection)).ending is Ending.SUCCEEDED
+    assert (await begin(connection)).ending is GoalEnding.SUCCEEDED
     await connection.close("the end")
 
 
@@ -164,16 +164,16 @@ async def test_any_hand_will_do() -> None:
 
 
 async def test_forbidding_aborts_the_goal_and_halts(
-    connection: Connection, gripper: SimulatedGripper
+    connection: GripperConnection, gripper: SimulatedGripper
 ) -> None:
     goal = await moving(connection)
     assert await connection.forbid("the node was deactivated")
-    assert ((await goal).ending, (await goal).reason) == (Ending.ABORTED, "the node was deactivated")
+    assert ((await goal).ending, (await goal).reason) == (GoalEnding.ABORTED, "the node was deactivated")
     assert not gripper.request_registers[0] >> 8 & 0x08, "rGTO"
     assert not connection.takes_commands
 
 
-async def test_a_halt_is_never_one_command_too_many(connection: Connection) -> None:
+async def test_a_halt_is_never_one_command_too_many(connection: GripperConnection) -> None:
     await connection.command("reset")
     activations = [asyncio.create_task(connection.command("activate")) for _ in range(MOST_CALLS)]
     await connection.hand.wait_for_state(State.WF_ACTIVATION)
@@ -185,18 +185,18 @@ async def test_a_halt_is_never_one_command_too_many(connection: Connection) -> N
 
 @pytest.mark.parametrize("turns", [1, 2, 3, 4])
 async def test_a_goal_that_begins_beside_a_halt_moves_nothing_after_it(
-    connection: Connection, gripper: SimulatedGripper, turns: int
+    connection: GripperConnection, gripper: SimulatedGripper, turns: int
 ) -> None:
     goal = begin(connection)
     for _ in range(turns):
         await asyncio.sleep(0)
     await connection.command("halt")
-    assert (await goal).ending is Ending.ABORTED
+    assert (await goal).ending is GoalEnding.ABORTED
     assert await settled(gripper) < 20
 
 
 async def test_a_goal_that_was_accepted_before_a_halt_is_not_begun_after_it(
-    connection: Connection, gripper: SimulatedGripper
+    connection: GripperConnection, gripper: SimulatedGripper
 ) -> None:
     accepted_at = connection.stops
     await connection.command("halt")
@@ -207,7 +207,7 @@ async def test_a_goal_that_was_accepted_before_a_halt_is_not_begun_after_it(
 
 
 async def test_while_a_halt_is_under_way_nothing_else_is_taken(
-    connection: Connection, gripper: SimulatedGripper
+    connection: GripperConnection, gripper: SimulatedGripper
 ) -> None:
     goal = await moving(connection)
     halting = asyncio.create_task(connection.command("halt"))
@@ -221,7 +221,7 @@ async def test_while_a_halt_is_under_way_nothing_else_is_taken(
 
 
 @pytest.mark.parametrize("name", ["activate", "recover"])
-async def test_a_halt_ends_what_a_service_has_begun(connection: Connection, name: str) -> None:
+async def test_a_halt_ends_what_a_service_has_begun(connection: GripperConnection, name: str) -> None:
     await connection.command("reset")
     call = asyncio.create_task(connection.command(name))
     await connection.hand.wait_for_state(State.WF_ACTIVATION)
@@ -232,7 +232,7 @@ async def test_a_halt_ends_what_a_service_has_begun(connection: Connection, name
 @pytest.mark.parametrize("turns", [1, 2])
 async def test_an_activation_that_waits_for_its_lease_does_not_begin_after_a_stop(turns: int) -> None:
     async with lab(active=False) as here:
-        connection = Connection(here.client(control=None), SETTINGS)
+        connection = GripperConnection(here.client(control=None), SETTINGS)
         await connection.open()
         await connection.permit()
         call = asyncio.create_task(connection.command("activate"))
@@ -246,17 +246,19 @@ async def test_an_activation_that_waits_for_its_lease_does_not_begin_after_a_sto
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.006, 0.012, 0.018])
-async def test_a_cancel_is_acknowledged_with_the_next_poll(connection: Connection, offset: float) -> None:
+async def test_a_cancel_is_acknowledged_with_the_next_poll(
+    connection: GripperConnection, offset: float
+) -> None:
     goal = await moving(connection)
     await asyncio.sleep(offset)
     asked = asyncio.get_running_loop().time()
     await connection.cancel_goal(b"1")
-    assert (await goal).ending is Ending.CANCELED
+    assert (await goal).ending is GoalEnding.CANCELED
     assert asyncio.get_running_loop().time() - asked <= POLL_S + 5 * LATENCY_S
 
 
 async def test_a_connection_that_is_ending_takes_no_command_while_the_rest_ends(
-    connection: Connection, gripper: SimulatedGripper
+    connection: GripperConnection, gripper: SimulatedGripper
 ) -> None:
     """The publishers were stopped first, and commands were taken until that was done."""
     goal = await moving(connection)
@@ -264,7 +266,7 @@ async def test_a_connection_that_is_ending_takes_no_command_while_the_rest_ends(
     calls = map(connection.command, ("activate", "reset", "recover", "release"))
     await refuses("not active|been closed", *calls, begin(connection, b"2"), connection.permit())
     await connection.close("the node is shutting down")
-    assert (await goal).ending is Ending.ABORTED
+    assert (await goal).ending is GoalEnding.ABORTED
     assert await settled(gripper) < FAR
 
 
@@ -272,11 +274,11 @@ async def test_a_connection_that_is_ending_takes_no_command_while_the_rest_ends(
 
 
 async def test_the_fingers_of_a_goal_that_a_lost_link_ended_are_held_when_it_is_back(
-    connection: Connection, gripper: SimulatedGripper, server: SimulatorServer
+    connection: GripperConnection, gripper: SimulatedGripper, server: SimulatorServer
 ) -> None:
     goal = await moving(connection)
     await lose_link(server, connection.hand)
-    assert (await goal).ending is Ending.ABORTED
+    assert (await goal).ending is GoalEnding.ABORTED
     await refuses("the link to the gripper is down", begin(connection, b"2"))
     await asyncio.sleep(0.2)
     assert gripper.is_moving, "nothing can stop them meanwhile"
@@ -284,11 +286,11 @@ async def test_the_fingers_of_a_goal_that_a_lost_link_ended_are_held_when_it_is_
     await connection.hand.wait_for_state(State.RUNNING_IDLE)
     await refuses("the fingers are not stopped yet", begin(connection, b"2"))
     assert await settled(gripper) < FAR
-    assert (await begin(connection, b"2")).ending is Ending.SUCCEEDED
+    assert (await begin(connection, b"2")).ending is GoalEnding.SUCCEEDED
 
 
 async def test_a_deactivation_without_a_link_halts_when_it_is_back(
-    connection: Connection, server: SimulatorServer, caplog: pytest.LogCaptureFixture
+    connection: GripperConnection, server: SimulatorServer, caplog: pytest.LogCaptureFixture
 ) -> None:
     await connection.command("reset")
     call = asyncio.create_task(connection.command("activate"))
@@ -308,7 +310,7 @@ async def test_a_deactivation_without_a_link_halts_when_it_is_back(
 
 
 async def test_a_stop_that_would_come_too_late_for_anything_is_not_sent(
-    connection: Connection, gripper: SimulatedGripper, server: SimulatorServer
+    connection: GripperConnection, gripper: SimulatedGripper, server: SimulatorServer
 ) -> None:
     await lose_link(server, connection.hand)
     await connection.forbid("the node was deactivated")
@@ -320,7 +322,9 @@ async def test_a_stop_that_would_come_too_late_for_anything_is_not_sent(
     assert len(gripper.writes) == writes
 
 
-async def test_the_end_of_the_node_owes_nothing(connection: Connection, server: SimulatorServer) -> None:
+async def test_the_end_of_the_node_owes_nothing(
+    connection: GripperConnection, server: SimulatorServer
+) -> None:
     goal = await moving(connection)
     await lose_link(server, connection.hand)
     await goal
@@ -330,19 +334,20 @@ async def test_the_end_of_the_node_owes_nothing(connection: Connection, server: 
 # -- what is reported --------------------------------------------------------------------------------------
 
 
-async def test_diagnoses_of_a_gripper_that_is_well(connection: Connection) -> None:
+async def test_diagnoses_of_a_gripper_that_is_well(connection: GripperConnection) -> None:
     link, gripper = diagnose(connection.hand, now())
-    assert (link.level, link.message) == (Level.OK, "connected")
-    assert (gripper.level, gripper.message) == (Level.OK, "RUNNING_IDLE")
+    assert (link.level, link.message) == (DiagnosticLevel.OK, "connected")
+    assert (gripper.level, gripper.message) == (DiagnosticLevel.OK, "RUNNING_IDLE")
     assert int(link.values["polls"]) > 0
     assert gripper.values["A position"] == "6"
 
 
 @pytest.mark.parametrize(
-    ("fault", "level"), [(Fault.COMMUNICATION_NOT_READY, Level.WARN), (Fault.SCISSOR_BLOCKED, Level.ERROR)]
+    ("fault", "level"),
+    [(Fault.COMMUNICATION_NOT_READY, DiagnosticLevel.WARN), (Fault.SCISSOR_BLOCKED, DiagnosticLevel.ERROR)],
 )
 async def test_diagnoses_of_a_fault(
-    connection: Connection, gripper: SimulatedGripper, fault: Fault, level: Level
+    connection: GripperConnection, gripper: SimulatedGripper, fault: Fault, level: DiagnosticLevel
 ) -> None:
     gripper.inject_fault(fault)
     await connection.hand.wait_for_state(State.FAULT)
@@ -364,19 +369,25 @@ async def test_the_diagnosis_of_a_controller_with_a_fault() -> None:
     gripper.controller_fault = 0x0C
     async with SimulatorServer(gripper) as server, RobotiqHand(server.address, poll_interval=POLL_S) as hand:
         _, shown = diagnose(hand, now())
-    assert (shown.level, shown.values["controller fault"]) == (Level.ERROR, "0x0C")
+    assert (shown.level, shown.values["controller fault"]) == (DiagnosticLevel.ERROR, "0x0C")
     assert shown.message == "RUNNING_IDLE; its controller reports: emergency stop (kFLT 0x0C)"
 
 
-async def test_without_a_link_nothing_is_known(connection: Connection, server: SimulatorServer) -> None:
+async def test_without_a_link_nothing_is_known(
+    connection: GripperConnection, server: SimulatorServer
+) -> None:
     await lose_link(server, connection.hand)
     link, gripper = diagnose(connection.hand, now())
-    assert link.level is Level.ERROR
-    assert (gripper.level, gripper.message, gripper.values) == (Level.STALE, "unknown: the link is down", {})
+    assert link.level is DiagnosticLevel.ERROR
+    assert (gripper.level, gripper.message, gripper.values) == (
+        DiagnosticLevel.STALE,
+        "unknown: the link is down",
+        {},
+    )
     shown = json.loads(status_text(connection.hand, takes_commands=False))
     assert shown == {"state": "DISCONNECTED", "connected": False, "takes_commands": False, "inhibited": None}
     fresh = RobotiqHand("tcp://192.0.2.1")
-    assert diagnose(fresh, 0.0)[1].level is Level.STALE
+    assert diagnose(fresh, 0.0)[1].level is DiagnosticLevel.STALE
     assert "fault" not in json.loads(status_text(fresh, takes_commands=False))
 
 

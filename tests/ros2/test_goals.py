@@ -11,7 +11,7 @@ import pytest
 
 from robotiq_async import HAND_E, TWO_FINGER_85, ConnectionLostError, Finger, MoveResult, RobotiqHand, State
 from robotiq_async.ros2.gripper.connection import make_hand
-from robotiq_async.ros2.gripper.goals import Ending, GoalRunner, Outcome
+from robotiq_async.ros2.gripper.goals import GoalEnding, GoalOutcome, GoalRunner
 from robotiq_async.ros2.translation.diagnosis import is_connected, why_not
 from robotiq_async.ros2.translation.joints import Targets
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
@@ -43,12 +43,12 @@ async def hand(server: SimulatorServer) -> AsyncIterator[RobotiqHand]:
 
 def begin(
     runner: GoalRunner, targets: Targets = CLOSE, key: bytes = b"1", **options: Any
-) -> asyncio.Task[Outcome]:
+) -> asyncio.Task[GoalOutcome]:
     options = {"speed": 255, "force": 64, "allow_stalling": True} | options
     return asyncio.create_task(runner.run(key, targets, **options))
 
 
-async def moving(hand: RobotiqHand) -> tuple[GoalRunner, asyncio.Task[Outcome]]:
+async def moving(hand: RobotiqHand) -> tuple[GoalRunner, asyncio.Task[GoalOutcome]]:
     """A goal that closes the fingers, which have begun to move."""
     runner = GoalRunner(hand)
     goal = begin(runner)
@@ -62,18 +62,20 @@ async def test_a_goal_for_several_positions_is_one_write(
     before = len(gripper.writes)
     outcome = await begin(GoalRunner(hand), Targets(((50, A), (80, B | C), (140, S))))
     reason = "every axis reached its target"
-    assert outcome == Outcome(Ending.SUCCEEDED, stalled=False, reached=True, reason=reason)
+    assert outcome == GoalOutcome(GoalEnding.SUCCEEDED, stalled=False, reached=True, reason=reason)
     assert [gripper.position(axis) for axis in (A, B, C, S)] == [50, 80, 80, 140]
     assert len(gripper.writes) == before + 1
     axes = Request.from_registers(gripper.writes[-1].registers).axes
     assert [(axis.speed, axis.force) for axis in axes] == [(255, 64)] * 4
 
 
-@pytest.mark.parametrize(("allow", "ending"), [(True, Ending.SUCCEEDED), (False, Ending.ABORTED)])
-async def test_a_contact(hand: RobotiqHand, gripper: SimulatedGripper, allow: bool, ending: Ending) -> None:
+@pytest.mark.parametrize(("allow", "ending"), [(True, GoalEnding.SUCCEEDED), (False, GoalEnding.ABORTED)])
+async def test_a_contact(
+    hand: RobotiqHand, gripper: SimulatedGripper, allow: bool, ending: GoalEnding
+) -> None:
     gripper.place_object(A, position=100)
     outcome = await begin(GoalRunner(hand), allow_stalling=allow)
-    assert outcome == Outcome(ending, stalled=True, reached=False, reason="contact: A")
+    assert outcome == GoalOutcome(ending, stalled=True, reached=False, reason="contact: A")
 
 
 async def test_a_canceled_goal_holds_its_axes_where_they_are(hand: RobotiqHand) -> None:
@@ -82,7 +84,7 @@ async def test_a_canceled_goal_holds_its_axes_where_they_are(hand: RobotiqHand) 
     await asyncio.sleep(0.1)
     assert not goal.done()
     runner.cancel(b"1")
-    assert (await goal).ending is Ending.CANCELED
+    assert (await goal).ending is GoalEnding.CANCELED
     there = hand.status.position(A)
     await asyncio.sleep(1)
     assert abs(hand.status.position(A) - there) <= 3
@@ -94,8 +96,8 @@ async def test_a_canceled_goal_does_not_hold_what_the_next_one_moves(hand: Robot
     runner, first = await moving(hand)
     runner.cancel(b"1")
     second = begin(runner, Targets(((230, Finger.ABC),)), b"2")
-    assert (await first).ending is Ending.CANCELED
-    assert (await second).ending is Ending.SUCCEEDED
+    assert (await first).ending is GoalEnding.CANCELED
+    assert (await second).ending is GoalEnding.SUCCEEDED
     assert hand.status.position(A) >= 228
 
 
@@ -119,7 +121,7 @@ async def test_a_hold_that_is_not_acknowledged_aborts_the_goal(caplog: pytest.Lo
         runner.cancel(b"1")
         with caplog.at_level(logging.ERROR, "robotiq_async"):
             outcome = await goal
-    assert outcome.ending is Ending.ABORTED, "canceled would say that the axes are to stay"
+    assert outcome.ending is GoalEnding.ABORTED, "canceled would say that the axes are to stay"
     assert outcome.reason == "canceled by its client, but the hold was not acknowledged: the link went down"
     assert "the hold was not acknowledged: the link went down" in caplog.text
 
@@ -152,7 +154,7 @@ async def test_a_goal_that_is_given_up_while_it_waits_keeps_none_waiting() -> No
             await anext(requests)
             assert loop.time() - began > 0.8, "the axes of the first one are free then"
             runner.abort("the end")
-            assert [(await each).ending for each in (first, third)] == [Ending.ABORTED] * 2
+            assert [(await each).ending for each in (first, third)] == [GoalEnding.ABORTED] * 2
         assert second.cancelled()
 
 
@@ -160,8 +162,8 @@ async def test_a_new_goal_holds_the_axes_that_it_does_not_address(hand: RobotiqH
     runner, first = await moving(hand)
     second = begin(runner, Targets(((60, A),)), b"2")
     outcome = await first
-    assert (outcome.ending, outcome.reason) == (Ending.ABORTED, "another goal took over")
-    assert (await second).ending is Ending.SUCCEEDED
+    assert (outcome.ending, outcome.reason) == (GoalEnding.ABORTED, "another goal took over")
+    assert (await second).ending is GoalEnding.SUCCEEDED
     assert abs(hand.status.position(A) - 60) <= 2
     assert hand.status.position(B) < 200
     assert not hand.is_moving
@@ -171,8 +173,8 @@ async def test_of_many_goals_at_once_the_last_one_runs(hand: RobotiqHand, grippe
     runner = GoalRunner(hand)
     goals = [begin(runner, Targets(((20 * n, A),)), bytes([n])) for n in range(1, 6)]
     *others, last = await asyncio.gather(*goals)
-    assert {outcome.ending for outcome in others} == {Ending.ABORTED}
-    assert last.ending is Ending.SUCCEEDED
+    assert {outcome.ending for outcome in others} == {GoalEnding.ABORTED}
+    assert last.ending is GoalEnding.SUCCEEDED
     assert gripper.position(A) == 100
 
 
@@ -183,7 +185,7 @@ async def test_a_goal_that_is_canceled_before_it_could_begin_moves_nothing(
     first, second = begin(runner), begin(runner, Targets(((99, S),)), b"2")
     await asyncio.sleep(0)
     runner.cancel(b"2")
-    assert [(await goal).ending for goal in (first, second)] == [Ending.ABORTED, Ending.CANCELED]
+    assert [(await goal).ending for goal in (first, second)] == [GoalEnding.ABORTED, GoalEnding.CANCELED]
     assert all(Request.from_registers(write.registers).position(S) != 99 for write in gripper.writes)
 
 
@@ -191,12 +193,12 @@ async def test_a_deactivation_and_a_halt_abort(hand: RobotiqHand) -> None:
     runner, goal = await moving(hand)
     runner.abort("the node was deactivated")
     reason = "the node was deactivated"
-    assert await goal == Outcome(Ending.ABORTED, stalled=False, reached=False, reason=reason)
+    assert await goal == GoalOutcome(GoalEnding.ABORTED, stalled=False, reached=False, reason=reason)
     await hand.move(0)
     _, goal = await moving(hand)
     await hand.halt()
     outcome = await goal
-    assert outcome.ending is Ending.ABORTED
+    assert outcome.ending is GoalEnding.ABORTED
     assert "halt" in outcome.reason
 
 

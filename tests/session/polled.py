@@ -13,7 +13,7 @@ from robotiq_async.control.controller import Controller
 from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.session.ending import STOP_S
 from robotiq_async.session.options import ReconnectPolicy
-from robotiq_async.session.poller import Parts
+from robotiq_async.session.poller import RunParts
 from robotiq_async.session.publisher import Publisher
 from robotiq_async.session.run import Run
 from robotiq_async.session.streams import Channel, Channels, Listeners
@@ -63,7 +63,7 @@ class Polled:
         channels.numbers = itertools.count(7)
         given = replace(options(self.wire, policy), poll_interval=poll_interval)
         publisher = Publisher(channels, self.controller)
-        self.run = Run(Parts(self.wire, self.controller, self.counters, publisher, given))
+        self.run = Run(RunParts(self.wire, self.controller, self.counters, publisher, given))
         self.at_next_status: Callable[[], None] | None = None
         self._published = asyncio.Event()
         self.task: asyncio.Task[None]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async.control.controller import NextWrite
-from robotiq_async.session.cycle import FRESH_S, READS, SOON_S, Step, next_step
+from robotiq_async.session.cycle import FRESH_S, READS, SOON_S, CycleStep, next_step
 from robotiq_async.session.options import LONGEST_SPACING_S
 
 STOP = NextWrite(wait=0.0, is_urgent=True, is_command=False, is_stop=True)
@@ -17,22 +17,24 @@ LONG_S = 1e-4  # more than that is too much
 @pytest.mark.parametrize(
     ("write", "age", "is_stale", "is_slow", "expected"),
     [
-        (STOP, 1.0, False, False, Step.WRITE),
-        (STOP, 1.0, False, True, Step.WRITE),
-        (STOP._replace(wait=LONGEST_SPACING_S), 1.0, False, False, Step.WAIT),
-        (STOP._replace(wait=LONGEST_SPACING_S + LONG_S), 1.0, False, False, Step.READ),
-        (STOP, 0.0, True, True, Step.READ),
-        (COMMAND, 0.0, False, False, Step.READ),
-        (COMMAND, FRESH_S, False, True, Step.WRITE_AND_READ),
-        (COMMAND, FRESH_S + LONG_S, False, True, Step.READ),
-        (COMMAND._replace(wait=SOON_S), FRESH_S - SOON_S, False, True, Step.WAIT),
-        (COMMAND._replace(wait=SOON_S), FRESH_S - SOON_S + LONG_S, False, True, Step.READ),
-        (COMMAND._replace(wait=SOON_S + LONG_S), 0.0, False, True, Step.READ),
-        (COMMAND, 0.0, True, True, Step.READ),
-        (PROCEDURE, 0.0, False, True, Step.READ),
+        (STOP, 1.0, False, False, CycleStep.WRITE),
+        (STOP, 1.0, False, True, CycleStep.WRITE),
+        (STOP._replace(wait=LONGEST_SPACING_S), 1.0, False, False, CycleStep.WAIT),
+        (STOP._replace(wait=LONGEST_SPACING_S + LONG_S), 1.0, False, False, CycleStep.READ),
+        (STOP, 0.0, True, True, CycleStep.READ),
+        (COMMAND, 0.0, False, False, CycleStep.READ),
+        (COMMAND, FRESH_S, False, True, CycleStep.WRITE_AND_READ),
+        (COMMAND, FRESH_S + LONG_S, False, True, CycleStep.READ),
+        (COMMAND._replace(wait=SOON_S), FRESH_S - SOON_S, False, True, CycleStep.WAIT),
+        (COMMAND._replace(wait=SOON_S), FRESH_S - SOON_S + LONG_S, False, True, CycleStep.READ),
+        (COMMAND._replace(wait=SOON_S + LONG_S), 0.0, False, True, CycleStep.READ),
+        (COMMAND, 0.0, True, True, CycleStep.READ),
+        (PROCEDURE, 0.0, False, True, CycleStep.READ),
     ],
 )
-def test_the_first_step(write: NextWrite, age: float, is_stale: bool, is_slow: bool, expected: Step) -> None:
+def test_the_first_step(
+    write: NextWrite, age: float, is_stale: bool, is_slow: bool, expected: CycleStep
+) -> None:
     assert next_step(write, 0, age, is_stale=is_stale, is_slow=is_slow) is expected
 
 
@@ -40,16 +42,16 @@ def test_the_first_step(write: NextWrite, age: float, is_stale: bool, is_slow: b
 @pytest.mark.parametrize(
     ("wait", "reads", "is_stale", "expected"),
     [
-        (0.0, 1, False, Step.WRITE_AND_READ),
-        (0.0, READS, False, Step.WRITE_AND_READ),
-        (0.0, READS - 1, True, Step.READ),
-        (0.0, READS, True, Step.WRITE),
-        (SOON_S, 1, True, Step.WAIT),
+        (0.0, 1, False, CycleStep.WRITE_AND_READ),
+        (0.0, READS, False, CycleStep.WRITE_AND_READ),
+        (0.0, READS - 1, True, CycleStep.READ),
+        (0.0, READS, True, CycleStep.WRITE),
+        (SOON_S, 1, True, CycleStep.WAIT),
         (SOON_S + LONG_S, 1, True, None),
     ],
 )
 def test_a_step_after_a_read(
-    write: NextWrite, wait: float, reads: int, is_stale: bool, expected: Step | None
+    write: NextWrite, wait: float, reads: int, is_stale: bool, expected: CycleStep | None
 ) -> None:
     now = write._replace(wait=wait)
     assert next_step(now, reads, 0.0, is_stale=is_stale, is_slow=False) is expected

@@ -9,7 +9,7 @@ from math import dist, pi
 
 import pytest
 
-from robotiq_async.tools.description import HandModel, Link, Pose, hand_model, mjcf, urdf
+from robotiq_async.tools.description import HandModel, Pose, RigidLink, hand_model, mjcf, urdf
 from robotiq_async.tools.description.__main__ import DATA, written
 from robotiq_async.tools.description.kinematics import JAW_JOINTS, joint_names
 from robotiq_async.tools.description.shapes import box, inertia, sphere
@@ -120,13 +120,13 @@ def test_the_links_weigh_what_the_gripper_weighs(name: str, kilograms: float) ->
 
 
 def test_inertia_is_that_of_the_textbook() -> None:
-    turned = Link("bar", 2.0, (box((0.1, 0.02, 0.04), (1, 2, 3), "body", (0, 0, pi / 2)),))
+    turned = RigidLink("bar", 2.0, (box((0.1, 0.02, 0.04), (1, 2, 3), "body", (0, 0, pi / 2)),))
     centre, moments, products = inertia(turned)
     assert centre == pytest.approx((1, 2, 3))
     x, y, z = 0.02, 0.1, 0.04
     assert moments == pytest.approx([(y * y + z * z) / 6, (x * x + z * z) / 6, (x * x + y * y) / 6])
     assert products == pytest.approx((0, 0, 0), abs=1e-12)
-    dumbbell = Link("dumbbell", 2.0, (sphere(0.1, (1, 1, 0), "body"), sphere(0.1, (-1, -1, 0), "body")))
+    dumbbell = RigidLink("dumbbell", 2.0, (sphere(0.1, (1, 1, 0), "body"), sphere(0.1, (-1, -1, 0), "body")))
     own = 2 * 2 / 5 * 0.01
     assert inertia(dumbbell).moments == pytest.approx((2 + own, 2 + own, 4 + own))
     assert inertia(dumbbell).products == pytest.approx((-2, 0, 0))

@@ -23,7 +23,7 @@ from robotiq_async.tools.measure.plots import (
     plot_peak_currents,
     plot_recording,
 )
-from robotiq_async.tools.recording.recordings import Entry
+from robotiq_async.tools.recording.recordings import RecordedMessage
 from robotiq_async.values.model import THREE_FINGER
 
 
@@ -68,7 +68,7 @@ def test_currents_over_time_are_drawn_near_the_usual_force_values(tmp_path: Path
 LONG = "X" * 2 * LONGEST
 
 
-def recorded() -> list[Entry]:
+def recorded() -> list[RecordedMessage]:
     """A status, three events and a status, each a second after the other."""
     axis = {"position": 6, "requested_position": 0, "current_ma": 0}
     status = {str(each.name): axis for each in THREE_FINGER.axes}
@@ -80,7 +80,7 @@ def recorded() -> list[Entry]:
     messages = [("/gripper/status", status), *(("/gripper/event", each) for each in events)]
     messages.append(("/gripper/status", status))
     return [
-        Entry(topic, second * 10**9, 0, json.dumps(fields).encode(), is_json=True)
+        RecordedMessage(topic, second * 10**9, 0, json.dumps(fields).encode(), is_json=True)
         for second, (topic, fields) in enumerate(messages)
     ]
 

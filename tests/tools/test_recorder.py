@@ -29,7 +29,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.description.joint_states import SCHEMA_NAME, JointStateEncoder
 from robotiq_async.tools.description.kinematics import JOINTS, joint_angles
 from robotiq_async.tools.recording.recorder import Recorder
-from robotiq_async.tools.recording.recordings import Entry, read_recording, recover
+from robotiq_async.tools.recording.recordings import RecordedMessage, read_recording, recover
 from robotiq_async.tools.recording.table import export
 from robotiq_async.values.errors import RecordingError
 from tests.forks import in_the_child
@@ -210,7 +210,7 @@ async def test_values_that_numpy_made_are_taken_and_none_left_out(hand: RobotiqH
 
 
 def test_text_that_utf_8_does_not_have_is_exported_all_the_same(tmp_path: Path) -> None:
-    foreign = Entry(
+    foreign = RecordedMessage(
         "/gripper/event", 0, 1, b'{"kind": "mark", "label": "part \\udcff", "values": {}}', is_json=True
     )
     assert export([foreign], "event", tmp_path / "it.csv") == 1

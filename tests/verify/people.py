@@ -16,9 +16,9 @@ from robotiq_async.simulator import (
     Trouble,
     UrcapSimulatorServer,
 )
-from robotiq_async.tools.verify import ENTER, Lengths, Plan, Report, Runner, Verdict
+from robotiq_async.tools.verify import ENTER, CheckVerdict, Lengths, Plan, Report, Runner
 from robotiq_async.tools.verify.catalogue import LAST, checks_of
-from robotiq_async.tools.verify.recorded_link import Frame
+from robotiq_async.tools.verify.recorded_link import RecordedExchange
 from robotiq_async.tools.verify.stages import first_motions, loss, soft_part
 from robotiq_async.values.enums import Finger
 from tests.grippers import activate_beforehand
@@ -53,10 +53,10 @@ class Roll:
     failure = ""
 
     def __init__(self) -> None:
-        self.frames: list[Frame] = []
+        self.frames: list[RecordedExchange] = []
         self.stages: list[int] = []
 
-    def keep(self, frame: Frame) -> None:
+    def keep(self, frame: RecordedExchange) -> None:
         self.frames.append(frame)
 
     def begin(self, stage: int) -> None:
@@ -179,7 +179,9 @@ def differing(report: Report) -> dict[str, dict[str, int | float]]:
 def assert_as_assumed(report: Report) -> None:
     """Every check of the stages that ran ended well."""
     assert report.why == "done", report.words
-    wrong = {name: check for name, check in report.checks.items() if check.verdict is not Verdict.AS_ASSUMED}
+    wrong = {
+        name: check for name, check in report.checks.items() if check.verdict is not CheckVerdict.AS_ASSUMED
+    }
     assert not wrong
     expected = {
         name for name, each in checks_of(report.model, report.link).items() if each.stage in report.stages

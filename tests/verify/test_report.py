@@ -22,9 +22,9 @@ from robotiq_async.link.address import parse_address
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_parameter
 from robotiq_async.simulator import SimulatorServer, Trouble
 from robotiq_async.tools.recording.recordings import read_recording
-from robotiq_async.tools.verify import CATALOGUE, ENDINGS, Check, Plan, Report, Runner, Verdict
+from robotiq_async.tools.verify import CATALOGUE, ENDINGS, Check, CheckVerdict, Plan, Report, Runner
 from robotiq_async.tools.verify.files import JSON, NAME, PAGE, Folder, Recording, Scrubber
-from robotiq_async.tools.verify.recorded_link import Frame
+from robotiq_async.tools.verify.recorded_link import RecordedExchange
 from robotiq_async.tools.verify.report import SCHEMA, lines, page, sentences
 from tests.docs.pages import read, table
 from tests.register_words import status_of
@@ -49,7 +49,7 @@ class Both(Roll):
         super().__init__()
         self._recording = recording
 
-    def keep(self, frame: Frame) -> None:
+    def keep(self, frame: RecordedExchange) -> None:
         super().keep(frame)
         self._recording.keep(frame)
 
@@ -63,7 +63,7 @@ class Kept(NamedTuple):
 
     report: Report
     path: Path
-    frames: list[Frame]
+    frames: list[RecordedExchange]
     stages: list[list[int]]
     pages: list[str]
 
@@ -257,7 +257,7 @@ def test_above_do_not_use_there_are_no_lines_to_paste() -> None:
 
 
 def report_with(**options: float) -> Report:
-    check = Check("read.registers", Verdict.DIFFERS, "as found", "so it goes", options)
+    check = Check("read.registers", CheckVerdict.DIFFERS, "as found", "so it goes", options)
     found, stages = status_of(0x31), [0, 1, 2]
     return Report("tcp", stages=stages, entered=stages[:], checks={check.name: check}, why="done", last=found)
 
@@ -345,7 +345,7 @@ def test_checks_that_were_not_reached_are_said_to_be_so() -> None:
     report = Report("tcp", entered=[0, 1])
     report.complete()
     assert report.checks.keys() == {name for name, each in CATALOGUE.items() if each.stage <= 1}
-    assert {check.verdict for check in report.checks.values()} == {Verdict.INCONCLUSIVE}
+    assert {check.verdict for check in report.checks.values()} == {CheckVerdict.INCONCLUSIVE}
 
 
 # -- the page that describes them --------------------------------------------------------------------------

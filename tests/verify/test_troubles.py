@@ -13,7 +13,7 @@ import pytest
 from robotiq_async.link.address import parse_address
 from robotiq_async.simulator import SimulatorServer, Trouble
 from robotiq_async.simulator.troubles.like_hardware import like_hardware, own_habits
-from robotiq_async.tools.verify import Plan, Report, Runner, Verdict
+from robotiq_async.tools.verify import CheckVerdict, Plan, Report, Runner
 from robotiq_async.tools.verify.bench import Lengths
 from robotiq_async.tools.verify.catalogue import HARMLESS, checks_of
 from robotiq_async.tools.verify.motions import REACHED, UNREACHED
@@ -221,7 +221,7 @@ def test_late_timers_of_this_computer_are_not_blamed_on_the_gripper(is_late: boo
         async with served("delay") as server:
             report = await verified(server, last=1)
         check = report.checks["read.round_trip"]
-        assert check.verdict is (Verdict.INCONCLUSIVE if is_late else Verdict.DIFFERS)
+        assert check.verdict is (CheckVerdict.INCONCLUSIVE if is_late else CheckVerdict.DIFFERS)
         assert ("poll_interval" in report.options) is not is_late
         assert "wired network" not in check.follows, "the simulator is on this computer"
 

@@ -8,7 +8,7 @@ pytest.importorskip("mujoco", reason="needs the extra physics")
 
 from robotiq_async.session.options import units_of
 from robotiq_async.simulator import Habits, Physics, SimulatedGripper
-from robotiq_async.tools.verify import Verdict
+from robotiq_async.tools.verify import CheckVerdict
 from robotiq_async.tools.verify.stages import soft_part
 from robotiq_async.tools.verify.stages.full_strokes import SHARE
 from robotiq_async.values.enums import Finger
@@ -32,7 +32,7 @@ async def test_every_stage_ends_well_but_the_one_with_foam(model: Model, last: i
         report = await verified(server, helper, Roll(), first=3, last=last)
     assert report.why == "done", report.words
     assert report.stages == list(range(3, last + 1))
-    other = {each for each, check in report.checks.items() if check.verdict is not Verdict.AS_ASSUMED}
+    other = {each for each, check in report.checks.items() if check.verdict is not CheckVerdict.AS_ASSUMED}
     assert {each for each in other if not each.startswith("soft.")} == set()
     assert not helper.alarms
 

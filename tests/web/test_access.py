@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from robotiq_async.tools.web.page.access import Access, Head, Verdict
+from robotiq_async.tools.web.page.access import Access, AccessDecision, Head
 from robotiq_async.tools.web.page.guard import WAITING, Guard
 from robotiq_async.tools.web.settings import PageSettings
 
@@ -33,9 +33,9 @@ def head(rules: Access, path: str = "/", method: str = "GET", **headers: str) ->
 def test_the_token_lets_in_and_nothing_else_does() -> None:
     rules = access()
     token = rules.settings.token
-    assert rules.judge(head(rules, query=f"token={token}")) is Verdict.LET_IN
+    assert rules.judge(head(rules, query=f"token={token}")) is AccessDecision.LET_IN
     for query in ("", "token=", f"token={token[:-1]}", f"token=x{token}", f"other={token}", "token=%FF"):
-        assert rules.judge(head(rules, query=query)) is Verdict.NO_TOKEN
+        assert rules.judge(head(rules, query=query)) is AccessDecision.NO_TOKEN
     assert len(token) >= 24
     assert access().settings.token != token
 
@@ -43,12 +43,12 @@ def test_the_token_lets_in_and_nothing_else_does() -> None:
 def test_the_cookie_serves_what_lies_in_the_folder() -> None:
     rules = access()
     inside = f"{rules.settings.folder}/anything"
-    assert rules.judge(head(rules, inside, cookie=cookie(rules))) is Verdict.SERVE
+    assert rules.judge(head(rules, inside, cookie=cookie(rules))) is AccessDecision.SERVE
     for wrong in ("", "robotiq_async=", "robotiq_async=x", cookie(access()), "a=b; robotiq_async", "\x00"):
-        assert rules.judge(head(rules, inside, cookie=wrong)) is Verdict.NO_TOKEN
-    assert rules.judge(head(rules, inside, cookie=f"x{cookie(rules)}")) is Verdict.NO_TOKEN
-    assert rules.judge(head(rules, "/elsewhere", cookie=cookie(rules))) is Verdict.NO_TOKEN
-    assert rules.judge(head(rules, inside)) is Verdict.NO_TOKEN
+        assert rules.judge(head(rules, inside, cookie=wrong)) is AccessDecision.NO_TOKEN
+    assert rules.judge(head(rules, inside, cookie=f"x{cookie(rules)}")) is AccessDecision.NO_TOKEN
+    assert rules.judge(head(rules, "/elsewhere", cookie=cookie(rules))) is AccessDecision.NO_TOKEN
+    assert rules.judge(head(rules, inside)) is AccessDecision.NO_TOKEN
 
 
 def test_the_cookie_is_for_browsers_only_and_for_this_server_only() -> None:
@@ -70,7 +70,7 @@ def test_cookies_of_other_servers_of_this_machine_do_no_harm(others: str) -> Non
     rules = access()
     for together in (f"{others}; {cookie(rules)}", f"{cookie(rules)}; {others}"):
         asked = head(rules, f"{rules.settings.folder}/x", cookie=together)
-        assert rules.judge(asked) is Verdict.SERVE
+        assert rules.judge(asked) is AccessDecision.SERVE
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_the_host_must_be_ours(host: str, fine: bool) -> None:
     """A name of another site may resolve to this machine: its pages would be of the same origin."""
     rules = access()
     verdict = rules.judge(head(rules, query=f"token={rules.settings.token}", host=host))
-    assert verdict is (Verdict.LET_IN if fine else Verdict.WRONG_HOST)
+    assert verdict is (AccessDecision.LET_IN if fine else AccessDecision.WRONG_HOST)
 
 
 @pytest.mark.parametrize("method", ["GET", "POST", ""])
@@ -101,25 +101,25 @@ def test_the_host_must_be_ours(host: str, fine: bool) -> None:
 def test_a_foreign_origin_is_refused_even_with_the_cookie(method: str, origin: str) -> None:
     rules = access()
     asked = head(rules, f"{rules.settings.folder}/x", method, cookie=cookie(rules), origin=origin)
-    assert rules.judge(asked) is Verdict.WRONG_ORIGIN
+    assert rules.judge(asked) is AccessDecision.WRONG_ORIGIN
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "OPTIONS", ""])
 def test_requests_that_change_something_or_stay_open_need_an_origin(method: str) -> None:
     rules = access()
     inside = f"{rules.settings.folder}/x"
-    assert rules.judge(head(rules, inside, method, cookie=cookie(rules))) is Verdict.WRONG_ORIGIN
+    assert rules.judge(head(rules, inside, method, cookie=cookie(rules))) is AccessDecision.WRONG_ORIGIN
     ours = head(rules, inside, method, cookie=cookie(rules), origin=f"http://{HERE}")
-    assert rules.judge(ours) is Verdict.SERVE
+    assert rules.judge(ours) is AccessDecision.SERVE
 
 
 def test_a_password_takes_the_place_of_the_token() -> None:
     rules = access(host="192.0.2.1", password="correct horse")
     here = "gripper.lab:8766"
-    assert rules.judge(head(rules, host=here)) is Verdict.ASK
-    assert rules.judge(head(rules, host=here, query=f"token={rules.settings.token}")) is Verdict.ASK
-    assert rules.judge(head(rules, "/", "POST", host=here)) is Verdict.WRONG_ORIGIN
-    assert rules.judge(head(rules, "/", "POST", host=here, origin=f"http://{here}")) is Verdict.ASK
+    assert rules.judge(head(rules, host=here)) is AccessDecision.ASK
+    assert rules.judge(head(rules, host=here, query=f"token={rules.settings.token}")) is AccessDecision.ASK
+    assert rules.judge(head(rules, "/", "POST", host=here)) is AccessDecision.WRONG_ORIGIN
+    assert rules.judge(head(rules, "/", "POST", host=here, origin=f"http://{here}")) is AccessDecision.ASK
     assert rules.knows("correct horse")
     for wrong in ("", "correct", "correct horse ", "\udcff"):
         assert not rules.knows(wrong)

@@ -25,7 +25,7 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import Operator
 from robotiq_async.tools.web.commands import BUTTONS, FRESH_S, MAX_COMMANDS, PageCommands
 from robotiq_async.tools.web.page.heartbeat import LOST_S, Heartbeat
-from robotiq_async.tools.web.page.mirror import HISTORY_S, HandMirror, Mirror
+from robotiq_async.tools.web.page.mirror import HISTORY_S, HandMirror, PageMirror
 from robotiq_async.tools.web.page.widgets.words import event_words, fault_words, state_words
 from robotiq_async.tools.web.server import HandUpdates, PageServer
 from robotiq_async.tools.web.settings import PageSettings
@@ -204,13 +204,13 @@ async def test_a_halt_finds_its_way_through_a_crowd() -> None:
 # -- updates and mirror -----------------------------------------------------------------------------------
 
 
-def mirrored(updates: HandUpdates, mirror: Mirror) -> None:
+def mirrored(updates: HandUpdates, mirror: PageMirror) -> None:
     updates.gather()
     mirror.hear(json.dumps({"hands": [updates.take(0)], "answers": []}).encode())
 
 
 async def test_the_mirror_shows_what_the_hand_is(hand: RobotiqHand, gripper: SimulatedGripper) -> None:
-    updates, mirror = HandUpdates(hand), Mirror(("here",), control=False, say=lambda _: None)
+    updates, mirror = HandUpdates(hand), PageMirror(("here",), control=False, say=lambda _: None)
     shown = mirror.hands[0]
     assert state_words(shown, is_quiet=False)[0] == "lost"
     await hand.move(90)
@@ -234,7 +234,7 @@ async def test_the_mirror_shows_what_the_hand_is(hand: RobotiqHand, gripper: Sim
 )
 async def test_what_a_simulation_knows_reaches_the_page(query: str, parts: int | None) -> None:
     pytest.importorskip("mujoco", reason="needs the extra physics")
-    mirror = Mirror(("here",), control=False, say=lambda _: None)
+    mirror = PageMirror(("here",), control=False, say=lambda _: None)
 
     def known() -> int | None:
         mirrored(HandUpdates(jaw), mirror)
@@ -245,7 +245,7 @@ async def test_what_a_simulation_knows_reaches_the_page(query: str, parts: int |
 
 
 async def test_a_gripper_elsewhere_tells_no_more_than_its_registers(hand: RobotiqHand) -> None:
-    mirror = Mirror(("here",), control=False, say=lambda _: None)
+    mirror = PageMirror(("here",), control=False, say=lambda _: None)
     mirrored(HandUpdates(hand), mirror)
     assert mirror.hands[0].status is not None
     assert (mirror.hands[0].joints, mirror.hands[0].parts) == (None, ())
@@ -266,7 +266,7 @@ async def test_a_peak_of_the_current_is_not_lost_between_two_looks(hand: Robotiq
 
 
 def test_the_curves_are_of_the_last_half_minute() -> None:
-    mirror = Mirror(("here",), control=False, say=lambda _: None)
+    mirror = PageMirror(("here",), control=False, say=lambda _: None)
     shown = mirror.hands[0]
     for tick in range(1000):
         shown._sample(tick * 0.1)
@@ -276,7 +276,7 @@ def test_the_curves_are_of_the_last_half_minute() -> None:
 
 
 async def test_a_silence_is_a_gap_in_the_curves_and_no_line(hand: RobotiqHand) -> None:
-    updates, mirror = HandUpdates(hand), Mirror(("here",), control=False, say=lambda _: None)
+    updates, mirror = HandUpdates(hand), PageMirror(("here",), control=False, say=lambda _: None)
     mirrored(updates, mirror)
     shown = mirror.hands[0]
     shown._sample(shown.samples[-1].at + 10)
@@ -286,7 +286,7 @@ async def test_a_silence_is_a_gap_in_the_curves_and_no_line(hand: RobotiqHand) -
 def test_an_answer_goes_to_the_page_that_asked() -> None:
     said: list[dict[str, Any]] = []
     answers: list[tuple[bool, str]] = []
-    mirror = Mirror(("here",), control=True, say=said.append)
+    mirror = PageMirror(("here",), control=True, say=said.append)
     mirror.ask("page", 0, "close", {}, lambda ok, words: answers.append((ok, words)), at=1.0)
     number = said[0]["do"]["number"]
     answer = {"number": number, "ok": True, "words": "A"}
@@ -299,7 +299,7 @@ def test_what_a_browser_sends_at_length_ends_no_page() -> None:
     """The other process took the line for an invalid message, and ignored all commands from then on."""
     said: list[dict[str, Any]] = []
     answers: list[tuple[bool, str]] = []
-    mirror = Mirror(("here",), control=True, say=said.append)
+    mirror = PageMirror(("here",), control=True, say=said.append)
     many = {"position": "\u00e9" * 20_000}
     mirror.ask("page", 0, "move", many, lambda ok, words: answers.append((ok, words)), at=1.0)
     assert not said

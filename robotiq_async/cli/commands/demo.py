@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import Final
 
 from ...hand import Hand
-from ..arguments import Address, Flag, Yes, need
+from ..arguments import AddressArgument, Flag, Yes, need
 from ..browser import opened
 from ..consent import consent
 from ..failures import CommandError
@@ -24,7 +24,7 @@ LOOK_S: Final = 2.0
 
 
 def demo(
-    address: Address = "sim://", /, *, yes: Yes = False, show: Flag = False
+    address: AddressArgument = "sim://", /, *, yes: Yes = False, show: Flag = False
 ) -> Coroutine[None, None, None]:
     """Show what the library does, call by call. THE FINGERS MOVE.
 

@@ -12,7 +12,7 @@ from ...link.registers import registers_of
 from ...runtime.log import printable
 from ...session.options import HandOptions
 from ..addresses import full_address, gripper_words
-from ..arguments import Address, Unit, need
+from ..arguments import AddressArgument, Unit, need
 from ..failures import CommandError, UsageError, usage
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 async def doctor(
-    address: Address,
+    address: AddressArgument,
     /,
     *,
     device_id: Unit | None = None,

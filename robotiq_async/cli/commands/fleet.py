@@ -171,18 +171,18 @@ def _print_object(member: Member) -> None:
 
 _MAY: Final = {"read": "watch", "halt": "watch and halt", "operate": "watch, halt and command"}
 
-Names = Annotated[tuple[str, ...], Parameter(metavar="NAME", negative=(), show_default=False)]
-Agents = Annotated[tuple[str, ...], Parameter(metavar="NAME[=HOST,...]", negative=(), show_default=False)]
+Operators = Annotated[tuple[str, ...], Parameter(metavar="NAME", negative=(), show_default=False)]
+AgentHosts = Annotated[tuple[str, ...], Parameter(metavar="NAME[=HOST,...]", negative=(), show_default=False)]
 
 
 def keys(
     folder: Path,
     /,
     *,
-    agent: Agents = (),
-    read: Names = (),
-    halt: Names = (),
-    operate: Names = (),
+    agent: AgentHosts = (),
+    read: Operators = (),
+    halt: Operators = (),
+    operate: Operators = (),
     days: Annotated[int | None, Parameter(metavar="N", show_default=False)] = None,
 ) -> None:
     """Make keys for agents and clients, and set who may do what.

@@ -14,7 +14,7 @@ from ...link.address import Simulation, parse_address
 from ...values.enums import Finger
 from ...values.errors import MeasuringError
 from ..addresses import full_address, gripper_words, is_simulated, named_model
-from ..arguments import Address, Fingers, Flag, Runs, Step, Yes, need
+from ..arguments import AddressArgument, Fingers, Flag, Runs, StepCounts, Yes, need
 from ..consent import consent
 from ..failures import CommandError, UsageError
 
@@ -176,11 +176,11 @@ If it is not active yet it is activated first, and what it holds drops."""
 
 
 def speed(
-    address: Address,
+    address: AddressArgument,
     /,
     *,
     output: Annotated[Path, Parameter(metavar="FILE.csv")] = Path("closing_time_ms.csv"),
-    step: Step = 4,
+    step: StepCounts = 4,
     runs: Runs = 3,
     fingers: Fingers = Finger.ABC,
     speedup: Speedup = None,

@@ -14,7 +14,7 @@ from ...runtime.concurrency import in_a_thread
 from ...values.enums import DEFAULT_SPEED, Finger
 from ...values.model import THREE_FINGER
 from ..addresses import full_address, is_simulated, named_model
-from ..arguments import Address, Byte, Runs, Step, Yes
+from ..arguments import AddressArgument, Byte, Runs, StepCounts, Yes
 from ..consent import consent, read_line
 from ..failures import CommandError, UsageError
 from .measure import NoPlot, Speedup, check, measure_left, print_files, table_errors
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ...hand import Hand
     from ...simulator import SimulatedGripper
     from ...tools.measure.campaigns import Campaign, Currents
-    from ...values.calibration.csv_tables import Table
+    from ...values.calibration.csv_tables import RunsTable
 
 WARNING = """the fingers MOVE: they open and close on what lies between them, {count} times.
 If it is not active yet it is activated first, and what it holds drops."""
@@ -31,13 +31,13 @@ MOST_GRAMS = 100_000
 
 
 def force(
-    address: Address,
+    address: AddressArgument,
     /,
     *,
     surface: Literal["foam", "rigid"] = "foam",
     output: Annotated[Path | None, Parameter(metavar="FILE.csv")] = None,
     scale: Annotated[Path | None, Parameter(metavar="FILE.csv")] = None,
-    step: Step = 25,
+    step: StepCounts = 25,
     runs: Runs = 3,
     speed: Byte = DEFAULT_SPEED,
     speedup: Speedup = None,
@@ -149,7 +149,7 @@ def _currents_of(campaign: Campaign) -> Currents:
 
 
 def _scale(
-    address: str, surface: Literal["foam", "rigid"], readings: Table | None, values: list[int], runs: int
+    address: str, surface: Literal["foam", "rigid"], readings: RunsTable | None, values: list[int], runs: int
 ) -> Callable[[int, int], Awaitable[int]]:
     """The source of the readings."""
     if readings is not None:
@@ -190,7 +190,7 @@ async def prompt(question: str) -> str:
     return line.strip()
 
 
-def _plot(output: Path, surface: str, table: Table, label: str) -> None:
+def _plot(output: Path, surface: str, table: RunsTable, label: str) -> None:
     from ...tools.measure.campaigns import read_currents
     from ...tools.measure.plots import plot_current_over_time, plot_force, plot_peak_currents
 

@@ -13,7 +13,7 @@ from cyclopts import Parameter
 from ...link.address import is_remote
 from ...values.stroke import why_not_after
 from ..addresses import gripper_words, is_simulated, named_model
-from ..arguments import Address, Flag, PointCount, Yes
+from ..arguments import AddressArgument, Flag, PointCount, Yes
 from ..consent import consent
 from ..failures import CommandError, UsageError, file_errors
 from .measure import check, gripper_to_measure
@@ -42,7 +42,7 @@ Calliper = Callable[[int], Awaitable[float]]  # takes the position, in counts
 
 
 def stroke(
-    address: Address,
+    address: AddressArgument,
     /,
     *,
     output: Annotated[Path, Parameter(metavar="FILE.csv")] = Path("stroke.csv"),

@@ -16,7 +16,7 @@ from ...hand import Hand
 from ...tools.recording.payloads import reading_fields
 from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..addresses import gripper_words
-from ..arguments import USUAL, Address, Byte, Flag, Link, need
+from ..arguments import USUAL, AddressArgument, Byte, Flag, LinkOptions, need
 from ..consent import forget_keys
 from ..failures import CommandError, UsageError, normal_end
 from ..output.messages import forget, forwarded_warnings, tell
@@ -26,14 +26,14 @@ SCREEN_S: Final = 1.0
 
 
 async def monitor(
-    address: Address = "sim://",
+    address: AddressArgument = "sim://",
     /,
     *,
     watch: Flag = False,
     as_json: Annotated[Flag, Parameter(name="--json")] = False,
     speed: Byte = DEFAULT_SPEED,
     force: Byte = DEFAULT_FORCE,
-    link: Link = USUAL,
+    link: LinkOptions = USUAL,
 ) -> None:
     """Show a gripper while it works, and move it by keys. Nothing moves until a key is pressed.
 
@@ -84,7 +84,7 @@ def _is_terminal() -> bool:
     return all(each is not None and each.isatty() for each in streams) and os.environ.get("TERM") != "dumb"
 
 
-async def _look(address: str, link: Link, *, as_json: bool) -> None:
+async def _look(address: str, link: LinkOptions, *, as_json: bool) -> None:
     from ..output.lines import print_objects, watch
 
     async with _named(address, link, as_json=as_json) as hand:
@@ -93,7 +93,7 @@ async def _look(address: str, link: Link, *, as_json: bool) -> None:
 
 
 @asynccontextmanager
-async def _named(address: str, link: Link, *, as_json: bool) -> AsyncIterator[Hand]:
+async def _named(address: str, link: LinkOptions, *, as_json: bool) -> AsyncIterator[Hand]:
     """A hand that is only watched; the line that names the gripper is not among the JSON."""
     from ..connect import connected
 
@@ -105,7 +105,7 @@ async def _named(address: str, link: Link, *, as_json: bool) -> AsyncIterator[Ha
         yield hand
 
 
-async def _screen(address: str, link: Link, speed: int, force: int) -> None:
+async def _screen(address: str, link: LinkOptions, speed: int, force: int) -> None:
     from ..connect import make_operator
     from ..tui.screen import Monitor
 
@@ -133,11 +133,11 @@ async def _screen(address: str, link: Link, speed: int, force: int) -> None:
 
 
 async def status(
-    address: Address = "sim://",
+    address: AddressArgument = "sim://",
     /,
     *,
     as_json: Annotated[Flag, Parameter(name="--json")] = False,
-    link: Link = USUAL,
+    link: LinkOptions = USUAL,
 ) -> None:
     """Read the gripper once and print its status. Nothing moves and nothing is written.
 

@@ -14,7 +14,18 @@ from ...values.calibration import Units
 from ...values.checks import check_timeout
 from ...values.enums import Finger
 from ..addresses import gripper_words, is_simulated
-from ..arguments import USUAL, Address, Amount, Fingers, Flag, Force, Link, Position, Speed, Yes
+from ..arguments import (
+    USUAL,
+    AddressArgument,
+    Amount,
+    Fingers,
+    Flag,
+    Force,
+    LinkOptions,
+    Position,
+    Speed,
+    Yes,
+)
 from ..consent import consent
 from ..failures import usage
 
@@ -28,7 +39,7 @@ HINT = " With --keep it stays set."
 
 def move(
     position: Position,
-    address: Address = "sim://",
+    address: AddressArgument = "sim://",
     /,
     *,
     fingers: Fingers = Finger.ABC,
@@ -37,7 +48,7 @@ def move(
     timeout: Annotated[float | None, Parameter(metavar="SECONDS")] = None,
     keep: Flag = False,
     yes: Yes = False,
-    link: Link = USUAL,
+    link: LinkOptions = USUAL,
 ) -> Coroutine[None, None, None]:
     """Move axes and wait until they have stopped. THE FINGERS MOVE.
 
@@ -103,7 +114,7 @@ async def _move(
     force: Amount | None,
     timeout: float | None,
     keep: bool,
-    link: Link,
+    link: LinkOptions,
 ) -> None:
     from ..connect import connected
     from ..output.tables import print_outcomes

@@ -15,14 +15,14 @@ from cyclopts import Parameter
 from ...runtime.log import printable
 from ...values.conventions import CONVENTIONS, Convention
 from ..addresses import gripper_words
-from ..arguments import USUAL, Address, Flag, Link, need
+from ..arguments import USUAL, AddressArgument, Flag, LinkOptions, need
 from ..failures import CommandError, UsageError, file_errors, normal_end
 from ..output.lines import FORMATTERS, brief_line, clock
 
 if TYPE_CHECKING:
     from ...hand import Hand
     from ...tools.recording.recorder import Recorder
-    from ...tools.recording.recordings import Entry
+    from ...tools.recording.recordings import RecordedMessage
 
 Overwrite = Annotated[Flag, Parameter(help="Replace an existing file.")]
 KINDS: Final = {"statuses": "status", "commands": "command", "events": "event"}
@@ -67,14 +67,14 @@ def replay(
         raise CommandError(f"{file}: it contains nothing for this command")
 
 
-def _entries(file: Path) -> Iterator[Entry]:
+def _entries(file: Path) -> Iterator[RecordedMessage]:
     need("mcap", "record")
     from ...tools.recording.recordings import read_recording
 
     return (entry for entry in read_recording(file) if entry.is_json)
 
 
-def _lines(entries: Iterable[Entry]) -> Iterator[str]:
+def _lines(entries: Iterable[RecordedMessage]) -> Iterator[str]:
     shown = ""
     for entry in entries:
         if entry.topic not in FORMATTERS:
@@ -87,7 +87,7 @@ def _lines(entries: Iterable[Entry]) -> Iterator[str]:
         yield _stamped(entry, line)
 
 
-def _brief(entries: Iterable[Entry]) -> Iterator[str]:
+def _brief(entries: Iterable[RecordedMessage]) -> Iterator[str]:
     polls, commands, began, ended = 0, 0, 0, 0
     contacts: dict[str, Any] = {}
     for entry in entries:
@@ -102,7 +102,7 @@ def _brief(entries: Iterable[Entry]) -> Iterator[str]:
         yield f"{polls} polls and {commands} commands in {(ended - began) / 1e9:.1f} s"
 
 
-def _stamped(entry: Entry, line: str) -> str:
+def _stamped(entry: RecordedMessage, line: str) -> str:
     return f"{clock(entry.nanoseconds / 1e9)} {line}"
 
 
@@ -232,13 +232,13 @@ WHOLE = "robotiq-async recover makes a complete file of it"
 
 async def record(
     file: Path,
-    address: Address = "sim://",
+    address: AddressArgument = "sim://",
     /,
     *,
     seconds: Annotated[float | None, Parameter(metavar="SECONDS")] = None,
     ros2: Flag = False,
     as_csv: Annotated[Flag, Parameter(name="--csv")] = False,
-    link: Link = USUAL,
+    link: LinkOptions = USUAL,
 ) -> None:
     """Record every poll, command, transition and fault in a file, until Ctrl-C.
 

@@ -18,7 +18,7 @@ from ...values.enums import Finger
 from ...values.errors import RobotiqError
 from ...values.model import Model, model_of
 from ...values.registers import RTU_REGISTERS
-from ..arguments import Byte, Flag, Host, Port, Units
+from ..arguments import Byte, Flag, Host, Port, UnitIds
 from ..failures import normal_end, usage
 from ..output.messages import tell
 
@@ -53,7 +53,7 @@ async def simulate(
     rtu_over_tcp: Flag = False,
     urcap: Flag = False,
     unpaced: Flag = False,
-    device_id: Units | None = None,
+    device_id: UnitIds | None = None,
     like: Annotated[Path | None, Parameter(metavar="report.json")] = None,
     trouble: Annotated[list[str] | None, Parameter(metavar="WORDS", negative=())] = None,
     troubles: Flag = False,

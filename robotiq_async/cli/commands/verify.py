@@ -17,7 +17,7 @@ from ...runtime.concurrency import wait_shielded
 from ...session.options import HandOptions
 from ...values.model import model_of
 from ..addresses import gripper_words
-from ..arguments import Address, Stage, need
+from ..arguments import AddressArgument, StageNumber, need
 from ..failures import CommandError, UsageError, usage
 from ..keyboard import Keyboard, has_terminal, wrapped
 from ..output.messages import tell
@@ -34,13 +34,13 @@ NOTE = (
 
 
 async def verify(
-    address: Address,
+    address: AddressArgument,
     /,
     *,
-    up_to: Stage | None = None,
-    from_: Annotated[Stage, Parameter(name="--from")] = 0,
+    up_to: StageNumber | None = None,
+    from_: Annotated[StageNumber, Parameter(name="--from")] = 0,
     report: Annotated[Path | None, Parameter(metavar="DIR")] = None,
-    yes_to: Annotated[Stage | None, Parameter(show_default=False)] = None,
+    yes_to: Annotated[StageNumber | None, Parameter(show_default=False)] = None,
     label: Annotated[str, Parameter(metavar="TEXT", show_default=False)] = "",
     model: Literal["3f", "2f85", "2f140", "hand-e"] | None = None,
 ) -> None:

@@ -11,19 +11,19 @@ from cyclopts import Parameter
 
 from ...runtime.sockets import is_loopback
 from ..addresses import gripper_words
-from ..arguments import USUAL, Address, Host, Link, Port, need
+from ..arguments import USUAL, AddressArgument, Host, LinkOptions, Port, need
 from ..failures import file_errors, normal_end
 from ..output.messages import tell
 
 
 async def view(
-    address: Address = "sim://",
+    address: AddressArgument = "sim://",
     /,
     *,
     port: Port = 8765,
     host: Host = "127.0.0.1",
     layout: Annotated[Path | None, Parameter(metavar="FILE")] = None,
-    link: Link = USUAL,
+    link: LinkOptions = USUAL,
 ) -> None:
     """Show a gripper in Foxglove or Lichtblick until Ctrl-C. Viewers only look; web --control also moves.
 

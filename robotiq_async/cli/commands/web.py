@@ -16,7 +16,7 @@ from ...tools.recording.payloads import title
 from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...values.errors import RobotiqError
 from ..addresses import gripper_words
-from ..arguments import USUAL, Address, Byte, Flag, Host, Link, Port, need
+from ..arguments import USUAL, AddressArgument, Byte, Flag, Host, LinkOptions, Port, need
 from ..browser import opened
 from ..failures import CommandError, UsageError, file_errors, normal_end, usage
 from ..output.messages import tell
@@ -30,7 +30,7 @@ AGAIN_S: Final = 3.0
 
 
 async def web(
-    *addresses: Address,
+    *addresses: AddressArgument,
     control: Flag = False,
     open_browser: Annotated[Flag, Parameter(name="--open")] = False,
     port: Port = 8766,
@@ -40,7 +40,7 @@ async def web(
     key: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     speed: Byte = DEFAULT_SPEED,
     force: Byte = DEFAULT_FORCE,
-    link: Link = USUAL,
+    link: LinkOptions = USUAL,
 ) -> None:
     """Show grippers on a page in the browser, the hand in three dimensions, until Ctrl-C.
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ...runtime.concurrency import in_a_thread, write_all
 from ...tools.recording.feed import Timeline, compact
-from ...tools.recording.payloads import Fields, is_command
+from ...tools.recording.payloads import Properties, is_command
 from ...tools.wording import JAW_NAME, inhibit_words
 from ...values.enums import Finger, State, Trigger
 from ...values.status import NO_REQUEST, RobotiqStatus
@@ -31,15 +31,15 @@ def clock(seconds: float) -> str:
     return f"{datetime.fromtimestamp(seconds).astimezone():%H:%M:%S.%f}"[:-3]
 
 
-def _axes_in(fields: Fields) -> list[str]:
+def _axes_in(fields: Properties) -> list[str]:
     return [name for name in _NAMES if name == "A" or name in fields]  # a sibling has A alone
 
 
-def _title(name: str, fields: Fields) -> str:
+def _title(name: str, fields: Properties) -> str:
     return JAW_NAME if len(_axes_in(fields)) == 1 else name
 
 
-def status_line(fields: Fields) -> str:
+def status_line(fields: Properties) -> str:
     """The line for a status: position and state of every axis; of a jaw also its opening."""
     axes = (
         f"{_title(n, fields)}={fields[n]['position']}{_opening(n, fields)} "
@@ -49,7 +49,7 @@ def status_line(fields: Fields) -> str:
     return f"status   {' '.join(axes)}"
 
 
-def _opening(name: str, fields: Fields) -> str:
+def _opening(name: str, fields: Properties) -> str:
     # Recordings of earlier versions have none.
     mm = fields[name].get("opening_mm") if _title(name, fields) == JAW_NAME else None
     return "" if mm is None else f" ({float(mm):.1f} mm)"
@@ -60,7 +60,7 @@ def axis_words(state: str) -> str:
     return NOTHING if state == NO_REQUEST else state
 
 
-def command_line(fields: Fields) -> str:
+def command_line(fields: Properties) -> str:
     """The line for a request that was written."""
     axes = (
         f"{_title(n, fields)}={fields[n]['position']}@{fields[n]['speed']}/{fields[n]['force']}"
@@ -70,7 +70,7 @@ def command_line(fields: Fields) -> str:
     return f"command  {bits} {' '.join(axes)}{'' if fields['acknowledged'] else ' NOT ACKNOWLEDGED'}"
 
 
-def event_line(fields: Fields) -> str:
+def event_line(fields: Properties) -> str:
     """The line for the initial state, a transition, a fault, a mark, or a warning of the library."""
     if fields["kind"] == "log":
         return f"log      {fields['message']}"
@@ -88,7 +88,7 @@ def event_line(fields: Fields) -> str:
     return f"state    {fields['source']} -> {fields['target']} ({why})"
 
 
-def brief_line(fields: Fields, contacts: dict[str, Any]) -> str:
+def brief_line(fields: Properties, contacts: dict[str, Any]) -> str:
     """The line for a state, a fault, or a change of the contacts, which it updates; empty for all else."""
     if "kind" in fields:
         return "" if is_command(fields) else event_line(fields)
@@ -103,7 +103,7 @@ def brief_line(fields: Fields, contacts: dict[str, Any]) -> str:
     return f"contact  {' '.join(where) or 'none'}"
 
 
-FORMATTERS: Final[dict[str, Callable[[Fields], str]]] = {
+FORMATTERS: Final[dict[str, Callable[[Properties], str]]] = {
     "/gripper/status": status_line,
     "/gripper/command": command_line,
     "/gripper/event": event_line,
@@ -117,7 +117,7 @@ JSON_INTERVAL_S: Final = 0.02
 WATCH_INTERVAL_S: Final = 0.1
 EVENTS: Final = ("transition", "fault", "inhibit", "log")
 
-Formatter = Callable[[list[Fields]], list[str]]
+Formatter = Callable[[list[Properties]], list[str]]
 
 
 async def print_objects(hand: Hand, buffer: int = BUFFER) -> None:
@@ -164,7 +164,7 @@ class _History:
     def add_warning(self, message: str) -> None:
         self._warnings.append((time.time(), message))
 
-    def new(self) -> Iterator[Fields]:
+    def new(self) -> Iterator[Properties]:
         while self._warnings:
             at, message = self._warnings.popleft()
             yield {"kind": "log", "time": at, "message": message}
@@ -180,7 +180,7 @@ class _History:
                 yield stamp | each
 
 
-def _json_lines(new: list[Fields]) -> list[str]:
+def _json_lines(new: list[Properties]) -> list[str]:
     return [compact(each).decode() for each in new]
 
 
@@ -188,7 +188,7 @@ class _TextLines:
     def __init__(self) -> None:
         self._shown = ""
 
-    def __call__(self, new: list[Fields]) -> list[str]:
+    def __call__(self, new: list[Properties]) -> list[str]:
         lines = [f"{clock(each['time'])} {event_line(each)}" for each in new if each["kind"] in EVENTS]
         newest = next((each for each in reversed(new) if each["kind"] == "status"), None)
         if newest is not None and (line := status_line(newest)) != self._shown:

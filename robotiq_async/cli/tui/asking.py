@@ -51,7 +51,7 @@ class Question:
         return key in NO or key == "n"
 
 
-class Target:
+class TargetQuestion:
     """Asks for axes of a model and a position; a jaw is chosen from the start. Only Enter moves anything."""
 
     def __init__(self, model: Model, move: Callable[[Finger, int], None]) -> None:
@@ -91,4 +91,4 @@ class Target:
         return False
 
 
-Asking = Question | Target  # takes the keys, except those that halt
+Asking = Question | TargetQuestion  # takes the keys, except those that halt

@@ -25,8 +25,8 @@ from ...values.enums import Finger, State
 from ...values.errors import RobotiqError
 from ...values.status import RobotiqStatus
 from ..output.lines import clock, event_line
-from .asking import Asking, Question, Target
-from .widgets import HINTS, KEYS, Axes, Line, link_text, state_text, transition_words
+from .asking import Asking, Question, TargetQuestion
+from .widgets import HINTS, KEYS, Axes, TextLine, link_text, state_text, transition_words
 
 if sys.platform == "win32":
     DRIVER, NONBLOCKING = None, ()
@@ -94,9 +94,9 @@ class Monitor(App[None]):
         self._timeline = Timeline(operator.hand, BUFFER)
         self._newest = operator.hand.status
         # Kept here and not looked up: a paint may come while the screen is closing.
-        self._top = Line(id="state")
+        self._top = TextLine(id="state")
         self._axes = Axes(operator.hand.model)
-        self._figures = Line(id="link")
+        self._figures = TextLine(id="link")
         self._question = Static(id="question")
         self.asking: Asking | None = None
         """The open question, which takes the keys."""
@@ -202,7 +202,7 @@ class Monitor(App[None]):
         def begin(axes: Finger, position: int) -> None:
             self._begin(f"{axes} to {position}", partial(self._operator.move, position, axes))
 
-        self.ask(Target(self._hand.model, begin))
+        self.ask(TargetQuestion(self._hand.model, begin))
 
     def action_speed(self, by: int) -> None:
         self._begin("speed", partial(self._operator.change_speed, by))

@@ -10,7 +10,7 @@ from rich.text import Text
 from textual.widget import Widget
 from textual.widgets import Static
 
-from ...tools.recording.payloads import Fields
+from ...tools.recording.payloads import Properties
 from ...tools.wording import AXIS_WORDS, STATE_WORDS, TRIGGER_WORDS, axis_name
 from ...values.enums import Fault, Finger, ObjectStatus, Severity, State, Trigger
 from ...values.inhibit import Inhibit
@@ -50,7 +50,7 @@ _STYLES: Final = {
 _CALM: Final = (State.RUNNING_IDLE, State.RUNNING_CC)
 
 
-class Line(Static):
+class TextLine(Static):
     """A text of a fixed size. It is painted only after a change, because painting is expensive."""
 
     _text = Text()
@@ -211,7 +211,7 @@ def link_text(figures: Statistics, rate: float, held_up: bool, speed: int, force
     return text
 
 
-def transition_words(event: Fields) -> str | None:
+def transition_words(event: Properties) -> str | None:
     """The new state and its cause; None if both states have the same description.
 
     That drops the transitions between sending a request and its acknowledgement.

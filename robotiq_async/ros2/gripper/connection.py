@@ -37,8 +37,8 @@ from ...values.errors import (
 )
 from ..translation.diagnosis import why_not
 from ..translation.joints import Targets
-from ..translation.settings import Settings
-from .goals import GoalRunner, Outcome
+from ..translation.settings import NodeSettings
+from .goals import GoalOutcome, GoalRunner
 
 COMMANDS: Final = ("activate", "reset", "halt", "recover", "release", "inhibit", "permit")
 """Names of the services, and of the actions that they carry out."""
@@ -51,7 +51,7 @@ class RefusedError(RobotiqError):
     """The node does not accept the request now."""
 
 
-class Connection:
+class GripperConnection:
     """A hand, from the configuration of the node to its cleanup.
 
     A stop ends all requests that came before it, also those that have not begun, and no other request is
@@ -63,7 +63,7 @@ class Connection:
         stops: number of stops; a goal that was accepted before the last one does not begin.
     """
 
-    def __init__(self, hand: Hand, settings: Settings) -> None:
+    def __init__(self, hand: Hand, settings: NodeSettings) -> None:
         """Opens nothing; the hand, made with these settings, is not started.
 
         Belongs to the loop of the hand; other threads may read its attributes.
@@ -166,8 +166,8 @@ class Connection:
         self._check_stopped()
 
     async def run_goal(
-        self, key: bytes, targets: Targets, settings: Settings, feedback: Callable[[], object], stops: int
-    ) -> Outcome:
+        self, key: bytes, targets: Targets, settings: NodeSettings, feedback: Callable[[], object], stops: int
+    ) -> GoalOutcome:
         """Carry out a goal; see :meth:`GoalRunner.run`. ``stops`` is :attr:`stops` when it was accepted.
 
         Raises:
@@ -270,7 +270,7 @@ class PendingStop:
                 return
 
 
-def make_hand(settings: Settings) -> Hand:
+def make_hand(settings: NodeSettings) -> Hand:
     """A hand that is not started. In the ROS node only this function knows which kind of hand it is.
 
     A hand on another host acquires its lease with the first command: connecting only reads.

@@ -19,7 +19,7 @@ from ..translation.joints import Targets
 FEEDBACK_S: Final = 0.05  # seconds between two feedbacks: 20 Hz
 
 
-class Ending(Enum):
+class GoalEnding(Enum):
     """The final state of a goal, as the actions of ROS name it."""
 
     SUCCEEDED = "succeeded"
@@ -28,10 +28,10 @@ class Ending(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class GoalOutcome:
     """The outcome of a goal."""
 
-    ending: Ending  # the final state of the goal
+    ending: GoalEnding  # the final state of the goal
     stalled: bool  # whether a contact stopped at least one addressed axis
     reached: bool  # whether every addressed axis has reached its target
     reason: str  # for the log and the client
@@ -41,13 +41,13 @@ class _Goal:
     def __init__(self, key: bytes) -> None:
         self.key = key
         self.work: asyncio.Task[Sequence[MoveResult]] | None = None
-        self.ended: tuple[Ending, str] | None = None
+        self.ended: tuple[GoalEnding, str] | None = None
         """Final state and reason, if the goal was ended before its moves."""
         self.hold: asyncio.Future[str] | None = None
         """Done when the gripper has acknowledged the hold of its axes: empty, or why it has not."""
         self.is_over = asyncio.Event()  # set when the next goal may use its axes
 
-    def end(self, ending: Ending, reason: str) -> None:
+    def end(self, ending: GoalEnding, reason: str) -> None:
         # The first reason counts. Its task then holds the axes that still move.
         if self.ended is None and not self.is_over.is_set():
             self.ended = ending, reason
@@ -75,7 +75,7 @@ class GoalRunner:
         force: int,
         allow_stalling: bool,
         feedback: Callable[[], object] = lambda: None,
-    ) -> Outcome:
+    ) -> GoalOutcome:
         """Move the axes of a goal until they stop or the goal is ended. If cancelled, hold them.
 
         ``key`` identifies the goal for :meth:`cancel`. With ``allow_stalling`` a contact is a success.
@@ -84,7 +84,7 @@ class GoalRunner:
         goal, before = _Goal(key), self._newest
         self._newest = goal
         if before is not None:
-            before.end(Ending.ABORTED, "another goal took over")
+            before.end(GoalEnding.ABORTED, "another goal took over")
             # By then its holds have been passed to the hand, and the new targets replace them.
             try:
                 await wait_shielded(asyncio.ensure_future(before.is_over.wait()))
@@ -96,23 +96,23 @@ class GoalRunner:
         except RobotiqError as error:
             if isinstance(error, RobotiqConnectionError):
                 self._lost(targets.axes)
-            return Outcome(Ending.ABORTED, stalled=False, reached=False, reason=str(error))
+            return GoalOutcome(GoalEnding.ABORTED, stalled=False, reached=False, reason=str(error))
         if results is None:
             assert goal.ended is not None
             ending, reason = goal.ended
             if goal.hold is not None and (problem := await goal.hold):
                 # A canceled goal has its axes held, so a failed hold aborts it instead.
-                ending, reason = Ending.ABORTED, f"{reason}, but {problem}"
-            return Outcome(ending, stalled=False, reached=False, reason=reason)
+                ending, reason = GoalEnding.ABORTED, f"{reason}, but {problem}"
+            return GoalOutcome(ending, stalled=False, reached=False, reason=reason)
         return _judge(results, allow_stalling=allow_stalling)
 
     def cancel(self, key: bytes) -> None:
         if self._newest is not None and self._newest.key == key:
-            self._newest.end(Ending.CANCELED, "canceled by its client")
+            self._newest.end(GoalEnding.CANCELED, "canceled by its client")
 
     def abort(self, reason: str) -> None:
         if self._newest is not None:
-            self._newest.end(Ending.ABORTED, reason)
+            self._newest.end(GoalEnding.ABORTED, reason)
 
     async def _move_axes(
         self, goal: _Goal, targets: Targets, speed: int, force: int, feedback: Callable[[], object]
@@ -133,7 +133,7 @@ class GoalRunner:
             # Moves that were done before the goal was ended count.
             if not work.cancelled():
                 return work.result()
-            if goal.ended is not None and goal.ended[0] is Ending.CANCELED:
+            if goal.ended is not None and goal.ended[0] is GoalEnding.CANCELED:
                 # Now: a later hold would stop the axes of the next goal.
                 goal.hold = asyncio.ensure_future(self._hold_axes(goal, targets.axes))
             return None
@@ -167,9 +167,11 @@ async def _move(hand: Hand, targets: Targets, speed: int, force: int) -> Sequenc
         await asyncio.gather(*moves, return_exceptions=True)
 
 
-def _judge(results: Sequence[MoveResult], *, allow_stalling: bool) -> Outcome:
+def _judge(results: Sequence[MoveResult], *, allow_stalling: bool) -> GoalOutcome:
     touched = [str(result.contacts) for result in results if result.contacts]
     if not touched:
-        return Outcome(Ending.SUCCEEDED, stalled=False, reached=True, reason="every axis reached its target")
-    ending = Ending.SUCCEEDED if allow_stalling else Ending.ABORTED
-    return Outcome(ending, stalled=True, reached=False, reason=f"contact: {'|'.join(touched)}")
+        return GoalOutcome(
+            GoalEnding.SUCCEEDED, stalled=False, reached=True, reason="every axis reached its target"
+        )
+    ending = GoalEnding.SUCCEEDED if allow_stalling else GoalEnding.ABORTED
+    return GoalOutcome(ending, stalled=True, reached=False, reason=f"contact: {'|'.join(touched)}")

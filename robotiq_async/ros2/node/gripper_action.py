@@ -22,15 +22,15 @@ from rclpy.qos import qos_profile_action_status_default
 
 from ...runtime.clock import now
 from ...values.errors import NotStartedError
-from ..gripper.connection import Connection, RefusedError
-from ..gripper.goals import Ending, Outcome
+from ..gripper.connection import GripperConnection, RefusedError
+from ..gripper.goals import GoalEnding, GoalOutcome
 from ..translation.joints import GoalError, Targets, targets
-from ..translation.settings import Settings
+from ..translation.settings import NodeSettings
 from .bridge import Bridge, ClosedError
 from .publishing import JointStates
 from .unasked import UnaskedGoals
 
-Configured = tuple[Connection, JointStates, Settings]
+Configured = tuple[GripperConnection, JointStates, NodeSettings]
 RECEIPT_S: Final = 3.0  # seconds for clients to receive results: milliseconds, unless one has crashed
 RECEIPT_LOOK_S: Final = 0.01  # seconds between two looks at that
 
@@ -143,18 +143,22 @@ class GripperAction:
         result = ParallelGripperCommand.Result()
         try:
             if handle.is_cancel_requested:  # since it was accepted
-                outcome = Outcome(Ending.CANCELED, stalled=False, reached=False, reason="canceled at once")
+                outcome = GoalOutcome(
+                    GoalEnding.CANCELED, stalled=False, reached=False, reason="canceled at once"
+                )
             else:
                 outcome = await self._run(handle, result)
         except Exception as error:  # noqa: BLE001  # would leave the client without a result
-            outcome = Outcome(Ending.ABORTED, stalled=False, reached=False, reason=str(error) or repr(error))
+            outcome = GoalOutcome(
+                GoalEnding.ABORTED, stalled=False, reached=False, reason=str(error) or repr(error)
+            )
         self._accepted.pop(_key(handle), None)
         result.stalled, result.reached_goal = outcome.stalled, outcome.reached
         self._finish(handle, outcome)
         self._bridge.tell(self._unasked.ended, _key(handle))
         return result
 
-    async def _run(self, handle: ServerGoalHandle, result: ParallelGripperCommand.Result) -> Outcome:
+    async def _run(self, handle: ServerGoalHandle, result: ParallelGripperCommand.Result) -> GoalOutcome:
         if _key(handle) not in self._accepted:
             raise RefusedError("the node is not configured")
         (connection, joints, settings), stops = self._accepted[_key(handle)]
@@ -164,7 +168,7 @@ class GripperAction:
             state = joints.message(connection.hand.status)
             handle.publish_feedback(ParallelGripperCommand.Feedback(state=state))
 
-        async def work() -> Outcome:
+        async def work() -> GoalOutcome:
             try:
                 return await connection.run_goal(_key(handle), asked, settings, feedback, stops)
             finally:
@@ -173,12 +177,12 @@ class GripperAction:
 
         return await self._bridge.ask(work())
 
-    def _finish(self, handle: ServerGoalHandle, outcome: Outcome) -> None:
+    def _finish(self, handle: ServerGoalHandle, outcome: GoalOutcome) -> None:
         # ROS permits the state canceled only if the client requested it.
-        if outcome.ending is Ending.SUCCEEDED:
+        if outcome.ending is GoalEnding.SUCCEEDED:
             self._log.info(f"goal succeeded: {outcome.reason}")
             handle.succeed()
-        elif outcome.ending is Ending.CANCELED and handle.is_cancel_requested:
+        elif outcome.ending is GoalEnding.CANCELED and handle.is_cancel_requested:
             self._log.info(f"goal canceled: {outcome.reason}")
             handle.canceled()
         else:
@@ -197,6 +201,8 @@ def _key(handle: ServerGoalHandle) -> bytes:
     return bytes(handle.goal_id.uuid)
 
 
-def _targets(request: ParallelGripperCommand.Goal, connection: Connection, settings: Settings) -> Targets:
+def _targets(
+    request: ParallelGripperCommand.Goal, connection: GripperConnection, settings: NodeSettings
+) -> Targets:
     command, model = request.command, connection.hand.model
     return targets(command.name, command.position, settings.joint_prefix, model)

@@ -18,7 +18,7 @@ from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
 from ...values.errors import RobotiqError
-from ..gripper.connection import COMMANDS, Connection, RefusedError, make_hand
+from ..gripper.connection import COMMANDS, GripperConnection, RefusedError, make_hand
 from ..translation.description import robot_description
 from . import parameters
 from .bridge import Bridge, ClosedError
@@ -119,7 +119,7 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
     def _configure(self) -> str:
         settings = parameters.read(self)
         given = robot_description(settings.urdf, settings.joint_prefix) if settings.urdf else ""
-        connection = Connection(make_hand(settings), settings)
+        connection = GripperConnection(make_hand(settings), settings)
         joints = JointStates(self.get_clock(), settings.joint_prefix, settings.frame_id)
         self._current = connection, joints, settings
         try:
@@ -149,7 +149,7 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
         self._current = None
         return "disconnected"
 
-    async def _connect(self, connection: Connection, joints: JointStates, rate: float) -> None:
+    async def _connect(self, connection: GripperConnection, joints: JointStates, rate: float) -> None:
         try:
             await connection.open()
             await self._publishing.start(connection, joints, rate)
@@ -157,7 +157,7 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
             await self._disconnect(connection, "the configuration failed")
             raise
 
-    async def _disconnect(self, connection: Connection, reason: str) -> None:
+    async def _disconnect(self, connection: GripperConnection, reason: str) -> None:
         connection.refuse(reason)  # first: nothing must begin during the stop
         await self._publishing.stop()
         await connection.close(reason)

@@ -9,7 +9,7 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
-from ..translation.settings import PARAMETERS, Parameter, Settings, check_parameter, check_settings
+from ..translation.settings import PARAMETERS, NodeSettings, Parameter, check_parameter, check_settings
 
 
 def declare(node: Node) -> None:
@@ -26,7 +26,7 @@ def declare(node: Node) -> None:
             node.declare_parameter(name, parameter.default, plain)
 
 
-def read(node: Node) -> Settings:
+def read(node: Node) -> NodeSettings:
     """The checked parameters."""
     return check_settings({name: node.get_parameter(name).value for name in PARAMETERS})
 

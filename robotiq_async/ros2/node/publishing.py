@@ -25,7 +25,7 @@ from ...runtime.clock import now
 from ...tools.description.joint_states import JointStateEncoder
 from ...values.model import THREE_FINGER, Model
 from ...values.status import RobotiqStatus
-from ..gripper.connection import Connection
+from ..gripper.connection import GripperConnection
 from ..translation.diagnosis import Diagnosis, diagnose, is_connected, status_text
 from ..translation.joints import Motion, joint_names, positions
 from .timing import Pace, Timer
@@ -56,7 +56,7 @@ class Publishing:
     def describe(self, urdf: str) -> None:
         self._description.publish(String(data=urdf))
 
-    async def start(self, connection: Connection, joint_states: JointStates, rate: float) -> None:
+    async def start(self, connection: GripperConnection, joint_states: JointStates, rate: float) -> None:
         """Publish the hand of a connection; ``rate`` is in joint states a second."""
         self._timer = Timer(1 / DIAGNOSTICS_RATE_HZ, lambda: self._publish_rarely(connection), self._failed)
         readers = (
@@ -80,7 +80,9 @@ class Publishing:
         if not reader.cancelled() and (error := reader.exception()) is not None:
             self._failed(error)
 
-    async def _publish_statuses(self, connection: Connection, joints: JointStates, rate: float) -> None:
+    async def _publish_statuses(
+        self, connection: GripperConnection, joints: JointStates, rate: float
+    ) -> None:
         joint_states, status_pace = Pace(rate), Pace(STATUS_RATE_HZ)
         async for status in connection.hand.statuses():
             if joint_states.takes(status.timestamp):
@@ -88,17 +90,17 @@ class Publishing:
             if status_pace.takes(status.timestamp):
                 self.publish_status(connection)
 
-    async def _publish_transitions(self, connection: Connection, joints: JointStates) -> None:
+    async def _publish_transitions(self, connection: GripperConnection, joints: JointStates) -> None:
         async for _ in connection.hand.transitions():
             self.publish_status(connection)
             if not is_connected(connection.hand):
                 joints.forget()
 
-    def publish_status(self, connection: Connection) -> None:
+    def publish_status(self, connection: GripperConnection) -> None:
         text = status_text(connection.hand, takes_commands=connection.takes_commands)
         self._status.publish(String(data=text))
 
-    def _publish_rarely(self, connection: Connection) -> None:
+    def _publish_rarely(self, connection: GripperConnection) -> None:
         # Also while the link is down: readers must learn of that.
         self.publish_status(connection)
         hand = connection.hand

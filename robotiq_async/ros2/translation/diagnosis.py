@@ -14,7 +14,7 @@ from ...values.errors import NotStartedError
 from ...values.status import RobotiqStatus
 
 
-class Level(IntEnum):
+class DiagnosticLevel(IntEnum):
     """The levels of ``diagnostic_msgs/DiagnosticStatus``."""
 
     OK = 0
@@ -24,10 +24,10 @@ class Level(IntEnum):
 
 
 _LEVELS = {
-    Severity.NONE: Level.OK,
-    Severity.PRIORITY: Level.OK,
-    Severity.MINOR: Level.WARN,
-    Severity.MAJOR: Level.ERROR,
+    Severity.NONE: DiagnosticLevel.OK,
+    Severity.PRIORITY: DiagnosticLevel.OK,
+    Severity.MINOR: DiagnosticLevel.WARN,
+    Severity.MAJOR: DiagnosticLevel.ERROR,
 }
 
 
@@ -36,7 +36,7 @@ class Diagnosis:
     """The condition of one part."""
 
     what: str  # the part
-    level: Level  # severity of the condition
+    level: DiagnosticLevel  # severity of the condition
     message: str  # the condition as a text
     values: Mapping[str, str] = field(default_factory=dict)  # figures
 
@@ -62,14 +62,14 @@ def _link(hand: Hand, now: float) -> Diagnosis:
     if status is not None:
         values["age of the newest status [s]"] = f"{now - status.timestamp:.3f}"
     if is_connected(hand):
-        return Diagnosis("link", Level.OK, "connected", values)
-    return Diagnosis("link", Level.ERROR, "the link is down and being opened again", values)
+        return Diagnosis("link", DiagnosticLevel.OK, "connected", values)
+    return Diagnosis("link", DiagnosticLevel.ERROR, "the link is down and being opened again", values)
 
 
 def _gripper(hand: Hand) -> Diagnosis:
     status = _newest(hand)
     if status is None or not is_connected(hand):
-        return Diagnosis("gripper", Level.STALE, "unknown: the link is down")
+        return Diagnosis("gripper", DiagnosticLevel.STALE, "unknown: the link is down")
     values = {"state": hand.state.name, "fault": f"0x{int(status.fault):02X}"}
     if not status.model.has_modes:
         values["controller fault"] = f"0x{status.controller_fault:02X}"
@@ -79,11 +79,11 @@ def _gripper(hand: Hand) -> Diagnosis:
         if (current := status.current_ma(axis)) is not None:
             values[f"{axis.name} current [mA]"] = str(current)
     level = _LEVELS[status.fault.severity]
-    words = hand.state.name if level is Level.OK else status.fault.description
+    words = hand.state.name if level is DiagnosticLevel.OK else status.fault.description
     if text := status.controller_fault_text:
-        level, words = Level.ERROR, f"{words}; {text}"
+        level, words = DiagnosticLevel.ERROR, f"{words}; {text}"
     if hand.inhibited is not None:
-        level, words = max(level, Level.WARN), f"{words}; {hand.inhibited}"
+        level, words = max(level, DiagnosticLevel.WARN), f"{words}; {hand.inhibited}"
         values["inhibited"] = hand.inhibited.reason
     return Diagnosis("gripper", level, words, values)
 

@@ -24,7 +24,7 @@ from ...tools.description.kinematics import (
     JOINTS,
     MIDDLE,
     PALM,
-    Points,
+    AngleTable,
     joint_angles,
 )
 from ...values.enums import JAW, Finger
@@ -227,14 +227,14 @@ def _closing_counts(angle: float) -> int:
     return _between(angle, BASE) if angle <= stop else _between(angle - stop, MIDDLE)
 
 
-def _counts(name: str, angle: float, limits: tuple[float, float], points: Points) -> int:
+def _counts(name: str, angle: float, limits: tuple[float, float], points: AngleTable) -> int:
     low, high = limits
     if not low - TOLERANCE <= angle <= high + TOLERANCE:
         raise GoalError(f"{name!r} must be in {low}..{high} rad, got {angle:.4f}")
     return _between(angle, points)
 
 
-def _between(angle: float, points: Points) -> int:
+def _between(angle: float, points: AngleTable) -> int:
     (first, at_first), (last, at_last) = points
     share = (degrees(angle) - at_first) / (at_last - at_first)
     return round(first + (last - first) * min(max(share, 0.0), 1.0))

@@ -70,7 +70,7 @@ PARAMETERS: Final[Mapping[str, Parameter]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class NodeSettings:
     """The parameters, checked.
 
     Attributes:
@@ -91,16 +91,16 @@ class Settings:
     autostart: bool
 
 
-def check_settings(values: Mapping[str, object]) -> Settings:
+def check_settings(values: Mapping[str, object]) -> NodeSettings:
     """Check all parameters.
 
     Raises:
         ValueError: a value out of range or of the wrong type; names the parameter, the value and the range.
     """
     checked = {name: check_parameter(name, values[name]) for name in PARAMETERS}
-    own = {each.name for each in fields(Settings)}
+    own = {each.name for each in fields(NodeSettings)}
     options = {name: _option_value(name, checked.pop(name)) for name in OF_HAND if name not in own}
-    return Settings(options, **checked)  # type: ignore[arg-type]
+    return NodeSettings(options, **checked)  # type: ignore[arg-type]
 
 
 def _option_value(name: str, value: Value) -> object:

@@ -9,7 +9,7 @@ from ...values.model import HAND_E, THREE_FINGER, Model, model_of
 from .geometry import Pose
 from .hand_e import hand_e
 from .kinematics import named_states
-from .model import HandModel, Joint, Link, Mimic, Shape, Tendon
+from .model import HandModel, Joint, Mimic, RigidLink, Shape, Tendon
 from .srdf_writer import write_srdf
 from .three_finger import three_finger
 from .two_finger import two_finger
@@ -17,9 +17,9 @@ from .two_finger import two_finger
 __all__ = [
     "HandModel",
     "Joint",
-    "Link",
     "Mimic",
     "Pose",
+    "RigidLink",
     "Shape",
     "Tendon",
     "hand_model",

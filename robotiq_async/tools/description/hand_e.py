@@ -17,7 +17,7 @@ from ...values.enums import JAW
 from ...values.model import HAND_E
 from .geometry import Pose
 from .kinematics import JAW_JOINTS
-from .model import HandModel, Joint, Link, Mimic, Shape
+from .model import HandModel, Joint, Mimic, RigidLink, Shape
 from .shapes import box, cylinder, pad
 
 _ROOT: Final = "robotiq_hande_link"
@@ -31,8 +31,8 @@ _SIDES: Final = {"left": 1.0, "right": -1.0}
 def hand_e() -> HandModel:
     """The description of the Hand-E."""
     names = {side: f"robotiq_hande_{side}_finger" for side in _SIDES}
-    links = {_ROOT: Link(_ROOT, _MASS - 2 * _FINGER_MASS, _base())}
-    links |= {name: Link(name, _FINGER_MASS, _finger(_SIDES[side])) for side, name in names.items()}
+    links = {_ROOT: RigidLink(_ROOT, _MASS - 2 * _FINGER_MASS, _base())}
+    links |= {name: RigidLink(name, _FINGER_MASS, _finger(_SIDES[side])) for side, name in names.items()}
     return HandModel(
         name="robotiq_hande",
         root=_ROOT,

@@ -28,16 +28,16 @@ from ...values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140,
 from ...values.status import RobotiqStatus
 from ...values.stroke import Stroke
 
-Points = tuple[tuple[int, float], ...]
+AngleTable = tuple[tuple[int, float], ...]
 """Position in counts, rising, and angle in degrees; straight in between, level beyond the ends."""
 
-BASE: Final[Points] = ((0, 0.0), (140, 70.0))
+BASE: Final[AngleTable] = ((0, 0.0), (140, 70.0))
 """joint_1. The ROS node has a slope of 70/148 with a jump at 140; a straight line to 70 degrees is meant."""
-MIDDLE: Final[Points] = ((140, 0.0), (240, 90.0))
+MIDDLE: Final[AngleTable] = ((140, 0.0), (240, 90.0))
 """joint_2: still until the base stops, then up to its own stop."""
-TIP: Final[Points] = ((0, 0.0), (110, -55.0))
+TIP: Final[AngleTable] = ((0, 0.0), (110, -55.0))
 """joint_3: against the base, for the tip stays parallel, until its stop."""
-PALM: Final[Points] = ((15, 11.0), (240, -11.0))
+PALM: Final[AngleTable] = ((15, 11.0), (240, -11.0))
 """The palm joint of finger_1 against the scissor; that of finger_2 is its negative. The publisher's author
 measured about 11 degrees to each side, where the manual has 32 in all; the source of 15 and 240 is not
 given."""

@@ -16,7 +16,7 @@ from typing import Final
 
 from ...values.enums import Finger
 from .geometry import Pose
-from .model import HandModel, Joint, Link, Mimic, Shape
+from .model import HandModel, Joint, Mimic, RigidLink, Shape
 from .shapes import inertia
 from .urdf_writer import as_text, numbers
 
@@ -94,7 +94,7 @@ def _body(parent: ET.Element, model: HandModel, name: str, pose: Pose) -> ET.Ele
     return body
 
 
-def _geom(model: HandModel, link: Link, shape: Shape) -> ET.Element:
+def _geom(model: HandModel, link: RigidLink, shape: Shape) -> ET.Element:
     halved = {
         "box": [edge / 2 for edge in shape.size],
         "cylinder": [shape.size[0], shape.size[-1] / 2],

@@ -57,7 +57,7 @@ class Shape:
 
 
 @dataclass(frozen=True, slots=True)
-class Link:
+class RigidLink:
     """A rigid part.
 
     Attributes:
@@ -163,7 +163,7 @@ class HandModel:
 
     name: str
     root: str
-    links: Mapping[str, Link]
+    links: Mapping[str, RigidLink]
     joints: tuple[Joint, ...]
     stand: Pose
     fingers: Mapping[Finger, tuple[str, ...]]

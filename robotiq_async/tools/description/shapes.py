@@ -7,7 +7,7 @@ from math import pi
 from typing import NamedTuple
 
 from .geometry import Pose, Vector, from_rpy
-from .model import PAD, Link, Shape
+from .model import PAD, RigidLink, Shape
 
 
 def box(size: Vector, at: Vector, material: str, rpy: Vector = (0.0, 0.0, 0.0), name: str = "") -> Shape:
@@ -40,7 +40,7 @@ class Inertia(NamedTuple):
     products: Vector
 
 
-def inertia(link: Link) -> Inertia:
+def inertia(link: RigidLink) -> Inertia:
     """The inertia of a link's mass, spread evenly over its shapes; where they overlap it counts twice."""
     volumes = [_volume(shape) for shape in link.shapes]
     masses = [link.mass * volume / sum(volumes) for volume in volumes]

@@ -35,7 +35,7 @@ from typing import Final
 from ...values.enums import Finger
 from .geometry import Pose, from_rpy
 from .kinematics import BASE, FINGER_NAMES, MIDDLE, PALM, TIP
-from .model import HandModel, Joint, Link, Mimic, Shape, Tendon
+from .model import HandModel, Joint, Mimic, RigidLink, Shape, Tendon
 from .shapes import box, cylinder, pad, sphere
 
 _MASS: Final = 2.3
@@ -99,12 +99,12 @@ _FEET: Final = {
 @cache
 def three_finger() -> HandModel:
     """The description of the 3-Finger."""
-    links = {"palm": Link("palm", _MASS - 3 * sum(_LINK_MASSES), _palm())}
+    links = {"palm": RigidLink("palm", _MASS - 3 * sum(_LINK_MASSES), _palm())}
     joints: list[Joint] = []
     for finger, name in FINGER_NAMES.items():
         parts = zip(_LINK_MASSES, _FINGER, strict=True)
         links |= {
-            f"{name}_link_{n}": Link(f"{name}_link_{n}", mass, shapes)
+            f"{name}_link_{n}": RigidLink(f"{name}_link_{n}", mass, shapes)
             for n, (mass, shapes) in enumerate(parts)
         }
         joints += [_foot(finger, name), *_phalanges(name)]

@@ -29,7 +29,7 @@ from ...values.enums import JAW
 from ...values.model import TWO_FINGER_85, TWO_FINGER_140, Model
 from .geometry import Pose, Vector
 from .kinematics import JAW_JOINTS
-from .model import HandModel, Joint, Link, Mimic, Shape
+from .model import HandModel, Joint, Mimic, RigidLink, Shape
 from .shapes import box, cylinder, pad
 
 _PIVOT: Final = (0.0306, 0.0549)
@@ -100,14 +100,14 @@ def two_finger(model: Model) -> HandModel:
     """
     linkage, driver = LINKAGES[model], JAW_JOINTS[model].name
     root, *names = linkage.names
-    links = {root: Link(root, linkage.mass * (1 - 2 * sum(_SHARES)), _base())}
+    links = {root: RigidLink(root, linkage.mass * (1 - 2 * sum(_SHARES)), _base())}
     joints: list[Joint] = []
     for side in _SIDES:
         crank, inner, tip = (_link_name(name, side) for name in names)
         shapes = (_crank(model, side), _inner(model, side), _tip(model, side))
         masses = (linkage.mass * share for share in _SHARES)
         links |= {
-            name: Link(name, mass, parts)
+            name: RigidLink(name, mass, parts)
             for name, mass, parts in zip((crank, inner, tip), masses, shapes, strict=True)
         }
         joints += _joints(model, side, root, (crank, inner, tip))

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from math import atan2, hypot
 
 from .geometry import Matrix, Pose
-from .model import MATERIALS, HandModel, Joint, Link, Shape
+from .model import MATERIALS, HandModel, Joint, RigidLink, Shape
 from .shapes import inertia
 
 
@@ -37,7 +37,7 @@ def numbers(values: Sequence[float]) -> str:
     return " ".join(f"{value:.6g}" if abs(value) >= 1e-9 else "0" for value in values)
 
 
-def _link(link: Link) -> ET.Element:
+def _link(link: RigidLink) -> ET.Element:
     element = ET.Element("link", name=link.name)
     centre, moments, products = inertia(link)
     inertial = ET.SubElement(element, "inertial")
@@ -53,7 +53,7 @@ def _link(link: Link) -> ET.Element:
     return element
 
 
-def _placed(element: ET.Element, link: Link, shape: Shape) -> ET.Element:
+def _placed(element: ET.Element, link: RigidLink, shape: Shape) -> ET.Element:
     if shape.name:  # MuJoCo wants it to be the only one of its name
         element.set("name", f"{link.name}_{shape.name}_{element.tag}")
     _origin(element, shape.origin)

@@ -3,8 +3,8 @@
 Nothing moves, whatever is examined: a gripper that this host reaches, or one that an agent serves.
 """
 
-from .findings import Finding, Level, Report
+from .findings import Finding, Level, ReportFinding
 from .fleet import examine_remote
 from .gripper import examine
 
-__all__ = ["Finding", "Level", "Report", "examine", "examine_remote"]
+__all__ = ["Finding", "Level", "ReportFinding", "examine", "examine_remote"]

@@ -20,7 +20,7 @@ from ...values.enums import State
 from ...values.errors import AgentError, ConnectionLostError, NotAllowedError, ProtocolError, RobotiqError
 from ...values.statistics import percentile
 from ...values.status import RobotiqStatus
-from .findings import Finding, GiveUpError, Level, Report
+from .findings import Finding, GiveUpError, Level, ReportFinding
 from .gripper import report_state
 
 ANSWER_S: Final = 1.0
@@ -31,7 +31,7 @@ _READ: Final = frozenset({"version", "window", "statistics", "problem", "state",
 LOST: Final = 0.01  # accepted share of lost statuses
 
 
-async def examine_agent(name: GripperName, bus: Bus, report: Report) -> None:
+async def examine_agent(name: GripperName, bus: Bus, report: ReportFinding) -> None:
     """Examine the answers and the messages of an agent."""
     asker = _Asker(name, bus)
     await _describe(asker, report)
@@ -107,7 +107,7 @@ class _Listener:
             self.misrouted += 1
 
 
-async def _describe(asker: _Asker, report: Report) -> Fields:
+async def _describe(asker: _Asker, report: ReportFinding) -> Fields:
     why: RobotiqError | None = None
     for _ in range(TRIES):
         try:
@@ -142,7 +142,7 @@ async def _round_trips(asker: _Asker, ends: float) -> list[float]:
     return sorted(times)
 
 
-def _report_version(info: Fields, report: Report) -> None:
+def _report_version(info: Fields, report: ReportFinding) -> None:
     version = info["version"]
     if version == __version__:
         report(Finding(Level.GOOD, "version", f"{version} on both sides"))
@@ -151,7 +151,7 @@ def _report_version(info: Fields, report: Report) -> None:
         report(Finding(Level.GOOD, "version", f"{version} there, {__version__} here", advice))
 
 
-def _report_round_trip(times: list[float], window: float, report: Report) -> None:
+def _report_round_trip(times: list[float], window: float, report: ReportFinding) -> None:
     p50, p99 = percentile(times, 0.5), percentile(times, 0.99)
     found = f"{1000 * p50:.1f} ms, 99th percentile {1000 * p99:.1f} ms"
     if p99 < window / 5:
@@ -163,7 +163,7 @@ def _report_round_trip(times: list[float], window: float, report: Report) -> Non
     report(Finding(level, "round trip", found, advice))
 
 
-def _report_statuses(listener: _Listener, seconds: float, info: Fields, report: Report) -> None:
+def _report_statuses(listener: _Listener, seconds: float, info: Fields, report: ReportFinding) -> None:
     if listener.misrouted:
         found = f"{listener.misrouted} messages about another gripper came under this one's key; dropped"
         advice = "zenoh does that after a link has been down; clients notice. Restarting the client ends it."
@@ -189,7 +189,7 @@ def _report_statuses(listener: _Listener, seconds: float, info: Fields, report: 
         report(Finding(Level.DOUBT, "statuses", found, advice))
 
 
-def _report_gripper(listener: _Listener, info: Fields, report: Report) -> None:
+def _report_gripper(listener: _Listener, info: Fields, report: ReportFinding) -> None:
     problem, state = info["problem"], str(info["state"])
     if problem or state == State.DISCONNECTED.name:
         found = f"its agent cannot reach it: {problem or 'the link is down'}"

@@ -24,7 +24,7 @@ from ...values.errors import (
 from ...values.model import model_of, why_stranger
 from ...values.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap
 from ...values.status import RobotiqStatus
-from .findings import Finding, GiveUpError, Level, Report
+from .findings import Finding, GiveUpError, Level, ReportFinding
 
 REACH_S: Final = 3.0  # timeout for resolving the name, and for connecting to the port
 ANSWER_S: Final = 0.5
@@ -61,7 +61,7 @@ STRANGER: Final = "gripper"
 """What a finding is about if a device answers that is no gripper."""
 
 
-async def find_gripper(address: Address, usual: RegisterMap, report: Report) -> Answering:
+async def find_gripper(address: Address, usual: RegisterMap, report: ReportFinding) -> Answering:
     """Find the unit id and the registers under which a gripper answers; returns an open link to it.
 
     It opens no extra connection to test the port, which would occupy a gateway that serves one client.
@@ -195,7 +195,7 @@ async def _first_reading(link: Link) -> tuple[RobotiqStatus, float]:
 # -- no connection -----------------------------------------------------------------------------------------
 
 
-def _report_port(address: Address, report: Report) -> None:
+def _report_port(address: Address, report: ReportFinding) -> None:
     if address.is_socket:
         report(Finding(Level.GOOD, "port", f"{address.port} is open"))
     elif address.scheme:
@@ -203,7 +203,7 @@ def _report_port(address: Address, report: Report) -> None:
 
 
 def _report_no_connection(
-    address: Address, error: ConnectFailedError, report: Report, *, is_first: bool
+    address: Address, error: ConnectFailedError, report: ReportFinding, *, is_first: bool
 ) -> None:
     if address.scheme and is_first:
         report(Finding(Level.BAD, "tunnel", error.args[0], NO_TUNNEL))
@@ -316,7 +316,7 @@ def _advice_for_a_line(address: Address, error: RobotiqConnectionError, echoes: 
 # -- the device that answers -------------------------------------------------------------------------------
 
 
-def _report_place(usual: RegisterMap, found: RegisterMap, report: Report) -> None:
+def _report_place(usual: RegisterMap, found: RegisterMap, report: ReportFinding) -> None:
     unit = Finding(Level.GOOD, "unit id", str(found.device_id))
     if found.device_id != usual.device_id:
         advice = f"Pass device_id={found.device_id}, or --device-id {found.device_id}."
@@ -340,7 +340,7 @@ def _report_place(usual: RegisterMap, found: RegisterMap, report: Report) -> Non
     report(where)
 
 
-def report_silence(status: RobotiqStatus, report: Report) -> None:
+def report_silence(status: RobotiqStatus, report: ReportFinding) -> None:
     """Report a status that tells nothing."""
     if not any(status.registers):
         found = "all registers read 0: nothing shows that this is a gripper"
@@ -351,7 +351,7 @@ def report_silence(status: RobotiqStatus, report: Report) -> None:
         report(Finding(Level.BAD, STRANGER, found, advice))
 
 
-def _report_stranger(why: str, report: Report) -> None:
+def _report_stranger(why: str, report: ReportFinding) -> None:
     report(Finding(Level.GOOD, "Modbus", "answers"))
     advice = "Send it no commands: another machine may move. Are address, unit id and registers right?"
     report(Finding(Level.BAD, STRANGER, f"another device answers: {why}", advice))

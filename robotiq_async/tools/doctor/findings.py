@@ -25,7 +25,7 @@ class Finding:
     advice: str = ""  # the remedy; empty if there is none
 
 
-Report = Callable[[Finding], None]
+ReportFinding = Callable[[Finding], None]
 
 
 class GiveUpError(Exception):

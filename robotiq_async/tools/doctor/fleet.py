@@ -21,13 +21,13 @@ from ...fleet.network.route import Route, parse_remote_address
 from ...fleet.wire.names import ROOT, GripperName
 from ...values.errors import ConnectFailedError
 from .agent import examine_agent
-from .findings import Finding, GiveUpError, Level, Report
+from .findings import Finding, GiveUpError, Level, ReportFinding
 
 LOOK_S: Final = 3.0  # seconds of looking for the agent
 ROUND_S: Final = 0.3  # duration of one look
 
 
-async def examine_remote(address: str, report: Report, *, bus: Bus | None = None) -> None:
+async def examine_remote(address: str, report: ReportFinding, *, bus: Bus | None = None) -> None:
     """Examine the way to a gripper on another host; reports each finding at once.
 
     An open session is given as ``bus``: it stays open and is not examined.
@@ -45,7 +45,7 @@ async def examine_remote(address: str, report: Report, *, bus: Bus | None = None
             await _examine_way_and_agent(name, route, report)
 
 
-async def _examine_way_and_agent(name: GripperName, route: Route, report: Report) -> None:
+async def _examine_way_and_agent(name: GripperName, route: Route, report: ReportFinding) -> None:
     from ...fleet.network.zenoh_bus import open_bus  # noqa: PLC0415  # needs the extra
 
     if route.keys is not None:
@@ -68,12 +68,12 @@ async def _examine_way_and_agent(name: GripperName, route: Route, report: Report
         await bus.close()
 
 
-async def _examine(name: GripperName, bus: Bus, report: Report) -> None:
+async def _examine(name: GripperName, bus: Bus, report: ReportFinding) -> None:
     await _find(name, bus, report)
     await examine_agent(name, bus, report)
 
 
-async def _find(name: GripperName, bus: Bus, report: Report) -> None:
+async def _find(name: GripperName, bus: Bus, report: ReportFinding) -> None:
     loop = asyncio.get_running_loop()
     ends = loop.time() + LOOK_S
     own: set[str] = set()
@@ -115,7 +115,7 @@ _MAY: Final = {
 _NEW: Final = "The owner of the authority can make a new one: robotiq-async fleet keys."
 
 
-def examine_keys(folder: Path, report: Report, *, now: datetime) -> None:
+def examine_keys(folder: Path, report: ReportFinding, *, now: datetime) -> None:
     """Examine a client's folder of keys."""
     # Needs the extra fleet. The folder of keys may come from another machine.
     from ...fleet.keys.certificates import read_credentials  # noqa: PLC0415
@@ -131,7 +131,7 @@ def examine_keys(folder: Path, report: Report, *, now: datetime) -> None:
     _report_role(found.common_name, found.role, report)
 
 
-def _report_dates(begins: datetime, ends: datetime, now: datetime, report: Report) -> None:
+def _report_dates(begins: datetime, ends: datetime, now: datetime, report: ReportFinding) -> None:
     if now < begins:
         found = f"holds from {begins:%Y-%m-%d} on, and here it is {now:%Y-%m-%d}"
         report(Finding(Level.BAD, "certificate", found, "Set the clock of this computer."))
@@ -145,7 +145,7 @@ def _report_dates(begins: datetime, ends: datetime, now: datetime, report: Repor
         report(Finding(Level.GOOD, "certificate", f"holds until {ends:%Y-%m-%d}"))
 
 
-def _report_mode(key: Path, report: Report) -> None:
+def _report_mode(key: Path, report: ReportFinding) -> None:
     if stat.S_IMODE(key.stat().st_mode) & (stat.S_IRWXG | stat.S_IRWXO) and stat.S_ISREG(key.stat().st_mode):
         advice = f"chmod 600 {key}"
         report(
@@ -153,7 +153,7 @@ def _report_mode(key: Path, report: Report) -> None:
         )
 
 
-def _report_role(common_name: str, role: Role | None, report: Report) -> None:
+def _report_role(common_name: str, role: Role | None, report: ReportFinding) -> None:
     if role in _MAY:
         assert role is not None
         report(Finding(Level.GOOD, "role", f"{common_name}: {_MAY[role]}, if the agent's list has it"))
@@ -172,7 +172,7 @@ REACH_S: Final = 3.0  # timeout for connecting, and for the TLS handshake
 SHUT_S: Final = 0.5  # A side that distrusts a certificate hangs up within this time; one that trusts it waits
 
 
-async def examine_way(route: Route, report: Report) -> None:
+async def examine_way(route: Route, report: ReportFinding) -> None:
     """Examine every endpoint of a route."""
     endpoints = [parse_endpoint("connect", text) for text in route.endpoints]
     is_open = [await _examine_endpoint(endpoint, route, report) for endpoint in endpoints]
@@ -180,7 +180,7 @@ async def examine_way(route: Route, report: Report) -> None:
         raise GiveUpError
 
 
-async def _examine_endpoint(endpoint: Endpoint, route: Route, report: Report) -> bool:
+async def _examine_endpoint(endpoint: Endpoint, route: Route, report: ReportFinding) -> bool:
     if endpoint.protocol == "quic":
         report(Finding(Level.GOOD, "port", f"{endpoint.text}: not checked, because it is not TCP"))
         return True
@@ -196,7 +196,7 @@ async def _examine_endpoint(endpoint: Endpoint, route: Route, report: Report) ->
     return True
 
 
-async def _is_open(endpoint: Endpoint, report: Report) -> bool:
+async def _is_open(endpoint: Endpoint, report: ReportFinding) -> bool:
     try:
         await _connect(endpoint, None)
     except TimeoutError:
@@ -215,7 +215,7 @@ async def _is_open(endpoint: Endpoint, report: Report) -> bool:
     return False
 
 
-async def _shake_hands(endpoint: Endpoint, keys: Path, report: Report) -> bool:
+async def _shake_hands(endpoint: Endpoint, keys: Path, report: ReportFinding) -> bool:
     own = _context(keys, shows=True)
     stays, found = False, "the agent does not trust this certificate"
     advice = "Is it from the same authority? Check the clock of the agent's host, too."
@@ -238,7 +238,7 @@ async def _shake_hands(endpoint: Endpoint, keys: Path, report: Report) -> bool:
     return True
 
 
-async def _try_without(endpoint: Endpoint, keys: Path, report: Report) -> None:
+async def _try_without(endpoint: Endpoint, keys: Path, report: ReportFinding) -> None:
     try:
         stays = await _connect(endpoint, _context(keys, shows=False))
     except OSError:

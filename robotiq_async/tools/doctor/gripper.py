@@ -24,7 +24,7 @@ from ...values.registers import Registers
 from ...values.statistics import percentile
 from ...values.status import RobotiqStatus
 from .answer import DAMAGED, LOST_PORT, REACH_S, find_gripper, long_enough
-from .findings import Finding, GiveUpError, Level, Report
+from .findings import Finding, GiveUpError, Level, ReportFinding
 from .urcap import find_urcap
 
 PROBES: Final = 300  # reads for measuring round trip and rate
@@ -32,7 +32,7 @@ WATCH_S: Final = 2.0  # seconds of watching for another client
 LONGEST_PERIOD_S: Final = 0.1  # the longest poll_interval of a hand
 
 
-async def examine(address: Address, report: Report, *, device_id: int | None = None) -> None:
+async def examine(address: Address, report: ReportFinding, *, device_id: int | None = None) -> None:
     """Examine a connection; reports each finding at once, and never raises for a bad one.
 
     ``device_id`` is the Modbus unit id, or the gripper of a URCap; None for the usual one.
@@ -73,7 +73,7 @@ def _advice_for_a_loss(address: Address, error: RobotiqConnectionError) -> str:
     return "Check cable, switch and power: something on the way to the gripper drops packets."
 
 
-def _check_model(model: Model, registers: Registers, report: Report) -> None:
+def _check_model(model: Model, registers: Registers, report: ReportFinding) -> None:
     """Report registers that only another model can have."""
     if not (why := model.contradiction(registers)):
         if any(registers):  # a gateway may send zeros before its gripper answers
@@ -86,7 +86,7 @@ def _check_model(model: Model, registers: Registers, report: Report) -> None:
     raise GiveUpError
 
 
-async def _resolve(address: Address, report: Report) -> None:
+async def _resolve(address: Address, report: ReportFinding) -> None:
     try:
         async with asyncio.timeout(REACH_S):
             found = await addresses_of(address.host, address.port)
@@ -98,7 +98,7 @@ async def _resolve(address: Address, report: Report) -> None:
     report(Finding(Level.GOOD, "name", f"{address.host} is {', '.join(found)}"))
 
 
-async def _timing(address: Address, link: Link, report: Report) -> None:
+async def _timing(address: Address, link: Link, report: ReportFinding) -> None:
     loop = asyncio.get_running_loop()
     times, began = [], loop.time()
     for _ in range(PROBES):
@@ -135,7 +135,7 @@ def _rate(rate: float) -> Finding:
     return Finding(Level.DOUBT, "rate", found, advice)
 
 
-def report_state(status: RobotiqStatus, report: Report) -> None:
+def report_state(status: RobotiqStatus, report: ReportFinding) -> None:
     """Report activation and fault."""
     if status.is_activated:
         report(Finding(Level.GOOD, "activation", "active"))
@@ -172,7 +172,7 @@ def report_state(status: RobotiqStatus, report: Report) -> None:
             report(Finding(Level.BAD, "fault", found, advice))
 
 
-async def _others(link: Link, report: Report) -> None:
+async def _others(link: Link, report: ReportFinding) -> None:
     loop = asyncio.get_running_loop()
     until, seen = loop.time() + WATCH_S, set()
     while loop.time() < until:
@@ -192,7 +192,7 @@ async def _others(link: Link, report: Report) -> None:
 LATENCY_MS: Final = 2  # an adapter that keeps bytes for longer delays every read; a hand sets 1 ms
 
 
-def report_adapter(address: Address, report: Report, folder: Path = USB_SERIAL) -> None:
+def report_adapter(address: Address, report: ReportFinding, folder: Path = USB_SERIAL) -> None:
     """Report the latency timer of the USB adapter, if it has one. The port is open."""
     kept = latency_timer(address.host, folder)
     if kept is None:
@@ -209,7 +209,7 @@ def report_adapter(address: Address, report: Report, folder: Path = USB_SERIAL) 
         report(Finding(Level.DOUBT, "adapter", f"{found}, which delays every read", advice))
 
 
-def report_damage(link: Link, reads: int, report: Report) -> None:
+def report_damage(link: Link, reads: int, report: ReportFinding) -> None:
     """Report reads that had to be repeated."""
     repeats = link.repeats if isinstance(link, ModbusTransport) else 0
     if repeats:

@@ -15,7 +15,7 @@ from ...values.errors import (
 )
 from ...values.status import RobotiqStatus
 from .answer import ANSWER_S, REACH_S, no_connection, report_silence
-from .findings import Finding, GiveUpError, Level, Report
+from .findings import Finding, GiveUpError, Level, ReportFinding
 
 ABSENT: Final = (
     "The host is up, but nothing listens on this port. Is Robotiq's URCap installed on this UR, its gripper "
@@ -24,7 +24,7 @@ ABSENT: Final = (
 )
 
 
-async def find_urcap(address: Address, gripper: int | None, report: Report) -> Link:
+async def find_urcap(address: Address, gripper: int | None, report: ReportFinding) -> Link:
     """An open link to the gripper behind a URCap; ``gripper`` is the one to choose, None for the URCap's."""
     link = UrcapTransport(address, gripper, connect_timeout=REACH_S, response_timeout=ANSWER_S)
     try:

@@ -20,7 +20,7 @@ from ...values.calibration.csv_tables import (
     FORCE,
     SPEED,
     Layout,
-    Table,
+    RunsTable,
     TableError,
     integer,
     read_measured,
@@ -170,7 +170,7 @@ class Campaign:
     runs: int  # number of columns
     origin: dict[str, str] = field(default_factory=dict)
     """The subject and conditions of the measurement, kept beside the table. Only the same can resume it."""
-    table: Table = field(default_factory=dict)  # the measurements so far
+    table: RunsTable = field(default_factory=dict)  # the measurements so far
     model: Model | None = None  # on which these were made; None if the file does not say
 
     def __post_init__(self) -> None:

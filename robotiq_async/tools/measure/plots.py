@@ -19,7 +19,7 @@ except ModuleNotFoundError as error:
     raise ImportError(f"pictures need matplotlib: {install('plot')}") from error
 
 from ...runtime.log import printable
-from ...values.calibration.csv_tables import Table
+from ...values.calibration.csv_tables import RunsTable
 from ...values.calibration.scales import ForceCalibration, SpeedCalibration, mean, newton
 from ..recording.payloads import is_command
 from ..recording.table import CURRENT
@@ -29,7 +29,7 @@ from .campaigns import Currents, peak_currents
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..recording.recordings import Entry
+    from ..recording.recordings import RecordedMessage
 
 OURS: Final = "#0b6ea8"
 THEIRS: Final = "#d1731f"
@@ -47,7 +47,7 @@ SHOWN_FORCES: Final = (0, 125, 250)  # force values whose currents are drawn ove
 Event = tuple[float, str, bool]  # time, text, and whether it is about a fault
 
 
-def plot_speed(path: Path, table: Table, label: str) -> list[Path]:
+def plot_speed(path: Path, table: RunsTable, label: str) -> list[Path]:
     """Plot closing time against speed value beside the thesis's curve, and the difference between the two.
 
     The path has no suffix; the label is that of the table. Returns the files written, as all plots do.
@@ -75,7 +75,7 @@ def plot_speed(path: Path, table: Table, label: str) -> list[Path]:
     return files
 
 
-def plot_force(path: Path, table: Table, surface: str, label: str) -> list[Path]:
+def plot_force(path: Path, table: RunsTable, surface: str, label: str) -> list[Path]:
     """Plot force against force value, one point per run, beside the thesis's and the nominal figures."""
     with _figure(path, f"Force of a grasp, {surface}") as ((axes,), files):
         nominal, thesis = ForceCalibration.nominal(), ForceCalibration.thesis(surface)
@@ -141,7 +141,7 @@ def plot_current_over_time(path: Path, by_surface: Mapping[str, Currents], label
 
 
 def plot_recording(
-    path: Path, entries: Iterable[Entry], *, begin: float = 0.0, end: float = math.inf
+    path: Path, entries: Iterable[RecordedMessage], *, begin: float = 0.0, end: float = math.inf
 ) -> list[Path]:
     """Plot positions, currents, events and marks of a recording, its JSON messages, over time.
 

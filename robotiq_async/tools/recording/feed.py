@@ -23,7 +23,7 @@ from ...values.model import THREE_FINGER
 from ...values.status import RobotiqStatus
 from ..description.joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
 from ..description.kinematics import joint_angles, joint_names, joint_velocities
-from .payloads import SCHEMAS, Fields, InhibitEvents, efforts, fault_event, mark_fields, transition_fields
+from .payloads import SCHEMAS, InhibitEvents, Properties, efforts, fault_event, mark_fields, transition_fields
 
 BUFFER: Final = 100_000
 """Statuses kept while the event loop is busy with something else: minutes."""
@@ -49,7 +49,7 @@ def json_topic(name: str, schema: object) -> Topic:
     return Topic(f"/gripper/{name}", "json", f"gripper.{name}", "jsonschema", json.dumps(schema).encode())
 
 
-def compact(fields: Fields) -> bytes:
+def compact(fields: Properties) -> bytes:
     """An object as one line of JSON without spaces."""
     return json.dumps(fields, separators=(",", ":")).encode()
 
@@ -171,7 +171,7 @@ class Feed:
         """Convert a timestamp in monotonic seconds to nanoseconds since 1970."""
         return round((timestamp + self._epoch) * 1e9)
 
-    def _publish_json(self, topic: Topic, timestamp: float, fields: Fields) -> None:
+    def _publish_json(self, topic: Topic, timestamp: float, fields: Properties) -> None:
         self._counts[topic] += 1
         self._publish(Message(topic, self.nanoseconds(timestamp), compact(fields), self._counts[topic]))
 
@@ -223,7 +223,7 @@ class Timeline:
         """Statuses that were dropped because the buffer was full."""
         return self._statuses.missed
 
-    def new(self) -> Iterator[tuple[float, RobotiqStatus | Fields]]:
+    def new(self) -> Iterator[tuple[float, RobotiqStatus | Properties]]:
         """Statuses, and events for transitions and faults, each with its time in seconds since 1970."""
         # Timestamps of a hand are monotonic; people and files use the wall clock.
         offset = time.time() - now()

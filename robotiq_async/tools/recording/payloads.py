@@ -20,7 +20,7 @@ from ...values.model import THREE_FINGER
 from ...values.status import RobotiqStatus
 from ..description.kinematics import FINGER_NAMES
 
-Fields = dict[str, Any]
+Properties = dict[str, Any]
 LONGEST_BITS: Final = 64
 """Of an int in a mark: others who read JSON keep no more, and Python writes no more than 4,300 digits."""
 
@@ -133,12 +133,12 @@ def title(hand: Hand) -> str:
     return f"{words}, simulated" if hand.address.startswith("sim:") else words
 
 
-def transition_fields(transition: Transition) -> Fields:
+def transition_fields(transition: Transition) -> Properties:
     """The event for a transition."""
     return {"kind": "transition", **transition.as_dict()}
 
 
-def mark_fields(label: str, values: Mapping[str, object], timestamp: float) -> Fields:
+def mark_fields(label: str, values: Mapping[str, object], timestamp: float) -> Properties:
     """The event for a mark of the program that records.
 
     Raises:
@@ -166,12 +166,12 @@ def _plain(name: str, given: object) -> str | int | float | bool:
     return value
 
 
-def is_command(event: Fields) -> bool:
+def is_command(event: Properties) -> bool:
     """Whether an event is the start or the end of a command. A control loop makes hundreds a second."""
     return State.RUNNING_CC.name in (event.get("source"), event.get("target"))
 
 
-def fault_event(status: RobotiqStatus, before: RobotiqStatus | None) -> Fields | None:
+def fault_event(status: RobotiqStatus, before: RobotiqStatus | None) -> Properties | None:
     """The event for a fault that has appeared or cleared (NONE) since the status before, or None."""
     if status.fault == (Fault.NONE if before is None else before.fault):
         return None
@@ -185,7 +185,7 @@ class InhibitEvents:
         self._hand = hand
         self._before: Inhibit | None = None
 
-    def new(self, timestamp: float) -> Iterator[Fields]:
+    def new(self, timestamp: float) -> Iterator[Properties]:
         """The event since the last look, if any; an inhibit from before the first one counts."""
         before, now = self._before, self._hand.inhibited
         if before == now:
@@ -197,7 +197,7 @@ class InhibitEvents:
         yield {"kind": "inhibit", "timestamp": timestamp, **what}
 
 
-def _in_words(fault: Fault) -> Fields:
+def _in_words(fault: Fault) -> Properties:
     return {
         "fault": fault.name,
         "fault_code": int(fault),
@@ -206,7 +206,7 @@ def _in_words(fault: Fault) -> Fields:
     }
 
 
-def reading_fields(hand: Hand) -> Fields:
+def reading_fields(hand: Hand) -> Properties:
     """A hand and its newest status.
 
     Raises:
@@ -223,12 +223,12 @@ def reading_fields(hand: Hand) -> Fields:
     }
 
 
-def state_fields(hand: Hand, now: float) -> Fields:
+def state_fields(hand: Hand, now: float) -> Properties:
     """State and statistics of a hand; fault and age of the newest status only while they are known.
 
     ``now`` is in monotonic seconds.
     """
-    fields: Fields = {
+    fields: Properties = {
         "name": hand.name,
         "address": hand.address,
         "state": hand.state.name,

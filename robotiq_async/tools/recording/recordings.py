@@ -92,7 +92,7 @@ class McapFile:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class RecordedMessage:
     """One message of a recording."""
 
     topic: str  # the channel's name
@@ -136,7 +136,7 @@ class Entry:
         return RecordingError(f"{self.path}: a message on {reprlib.repr(self.topic)} {why}")
 
 
-@dataclass
+@dataclass(frozen=True)
 class Recovered:
     """The outcome of :func:`recover`.
 
@@ -148,12 +148,8 @@ class Recovered:
     messages: int = 0
     is_whole: bool = False
 
-    def _note(self, record: McapRecord) -> None:
-        self.messages += isinstance(record, Message)
-        self.is_whole |= isinstance(record, Footer)
 
-
-def read_recording(path: Path | str) -> Iterator[Entry]:
+def read_recording(path: Path | str) -> Iterator[RecordedMessage]:
     """Iterate over the messages of a recording. A truncated one ends with a warning.
 
     Raises:
@@ -168,7 +164,9 @@ def read_recording(path: Path | str) -> Iterator[Entry]:
         elif isinstance(record, Message):
             channel, count = channels[record.channel_id], count + 1
             is_json = channel.message_encoding == "json"
-            yield Entry(channel.topic, record.log_time, record.sequence, record.data, is_json, str(path))
+            yield RecordedMessage(
+                channel.topic, record.log_time, record.sequence, record.data, is_json, str(path)
+            )
         elif isinstance(record, Footer):
             is_whole = True
     if not is_whole:
@@ -182,7 +180,7 @@ def recover(path: Path | str, target: Path | str) -> Recovered:
         RecordingError: as :func:`read_recording`, with the messages before in the target; or the target
             exists already.
     """
-    found = Recovered()
+    messages, is_whole = 0, False
     records = _records(path)
     header = next(records)  # raises for other files, before the target exists
     assert isinstance(header, Header)
@@ -192,7 +190,9 @@ def recover(path: Path | str, target: Path | str) -> Recovered:
             writer = Writer(file)
             writer.start(header.profile, header.library)
             try:
-                _copy(records, writer, found, path)
+                for record in _copied(records, writer, path):
+                    messages += isinstance(record, Message)
+                    is_whole |= isinstance(record, Footer)
             except RecordingError as error:
                 refused = error
             writer.finish()  # type: ignore[no-untyped-call]
@@ -203,10 +203,10 @@ def recover(path: Path | str, target: Path | str) -> Recovered:
         raise RecordingError(f"{target}: {error.strerror}") from error
     if refused is not None:
         raise RecordingError(f"{refused}; the messages before it are in {target}") from refused
-    return found
+    return Recovered(messages, is_whole)
 
 
-def _copy(records: Iterator[McapRecord], writer: Writer, found: Recovered, path: Path | str) -> None:
+def _copied(records: Iterator[McapRecord], writer: Writer, path: Path | str) -> Iterator[McapRecord]:
     schemas: _Known[int] = _Known(path, "schema")
     schemas[0] = 0
     channels: _Known[int] = _Known(path, "channel")
@@ -223,7 +223,7 @@ def _copy(records: Iterator[McapRecord], writer: Writer, found: Recovered, path:
             writer.add_message(channel, record.log_time, record.data, record.publish_time, record.sequence)
         elif isinstance(record, Metadata):
             writer.add_metadata(record.name, record.metadata)
-        found._note(record)  # noqa: SLF001  # of this module
+        yield record
 
 
 class _Known(dict[int, T]):

@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any, Final
 from ...values.calibration.csv_tables import write_rows
 from ...values.conventions import Convention
 from .feed import EVENT, STATUS, Message
-from .payloads import SCHEMAS, Fields
+from .payloads import SCHEMAS, Properties
 
 if TYPE_CHECKING:
-    from .recordings import Entry
+    from .recordings import RecordedMessage
 
 _SECOND: Final = 10**9
 _FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
@@ -74,7 +74,7 @@ class Table:
         self._label = ""
         self._values = ""
 
-    def row(self, kind: str, nanoseconds: int, fields: Fields) -> list[object] | None:
+    def row(self, kind: str, nanoseconds: int, fields: Properties) -> list[object] | None:
         """The row of a message of this kind, with its time since 1970; None if it has none."""
         if kind == "event" and "target" in fields:
             self._state = fields["target"]
@@ -101,7 +101,7 @@ def wall_clock(nanoseconds: int) -> str:
     return f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%dT%H:%M:%S}.{rest // 1000:06d}Z"
 
 
-def _value(fields: Fields, name: str, kind: str) -> Any:  # noqa: ANN401  # as JSON has it
+def _value(fields: Properties, name: str, kind: str) -> Any:  # noqa: ANN401  # as JSON has it
     axis, _, key = name.rpartition(".")
     if kind == "event":
         return fields.get(name)
@@ -112,7 +112,7 @@ def _value(fields: Fields, name: str, kind: str) -> Any:  # noqa: ANN401  # as J
     return fields[axis][key] if axis else fields[name]
 
 
-def _opening(fields: Fields, convention: Convention) -> float | None:
+def _opening(fields: Properties, convention: Convention) -> float | None:
     """The opening by a convention; None in a recording of an earlier version, which has no share."""
     shares = [fields[finger].get("open_fraction") for finger in ("A", "B", "C") if finger in fields]
     return None if None in shares else convention.value(sum(shares) / len(shares))
@@ -157,7 +157,7 @@ class CsvFile:
 
 
 def export(
-    entries: Iterable[Entry], kind: str, target: Path | str, convention: Convention | None = None
+    entries: Iterable[RecordedMessage], kind: str, target: Path | str, convention: Convention | None = None
 ) -> int:
     """Write the messages of one kind into a CSV file, all or none; an existing file is replaced.
 
@@ -186,7 +186,7 @@ def export(
     return count
 
 
-def _rows(entries: Iterable[Entry], kind: str, table: Table) -> Iterator[list[object]]:
+def _rows(entries: Iterable[RecordedMessage], kind: str, table: Table) -> Iterator[list[object]]:
     for entry in in_order(entries):
         of = entry.topic.removeprefix(PREFIX)
         if of in (kind, "event") and of != entry.topic:
@@ -195,9 +195,9 @@ def _rows(entries: Iterable[Entry], kind: str, table: Table) -> Iterator[list[ob
                 yield row
 
 
-def in_order(entries: Iterable[Entry]) -> Iterator[Entry]:
+def in_order(entries: Iterable[RecordedMessage]) -> Iterator[RecordedMessage]:
     """Sort by time: messages of different streams are some milliseconds out of order in the file."""
-    waiting: list[tuple[int, int, Entry]] = []
+    waiting: list[tuple[int, int, RecordedMessage]] = []
     for number, entry in enumerate(entries):
         heappush(waiting, (entry.nanoseconds, number, entry))
         if len(waiting) > NEARBY:

@@ -7,7 +7,7 @@ hardware yet. docs/decisions/verify.md has the reasons.
 from __future__ import annotations
 
 from .bench import Lengths
-from .catalogue import CATALOGUE, ENDINGS, Check, Verdict
+from .catalogue import CATALOGUE, ENDINGS, Check, CheckVerdict
 from .report import Report
 from .runner import Plan, Runner
 from .watch import ENTER, Person
@@ -17,10 +17,10 @@ __all__ = [
     "ENDINGS",
     "ENTER",
     "Check",
+    "CheckVerdict",
     "Lengths",
     "Person",
     "Plan",
     "Report",
     "Runner",
-    "Verdict",
 ]

@@ -16,9 +16,9 @@ from ...values.enums import Finger
 from ...values.model import Model, model_of
 from ...values.registers import RegisterMap
 from ...values.status import RobotiqStatus
-from .catalogue import CATALOGUE, NO_OPTIONS, Check, EndError, Figure, Options, Verdict
-from .recorded_link import Frame, RecordedLink
-from .watch import Person, Watch
+from .catalogue import CATALOGUE, NO_OPTIONS, Check, CheckVerdict, EndError, Figure, Options
+from .recorded_link import RecordedExchange, RecordedLink
+from .watch import Person, StageWatch
 
 CONNECT_S: Final = 2.0  # for a connection; short, so that a stop over a lost link is soon tried again
 SPACING_S: Final = 0.02  # twice the time between two writes in the manual
@@ -42,7 +42,7 @@ class Bench:
 
     address: Address  # of the gripper; any but sim
     person: Person  # beside it
-    keep: Callable[[Frame], None]  # takes every frame
+    keep: Callable[[RecordedExchange], None]  # takes every frame
     lengths: Lengths = field(default_factory=Lengths)  # of the long checks
     checks: dict[str, Check] = field(default_factory=dict)  # the results so far, by name
     link: RecordedLink = field(init=False)  # to the gripper, once it has been found
@@ -66,7 +66,7 @@ class Bench:
         return "finger A" if len(self.fingers) > 1 else "the jaw"
 
     def another_link(
-        self, registers: RegisterMap | None = None, keep: Callable[[Frame], None] | None = None
+        self, registers: RegisterMap | None = None, keep: Callable[[RecordedExchange], None] | None = None
     ) -> RecordedLink:
         """Another link, not opened.
 
@@ -86,8 +86,10 @@ class Bench:
         """Seconds between two reads in a watch."""
         return self.lengths.interval or POLL_INTERVAL_S
 
-    def watch(self, seconds: float) -> Watch:
-        return Watch(self.link, self.person, seconds=seconds, interval=self.interval, spacing=self.spacing)
+    def watch(self, seconds: float) -> StageWatch:
+        return StageWatch(
+            self.link, self.person, seconds=seconds, interval=self.interval, spacing=self.spacing
+        )
 
     # -- results ---------------------------------------------------------------------------------------------
 
@@ -107,9 +109,9 @@ class Bench:
             EndError: it does not hold, and is about safety.
         """
         if holds:
-            self._add(Check(name, Verdict.AS_ASSUMED, found, figures=figures))
+            self._add(Check(name, CheckVerdict.AS_ASSUMED, found, figures=figures))
             return
-        self._add(Check(name, Verdict.DIFFERS, found, follows, options, figures))
+        self._add(Check(name, CheckVerdict.DIFFERS, found, follows, options, figures))
         if CATALOGUE[name].is_safety:
             raise EndError("deviation", f"{name}: {found}")
 
@@ -122,7 +124,7 @@ class Bench:
         self.judge(name, False, found, follows, options, **figures)
 
     def inconclusive(self, name: str, why: str, **figures: Figure) -> None:
-        self._add(Check(name, Verdict.INCONCLUSIVE, why, figures=figures))
+        self._add(Check(name, CheckVerdict.INCONCLUSIVE, why, figures=figures))
 
     def _add(self, check: Check) -> None:
         assert check.name in CATALOGUE

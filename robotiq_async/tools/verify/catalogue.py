@@ -127,7 +127,7 @@ Options = Mapping[str, int | float]  # options of a hand, by the names of its co
 NO_OPTIONS: Final[Options] = MappingProxyType({})
 
 
-class Verdict(Enum):
+class CheckVerdict(Enum):
     """The verdict of a check."""
 
     AS_ASSUMED = "as assumed"
@@ -140,7 +140,7 @@ class Check:
     """One check that was made, or could not be."""
 
     name: str  # of the assumption, see catalogue
-    verdict: Verdict  # its verdict
+    verdict: CheckVerdict  # its verdict
     found: str  # the finding, in a sentence
     follows: str = ""  # the consequence for the user, where it differs
     options: Options = field(default_factory=lambda: NO_OPTIONS)  # make the library right, where it differs

@@ -23,11 +23,11 @@ from ...values.model import Model, model_of
 from ...values.request import Request
 from ...values.status import RobotiqStatus
 from ..recording.feed import COMMAND, EVENT, STATUS, Message, Topic, compact
-from ..recording.payloads import Fields
+from ..recording.payloads import Properties
 from ..recording.recorder import FLUSH_S, Outbox
 from ..recording.recordings import McapFile
 from .catalogue import STAGE
-from .recorded_link import Frame
+from .recorded_link import RecordedExchange
 from .report import Report, page
 
 NAME: Final = "recording.mcap"
@@ -50,7 +50,7 @@ class Recording:
 
     # The frames of a run.
 
-    def keep(self, frame: Frame) -> None:
+    def keep(self, frame: RecordedExchange) -> None:
         """Take a frame. Never blocks and never fails."""
         if self.failure:
             return
@@ -70,7 +70,7 @@ class Recording:
         fields = {"kind": "state", "timestamp": now, "target": f"{STAGE}{stage}", "model": self._model.name}
         self._add(EVENT, now, fields)
 
-    def _add(self, topic: Topic, seconds: float, fields: Fields) -> None:
+    def _add(self, topic: Topic, seconds: float, fields: Properties) -> None:
         self._counts[topic] += 1
         stamp = round((seconds + self._epoch) * 1e9)
         self._format.take(Message(topic, stamp, compact(fields), self._counts[topic]))

@@ -13,7 +13,7 @@ from ...values.request import AxisRequest, Request
 from ...values.status import RobotiqStatus
 from .catalogue import EndError
 from .recorded_link import RecordedLink
-from .watch import ANYWHERE, Watch, describe
+from .watch import ANYWHERE, StageWatch, describe
 
 MARGIN: Final = 4  # counts by which an axis may leave its path: it may stop 2 off its request (manual)
 ASIDE: Final = 3  # counts by which the position of a resting axis may change
@@ -57,7 +57,7 @@ def are_near(status: RobotiqStatus, targets: Mapping[Finger, int], counts: int) 
     return all(abs(status.position(axis) - target) <= counts for axis, target in targets.items())
 
 
-async def reset(watch: Watch) -> None:
+async def reset(watch: StageWatch) -> None:
     """Clear rACT and wait for its echo. The fingers stay where they are."""
     watch.needs_active = False
     await watch.write(Request(model=watch.model))
@@ -65,7 +65,7 @@ async def reset(watch: Watch) -> None:
         raise EndError("inactive", "rACT = 0 was acknowledged, but the gripper does not show it")
 
 
-async def activate(watch: Watch) -> float:
+async def activate(watch: StageWatch) -> float:
     """Reset and activate: all fingers move. Returns the seconds that the activation took."""
     watch.envelope = ANYWHERE
     await reset(watch)
@@ -78,7 +78,7 @@ async def activate(watch: Watch) -> float:
 
 
 async def go(
-    watch: Watch, image: Request, targets: Mapping[Finger, int], seconds: float
+    watch: StageWatch, image: Request, targets: Mapping[Finger, int], seconds: float
 ) -> RobotiqStatus | None:
     """Send axes to targets and wait until they rest there; None if they do not in time."""
     assert watch.last is not None

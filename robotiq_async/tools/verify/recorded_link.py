@@ -24,7 +24,7 @@ RECENT_S: Final = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class RecordedExchange:
     """One exchange."""
 
     began: float  # the loop's time of sending
@@ -41,7 +41,7 @@ class RecordedLink:
     stop that follows would have to make a new one first.
     """
 
-    def __init__(self, link: Link, keep: Callable[[Frame], None], model: Model) -> None:
+    def __init__(self, link: Link, keep: Callable[[RecordedExchange], None], model: Model) -> None:
         self.model = model  # of the gripper
         self.link = link
         self.written: Request | None = None  # the last image that was written; None before the first
@@ -67,10 +67,10 @@ class RecordedLink:
         try:
             registers = await self._whole(self.link.read())
         except RobotiqConnectionError as error:
-            self._keep(Frame(began, loop.time(), "failure", words=str(error)))
+            self._keep(RecordedExchange(began, loop.time(), "failure", words=str(error)))
             raise
         ended = loop.time()
-        self._keep(Frame(began, ended, "status", registers))
+        self._keep(RecordedExchange(began, ended, "status", registers))
         self.asked = began
         self.shown = RobotiqStatus.from_registers(
             registers, timestamp=ended, model=self.model, has_current=self.link.has_current
@@ -81,7 +81,7 @@ class RecordedLink:
         """Write an image, once; returns the loop's time of its acknowledgement."""
         await self._sent(request, self.link.send(lambda: request.registers))
         ended = asyncio.get_running_loop().time()
-        self._keep(Frame(self.wrote, ended, "command", request.registers))
+        self._keep(RecordedExchange(self.wrote, ended, "command", request.registers))
         return ended
 
     async def write_and_read(self, request: Request) -> bool:
@@ -90,8 +90,8 @@ class RecordedLink:
         answer = await self._sent(request, self.link.send_and_read(lambda: request.registers))
         assert answer is not None, "there was an image to write"
         ended = asyncio.get_running_loop().time()
-        self._keep(Frame(self.wrote, ended, "command", request.registers))
-        self._keep(Frame(self.wrote, ended, "status", answer.registers))
+        self._keep(RecordedExchange(self.wrote, ended, "command", request.registers))
+        self._keep(RecordedExchange(self.wrote, ended, "status", answer.registers))
         return answer.doubt is None and self.link.has_read_with_write
 
     async def _sent(self, request: Request, exchange: Coroutine[Any, Any, T]) -> T:
@@ -104,7 +104,7 @@ class RecordedLink:
         try:
             return await self._whole(exchange)
         except RobotiqConnectionError as error:
-            self._keep(Frame(began, loop.time(), "failure", request.registers, str(error)))
+            self._keep(RecordedExchange(began, loop.time(), "failure", request.registers, str(error)))
             raise
 
     def expect(self, echo: Echo) -> None:

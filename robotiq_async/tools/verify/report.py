@@ -10,7 +10,7 @@ from ...runtime.version import __version__
 from ...values.model import THREE_FINGER, Model
 from ...values.registers import RegisterMap
 from ...values.status import RobotiqStatus
-from .catalogue import CATALOGUE, ENDINGS, HARMLESS, LAST, Check, Verdict, checks_of, left_out
+from .catalogue import CATALOGUE, ENDINGS, HARMLESS, LAST, Check, CheckVerdict, checks_of, left_out
 
 T = TypeVar("T")
 
@@ -42,7 +42,7 @@ class Report:
         """Note as inconclusive the checks that a stage has not reached."""
         for name, assumption in checks_of(self.model, self.link).items():
             if assumption.stage in self.entered and name not in self.checks:
-                self.checks[name] = Check(name, Verdict.INCONCLUSIVE, "not reached")
+                self.checks[name] = Check(name, CheckVerdict.INCONCLUSIVE, "not reached")
 
     @property
     def left_out(self) -> dict[str, str]:
@@ -52,11 +52,11 @@ class Report:
 
     @property
     def differing(self) -> list[Check]:
-        return self._in_order(Verdict.DIFFERS)
+        return self._in_order(CheckVerdict.DIFFERS)
 
     @property
     def inconclusive(self) -> list[Check]:
-        return self._in_order(Verdict.INCONCLUSIVE)
+        return self._in_order(CheckVerdict.INCONCLUSIVE)
 
     @property
     def options(self) -> dict[str, int | float]:
@@ -67,7 +67,7 @@ class Report:
                 options[name] = max(value, options.get(name, value))
         return options
 
-    def _in_order(self, verdict: Verdict) -> list[Check]:
+    def _in_order(self, verdict: CheckVerdict) -> list[Check]:
         return [
             self.checks[name]
             for name in CATALOGUE
@@ -237,6 +237,6 @@ def page(report: Report, pictures: tuple[str, ...] = (), why_none: str = "") -> 
 def _row(check: Check) -> str:
     assumption = CATALOGUE[check.name]
     found = f"{check.found}. {check.follows}" if check.follows else check.found
-    mark = "**DIFFERS**" if check.verdict is Verdict.DIFFERS else check.verdict.value
+    mark = "**DIFFERS**" if check.verdict is CheckVerdict.DIFFERS else check.verdict.value
     cells = (str(assumption.stage), f"`{check.name}`", assumption.assumed, mark, found)
     return f"| {' | '.join(cell.replace('|', '/').replace(chr(10), ' ') for cell in cells)} |"

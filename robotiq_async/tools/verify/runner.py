@@ -30,7 +30,7 @@ from .bench import Bench, Lengths
 from .catalogue import HARMLESS, LAST, EndError
 from .identification import check_before_writing, find
 from .motions import as_found, stop_fingers
-from .recorded_link import Frame
+from .recorded_link import RecordedExchange
 from .report import Report
 from .stages import STAGES, Stage
 from .stages.loss import report_lost_activation
@@ -48,7 +48,7 @@ class Tape(Protocol):
     @property
     def failure(self) -> str: ...
 
-    def keep(self, frame: Frame) -> None: ...
+    def keep(self, frame: RecordedExchange) -> None: ...
 
     def begin(self, stage: int) -> None: ...
 

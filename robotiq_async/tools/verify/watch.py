@@ -51,7 +51,7 @@ LIMITS: Final = 20, 225
 """A request beyond may be echoed as a software limit (drivers keep the scissor within 15..232)."""
 
 
-class Rest:
+class AxesAtRest:
     """Follows some axes, all unless they are named.
 
     Attributes:
@@ -73,7 +73,7 @@ class Rest:
         return self._loop.time() - self.moved_at >= seconds
 
 
-class Watch:
+class StageWatch:
     """Reads and writes for one stage, and ends it when something is wrong."""
 
     def __init__(
@@ -138,7 +138,7 @@ class Watch:
 
     async def until_still(self, seconds: float) -> RobotiqStatus | None:
         """Read until no axis has moved for a while; None if one still moves after some seconds."""
-        rest = Rest()
+        rest = AxesAtRest()
         return await self.until(lambda status: rest.lasts(status, STILL_S), seconds)
 
     async def pause(self, seconds: float) -> None:

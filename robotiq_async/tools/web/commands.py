@@ -14,7 +14,7 @@ from ...values.checks import parse_fingers
 from ...values.enums import State
 from ...values.errors import RobotiqError
 from ..actions import ACTIONS, Action, Operator
-from ..recording.payloads import Fields
+from ..recording.payloads import Properties
 from ..wording import refusal_words
 
 MAX_COMMANDS: Final = 16
@@ -29,15 +29,15 @@ BUTTONS: Final = {
 FRESH_S: Final = 1.5
 """Maximum age of a command; a halt is never too old."""
 Arguments = Mapping[str, Any]
-Run = Callable[[Operator, Arguments], Awaitable[str]]
+RunCommand = Callable[[Operator, Arguments], Awaitable[str]]
 """Carries out a command; returns a description of the outcome."""
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class PageCommand:
     """A command of a page."""
 
-    run: Run
+    run: RunCommand
     takes: frozenset[str] = frozenset()  # names of the arguments, all of which are needed
 
 
@@ -58,13 +58,13 @@ async def call(operator: Operator, name: str, arguments: Arguments) -> str:
     return await command.run(operator, arguments)
 
 
-def _of(action: Action) -> Command:
+def _of(action: Action) -> PageCommand:
     async def run(operator: Operator, arguments: Arguments) -> str:
         if action.warning and arguments["confirm"] is not True:
             raise ValueError(f"{action.name} needs confirm = true: {action.warning}")
         return await operator.act(action)
 
-    return Command(run, frozenset({"confirm"} if action.warning else ()))
+    return PageCommand(run, frozenset({"confirm"} if action.warning else ()))
 
 
 async def _move(operator: Operator, arguments: Arguments) -> str:
@@ -74,7 +74,7 @@ async def _move(operator: Operator, arguments: Arguments) -> str:
     return await operator.move(arguments["position"], parse_fingers("fingers", fingers))
 
 
-def _set(setting: Callable[[Operator, int], Awaitable[str]]) -> Run:
+def _set(setting: Callable[[Operator, int], Awaitable[str]]) -> RunCommand:
     async def run(operator: Operator, arguments: Arguments) -> str:
         await setting(operator, arguments["value"])
         return "set"
@@ -85,9 +85,9 @@ def _set(setting: Callable[[Operator, int], Awaitable[str]]) -> Run:
 COMMANDS: Final = MappingProxyType(
     {
         **{name: _of(action) for name, action in ACTIONS.items()},
-        "move": Command(_move, frozenset({"position", "fingers"})),
-        "set_speed": Command(_set(Operator.set_speed), frozenset({"value"})),
-        "set_force": Command(_set(Operator.set_force), frozenset({"value"})),
+        "move": PageCommand(_move, frozenset({"position", "fingers"})),
+        "set_speed": PageCommand(_set(Operator.set_speed), frozenset({"value"})),
+        "set_force": PageCommand(_set(Operator.set_force), frozenset({"value"})),
     }
 )
 """The commands by name."""
@@ -103,7 +103,7 @@ class PageCommands:
     outcome of each command.
     """
 
-    def __init__(self, operators: Sequence[Operator], answer: Callable[[Fields], None]) -> None:
+    def __init__(self, operators: Sequence[Operator], answer: Callable[[Properties], None]) -> None:
         self._operators = operators
         self._answer = answer
         self._tasks: dict[str, set[asyncio.Task[str]]] = {}
@@ -115,7 +115,7 @@ class PageCommands:
         """Whether a command has not ended yet."""
         return any(not task.done() for tasks in self._tasks.values() for task in tasks)
 
-    def do(self, request: Fields) -> None:
+    def do(self, request: Properties) -> None:
         """Start a command; its answer comes later.
 
         A request has ``page``, ``number``, ``hand``, ``name`` and ``arguments`` of a command, and ``at``: the
@@ -155,7 +155,7 @@ class PageCommands:
         self.all_gone()
         await asyncio.gather(*tasks, *self._halts, return_exceptions=True)
 
-    async def _carry_out(self, request: Fields, page: str, name: str) -> str:
+    async def _carry_out(self, request: Properties, page: str, name: str) -> str:
         if not self._operators:
             raise ValueError("this page only watches; to command from a page: robotiq-async web --control")
         if name != HALT and self.is_ending:

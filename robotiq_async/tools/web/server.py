@@ -30,7 +30,7 @@ from ...values.status import RobotiqStatus
 from ..actions import Operator
 from ..description.simulated import bodies_of
 from ..recording.feed import Timeline
-from ..recording.payloads import Fields, is_command
+from ..recording.payloads import Properties, is_command
 from .commands import PageCommands
 from .settings import PageSettings
 
@@ -62,7 +62,7 @@ class HandUpdates:
         self.hand = hand
         self.problem = ""  # why the hand could not be started; empty if it was
         self._timeline = Timeline(hand, BUFFER)
-        self._events: deque[Fields] = deque(maxlen=EVENTS)
+        self._events: deque[Properties] = deque(maxlen=EVENTS)
         self._peaks = [0] * len(hand.model.axes)
         self._counted_at = 0.0
 
@@ -79,9 +79,9 @@ class HandUpdates:
             elif not is_command(each):
                 self._events.append({**each, "time": at})
 
-    def take(self, index: int) -> Fields:
+    def take(self, index: int) -> Properties:
         """The next update of the hand with this number on the page. It contains each event once."""
-        fields: Fields = {
+        fields: Properties = {
             "hand": index,
             "state": self.hand.state.name,
             "problem": self.problem,
@@ -95,7 +95,7 @@ class HandUpdates:
         self._peaks = [0] * len(self._peaks)
         return fields
 
-    def _newest(self) -> Fields:
+    def _newest(self) -> Properties:
         try:
             status = self.hand.status
         except NotStartedError:
@@ -111,7 +111,7 @@ class HandUpdates:
             "bodies": bodies_of(self.hand),
         }
 
-    def _statistics(self) -> Iterator[tuple[str, Fields]]:
+    def _statistics(self) -> Iterator[tuple[str, Properties]]:
         # Once a second: percentiles are expensive.
         if now() - self._counted_at >= STATISTICS_S:
             self._counted_at = now()
@@ -151,7 +151,7 @@ class PageServer:
         self._commands = PageCommands(operators, self._answer)
         self._process: Process
         self._tasks: list[asyncio.Task[None]] = []
-        self._answers: list[Fields] = []
+        self._answers: list[Properties] = []
         self._heard_at = 0.0
         self._seen = asyncio.Event()
         self._over = asyncio.Event()
@@ -235,7 +235,7 @@ class PageServer:
                 self._answers = []
             await asyncio.sleep(UPDATE_S)
 
-    def _answer(self, answer: Fields) -> None:
+    def _answer(self, answer: Properties) -> None:
         self._answers.append(answer)
 
     def _write(self, line: bytes) -> None:
@@ -255,7 +255,7 @@ class PageServer:
             self._commands.all_gone()
             self._over.set()
 
-    def _hear(self, message: Fields) -> None:
+    def _hear(self, message: Properties) -> None:
         if "do" in message:
             self._commands.do(message["do"])
         if "gone" in message:
@@ -265,10 +265,10 @@ class PageServer:
             if self.pages:
                 self._seen.set()
 
-    async def _read(self) -> Fields | None:
+    async def _read(self) -> Properties | None:
         assert self._process.stdout is not None
         line = await self._process.stdout.readline()
-        message: Fields | None = json.loads(line) if line else None
+        message: Properties | None = json.loads(line) if line else None
         return message
 
 

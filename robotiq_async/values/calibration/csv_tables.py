@@ -27,8 +27,8 @@ from typing import Final, TextIO
 from ..model import Model, model_of
 from ..stroke import Point, Points, why_not_after
 
-Table = dict[int, tuple[int, ...]]  # for each value, its runs
-Row = tuple[int, list[str]]  # line number and cells
+RunsTable = dict[int, tuple[int, ...]]  # for each value, its runs
+CsvRow = tuple[int, list[str]]  # line number and cells
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ class TableError(ValueError):
         return f"{path}{'' if line is None else f', line {line}'}: {reason}"
 
 
-def read_table(path: Path | str, layout: Layout) -> Table:
+def read_table(path: Path | str, layout: Layout) -> RunsTable:
     """Read a table from a file.
 
     Raises:
@@ -77,13 +77,13 @@ def read_table(path: Path | str, layout: Layout) -> Table:
     return read_measured(path, layout)[0]
 
 
-def read_measured(path: Path | str, layout: Layout) -> tuple[Table, Model | None]:
+def read_measured(path: Path | str, layout: Layout) -> tuple[RunsTable, Model | None]:
     """Read a table, and the model on which it was measured; None if the file does not say.
 
     Raises:
         TableError: as :func:`read_table`.
     """
-    table: Table = {}
+    table: RunsTable = {}
     columns = 0
     rows, model = _without_model(path, read_rows(path))
     for line, cells in rows:
@@ -163,7 +163,7 @@ def write_stroke(path: Path | str, points: Points, model: Model | None = None) -
     _write(path, model, [STROKE, *([position, f"{mm:g}"] for position, mm in points)])
 
 
-def thesis_table(name: str, layout: Layout) -> Table:
+def thesis_table(name: str, layout: Layout) -> RunsTable:
     """A table of the thesis: closing_time_ms (A1.1), force_foam_grams or force_rigid_grams."""
     with as_file(files("robotiq_async") / "data" / f"{name}.csv") as path:  # the package may be in a zip
         return read_table(path, layout)
@@ -174,7 +174,7 @@ def thesis_table(name: str, layout: Layout) -> Table:
 MODEL: Final = "model"
 
 
-def _without_model(path: Path | str, rows: Sequence[Row]) -> tuple[Sequence[Row], Model | None]:
+def _without_model(path: Path | str, rows: Sequence[CsvRow]) -> tuple[Sequence[CsvRow], Model | None]:
     """The rows without their last column, and what it says, if it is that of the model."""
     if not rows or rows[0][1][-1] != MODEL:
         return rows, None
@@ -201,13 +201,13 @@ def _write(path: Path | str, model: Model | None, rows: Sequence[Sequence[object
 # -- for other tables as well ------------------------------------------------------------------------------
 
 
-def read_rows(path: Path | str) -> list[Row]:
+def read_rows(path: Path | str) -> list[CsvRow]:
     """The rows of a CSV file with their line numbers; empty lines are left out.
 
     Raises:
         TableError: the file cannot be read.
     """
-    rows: list[Row] = []
+    rows: list[CsvRow] = []
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
             lines = csv.reader(_lines(path, file), strict=True)

@@ -22,7 +22,7 @@ from typing import Final
 from ..checks import check_byte, check_number
 from ..model import THREE_FINGER, Model
 from ..stroke import Stroke
-from .csv_tables import FORCE, SPEED, Layout, Table, TableError, read_measured, thesis_table
+from .csv_tables import FORCE, SPEED, Layout, RunsTable, TableError, read_measured, thesis_table
 from .motion_profile import MotionProfile, profile_of
 
 GRAVITY: Final = 9.81  # m/s2, the thesis's value
@@ -30,7 +30,7 @@ GRAVITY: Final = 9.81  # m/s2, the thesis's value
 LONGEST_S: Final = 600.0  # longest closing time that a table may contain
 STRONGEST_N: Final = 1000.0  # strongest force that a table may contain
 
-Points = tuple[tuple[int, float], ...]
+ScalePoints = tuple[tuple[int, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class SpeedCalibration:
     """
 
     source: str
-    points: Points
+    points: ScalePoints
     model: Model | None = None
     profile: MotionProfile | None = field(default=None, repr=False)
 
@@ -103,7 +103,7 @@ class SpeedCalibration:
         return cls.from_table(str(path), table, model)
 
     @classmethod
-    def from_table(cls, source: str, table: Table, model: Model | None = None) -> SpeedCalibration:
+    def from_table(cls, source: str, table: RunsTable, model: Model | None = None) -> SpeedCalibration:
         """The calibration in a table of closing times in milliseconds."""
         return cls(source, tuple((value, mean(table[value]) / 1000) for value in sorted(table)), model)
 
@@ -180,7 +180,7 @@ class ForceCalibration:
     """
 
     source: str
-    points: Points
+    points: ScalePoints
     model: Model | None = None
 
     def __post_init__(self) -> None:
@@ -224,7 +224,7 @@ class ForceCalibration:
         return cls.from_table(str(path), *_read_curve(path, FORCE))
 
     @classmethod
-    def from_table(cls, source: str, table: Table, model: Model | None = None) -> ForceCalibration:
+    def from_table(cls, source: str, table: RunsTable, model: Model | None = None) -> ForceCalibration:
         """The calibration in a table of scale readings in grams."""
         return cls(source, tuple((value, newton(mean(table[value]))) for value in sorted(table)), model)
 
@@ -248,7 +248,7 @@ class ForceCalibration:
         return figures.nearest(check_number("newton", newton, figures.low, figures.high))
 
 
-def _read_curve(path: Path | str, layout: Layout) -> tuple[Table, Model | None]:
+def _read_curve(path: Path | str, layout: Layout) -> tuple[RunsTable, Model | None]:
     """Read a table of at least two rows, and its model."""
     table, model = read_measured(path, layout)
     if len(table) < 2:
@@ -272,7 +272,7 @@ def _check_model(model: object) -> None:
         raise TypeError(f"model must be a Model or None, got {model!r}")
 
 
-def checked_points(given: Iterable[tuple[int, float]], high: float) -> Points:
+def checked_points(given: Iterable[tuple[int, float]], high: float) -> ScalePoints:
     """Copy points into tuples of plain numbers, and check that they form a curve."""
     points = tuple(
         (check_byte("a value of points", value), check_number("a figure of points", figure, 0.0, high))
@@ -286,7 +286,7 @@ def checked_points(given: Iterable[tuple[int, float]], high: float) -> Points:
     return points
 
 
-def covered(points: Points) -> range:
+def covered(points: ScalePoints) -> range:
     """The values between the first and the last point."""
     return range(points[0][0], points[-1][0] + 1)
 

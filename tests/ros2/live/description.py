@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from robotiq_async.ros2.translation.description import robot_description
-from robotiq_async.tools.description import Joint, Link, Pose, hand_model
+from robotiq_async.tools.description import Joint, Pose, RigidLink, hand_model
 from robotiq_async.tools.description.shapes import inertia
 from robotiq_async.values.model import MODELS
 
@@ -63,7 +63,7 @@ async def test_the_parser_of_ros_reads_what_the_description_says(
     assert sum(link["mass"] for link in found["links"].values()) == pytest.approx(hand.mass, rel=1e-4)
 
 
-def check_link(link: Link, found: Any) -> None:
+def check_link(link: RigidLink, found: Any) -> None:
     centre, moments, products = inertia(link)
     assert found["mass"] == pytest.approx(link.mass, rel=1e-5)
     assert found["inertia"] == pytest.approx([*moments, *products], rel=1e-5, abs=1e-9)

@@ -13,7 +13,7 @@ from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError
 from ..motions import ACTIVATION_S, activate, are_near, in_place, motion_envelope
-from ..watch import Watch
+from ..watch import StageWatch
 
 SECONDS: Final = ACTIVATION_S + 20
 USUAL_S: Final = 20.0
@@ -121,7 +121,7 @@ async def _there_and_back(bench: Bench, axis: Finger, found: _Found) -> None:
     await watch.until(lambda status: not status.go_echo, 1.0)
 
 
-async def _one_way(watch: Watch, image: Request, axis: Finger, goal: int, found: _Found) -> None:
+async def _one_way(watch: StageWatch, image: Request, axis: Finger, goal: int, found: _Found) -> None:
     start = await watch.look()
     watch.envelope = motion_envelope(start, {axis: goal})
     await watch.write(replace(image, go=True).with_positions({axis: goal}))
@@ -143,7 +143,7 @@ def _rests(status: RobotiqStatus, axis: Finger, goal: int) -> bool:
     )
 
 
-async def _lag(watch: Watch, axis: Finger, goal: int) -> float | None:
+async def _lag(watch: StageWatch, axis: Finger, goal: int) -> float | None:
     """Seconds from the first read with the echo to the first with a gDT of motion."""
     loop, echoed = asyncio.get_running_loop(), 0.0
 

@@ -13,7 +13,7 @@ from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError, Figure
 from ..motions import in_place, resting_envelope
-from ..watch import Rest, Watch
+from ..watch import AxesAtRest, StageWatch
 
 SECONDS: Final = 180.0
 SPEEDS: Final = (0, 64, 255)
@@ -50,7 +50,7 @@ async def full_strokes(bench: Bench) -> None:
 
 
 async def _fingers_to(
-    bench: Bench, watch: Watch, start: RobotiqStatus, goal: int, speed: int, force: int = 0
+    bench: Bench, watch: StageWatch, start: RobotiqStatus, goal: int, speed: int, force: int = 0
 ) -> tuple[RobotiqStatus, float]:
     """Move fingers; return the status at the end, and the seconds until the last was seen to move."""
     watch.envelope = resting_envelope(start, bench.fingers)
@@ -59,7 +59,7 @@ async def _fingers_to(
     return await _stroke(watch, image, bench.fingers)
 
 
-async def _press(bench: Bench, watch: Watch, least: int) -> None:
+async def _press(bench: Bench, watch: StageWatch, least: int) -> None:
     """Close once with the greatest force: the closed stop of a jaw gives."""
     before = await watch.look()
     closed, _ = await _fingers_to(bench, watch, before, CLOSED, PRESSING_SPEED, FORCE_MAX)
@@ -70,9 +70,9 @@ async def _press(bench: Bench, watch: Watch, least: int) -> None:
     bench.judge("stroke.force", 0 <= most - least <= GIVE, found, follows, least=least, greatest=most)
 
 
-async def _stroke(watch: Watch, image: Request, axes: tuple[Finger, ...]) -> tuple[RobotiqStatus, float]:
+async def _stroke(watch: StageWatch, image: Request, axes: tuple[Finger, ...]) -> tuple[RobotiqStatus, float]:
     began = await watch.write(image)
-    rest = Rest(axes)
+    rest = AxesAtRest(axes)
 
     def is_over(status: RobotiqStatus) -> bool:
         # Where limits are echoed, the scissor's echo does not reveal the end: two seconds of rest do.
@@ -87,7 +87,7 @@ async def _stroke(watch: Watch, image: Request, axes: tuple[Finger, ...]) -> tup
     return status, rest.moved_at - began
 
 
-async def _scissor(bench: Bench, watch: Watch, home: int) -> None:
+async def _scissor(bench: Bench, watch: StageWatch, home: int) -> None:
     echoes: list[Figure] = []
     readings: list[Figure] = []
     for goal in (0, 255, home):

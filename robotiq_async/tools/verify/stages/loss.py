@@ -13,7 +13,7 @@ from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError, Figure
 from ..motions import MARGIN, activate, are_near, in_place, motion_envelope
-from ..watch import ENTER, Watch
+from ..watch import ENTER, StageWatch
 
 SECONDS: Final = 900.0
 STEP: Final = 60
@@ -84,7 +84,7 @@ async def _client(bench: Bench) -> None:
     await _first_motion(bench, watch, image, home)
 
 
-async def _first_motion(bench: Bench, watch: Watch, image: Request, home: dict[Finger, int]) -> None:
+async def _first_motion(bench: Bench, watch: StageWatch, image: Request, home: dict[Finger, int]) -> None:
     """Write a motion as the first image on a new connection."""
     assert watch.last is not None
     here = {Finger.A: watch.last.position(Finger.A)}

@@ -17,8 +17,8 @@ from ....values.errors import RobotiqConnectionError
 from ....values.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap, Registers
 from ....values.statistics import percentile
 from ..bench import Bench
-from ..catalogue import EndError, Figure, Verdict
-from ..recorded_link import Frame, RecordedLink
+from ..catalogue import CheckVerdict, EndError, Figure
+from ..recorded_link import RecordedExchange, RecordedLink
 from ..watch import LASTING, show_echo
 
 TIMERS: Final = 300
@@ -156,7 +156,7 @@ async def _answers(bench: Bench, registers: RegisterMap) -> bool:
     finally:
         await link.close()
     asked = f"unit {registers.device_id}, function {registers.read_function} at {registers.status}"
-    bench.keep(Frame(began, loop.time(), "probe", words=f"{asked}: {words}"))
+    bench.keep(RecordedExchange(began, loop.time(), "probe", words=f"{asked}: {words}"))
     await asyncio.sleep(GONE_S)
     return bool(block)
 
@@ -194,7 +194,7 @@ async def _round_trip(bench: Bench) -> None:
         worst = max(worst, p99)
     found = f"99 of 100 reads take at most {1000 * worst:.1f} ms"
     timer = bench.checks.get("host.timer")
-    if worst >= POLL_INTERVAL_S and timer is not None and timer.verdict is Verdict.DIFFERS:
+    if worst >= POLL_INTERVAL_S and timer is not None and timer.verdict is CheckVerdict.DIFFERS:
         why = f"{found}, but timers of this computer are late: it may be the slow one"
         bench.inconclusive("read.round_trip", why, **figures)
         return

@@ -15,7 +15,7 @@ from ....values.statistics import percentile
 from ..bench import Bench
 from ..catalogue import EndError, Figure
 from ..motions import MARGIN, are_near, go, in_place, resting_envelope
-from ..watch import Watch
+from ..watch import StageWatch
 
 RATES: Final = (10, 20, 50, 100)
 SPEED: Final = 64
@@ -99,7 +99,7 @@ async def _command(bench: Bench) -> None:
 
 
 async def _burst(
-    bench: Bench, watch: Watch, image: Request, home: int, step: int, rate: int
+    bench: Bench, watch: StageWatch, image: Request, home: int, step: int, rate: int
 ) -> tuple[int, float, bool]:
     """Send commands at a rate; return their number, the seconds, and whether the last was followed."""
     loop = asyncio.get_running_loop()

@@ -10,7 +10,7 @@ from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError, Figure
 from ..motions import MARGIN, are_near, in_place, resting_envelope
-from ..watch import ENTER, Rest, Watch
+from ..watch import ENTER, AxesAtRest, StageWatch
 
 SECONDS: Final = 60.0
 CLOSE_S: Final = 15.0
@@ -105,10 +105,10 @@ class _Closing:
     fingers: tuple[Finger, ...]
     end: RobotiqStatus
     shown: RobotiqStatus | None = None
-    rest: Rest = field(init=False)
+    rest: AxesAtRest = field(init=False)
 
     def __post_init__(self) -> None:
-        self.rest = Rest(self.fingers)
+        self.rest = AxesAtRest(self.fingers)
 
     def is_over(self, status: RobotiqStatus) -> bool:
         """Take in a status; returns whether they have stood for a while, and gDT shows it."""
@@ -118,7 +118,7 @@ class _Closing:
         return stands and not moves
 
 
-async def _close(bench: Bench, watch: Watch, start: RobotiqStatus, speed: int = 0) -> _Closing:
+async def _close(bench: Bench, watch: StageWatch, start: RobotiqStatus, speed: int = 0) -> _Closing:
     """Close, and wait until every finger rests."""
     image = in_place(start, speed=speed)
     await watch.write(image)

@@ -13,7 +13,7 @@ from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError, Figure
 from ..motions import MARGIN, are_near, go, in_place, motion_envelope
-from ..watch import Rest, Watch
+from ..watch import AxesAtRest, StageWatch
 
 SECONDS: Final = 90.0
 SPEED: Final = 64
@@ -44,14 +44,14 @@ async def stopping(bench: Bench) -> None:
         raise EndError("time", "the fingers did not return to where they began")
 
 
-async def _until_past(watch: Watch, is_past: Callable[[RobotiqStatus], bool]) -> RobotiqStatus:
+async def _until_past(watch: StageWatch, is_past: Callable[[RobotiqStatus], bool]) -> RobotiqStatus:
     status = await watch.until(is_past, LEG_S)
     if status is None:
         raise EndError("time", f"the fingers did not get half way within {LEG_S:g} s")
     return status
 
 
-async def _halt(bench: Bench, watch: Watch, away: Request, home: dict[Finger, int]) -> None:
+async def _halt(bench: Bench, watch: StageWatch, away: Request, home: dict[Finger, int]) -> None:
     await watch.write(away)
     status = await _until_past(
         watch, lambda s: all(s.position(f) >= home[f] + STROKE // 2 for f in bench.fingers)
@@ -95,9 +95,9 @@ class _StopTrial(NamedTuple):
         }
 
 
-async def _stop(bench: Bench, watch: Watch, image: Request, status: RobotiqStatus) -> _StopTrial:
+async def _stop(bench: Bench, watch: StageWatch, image: Request, status: RobotiqStatus) -> _StopTrial:
     """Write an image that stops, and watch the fingers until they rest."""
-    rest = Rest(bench.fingers)
+    rest = AxesAtRest(bench.fingers)
     rest.lasts(status, 0.3)  # from here on
     began, before, asked = rest.moved_at, rest.positions, bench.link.asked
     acknowledged = await watch.write(image)
@@ -107,7 +107,7 @@ async def _stop(bench: Bench, watch: Watch, image: Request, status: RobotiqStatu
     return _StopTrial(counts, rest.moved_at - began, acknowledged - asked, rate)
 
 
-async def _resume(bench: Bench, watch: Watch, away: Request, far: dict[Finger, int]) -> None:
+async def _resume(bench: Bench, watch: StageWatch, away: Request, far: dict[Finger, int]) -> None:
     await watch.write(away)
     resumes = await watch.until(lambda status: are_near(status, far, MARGIN), LEG_S) is not None
     where = [watch.last.position(finger) for finger in bench.fingers] if watch.last else []
@@ -118,7 +118,7 @@ async def _resume(bench: Bench, watch: Watch, away: Request, far: dict[Finger, i
 
 
 async def _half_way_home(
-    bench: Bench, watch: Watch, image: Request, home: dict[Finger, int]
+    bench: Bench, watch: StageWatch, image: Request, home: dict[Finger, int]
 ) -> RobotiqStatus:
     near = {finger: home[finger] + 10 for finger in bench.fingers}
     await watch.write(replace(image, go=True).with_positions(near))
@@ -127,7 +127,7 @@ async def _half_way_home(
     )
 
 
-async def _new_target(bench: Bench, watch: Watch, image: Request, home: dict[Finger, int]) -> None:
+async def _new_target(bench: Bench, watch: StageWatch, image: Request, home: dict[Finger, int]) -> None:
     """Move towards home; half way back out a little."""
     await _half_way_home(bench, watch, image, home)
     turned = {finger: home[finger] + STROKE - 10 for finger in bench.fingers}
@@ -138,7 +138,7 @@ async def _new_target(bench: Bench, watch: Watch, image: Request, home: dict[Fin
     await watch.until_still(2.0)
 
 
-async def _hold(bench: Bench, watch: Watch, image: Request, home: dict[Finger, int]) -> None:
+async def _hold(bench: Bench, watch: StageWatch, image: Request, home: dict[Finger, int]) -> None:
     status = await _half_way_home(bench, watch, image, home)
     here = {finger: status.position(finger) for finger in bench.fingers}
     stop = await _stop(bench, watch, replace(image, go=True).with_positions(here), status)

@@ -15,7 +15,7 @@ from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import NO_OPTIONS, Figure, Options
 from ..motions import as_found
-from ..watch import Watch, describe
+from ..watch import StageWatch, describe
 
 SECONDS: Final = 60.0
 STILL_S: Final = 1.0
@@ -55,7 +55,7 @@ async def writing(bench: Bench) -> None:
     await _echoed(watch, image)
 
 
-async def _same(bench: Bench, watch: Watch, image: Request) -> None:
+async def _same(bench: Bench, watch: StageWatch, image: Request) -> None:
     """Write the image as found, twice; the first clears rGTO if it was left set."""
     await watch.write(image)
     before = await watch.watch_for(0.2)
@@ -73,7 +73,7 @@ def _lasting(status: RobotiqStatus) -> tuple[object, ...]:
     return status.activation_echo, status.initialization, status.mode, status.echo
 
 
-async def _motion(bench: Bench, watch: Watch, image: Request) -> None:
+async def _motion(bench: Bench, watch: StageWatch, image: Request) -> None:
     before = await watch.look()
     await watch.write(_marked(image, 1))
     moved: list[str] = []
@@ -94,7 +94,7 @@ async def _motion(bench: Bench, watch: Watch, image: Request) -> None:
         bench.differs("write.motion", f"with rGTO = 0 {', '.join(moved)}", follows)
 
 
-async def _echo(bench: Bench, watch: Watch, image: Request) -> float:
+async def _echo(bench: Bench, watch: StageWatch, image: Request) -> float:
     """Measure the time from the acknowledgement to the start of the first read with the echo.
 
     Returns:
@@ -130,11 +130,11 @@ async def _echo(bench: Bench, watch: Watch, image: Request) -> float:
     return percentile(sorted(writes), 0.5)
 
 
-async def _echoed(watch: Watch, image: Request, interval: float | None = None) -> RobotiqStatus | None:
+async def _echoed(watch: StageWatch, image: Request, interval: float | None = None) -> RobotiqStatus | None:
     return await watch.until(lambda status: status.echo == image.echo, LONGEST_ECHO_S, interval)
 
 
-async def _spacing(bench: Bench, watch: Watch, image: Request, usual: float) -> None:
+async def _spacing(bench: Bench, watch: StageWatch, image: Request, usual: float) -> None:
     """Write pairs of images, closer and closer, and check whether the second acts.
 
     A pair whose first image was late on its way reached the gripper closer together than it was sent: it does
@@ -162,7 +162,9 @@ async def _spacing(bench: Bench, watch: Watch, image: Request, usual: float) -> 
     _judge_spacing(bench, kept, enough)
 
 
-async def _pair(bench: Bench, watch: Watch, image: Request, gap: float, number: int) -> tuple[float, bool]:
+async def _pair(
+    bench: Bench, watch: StageWatch, image: Request, gap: float, number: int
+) -> tuple[float, bool]:
     """Write twice, so far apart; the seconds to the first acknowledgement, and whether the second acts."""
     loop = asyncio.get_running_loop()
     await watch.pause(APART_S)
@@ -175,7 +177,7 @@ async def _pair(bench: Bench, watch: Watch, image: Request, gap: float, number: 
     return acknowledged - began, shown is not None
 
 
-async def _function_23(bench: Bench, watch: Watch, image: Request) -> None:
+async def _function_23(bench: Bench, watch: StageWatch, image: Request) -> None:
     """Write marked images with function 23; one that is refused is written with function 16."""
     loop, times = asyncio.get_running_loop(), list[float]()
     for number in range(PROBES):
@@ -195,7 +197,7 @@ async def _function_23(bench: Bench, watch: Watch, image: Request) -> None:
     bench.as_assumed("write.function_23", found, p50_ms=p50, worst_ms=worst)
 
 
-async def _is_answered(bench: Bench, watch: Watch, image: Request, *, is_first: bool) -> bool:
+async def _is_answered(bench: Bench, watch: StageWatch, image: Request, *, is_first: bool) -> bool:
     """Write with function 23. If the first one takes the link along, the reads after it decide."""
     try:
         return await watch.write_and_read(image)

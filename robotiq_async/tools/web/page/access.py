@@ -25,7 +25,7 @@ COOKIE: Final = "robotiq_async"
 _LOCAL: Final = ("127.0.0.1", "localhost", "[::1]")
 
 
-class Verdict(Enum):
+class AccessDecision(Enum):
     """The decision about a request."""
 
     SERVE = "it is served"
@@ -59,21 +59,21 @@ class Access:
         if port == (443 if settings.certificate else 80):
             self._hosts |= {name.lower() for name in names}
 
-    def judge(self, head: Head) -> Verdict:
+    def judge(self, head: Head) -> AccessDecision:
         """Decide about a request."""
         host = head.headers.get("host", "").lower()
         # On another interface the server does not know its own names; the cookie belongs to the right one.
         if not host or (self.settings.loopback and host not in self._hosts):
-            return Verdict.WRONG_HOST
+            return AccessDecision.WRONG_HOST
         origin = head.headers.get("origin")
         needs_origin = head.method not in ("GET", "HEAD")
         if (origin is None and needs_origin) or not self._is_ours(origin, host):
-            return Verdict.WRONG_ORIGIN
+            return AccessDecision.WRONG_ORIGIN
         if head.path.startswith(f"{self.settings.folder}/") and self._has_cookie(head):
-            return Verdict.SERVE
+            return AccessDecision.SERVE
         if head.path == "/" and head.method in ("GET", "POST"):
             return self._login(head)
-        return Verdict.NO_TOKEN
+        return AccessDecision.NO_TOKEN
 
     def knows(self, password: str) -> bool:
         """Whether this is the password."""
@@ -90,12 +90,12 @@ class Access:
         path = self.settings.folder
         return f"{COOKIE}={self._session}; Path={path}; HttpOnly; SameSite=Lax{secure}"
 
-    def _login(self, head: Head) -> Verdict:
+    def _login(self, head: Head) -> AccessDecision:
         if self.settings.password:
-            return Verdict.ASK
+            return AccessDecision.ASK
         token = parse_qs(head.query).get("token", [""])[0]
         is_right = head.method == "GET" and _same(token, self.settings.token)
-        return Verdict.LET_IN if is_right else Verdict.NO_TOKEN
+        return AccessDecision.LET_IN if is_right else AccessDecision.NO_TOKEN
 
     def _is_ours(self, origin: str | None, host: str) -> bool:
         return origin is None or origin.lower() == f"{self.settings.scheme}://{host}"

@@ -11,12 +11,12 @@ from typing import Any, Final
 from urllib.parse import parse_qs
 from weakref import WeakValueDictionary
 
-from .access import Access, Head, Verdict
+from .access import Access, AccessDecision, Head
 
-Message = MutableMapping[str, Any]
-Receive = Callable[[], Awaitable[Message]]
-Send = Callable[[Message], Awaitable[None]]
-App = Callable[[Message, Receive, Send], Awaitable[None]]
+AsgiMessage = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[AsgiMessage]]
+AsgiSend = Callable[[AsgiMessage], Awaitable[None]]
+App = Callable[[AsgiMessage, Receive, AsgiSend], Awaitable[None]]
 
 TRY_S: Final = 1.0
 """Duration of a wrong attempt; the next one from the same address waits for it."""
@@ -53,24 +53,24 @@ class Guard:
         """Locks by address: many attempts from one do not delay those from others."""
         self._waiting: Counter[str] = Counter()  # attempts by address
 
-    async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
+    async def __call__(self, scope: AsgiMessage, receive: Receive, send: AsgiSend) -> None:
         if scope["type"] == "lifespan":
             await self.app(scope, receive, send)
             return
         verdict = self._access.judge(_head(scope))
-        if verdict is Verdict.SERVE:
+        if verdict is AccessDecision.SERVE:
             await self.app(scope, receive, _with_headers(send))
         elif scope["type"] == "websocket":
             await receive()
             await send({"type": "websocket.close", "code": 1008})
-        elif verdict is Verdict.LET_IN:
+        elif verdict is AccessDecision.LET_IN:
             await self._let_in(send)
-        elif verdict is Verdict.ASK:
+        elif verdict is AccessDecision.ASK:
             await self._ask(scope, receive, send)
         else:
             await _answer(send, 403, f"<p>{escape(verdict.value)}.</p>")
 
-    async def _ask(self, scope: Message, receive: Receive, send: Send) -> None:
+    async def _ask(self, scope: AsgiMessage, receive: Receive, send: AsgiSend) -> None:
         if scope["method"] != "POST":
             await _answer(send, 200, _FORM)
             return
@@ -92,12 +92,12 @@ class Guard:
         else:
             await _answer(send, 403, f"<p>That is not the password.</p>{_FORM}")
 
-    async def _let_in(self, send: Send) -> None:
+    async def _let_in(self, send: AsgiSend) -> None:
         location = f"{self._access.settings.folder}/"
         await _answer(send, 303, "", {"location": location, "set-cookie": self._access.cookie})
 
 
-def _head(scope: Message) -> Head:
+def _head(scope: AsgiMessage) -> Head:
     headers: dict[str, str] = {}
     for name, value in scope["headers"]:
         key, text = name.decode("latin-1"), value.decode("latin-1")
@@ -118,7 +118,7 @@ async def _body(receive: Receive) -> bytes:
     return body[:MAX_FORM]
 
 
-async def _answer(send: Send, status: int, words: str, more: dict[str, str] | None = None) -> None:
+async def _answer(send: AsgiSend, status: int, words: str, more: dict[str, str] | None = None) -> None:
     fields = {
         "content-type": "text/html; charset=utf-8",
         "cache-control": "no-store",
@@ -131,10 +131,10 @@ async def _answer(send: Send, status: int, words: str, more: dict[str, str] | No
     await send({"type": "http.response.body", "body": (_PAGE + words).encode()})
 
 
-def _with_headers(send: Send) -> Send:
+def _with_headers(send: AsgiSend) -> AsgiSend:
     added = [(name.encode(), value.encode()) for name, value in HEADERS.items()]
 
-    async def sent(message: Message) -> None:
+    async def sent(message: AsgiMessage) -> None:
         if message["type"] == "http.response.start":
             message = {**message, "headers": [*message.get("headers", ()), *added]}
         await send(message)

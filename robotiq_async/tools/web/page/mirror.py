@@ -29,7 +29,7 @@ QUIET_S: Final = 1.5
 
 
 @dataclass(frozen=True, slots=True)
-class Sample:
+class CurvePoint:
     """A point of the curves."""
 
     at: float  # monotonic seconds of this process
@@ -56,7 +56,7 @@ class HandMirror:
     problem: str = ""  # why the hand could not be started; empty if it was
     inhibited: Inhibit | None = None  # why a person has the hand refuse motion
     statistics: dict[str, Any] = field(default_factory=dict)  # the newest
-    samples: deque[Sample] = field(default_factory=deque)  # of the last 30 s
+    samples: deque[CurvePoint] = field(default_factory=deque)  # of the last 30 s
     events: deque[tuple[int, dict[str, Any]]] = field(default_factory=lambda: deque(maxlen=EVENTS))
     peaks: list[int] = field(default_factory=list)  # of the currents since the last sample
     changes: int = 0  # number of updates
@@ -103,17 +103,17 @@ class HandMirror:
         if self.samples and now - self.samples[-1].at < SAMPLE_S - 0.0005:
             return
         if self.samples and now - self.samples[-1].at > QUIET_S:
-            self.samples.append(Sample(now - SAMPLE_S, None, None))  # a gap in the curve
+            self.samples.append(CurvePoint(now - SAMPLE_S, None, None))  # a gap in the curve
         status = None if self.is_lost else self.status
         positions = None if status is None else tuple(status.position(axis) for axis in status.model.axes)
         currents = None if status is None or not status.has_current else tuple(self.peaks)
-        self.samples.append(Sample(now, positions, currents))
+        self.samples.append(CurvePoint(now, positions, currents))
         self.peaks = [0] * len(self.peaks)
         while now - self.samples[0].at > HISTORY_S:
             self.samples.popleft()
 
 
-class Mirror:
+class PageMirror:
     """The state of all hands, in the order of their addresses, and the way to the process that has them.
 
     ``speed`` and ``force`` are the initial values of the sliders; ``say`` sends to the other process.

@@ -10,7 +10,7 @@ from nicegui import Client, ui
 from nicegui.events import GenericEventArguments
 
 from .heartbeat import BEAT_MS, SCRIPT, Heartbeat
-from .mirror import HandMirror, Mirror
+from .mirror import HandMirror, PageMirror
 from .widgets.controls import Controls
 from .widgets.panels import AxesPanel, Curves, Events, StatePanel, StatisticsPanel
 from .widgets.scene import HandScene
@@ -66,7 +66,7 @@ PRESSED: Final = ", and nothing that is pressed here arrives, HALT neither"
 class PageSessions:
     """Counts the browsers, notices when one is lost, and resends everything to one that returns."""
 
-    def __init__(self, mirror: Mirror) -> None:
+    def __init__(self, mirror: PageMirror) -> None:
         self._mirror = mirror
         self._present: set[str] = set()
 
@@ -105,7 +105,7 @@ class PageSessions:
         self._mirror.count(len(self._present))
 
 
-def register(mirror: Mirror) -> None:
+def register(mirror: PageMirror) -> None:
     """Register the pages with NiceGUI."""
     sessions = PageSessions(mirror)
 
@@ -124,7 +124,7 @@ def register(mirror: Mirror) -> None:
             ui.label(f"There is no hand {index}: there are {len(mirror.hands)}.")
 
 
-def _frame(title: str, mirror: Mirror, *, home: bool) -> None:
+def _frame(title: str, mirror: PageMirror, *, home: bool) -> None:
     ui.add_head_html(STYLE)
     ui.add_body_html(CUT.format(PRESSED if mirror.control else "") + SCRIPT)
     dark = ui.dark_mode(None)
@@ -142,7 +142,7 @@ def _frame(title: str, mirror: Mirror, *, home: bool) -> None:
                 button.props(f"flat dense color=white data-testid={icon}")
 
 
-def _hand_page(mirror: Mirror, hand: HandMirror, client: Client, sessions: PageSessions) -> None:
+def _hand_page(mirror: PageMirror, hand: HandMirror, client: Client, sessions: PageSessions) -> None:
     _frame(hand.address, mirror, home=len(mirror.hands) > 1)
     heartbeat = sessions.begin(client)
     shown: list[Callable[[], None]] = []
@@ -185,7 +185,7 @@ def _halt_button(name: str, what: str, halt: Callable[[], None]) -> None:
         button.props("data-testid=halt").tooltip(f"{what}; the space bar does it too")
 
 
-def _tiles(mirror: Mirror, client: Client, sessions: PageSessions) -> None:
+def _tiles(mirror: PageMirror, client: Client, sessions: PageSessions) -> None:
     _frame(f"{len(mirror.hands)} hands", mirror, home=False)
     sessions.begin(client)
     with ui.element("div").classes("grid w-full gap-3 grid-cols-1 sm:grid-cols-2 xl:grid-cols-3"):
@@ -195,12 +195,12 @@ def _tiles(mirror: Mirror, client: Client, sessions: PageSessions) -> None:
     ui.timer(2 * REFRESH_S, lambda: [show() for show in shown])
 
 
-def _halt_all(mirror: Mirror, page: str) -> None:
+def _halt_all(mirror: PageMirror, page: str) -> None:
     for hand in mirror.hands:
         mirror.ask(page, hand.index, "halt", {}, lambda *_: None, at=monotonic())
 
 
-def _tile(mirror: Mirror, hand: HandMirror) -> Callable[[], None]:
+def _tile(mirror: PageMirror, hand: HandMirror) -> Callable[[], None]:
     # A link, so that it can be opened in another tab and by keyboard.
     link = ui.link(target=f"/hand/{hand.index}").classes(replace="w-full text-inherit no-underline")
     with link.props(f"data-testid=tile-{hand.index}"), ui.card().classes("w-full"):

@@ -17,7 +17,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from ..settings import PageSettings
 from .access import Access
 from .guard import Guard
-from .mirror import Mirror
+from .mirror import PageMirror
 from .pages import register
 from .pipes import Pipes
 
@@ -70,7 +70,7 @@ def run(settings: PageSettings, listening: socket.socket, pipes: Pipes) -> None:
     Raises:
         OSError: a certificate that cannot be used.
     """
-    mirror = Mirror(
+    mirror = PageMirror(
         settings.addresses,
         control=settings.control,
         say=pipes.say,
@@ -94,7 +94,7 @@ def run(settings: PageSettings, listening: socket.socket, pipes: Pipes) -> None:
     asyncio.run(_serve(config, listening, mirror, pipes))
 
 
-def _application(settings: PageSettings, mirror: Mirror) -> FastAPI:
+def _application(settings: PageSettings, mirror: PageMirror) -> FastAPI:
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     register(mirror)
     ui.run_with(
@@ -108,7 +108,7 @@ def _application(settings: PageSettings, mirror: Mirror) -> FastAPI:
     return app
 
 
-async def _serve(config: uvicorn.Config, listening: socket.socket, mirror: Mirror, pipes: Pipes) -> None:
+async def _serve(config: uvicorn.Config, listening: socket.socket, mirror: PageMirror, pipes: Pipes) -> None:
     server, loop = _Server(config), asyncio.get_running_loop()
     threading.Thread(target=_hear, args=(pipes, mirror, loop, server), daemon=True).start()
     beating = loop.create_task(_beat(mirror, server, pipes, listening.getsockname()[1]))
@@ -116,7 +116,7 @@ async def _serve(config: uvicorn.Config, listening: socket.socket, mirror: Mirro
     beating.cancel()
 
 
-async def _beat(mirror: Mirror, server: _Server, pipes: Pipes, port: int) -> None:
+async def _beat(mirror: PageMirror, server: _Server, pipes: Pipes, port: int) -> None:
     await server.serving.wait()
     pipes.say({"serving": port})
     while True:
@@ -124,7 +124,7 @@ async def _beat(mirror: Mirror, server: _Server, pipes: Pipes, port: int) -> Non
         mirror.beat()
 
 
-def _hear(pipes: Pipes, mirror: Mirror, loop: asyncio.AbstractEventLoop, server: _Server) -> None:
+def _hear(pipes: Pipes, mirror: PageMirror, loop: asyncio.AbstractEventLoop, server: _Server) -> None:
     # In a thread: not every system can wait for a pipe in an event loop.
     with suppress(RuntimeError):  # the loop has been closed
         for line in pipes.lines():

@@ -12,7 +12,7 @@ from .....values.enums import CLOSED, FORCE_MAX, OPEN, SPEED_MAX, Finger, names_
 from ....actions import ACTIONS, Action
 from ....wording import JAW_NAME
 from ..heartbeat import PRESS, PRESS_WITH_VALUE, Heartbeat
-from ..mirror import HandMirror, Mirror
+from ..mirror import HandMirror, PageMirror
 from .words import COLORS, NAMES
 
 ARMED_S: Final = 0.3
@@ -117,7 +117,12 @@ class Controls:
     """The controls; only a page that may command has them. ``report`` gets the outcome of each command."""
 
     def __init__(
-        self, mirror: Mirror, hand: HandMirror, page: str, heartbeat: Heartbeat, report: Callable[[str], None]
+        self,
+        mirror: PageMirror,
+        hand: HandMirror,
+        page: str,
+        heartbeat: Heartbeat,
+        report: Callable[[str], None],
     ) -> None:
         self._mirror, self._hand, self._page = mirror, hand, page
         self._heartbeat, self._report = heartbeat, report

@@ -49,7 +49,7 @@ MOVED: Final = 2e-5
 Calls = list[list[Any]]
 
 
-class Figure:
+class HandFigure:
     """The links of a hand as nested groups: turning a joint moves all links beyond it.
 
     A ghost cannot be found by the names of the links.
@@ -126,7 +126,7 @@ class Figure:
         self.look(link, GHOST if self._ghost else None, STALE if self._ghost else 1.0)
 
 
-class Parts:
+class SceneParts:
     """The parts before the gripper, where a simulation has them."""
 
     def __init__(self, root: Object3D) -> None:
@@ -177,15 +177,15 @@ class Drawing:
     def __init__(self, kind: Model, *, compact: bool) -> None:
         model = hand_model(kind)
         self.kind, self.model = kind, model
-        self.ghost: Figure | None = None if compact else Figure(model, ghost=True)
-        self.figure = Figure(model, ghost=False)
+        self.ghost: HandFigure | None = None if compact else HandFigure(model, ghost=True)
+        self.figure = HandFigure(model, ghost=False)
         with self.figure.root:
             # A cylinder of three.js lies along y, that of a 3-Finger's bar along z.
             self.bar = ui.scene.cylinder(1.0, 1.0, 1.0, 48).with_name("bar")
             if kind is THREE_FINGER:
                 self.bar.rotate(pi / 2, 0, 0)
             self.ball = ui.scene.sphere(1.0).with_name("ball")
-        self.parts = Parts(self.figure.root)
+        self.parts = SceneParts(self.figure.root)
         for each in (self.bar, self.ball):
             each.material(HELD, 0.7).visible(False)
         if kind is THREE_FINGER and not compact:
@@ -237,7 +237,9 @@ class HandScene:
             self.scene.move_camera(0.4 * near, -1.1 * near, 1.05 * near, 0, 0, 0.52 * near, duration=0)
         return self._drawing
 
-    def _show_ghost(self, model: HandModel, ghost: Figure, hand: HandMirror, status: RobotiqStatus) -> Calls:
+    def _show_ghost(
+        self, model: HandModel, ghost: HandFigure, hand: HandMirror, status: RobotiqStatus
+    ) -> Calls:
         away = _away(status) if status.go_echo and status.is_activated and not hand.is_lost else Finger(0)
         for finger, links in model.fingers.items():
             for link in links:
