@@ -6,7 +6,15 @@ import asyncio
 
 import pytest
 
-from robotiq_async import Finger, InvalidStateError, RobotiqHand, State
+from robotiq_async import (
+    TWO_FINGER_85,
+    ConnectFailedError,
+    ConnectionLostError,
+    Finger,
+    InvalidStateError,
+    RobotiqHand,
+    State,
+)
 from robotiq_async.simulator import RtuOverTcpSimulatorServer, SimulatedGripper, Trouble
 from tests.grippers import activate_beforehand
 
@@ -59,3 +67,60 @@ async def test_a_socket_carries_one_protocol() -> None:
         with pytest.raises(InvalidStateError):
             await RobotiqHand(server.address.removeprefix("rtu+"), device_id=12).start(activate=False)
         await one.stop()
+
+
+# -- links as they were recorded -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "least", "usual", "most"),
+    [("uneven-delay", 0.010, 0.035, 0.260), ("latency-timer", 0.013, 0.016, 0.020)],
+)
+async def test_a_slow_link_whose_delay_varies_costs_no_move(
+    words: str, least: float, usual: float, most: float
+) -> None:
+    """Serial servers took 20 to 60 ms, and up to 260; an adapter's timer ends every 16 ms."""
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, model=TWO_FINGER_85)
+    async with RtuOverTcpSimulatorServer(gripper) as server:
+        await server.fault_injector.begin(Trouble(words))
+        async with RobotiqHand(server.address) as hand:
+            for position in (200, 20, 120, 60):
+                assert (await hand.move(position, speed=60)).positions[A] == pytest.approx(position, abs=3)
+            statistics = hand.statistics
+    assert statistics.reconnects == 0
+    assert least <= statistics.round_trip_p50 <= 1.3 * usual
+    assert statistics.round_trip_p99 <= most + 0.01
+
+
+async def test_a_first_request_that_is_lost_costs_its_time_at_each_connection() -> None:
+    gripper = SimulatedGripper(asyncio.get_running_loop().time, model=TWO_FINGER_85)
+    async with RtuOverTcpSimulatorServer(gripper) as server:
+        lost = await server.fault_injector.begin(Trouble("first-lost"))
+        async with RobotiqHand(server.address) as hand:
+            server.cut()
+            await hand.wait_for_state(State.DISCONNECTED, timeout=5)
+            await hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
+            await hand.move(100)
+    assert lost.hits == 2
+
+
+async def test_a_forwarder_that_keeps_its_old_connection_is_waited_for() -> None:
+    """One at a tool port did so for 30 to 45 s."""
+    loop = asyncio.get_running_loop()
+    gripper = SimulatedGripper(loop.time, model=TWO_FINGER_85)
+    async with RtuOverTcpSimulatorServer(gripper) as server:
+        await server.fault_injector.begin(Trouble("old-connection"))
+        async with RobotiqHand(server.address) as hand:
+            await hand.move(200)
+            server.cut()
+            cut_at, written = loop.time(), len(gripper.writes)
+            await hand.wait_for_state(State.DISCONNECTED, timeout=5)
+            with pytest.raises(ConnectionLostError):
+                await hand.move(100)
+            await hand.wait_for_state(State.RUNNING_IDLE, timeout=60)
+            assert 30 <= loop.time() - cut_at < 40
+            assert len(gripper.writes) == written, "nothing that was asked meanwhile comes later"
+            await hand.move(100)
+        # A program that starts again at once meets its own old connection.
+        with pytest.raises(ConnectFailedError):
+            await RobotiqHand(server.address).start()

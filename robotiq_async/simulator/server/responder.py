@@ -88,6 +88,7 @@ class Responder(ABC):
         """Take note that a client has gone."""
         if client in self.clients:
             self.clients.remove(client)
+            self.fault_injector.left()
 
     def fail(self, error: PhysicsError) -> None:
         """Drop all clients for good: the gripper has no state any more that could be told."""

@@ -22,6 +22,7 @@ import contextlib
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from random import Random
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from robotiq_async.values.enums import Finger
@@ -29,6 +30,7 @@ from robotiq_async.values.registers import REGISTER_COUNT
 from robotiq_async.values.request import AxisRequest, Request
 
 from ..functions import READ_INPUT, READ_WRITE
+from . import corruption
 from .corruption import ReplyPolicy, reply_on
 from .trouble import KINDS, Link, Trouble
 
@@ -105,6 +107,12 @@ class FaultInjector:
         """The timer after which the gripper loses its activation, unless a request comes first."""
         self._idle_after: float | None
         """Its seconds, by the least patient trouble."""
+        self._draw = Random(1)
+        """The delays of an uneven link: the same each time."""
+        self._loses_next = False
+        """Whether the next request is the first of a connection, and is not heard."""
+        self._left_at = -math.inf
+        """The time at which the last connection ended that was answered."""
         self._decide()
 
     @property
@@ -220,6 +228,7 @@ class FaultInjector:
         self.served_registers: int = min(served, default=REGISTER_COUNT)
         self.set_spacing: float = max(spacings, default=0.0)
         self.is_unreadable: bool = bool(self._lasting("unreadable"))
+        self._kept_for = max((trouble.amount for trouble in self._lasting("old-connection")), default=0.0)
         self._idle_after = min(waits, default=None)
 
     # Called by the simulator.
@@ -230,11 +239,25 @@ class FaultInjector:
             return False
         if self._lasting("wake-needed"):
             self._target.gripper.is_asleep = True
+        self._loses_next = True
         return True
+
+    def left(self) -> None:
+        """A connection has ended. One that was not answered because of an older one counts for nothing."""
+        if not self._keeps_old_connection:
+            self._left_at = asyncio.get_running_loop().time()
+
+    @property
+    def _keeps_old_connection(self) -> bool:
+        return asyncio.get_running_loop().time() < self._left_at + self._kept_for
 
     def hears(self) -> bool:
         """Whether the request that came in is heard."""
-        if self._meets("silence", "accept-silence"):
+        is_first, self._loses_next = self._loses_next, False
+        if self._meets("silence", "accept-silence") or (is_first and self._meets("first-lost")):
+            return False
+        if self._keeps_old_connection:
+            self._meets("old-connection")
             return False
         self._await_request()
         return True
@@ -246,11 +269,21 @@ class FaultInjector:
     def deliver(self, frame: bytes) -> Iterable[tuple[float, bytes]] | None:
         """The parts to send for a reply; None to hang up."""
         for ongoing in self._ongoing:
-            parts = ongoing.trouble.corrupt(reply_on(self._target.link, frame))
+            trouble = ongoing.trouble
+            parts = trouble.corrupt(reply_on(self._target.link, frame), self._amount(trouble))
             if parts is not None:
                 self._hit(ongoing)
                 return parts
         return self._target.policy(frame)
+
+    def _amount(self, trouble: Trouble) -> float:
+        """The value of a trouble for one reply."""
+        match trouble.kind:
+            case "uneven-delay":
+                return corruption.uneven(self._draw.random(), trouble.amount)
+            case "latency-timer":
+                return trouble.amount - asyncio.get_running_loop().time() % trouble.amount
+        return trouble.amount
 
     def _meets(self, *kinds: str) -> bool:
         """Whether a trouble of these kinds lasts; the oldest of them counts a hit."""

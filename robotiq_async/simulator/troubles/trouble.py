@@ -143,6 +143,15 @@ KINDS: Final[dict[str, Kind]] = {
         link="tcp",
         is_modbus=True,
     ),
+    "uneven-delay": Kind(
+        "replies come 10 to 60 ms later as a rule, and one in a hundred up to VALUE seconds",
+        *(_CONDITION, 0.26, 0.12, 10, corruption.delay),
+    ),
+    "latency-timer": Kind(
+        "replies wait for the timer of a USB adapter, which ends every VALUE seconds",
+        *(_CONDITION, 0.016, 0.001, 1, corruption.delay),
+        link="rtu",
+    ),
     # Requests and connections.
     "silence": Kind("requests are not heard; connections stay open", _CONDITION),
     "echo": Kind("the line brings back what is sent", _CONDITION, link="rtu"),
@@ -157,6 +166,12 @@ KINDS: Final[dict[str, Kind]] = {
         "connections are reset; new ones are accepted, not answered", _CONDITION, link="tcp"
     ),
     "refuse": Kind("connections are reset; new ones are refused", _CONDITION, link="tcp"),
+    "first-lost": Kind("the first request of a new connection is not heard", _CONDITION, link="tcp"),
+    "old-connection": Kind(
+        "a forwarder keeps a connection for VALUE seconds after its end, and answers no new one until then",
+        *(_CONDITION, 30.0, 0, 3600),
+        link="tcp",
+    ),
     "multiplexer": Kind(
         "a gateway keeps its own connection: replies come VALUE seconds later, to the client connected then",
         *(_CONDITION, 0.7, 0, 10),
@@ -295,13 +310,13 @@ class Trouble:
         this: On = "write" if write else "read"
         return self.on in (this, "any") and KINDS[self.kind].on in (this, "any")
 
-    def corrupt(self, reply: Reply) -> Parts | None:
+    def corrupt(self, reply: Reply, amount: float) -> Parts | None:
         """The bytes to send in place of a reply; None for a refusal, or a reply that it does not concern."""
         # A multiplexer is late, and that is not all it does.
         kind = KINDS["delay" if self.kind == "multiplexer" else self.kind]
         if kind.corruption is None or reply.is_exception or not self.is_about(write=reply.is_to_a_write):
             return None
-        return kind.corruption(reply, self.amount)
+        return kind.corruption(reply, amount)
 
     def __str__(self) -> str:
         words = [self.kind]
