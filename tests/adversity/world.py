@@ -142,7 +142,10 @@ class RtuServer(Heard, SerialSimulatorServer):
 
 
 class ToolServer(Heard, RtuOverTcpSimulatorServer):
-    """The gripper at the tool of an arm."""
+    """The other end of the line at an arm's tool."""
+
+    class _responds(Hears, RtuResponder):  # noqa: N801
+        pass
 
 
 class UrcapServer(Heard, UrcapSimulatorServer):
