@@ -293,31 +293,23 @@ async def test_behind_a_router_the_rules_are_the_routers(keys: Path) -> None:
             agent_configuration("lab", "cell", [], [here.endpoint], keys=keys / "agent-cell")
         )
         await here.serve_over(bus, RobotiqHand("sim://"))
-        async with (
-            hand(here.endpoint, keys / "read-alice") as alice,
-            hand(here.endpoint, keys / "operate-bob") as bob,
-        ):
-            for attempt in (alice.halt, alice.acquire):
-                with pytest.raises(NotAllowedError):
-                    await attempt()
+        async with hand(here.endpoint, keys / "operate-bob") as bob:
             await bob.acquire()
             await bob.hold()
             await bob.halt()
-            eve, other, own = [
-                (await here.client(keys / who)).bus for who in ("operate-eve", "read-alice", "operate-bob")
-            ]
-            while (
-                await own.ask(LEFT.question("operate:bob"), b"?", timeout=1.0, urgency=Urgency.COMMAND)
-                is None
-            ):
-                pass
-            for bus in (eve, other):
-                assert (
-                    await bus.ask(LEFT.question("operate:bob"), b"?", timeout=0.5, urgency=Urgency.COMMAND)
-                    is None
-                )
-        async with Fleet("lab", route=Route((here.endpoint,), keys / "halt-panel")) as fleet:
-            assert list((await fleet.halt_all()).values()) == ["stopped"]
+        alice, panel, eve, own = [
+            await here.client(keys / who)
+            for who in ("read-alice", "halt-panel", "operate-eve", "operate-bob")
+        ]
+        for client in (alice, panel, own):
+            await client.watch(LEFT.key("alive", "*")).wait()
+        assert [await alice.may(verb) for verb in ("info", "halt", "lease")] == [True, False, False]
+        assert [await panel.may(verb) for verb in ("info", "halt", "lease")] == [True, True, False]
+        assert [await eve.may(verb) for verb in ("info", "halt", "lease")] == [False] * 3
+        for client, is_its_own in ((own, True), (alice, False)):
+            question = LEFT.question("operate:bob")
+            reply = await client.bus.ask(question, b"?", timeout=1.0, urgency=Urgency.COMMAND)
+            assert (reply is not None) is is_its_own
 
 
 # -- without keys ------------------------------------------------------------------------------------------
