@@ -11,9 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.fleet.agent.agent import Questions
+from robotiq_async.fleet.agent.questions import EACH, Questions
 from robotiq_async.fleet.control.admission import Admission
-from robotiq_async.fleet.control.budget import EACH, Budget
 from robotiq_async.fleet.control.lease import Holder, Lease
 from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
@@ -262,25 +261,35 @@ def test_it_is_known_why_a_lease_ended_for_a_while() -> None:
 # -- questions ---------------------------------------------------------------------------------------------
 
 
+class Asked:
+    """The questions of clients, at times of our own."""
+
+    def __init__(self) -> None:
+        self.at = 1.0
+        self.questions = Questions(lambda: self.at)
+
+    def read(self, who: str, count: int = FLOOD, step: float = 0.0) -> int:
+        """How many are read of those that a client sends, so many seconds from one to the next."""
+        read = 0
+        for _ in range(count):
+            read += self.questions.sort(LEFT.question(who)) is not None
+            self.at += step
+        return read
+
+
 def test_each_client_has_a_second_s_worth_and_then_its_rate() -> None:
-    budget = Budget()
-    assert sum(budget.allows("a", 10.0) for _ in range(FLOOD)) == EACH
-    assert budget.allows("b", 10.0), "others are not concerned"
-    assert sum(budget.allows("a", 11.0 + each / 1000) for each in range(1000)) in range(190, 202)
-    assert sum(budget.allows("a", 99.0) for _ in range(FLOOD)) == EACH, "what was not used is not saved up"
+    asked = Asked()
+    assert [asked.read(who) for who in ("one", "one", "two")] == [EACH, 0, EACH]
+    assert asked.read("one", 1000, step=0.001) in range(90, 102)
+    asked.at = 99.0
+    assert asked.read("one") == EACH, "what was not used is not saved up"
 
 
 def test_the_memory_is_bounded() -> None:
     """Without keys, a client may call itself something else each time."""
-    budget = Budget()
-    assert all(budget.allows(f"client {each}", 5.0) for each in range(FLOOD))
-    assert len(budget._left) <= 1000
-
-
-def test_each_client_has_its_own_budget() -> None:
-    questions = Questions(lambda: 1.0)
-    for who, left in (("one", EACH), ("one", 0), ("two", EACH)):
-        assert sum(questions.sort(LEFT.question(who), b"") is not None for _ in range(FLOOD)) == left
+    asked = Asked()
+    assert all(asked.read(f"client {each}", 1) for each in range(FLOOD))
+    assert len(asked.questions._left) <= 1000
 
 
 def test_dropped_questions_are_logged_now_and_then(caplog: pytest.LogCaptureFixture) -> None:
@@ -288,10 +297,10 @@ def test_dropped_questions_are_logged_now_and_then(caplog: pytest.LogCaptureFixt
     questions = Questions(lambda: at)
     with caplog.at_level(logging.WARNING):
         for _ in range(3000):  # for 15 s
-            questions.sort("", b"")
+            questions.sort("")
             at += 0.005
         for _ in range(FLOOD):
-            questions.sort("", b"")
+            questions.sort("")
     assert caplog.text.count("requests for information were dropped: a client sends too many") == 2
 
 

@@ -87,13 +87,15 @@ async def test_a_command_without_a_lease_or_for_another_run(
     assert len(here.gripper.writes) == writes
 
 
+@pytest.mark.parametrize("second", [{"position": 999}, {}, {"speed": None}, {"position": 9, "mm": 3}])
 @inside(lab)
 async def test_of_a_command_for_several_axes_all_is_carried_out_or_nothing(
-    here: Lab, hand: RemoteHand
+    here: Lab, hand: RemoteHand, second: dict[str, int]
 ) -> None:
+    """The first axis moved, and the answer said that nothing was done."""
     assert hand._session is not None
-    axes = {"1": {"position": 90}, "2": {"position": 999}}
-    with pytest.raises(ValueError, match="999"):
+    axes = {"1": {"position": 90}, "2": second}
+    with pytest.raises((TypeError, ValueError)):
         await hand._session.dialog.ask("cmd/command", {"axes": axes}, timeout=1.0)
     await asyncio.sleep(1)
     assert here.gripper.position(Finger.A) < 10

@@ -5,21 +5,20 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
-import threading
 import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from ...hand.robotiq_hand import RobotiqHand
 from ...runtime.clock import now
-from ...runtime.log import Log, log
+from ...runtime.log import Log
 from ...values.errors import AgentError
-from ..control.budget import Budget
 from ..control.lease import WINDOW_S
-from ..limited_log import EVERY_S, LimitedLog
+from ..limited_log import LimitedLog
 from ..network.bus import Bus, Kind, Query, Undo
 from ..wire.envelope import Call, failure
 from ..wire.names import ROOT, GripperName
+from .questions import Questions
 from .records import NoRecords, Records
 from .served_hand import ServedHand
 
@@ -228,32 +227,3 @@ def _suspended() -> float:
     if not hasattr(time, "CLOCK_BOOTTIME"):
         return 0.0
     return time.clock_gettime(time.CLOCK_BOOTTIME) - time.clock_gettime(time.CLOCK_MONOTONIC)
-
-
-class Questions:
-    """Admits a question before anything else is done with it, in any thread and in a few microseconds.
-
-    A dropped question gets no answer, not even a refusal, which would take as long as the answer.
-    """
-
-    def __init__(self, clock: Callable[[], float]) -> None:
-        self._clock = clock
-        self._budget = Budget()
-        self._lock = threading.Lock()
-        self._dropped = 0
-        self._report_due = 0.0
-
-    def sort(self, key: str, _payload: bytes) -> Kind | None:
-        """Whether to read a question. Its key ends in the client's name: with keys, its certificate's."""
-        # Of each gripper, unless the key names several.
-        client, now = key.rpartition("/")[2] if "*" in key else key, self._clock()
-        with self._lock:
-            if self._budget.allows(client, now):
-                return Kind.QUESTION
-            self._dropped += 1
-            if now >= self._report_due:
-                log.warning(
-                    "%d requests for information were dropped: a client sends too many", self._dropped
-                )
-                self._dropped, self._report_due = 0, now + EVERY_S
-            return None

@@ -34,7 +34,6 @@ from ...runtime.clock import now
 from ...runtime.log import Log
 from ...runtime.version import __version__
 from ...values.amounts import UNITS
-from ...values.checks import check_byte, check_mask
 from ...values.enums import Finger
 from ...values.errors import AgentError, ControlLostError, RobotiqConnectionError, RobotiqError
 from ...values.inhibit import LONGEST, Inhibit
@@ -44,7 +43,7 @@ from ..control.lease import Lease
 from ..network.bus import Bus, Query
 from ..wire.envelope import Answer, Call, failure, unpack_call
 from ..wire.names import GripperName
-from ..wire.settings import moved_by, read_settings, settings_of
+from ..wire.settings import check_changes, moved_by, read_settings, settings_of
 from ..wire.values import Fields, inhibit_fields, read_inhibit, words
 from .jobs import Job, Jobs, Work, label_of
 from .kept_settings import KeptSettings
@@ -423,15 +422,11 @@ class ServedHand:
 
     async def _set(self, job: Job, axes: Fields) -> None:
         """Like :meth:`RobotiqHand.command`, for several axes at once."""
-        asked = {check_mask(int(mask)): changes for mask, changes in axes.items()}
-        for changes in asked.values():  # all of them before the first takes effect
-            for name, value in changes.items():
-                if name in UNITS:
-                    raise TypeError(f"requests are in counts, got {name}")
-                check_byte(name, value)
+        mask = self._hand.model.mask  # all are checked before the first takes effect
+        asked = {mask(int(each)): check_changes(changes) for each, changes in axes.items()}
         self._settings.ask(job.asked)
-        for mask, changes in asked.items():
-            self._hand.command(mask, **changes)
+        for fingers, changes in asked.items():
+            self._hand.command(fingers, **changes)
         self._to_hold &= ~moved_by(job.asked)
 
     def _cancel(self, call: Call, query: Query) -> None:

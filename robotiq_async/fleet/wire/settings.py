@@ -31,6 +31,13 @@ def asked_of(name: str, arguments: Mapping[str, Any]) -> dict[Setting, int]:
         return {}
 
 
+def check_changes(changes: Mapping[str, Any]) -> Mapping[str, int]:
+    """The changes of an axis: TypeError or ValueError unless they are some of _ALL in counts."""
+    if not changes or changes.keys() - {*_ALL}:
+        raise TypeError(f"requests are in counts, got {', '.join(changes) or 'none'}")
+    return {what: check_byte(what, value) for what, value in changes.items()}
+
+
 def moved_by(asked: Mapping[Setting, int]) -> Finger:
     """The axes that are sent to a position."""
     return Finger(sum({axis for axis, what in asked if what == "position"}))

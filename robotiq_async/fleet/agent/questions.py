@@ -1,0 +1,51 @@
+"""Questions: which of them an agent reads. They need no lease, so anybody may send any number."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Final
+
+from ...runtime.log import log
+from ..limited_log import EVERY_S
+from ..network.bus import Kind
+
+EACH: Final = 100.0  # questions a second of one client; fetching missed events takes 50
+_CLIENTS: Final = 1000  # Clients with a budget of their own. The least recent one is forgotten
+
+
+class Questions:
+    """Admits a question before anything else is done with it, in any thread and in a few microseconds.
+
+    Each client has a budget, so that none uses up what the others need; what it does not use in a second is
+    not saved up. A dropped question gets no answer, not even a refusal, which would take as long as one.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._left: dict[str, tuple[float, float]] = {}  # by client: how many, and when that was so
+        self._dropped = 0
+        self._report_due = 0.0
+
+    def sort(self, key: str, _payload: bytes = b"") -> Kind | None:
+        """Whether to read a question. Its key ends in the client's name: with keys, its certificate's."""
+        # Of each gripper, unless the key names several.
+        client, now = key.rpartition("/")[2] if "*" in key else key, self._clock()
+        with self._lock:
+            if self._is_within_budget(client, now):
+                return Kind.QUESTION
+            self._dropped += 1
+            if now >= self._report_due:
+                dropped, self._dropped, self._report_due = self._dropped, 0, now + EVERY_S
+                log.warning("%d requests for information were dropped: a client sends too many", dropped)
+            return None
+
+    def _is_within_budget(self, client: str, now: float) -> bool:
+        left, at = self._left.pop(client, (EACH, now))
+        left = min(EACH, left + (now - at) * EACH)
+        is_within = left >= 1
+        self._left[client] = left - is_within, now
+        if len(self._left) > _CLIENTS:
+            del self._left[next(iter(self._left))]
+        return is_within
