@@ -359,13 +359,13 @@ class Controller:
             if before is None and is_reset and self.activates and self.machine.inhibited is None:
                 self._begin(Trigger.ACTIVATES)
                 return
+            if condition is not before:
+                self._update_state(condition)
         if condition is Trigger.SEEN_READY:
             ledger.update_rest(status)
             if self._requests.calls:
                 self._requests.end_arrived(status, ledger)
-        if condition is not before:
-            self._update_state(condition)
-        if condition is Trigger.SEEN_BUSY:
+        elif condition is Trigger.SEEN_BUSY:
             self._follow_activation(status)
 
     def _note_news(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
@@ -456,18 +456,17 @@ class Controller:
 
     def next_write(self, now: float) -> NextWrite | None:
         """What there is to write; None if there is nothing. It changes nothing, and makes no image."""
-        if not self.has_request:
-            return None  # most cycles end here
-        stop, status = self._stop, self._evidence.status
-        urgent = stop is not None and status is not None and stop.is_urgent(self._ledger, status)
+        stop, status, pending = self._stop, self._evidence.status, self._requests.pending
         is_command = stop is None and self._procedure is None
-        return NextWrite(self._wait(now), urgent, is_command, urgent or bool(self._requests.pending.hold))
+        if is_command and pending.is_empty:
+            return None  # most cycles end here
+        urgent = stop is not None and status is not None and stop.is_urgent(self._ledger, status)
+        return NextWrite(self._wait(now), urgent, is_command, urgent or bool(pending.hold))
 
     def _wait(self, now: float) -> float:
         stop = self._stop
-        if stop is not None and stop.level is not StopLevel.KEEP and not stop.writes:
-            return 0.0
-        return max(0.0, self._free_at - now)
+        is_free = stop is not None and stop.level is not StopLevel.KEEP and not stop.writes
+        return 0.0 if is_free or now >= self._free_at else self._free_at - now
 
     def decide(self, now: float) -> Request | None:
         """Return the image to write now, or None. It counts as sent from here on."""

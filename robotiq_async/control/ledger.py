@@ -171,10 +171,10 @@ class Ledger:
 
     def _may_get(self, is_meant: Callable[[Request], bool]) -> bool:
         """Whether such an image may still act; one in doubt may also never act."""
-        # Every question about what the gripper may get is this one, whatever a status shows today. Every
-        # write asks it, so what costs most comes last.
-        return any(
-            is_meant(each.image) and not (self.acts(each) or self._is_past(each)) for each in self.waiting()
+        # Every question about what the gripper may get is this one, whatever a status shows today.
+        waiting = self.waiting()  # usually nothing does
+        return bool(waiting) and any(
+            is_meant(each.image) and not (self.acts(each) or self._is_past(each)) for each in waiting
         )
 
     @property
@@ -426,8 +426,7 @@ class Ledger:
             # from it: a late gDT alone may make an axis look as if it was asked for where it is.
             if status.go_echo and (self._adoption is None or self._adoption.is_certain):
                 self._find_rest(status)
-        if status.go_echo and (self.contacts or status.contacts):
-            contacts = status.contacts
+        if status.go_echo and ((contacts := status.contacts) or self.contacts):
             if contacts & self.unrested:
                 contacts &= ~self.may_move(status)
             self.contacts.see(status, contacts)

@@ -165,7 +165,8 @@ class Contacts:
 
     def ask(self, axes: Finger) -> None:
         """Axes are asked for a position, perhaps the same: what they do next is open."""
-        self.open |= axes
+        if self._shown:
+            self.open |= axes
 
     def forget(self) -> None:
         """A reset and an activation end every grip."""

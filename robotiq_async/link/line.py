@@ -309,7 +309,7 @@ class Line:
             answer.set_result(obstacle)
             return answer
         self._exchange = exchange
-        self._watchdog.watch(min(self._watchdog.loop.time() + self._allowed(exchange), exchange.timing.by))
+        self._watchdog.watch(self._allowed(exchange), exchange.timing.by)
         try:
             self._send(exchange.frame)
         except OSError as error:
@@ -319,7 +319,7 @@ class Line:
     def _allowed(self, exchange: Exchange) -> float:
         """The longest time for the answer to a request of this turn, in seconds."""
         seconds = exchange.timing.seconds
-        return self._patience.seconds(self._speaker, seconds) if self.is_shared else seconds
+        return self._patience.seconds(self._speaker, seconds) if self._shares and self.is_shared else seconds
 
     def _obstacle(self, user: object) -> Outcome | None:
         """What keeps this user from sending."""

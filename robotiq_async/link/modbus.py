@@ -92,7 +92,7 @@ class ModbusTransport:
 
     @property
     def is_shared(self) -> bool:
-        return self._line.is_shared
+        return self._shares_line and self._line.is_shared
 
     @property
     def echoes(self) -> bool:

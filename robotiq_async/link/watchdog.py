@@ -37,9 +37,11 @@ class Watchdog:
         self._timer: asyncio.Handle | None = None
         self._timer_due = math.inf
 
-    def watch(self, by: float) -> None:
-        """Start watching an exchange; ``by`` is its latest end, in the loop's time."""
-        self._due = by
+    def watch(self, seconds: float, by: float) -> None:
+        """Watch an exchange that may take some seconds, and no longer than ``by`` in the loop's time."""
+        self._due = self.loop.time() + seconds
+        if by < self._due:
+            self._due = by
         self._has_grace = False
         if self._timer is not None and self._timer_due > self._due:
             self.stop()

@@ -51,6 +51,10 @@ class CycleStep(Enum):
     WRITE_AND_READ = "write, and read in the same exchange where link and request allow that"
 
 
+# Each poll asks for them, and Python 3.11 finds a member of an Enum by a detour.
+READ, WAIT, WRITE, WRITE_AND_READ = CycleStep
+
+
 def next_step(write: NextWrite, reads: int, age: float, *, is_stale: bool, is_slow: bool) -> CycleStep | None:
     """The next step of a cycle that has something to write; None if that must wait for another cycle.
 
@@ -65,18 +69,18 @@ def next_step(write: NextWrite, reads: int, age: float, *, is_stale: bool, is_sl
         if write.wait > SOON_S:
             return None
         if write.wait:
-            return CycleStep.WAIT
+            return WAIT
         if not is_stale:
-            return CycleStep.WRITE_AND_READ
-        return CycleStep.READ if reads < READS else CycleStep.WRITE
+            return WRITE_AND_READ
+        return READ if reads < READS else WRITE
     if is_stale:
-        return CycleStep.READ
+        return READ
     if write.is_urgent and write.wait <= LONGEST_SPACING_S:
-        return CycleStep.WAIT if write.wait else CycleStep.WRITE
+        return WAIT if write.wait else WRITE
     is_fresh = write.wait <= SOON_S and age + write.wait <= FRESH_S
     if is_slow and write.is_command and is_fresh:
-        return CycleStep.WAIT if write.wait else CycleStep.WRITE_AND_READ
-    return CycleStep.READ
+        return WAIT if write.wait else WRITE_AND_READ
+    return READ
 
 
 def begins_at_once(write: NextWrite, *, is_slow: bool) -> bool:

@@ -6,7 +6,6 @@ On a line that several grippers share, a poll waits for its turn. A stop that co
 from __future__ import annotations
 
 import asyncio
-import functools
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -24,7 +23,7 @@ from ..values.registers import Registers
 from ..values.request import Request
 from ..values.statistics import Counters
 from ..values.status import RobotiqStatus
-from .cycle import CycleStep, begins_at_once, next_step
+from .cycle import READ, WAIT, WRITE, WRITE_AND_READ, CycleStep, begins_at_once, next_step
 from .late_polls import LATE_S, LatePolls
 from .options import HandOptions
 from .publisher import Publisher
@@ -54,9 +53,7 @@ class Poller:
         self._line: Final = link if isinstance(link, SharedLink) else None
         self._model: Final = options.model
         self._is_slow: Final = options.link.is_slow
-        self._make_status: Final = functools.partial(
-            RobotiqStatus, model=options.model, stroke=options.units.stroke
-        )
+        self._stroke: Final = options.units.stroke
         self.tick: Final = Tick(options.poll_interval)
         self._late_polls: Final = LatePolls(self.tick.time, options.log)
         self._last_poll: float | None = None  # when the poll before was asked for; None: no period is counted
@@ -88,9 +85,8 @@ class Poller:
             return write.wait
         return write.wait + status.timestamp - self._asked
 
-    async def wait(self) -> bool:
-        """Wait for the next tick, or until hurried; whether it was the tick. Missed ones are counted."""
-        passed = await self.tick.wait()
+    def note_ticks(self, passed: int) -> bool:
+        """Count the missed ones of the ticks that a wait has seen; False if it saw none: it was hurried."""
         if not passed:
             self.break_period()
             return False
@@ -113,24 +109,25 @@ class Poller:
 
     async def cycle(self) -> None:
         """Read, decide and write, in the order that cycle.py has for it."""
-        reads, step = 0, CycleStep.READ
+        reads, step = 0, READ
         while True:
             write = self._controller.next_write(self.tick.time())
-            if write is None or step is CycleStep.WRITE:
+            if write is None or step is WRITE:
                 if reads:
                     return  # most cycles end here
-                step = CycleStep.READ
+                step = READ
             elif (planned := self._plan(write, reads)) is None:
                 return
-            elif planned is CycleStep.WRITE_AND_READ:
+            elif planned is WRITE_AND_READ:
                 if not await self._write_and_read(write) and not reads:
                     await self.read()  # it shows the echo; a later command begins the next cycle
                 return
-            elif (step := planned) is CycleStep.WAIT:
+            elif (step := planned) is WAIT:
                 await asyncio.sleep(write.wait)
                 continue
-            if step is CycleStep.READ:
-                await self._stop_or_read()
+            if step is READ:
+                line = self._line
+                await (self._stop_or_read(line) if line is not None and line.is_shared else self.read())
                 reads += 1
             else:
                 await self._write()
@@ -247,17 +244,16 @@ class Poller:
 
     # -- a status --------------------------------------------------------------------------------------
 
-    async def _stop_or_read(self) -> None:
+    async def _stop_or_read(self, line: SharedLink) -> None:
         """Read; before that write a stop that has come while others had the line."""
-        if self._line is not None and self._line.is_shared:
-            asked = self.tick.time()
-            with self._noting_doubt():
-                registers = await self._line.stop_or_read(self._decide_stop)
-            if registers is not None:
-                self._take(self._status(registers, self.tick.time()), asked)
-                return
+        asked = self.tick.time()
+        with self._noting_doubt():
+            registers = await line.stop_or_read(self._decide_stop)
+        if registers is None:
             self._note_acknowledged(asked)
-        await self.read()
+            await self.read()
+        else:
+            self._take(self._status(registers, self.tick.time()), asked)
 
     async def read(self, *, is_first: bool = False) -> None:
         """Read the status; who answers is settled by the first one on a link, before anything is written."""
@@ -277,7 +273,7 @@ class Poller:
 
     def _status(self, registers: Registers, answered: float) -> RobotiqStatus:
         number, has_current = next(self._publisher.numbers), self._link.has_current
-        return self._make_status(registers, answered, number, has_current=has_current)
+        return RobotiqStatus(registers, answered, number, self._model, self._stroke, has_current)
 
     def _take(self, status: RobotiqStatus, asked: float) -> None:
         """Pass on a status that was asked for at ``asked``."""

@@ -256,16 +256,17 @@ class Run:
     # -- polling ---------------------------------------------------------------------------------------
 
     async def _poll(self) -> None:
-        while self.state is RunState.POLLING:
-            is_regular = await self._poller.wait()
-            if self.state is not RunState.POLLING:
+        poller, publisher, polling = self._poller, self._parts.publisher, RunState.POLLING
+        while self.state is polling:
+            is_regular = poller.note_ticks(await poller.tick.wait())
+            if self.state is not polling:
                 return
             try:
-                await self._poller.cycle()
-                if self._parts.publisher.has_to_tell and self.state is RunState.POLLING:
-                    self._parts.publisher.tell()
+                await poller.cycle()
+                if publisher.has_to_tell and self.state is polling:
+                    publisher.tell()
                 if not is_regular:
-                    self._poller.break_period()
+                    poller.break_period()
             except RobotiqConnectionError as error:
                 await self._reconnect(error)
 
