@@ -198,7 +198,7 @@ interrupted("simulate", "--port", "0", by=signal.SIGBREAK)
 file, table = f"{folder}/grasp.mcap", f"{folder}/grasp.csv"
 run("record", file, "--seconds", "0.5", address)
 run("replay", file)
-run("export", file, table)
+run("export", file, table, "--convention", "COUNTS")
 assert b"\\r" not in open(table, "rb").read()
 interrupted("record", f"{folder}/second.mcap", address)
 """

@@ -32,6 +32,8 @@ from tests.grippers import until
 if TYPE_CHECKING:
     from tests.cli.conftest import Call, Shell
 
+EXPORT = "export --convention COUNTS"
+
 
 def rows_of(file: Path) -> list[dict[str, str]]:
     with file.open(encoding="utf-8", newline="") as stream:
@@ -80,7 +82,7 @@ def test_for_ros_2(call: Call, tmp_path: Path) -> None:
         assert [connection.topic for connection in reader.connections] == ["/joint_states"]
         assert f"\n{reader.message_count} polls, 0 lost" in outcome.out
     for command in ("replay", "plot"):
-        call(command, str(file)).assert_failed(1, "it.mcap: it contains no")
+        call(*command.split(), str(file)).assert_failed(1, "it.mcap: it contains no")
 
 
 @pytest.mark.parametrize("option", [[], ["--csv"]])
@@ -105,7 +107,7 @@ async def test_a_recorder_makes_the_same_table(call: Call, tmp_path: Path) -> No
     hand = RobotiqHand("sim://?speedup=20")
     async with Recorder(hand, table), Recorder(hand, file), hand:
         await hand.move(100)
-    call("export", str(file), str(exported)).assert_succeeded()
+    call("export", str(file), str(exported), "--convention", "COUNTS").assert_succeeded()
     for one, other in zip(rows_of(table), rows_of(exported), strict=True):
         for row in (one, other):
             del row["state"], row["time"]  # each recorder compares the clocks by itself
@@ -168,7 +170,7 @@ def test_in_brief_there_are_states_faults_and_contacts(grasp: Path, call: Call) 
 
 def test_export_has_a_row_for_every_poll(grasp: Path, call: Call) -> None:
     table = grasp.with_suffix(".csv")
-    outcome = call("export", str(grasp))
+    outcome = call("export", str(grasp), "--convention", "counts")
     rows, polls = rows_of(table), recorded(grasp, "/gripper/status")
     assert outcome.out == f"{len(polls)} statuses in {table}\n"
     for row, (nanoseconds, fields) in zip(rows, polls, strict=True):
@@ -201,7 +203,8 @@ def test_a_scale_that_export_does_not_know_and_one_without_an_opening_are_wrong_
     grasp: Path, call: Call
 ) -> None:
     for arguments, words in (
-        (("--convention", "ROBOMIMIC"), "must be one of DROID, RLDS"),
+        (("--convention", "ROBOMIMIC"), "(the gripper's own, 0 open .. 255 closed), DROID, RLDS"),
+        ((), "got none: nobody should guess a sign"),
         (("--convention", "DROID", "--of", "events"), "events have no opening"),
     ):
         outcome = call("export", str(grasp), str(grasp.with_name("none.csv")), *arguments)
@@ -225,7 +228,7 @@ def test_commands_and_events_are_tables_too(grasp: Path, call: Call, kind: str, 
 
 def test_pandas_takes_it(grasp: Path, call: Call) -> None:
     pandas = pytest.importorskip("pandas")
-    call("export", str(grasp)).assert_succeeded()
+    call("export", str(grasp), "--convention", "COUNTS").assert_succeeded()
     table = pandas.read_csv(grasp.with_suffix(".csv"), parse_dates=["time"], index_col="time")
     assert table.index.tz is not None
     assert abs(table.index[-1].timestamp() - time.time()) < 60
@@ -265,18 +268,18 @@ def test_a_part_of_a_recording_is_drawn(grasp: Path, call: Call) -> None:
 @pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("command", ["replay", "plot"])
 def test_of_a_broken_one_it_is_said_that_it_is(command: str, grasp: Path, call: Call) -> None:
-    assert call(command, str(grasp)).err == ""
+    assert call(*command.split(), str(grasp)).err == ""
     whole = grasp.read_bytes()
     grasp.write_bytes(whole[: len(whole) * 2 // 3])
-    outcome = call(command, str(grasp), "--overwrite")
+    outcome = call(*command.split(), str(grasp), "--overwrite")
     assert outcome.out
     outcome.assert_failed(0, "grasp.mcap ends too early, after ", "robotiq-async recover")
 
 
 @pytest.mark.usefixtures("undrawn")
-@pytest.mark.parametrize("command", ["plot", "replay --plot", "export"])
+@pytest.mark.parametrize("command", ["plot", "replay --plot", EXPORT])
 def test_an_existing_file_is_replaced_only_with_overwrite(command: str, grasp: Path, call: Call) -> None:
-    there = grasp.with_suffix(".csv" if command == "export" else ".svg")
+    there = grasp.with_suffix(".csv" if command == EXPORT else ".svg")
     there.write_text("mine")
     before = set(grasp.parent.iterdir())
     call(*command.split(), str(grasp)).assert_failed(1, f"{there}: File exists; --overwrite replaces it")
@@ -309,12 +312,12 @@ OLD_FAULT = event(kind="fault", code=9, name="N", description="D")
 SHOWS = {
     "replay": ("/gripper/event", "/gripper/status", "/gripper/command"),
     "plot": ("/gripper/event", "/gripper/status"),
-    "export": ("/gripper/status",),
+    EXPORT: ("/gripper/status",),
 }
 """The topics that each command reads."""
 
 
-@pytest.mark.parametrize("command", ["replay", "recover", "plot", "export"])
+@pytest.mark.parametrize("command", ["replay", "recover", "plot", EXPORT])
 @pytest.mark.parametrize("content", [None, b"", b"no recording"])
 def test_a_file_that_is_no_recording_gives_one_line_and_writes_nothing(
     command: str, content: bytes | None, tmp_path: Path, call: Call
@@ -323,7 +326,7 @@ def test_a_file_that_is_no_recording_gives_one_line_and_writes_nothing(
     if content is not None:
         file.write_bytes(content)
     words = "No such file" if content is None else "not an MCAP file"
-    call(command, str(file)).assert_failed(1, words)
+    call(*command.split(), str(file)).assert_failed(1, words)
     assert [*tmp_path.iterdir()] == [file] * (content is not None)
 
 
@@ -335,7 +338,7 @@ def test_a_foreign_recording_is_refused_in_one_line_and_writes_nothing(
         if command != "replay" and "code" in what:
             continue
         file = foreign(data, topic=topic)
-        call(command, str(file)).assert_failed(1, f"foreign.mcap: a message on '{topic}' ")
+        call(*command.split(), str(file)).assert_failed(1, f"foreign.mcap: a message on '{topic}' ")
         assert [*file.parent.iterdir()] == [file]
 
 
@@ -351,7 +354,7 @@ def test_a_foreign_recording_is_refused_in_one_line_and_writes_nothing(
 def test_a_recording_with_other_names_is_one_line_that_says_so(
     foreign: Callable[..., Path], command: str, topic: str, message: bytes, lacks: str, call: Call
 ) -> None:
-    outcome = call(command, str(foreign(message, topic=f"/gripper/{topic}")))
+    outcome = call(*command.split(), str(foreign(message, topic=f"/gripper/{topic}")))
     assert outcome.out == ""
     why = f"was not made by this version of robotiq_async: it has no '{lacks}'"
     outcome.assert_failed(1, f"{foreign()}: a message on '/gripper/{topic}' {why}\n")
@@ -359,7 +362,9 @@ def test_a_recording_with_other_names_is_one_line_that_says_so(
 
 @pytest.mark.parametrize("command", ["replay", "plot", "recover"])
 def test_a_message_of_no_channel_is_one_line(foreign: Callable[..., Path], command: str, call: Call) -> None:
-    call(command, str(foreign(STATE, channel=7))).assert_failed(1, "foreign.mcap: there is no channel 7")
+    call(*command.split(), str(foreign(STATE, channel=7))).assert_failed(
+        1, "foreign.mcap: there is no channel 7"
+    )
 
 
 def test_control_characters_are_escaped(foreign: Callable[..., Path], call: Call) -> None:
@@ -373,7 +378,7 @@ def test_control_characters_are_escaped(foreign: Callable[..., Path], call: Call
 
 @pytest.mark.parametrize("command", ["replay", "plot", "recover"])
 def test_an_error_does_not_steer_the_terminal_either(command: str, tmp_path: Path, call: Call) -> None:
-    outcome = call(command, str(tmp_path / f"{STEERING}.mcap".replace("\ud800", "")))
+    outcome = call(*command.split(), str(tmp_path / f"{STEERING}.mcap".replace("\ud800", "")))
     outcome.assert_failed(1, r"\x1b[2J")
     assert outcome.err.rstrip("\n").isprintable()
 
@@ -391,7 +396,7 @@ def test_words_of_others_are_no_formulas(foreign: Callable[..., Path], call: Cal
     [
         ("replay", "it contains nothing for this command"),
         ("replay --brief", "it contains nothing for this command"),
-        ("export", "it contains no statuses"),
+        (EXPORT, "it contains no statuses"),
     ],
 )
 def test_nothing_to_show_is_said(foreign: Callable[..., Path], command: str, words: str, call: Call) -> None:
@@ -431,7 +436,7 @@ LITTLE_MEMORY = """
 import resource, sys
 resource.setrlimit(resource.RLIMIT_AS, (1_500_000_000, 1_500_000_000))
 from robotiq_async.cli import main
-print(*(main([command, {!r}]) for command in ("replay", "recover", "export")))
+print(*(main([*command.split(), {!r}]) for command in ("replay", "recover", "export --convention COUNTS")))
 """
 """Runs commands with 1.5 GB of addresses."""
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ...tools.recording.recordings import RecordedMessage
 
 Overwrite = Annotated[Flag, Parameter(help="Replace an existing file.")]
+COUNTS: Final = "COUNTS"  # the numbers that a table has anyway
 KINDS: Final = {"statuses": "status", "commands": "command", "events": "event"}
 
 
@@ -118,18 +119,21 @@ def export(
     """Write a recording as a table, CSV, for spreadsheets and pandas.
 
     A row for each poll, with the time of the wall clock in UTC. With --of a row for each
-    command or event.
+    command or event. Stacks differ in the sign of an opening, so a table of polls says whose
+    numbers it has: COUNTS are the gripper's own, 0 open .. 255 closed, and any other adds a
+    column of its name.
 
     For example:
 
-        robotiq-async export grasp.mcap
+        robotiq-async export grasp.mcap --convention COUNTS
+        robotiq-async export grasp.mcap --convention DROID
         robotiq-async export grasp.mcap events.csv --of events
 
     Args:
         file: The recording.
         target: The table, named .csv (default: named as the recording).
         of: What has a row.
-        convention: Add the opening in the numbers of a learning stack, such as DROID or LEROBOT.
+        convention: COUNTS, or a learning stack, such as DROID or LEROBOT; needed for statuses.
     """
     named = _convention(convention, of)
     entries = _entries(file)
@@ -149,13 +153,16 @@ def export(
 
 
 def _convention(name: str | None, of: str) -> Convention | None:
-    if name is None:
-        return None
-    if name.upper() not in CONVENTIONS:
-        raise UsageError(f"--convention must be one of {', '.join(CONVENTIONS)}, got {name}")
+    """The convention whose column is added; None for the numbers that a table has anyway."""
     if of != "statuses":
-        raise UsageError(f"--convention is for statuses: {of} have no opening")
-    return CONVENTIONS[name.upper()]
+        if name is not None:
+            raise UsageError(f"--convention is for statuses: {of} have no opening")
+        return None
+    if name is None or name.upper() not in (COUNTS, *CONVENTIONS):
+        known = f"{COUNTS} (the gripper's own, 0 open .. 255 closed), {', '.join(CONVENTIONS)}"
+        got = "none: nobody should guess a sign" if name is None else name
+        raise UsageError(f"--convention must be one of {known}; got {got}")
+    return CONVENTIONS.get(name.upper())
 
 
 def _keep(*files: Path, overwrite: bool) -> None:

@@ -157,12 +157,12 @@ class CsvFile:
 
 
 def export(
-    entries: Iterable[RecordedMessage], kind: str, target: Path | str, convention: Convention | None = None
+    entries: Iterable[RecordedMessage], kind: str, target: Path | str, convention: Convention | None
 ) -> int:
     """Write the messages of one kind into a CSV file, all or none; an existing file is replaced.
 
-    With a convention statuses have a last column of its name: the opening in its numbers, which need no
-    guess at their sign.
+    With a convention statuses have a last column of its name: the opening in its numbers. It is asked for, as
+    None, too, so that nobody guesses the sign of another column.
 
     Returns:
         The number of rows; 0 writes no file.
