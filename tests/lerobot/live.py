@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import re
 import sys
 from asyncio.subprocess import PIPE, STDOUT
 from collections.abc import AsyncIterator, Iterator
@@ -24,9 +25,9 @@ from robotiq_async.simulator.troubles.trouble import Trouble
 from robotiq_async.values.request import Request
 from tests.docs.pages import ROOT
 from tests.grippers import active_gripper, until
-from tests.lerobot.leader.still import StillConfig
+from tests.lerobot.leader.lamp import LampConfig
 
-PATIENCE = 120.0  # a command needs 12 s to import torch
+PATIENCE = 300.0  # a command needs 12 s to import torch, and two record and train for a minute
 LEADER = ("--teleop.discover_packages_path=leader", "--teleop.type=sweep")
 DATASET = ("--dataset.repo_id=me/grip", "--play_sounds=false")
 EPISODE = (
@@ -57,6 +58,7 @@ class Commands:
                 "PYTHONPATH": str(ROOT / "tests" / "lerobot"),
                 "HF_HOME": str(self.folder),
                 "HF_HUB_OFFLINE": "1",
+                "OMP_NUM_THREADS": "1",  # its threads wait by spinning, which stalls a busy machine
             },
             stdout=PIPE,
             stderr=STDOUT,
@@ -157,6 +159,47 @@ async def test_a_gripper_that_falls_silent_ends_the_demonstration(commands: Comm
     assert "ConnectionLostError" in printed
 
 
+# -- what the data is for ------------------------------------------------------------------------------
+
+LAMP = ("--robot.discover_packages_path=leader", "--robot.cameras={lamp: {type: lamp}}")
+DEMONSTRATIONS = (
+    *("--dataset.num_episodes=20", "--dataset.episode_time_s=3", "--dataset.reset_time_s=0"),
+    *("--dataset.fps=15", "--dataset.video=false", "--dataset.push_to_hub=false"),
+    "--dataset.single_task=grip while the lamp is lit",
+)
+SMALL = (  # the smallest policy that has a picture among its inputs; no weights are fetched
+    *("--policy.type=act", "--policy.device=cpu", "--policy.push_to_hub=false", "--policy.use_vae=false"),
+    *("--policy.pretrained_backbone_weights=null", "--policy.chunk_size=4", "--policy.n_action_steps=2"),
+    *("--policy.dim_model=32", "--policy.n_heads=2", "--policy.dim_feedforward=64"),
+    *("--policy.n_encoder_layers=1", "--policy.optimizer_lr=1e-3", "--policy.optimizer_lr_backbone=1e-4"),
+    *("--steps=100", "--batch_size=16", "--num_workers=0", "--log_freq=50", "--env_eval_freq=0"),
+)
+
+
+async def test_what_is_recorded_teaches_a_policy_that_grips(commands: Commands) -> None:
+    """20 demonstrations of a lamp and a part; the policy then grips and lets go by what the camera sees."""
+    gripper, dataset = commands.gripper, f"--dataset.root={commands.folder / 'data'}"
+    gripper.place_object(JAW, 150)
+    leader = ("--teleop.discover_packages_path=leader", "--teleop.type=follow_lamp")
+    await commands.run("lerobot-record", *leader, *LAMP, *DATASET, dataset, *DEMONSTRATIONS)
+    about = json.loads((commands.folder / "data" / "meta" / "info.json").read_text())
+    assert about["total_episodes"] == 20
+    trained = commands.folder / "trained"
+    train = await commands.start(
+        "lerobot-train", DATASET[0], dataset, f"--output_dir={trained}", "--wandb.enable=false", *SMALL
+    )
+    losses = re.findall(r"loss:(\S+)", await ended(train))
+    print(f"{about['total_frames']} frames, loss {' '.join(losses)}")  # noqa: T201  # figures for the page
+    policy = f"--policy.path={trained / 'checkpoints' / 'last' / 'pretrained_model'}"
+    rest = ("--fps=15", "--duration=20", "--return_to_initial_position=false", "--play_sounds=false")
+    rollout = await commands.begin("lerobot-rollout", policy, *LAMP, "--task=grip", *rest)
+    for _ in range(2):
+        await until(lambda: abs(gripper.position(JAW) - 150) < 10 and not gripper.is_moving, within=PATIENCE)
+        await until(lambda: gripper.position(JAW) < 100, within=PATIENCE)
+    await ended(rollout)
+    assert not gripper.is_moving
+
+
 # -- the robot -----------------------------------------------------------------------------------------
 
 
@@ -236,7 +279,7 @@ def test_cameras_are_lerobots(tmp_path: Path) -> None:
     config = RobotiqGripperConfig(
         address="sim://?model=2f85&speedup=50",
         activate=True,
-        cameras={"front": StillConfig()},
+        cameras={"front": LampConfig()},
         calibration_dir=tmp_path,
     )
     with make_robot_from_config(config) as robot:

@@ -8,7 +8,7 @@ set -eu
 cd "$(dirname "$0")/../.."
 name=lerobot
 . tests/environment.sh
-LEROBOT='lerobot[core_scripts]==0.6.1'
+LEROBOT='lerobot[core_scripts,training]==0.6.1'
 
 fits() { # pyenv's commands do nothing unless they know which version is meant
     PYENV_VERSION=${2:-} "$1" -c 'import sys; sys.exit(sys.version_info < (3, 12))' 2>/dev/null

@@ -1,4 +1,4 @@
-"""A camera for LeRobot's commands: its picture is a grey one that brightens."""
+"""A camera for LeRobot's commands: it sees a lamp that is lit every other two seconds."""
 
 import time
 from dataclasses import dataclass
@@ -7,17 +7,23 @@ from typing import Any
 import numpy as np
 from lerobot.cameras import Camera, CameraConfig
 
+LIT_S = 2.0
 
-@CameraConfig.register_subclass("still")
+
+def is_lit() -> bool:
+    return time.monotonic() % (2 * LIT_S) < LIT_S
+
+
+@CameraConfig.register_subclass("lamp")
 @dataclass(kw_only=True)
-class StillConfig(CameraConfig):  # type: ignore[misc]  # LeRobot is not here
+class LampConfig(CameraConfig):  # type: ignore[misc]  # LeRobot is not here
     fps: int | None = 30
     width: int | None = 32
     height: int | None = 32
 
 
-class Still(Camera):  # type: ignore[misc]  # LeRobot is not here
-    def __init__(self, config: StillConfig) -> None:
+class Lamp(Camera):  # type: ignore[misc]  # LeRobot is not here
+    def __init__(self, config: LampConfig) -> None:
         super().__init__(config)
         self._is_connected = False
 
@@ -33,7 +39,7 @@ class Still(Camera):  # type: ignore[misc]  # LeRobot is not here
         self._is_connected = True
 
     def read(self, color_mode: Any = None) -> Any:  # noqa: ARG002
-        return np.full((32, 32, 3), int(50 * time.monotonic()) % 256, np.uint8)
+        return np.full((32, 32, 3), 220 if is_lit() else 30, np.uint8)
 
     def async_read(self, timeout_ms: float = 0) -> Any:  # noqa: ARG002
         return self.read()
