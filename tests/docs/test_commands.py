@@ -25,7 +25,7 @@ READ = [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
 COMMAND_LINE = build()
 OTHERS = {
     *("cp", "curl", "export", "ls", "python3", "python3.12", "ros2", "socat", "source", "sudo"),
-    *("lerobot-record", "lerobot-replay", "lerobot-teleoperate"),
+    *("lerobot-record", "lerobot-replay", "lerobot-rollout", "lerobot-teleoperate", "lerobot-train"),
 }
 """Programs that are not ours: ``python3 -m venv``, and what ROS, LeRobot and the shell have."""
 TARGETS = set(re.findall(r"^([a-z0-9-]+):", read(ROOT / "Makefile"), re.MULTILINE))
