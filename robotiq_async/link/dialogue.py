@@ -11,8 +11,9 @@ carries it out, and a test can, too.
   tells.
 * **Function 23 is tried without a command.** A jaw answers no function that it does not serve. So until it
   has answered this one, a command leaves with function 16, and the status is read after it. Before a command
-  that finds the jaw at rest, as this link has requested it, function 23 writes that image again. Nothing
-  moves by it, and a silence costs a read and no command.
+  that finds the jaw at rest, as this link has requested it, function 23 writes that image again; before the
+  first command, the image that an adopted jaw shows. Nothing moves by it, and a silence costs a read and no
+  command.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from typing import Final
 from ..runtime.log import Log
 from ..values import registers as reg
 from ..values.errors import ResponseTimeoutError, RobotiqConnectionError
+from ..values.model import TOLERANCE
 from ..values.registers import REGISTER_COUNT, RegisterMap, Registers
 from . import transport
 from .exchange import Answer, Exchange, Timing
@@ -38,6 +40,12 @@ USUAL_RESPONSE_S: Final = 0.4
 """A longer response timeout means a slow line: a repeated read then gets that timeout instead of REPEAT_S."""
 SHORT_READS: Final = 3
 """Reads after the short silence, at opening, before a line is trusted with it."""
+AT_TARGET: Final = 3
+"""gOBJ of a jaw that has come to its target and holds nothing."""
+ACTIVE: Final = 3
+"""gIMC of a jaw that is active."""
+ECHOED: Final = 0x0900
+"""The bits of the first register that a request and a status share: activation and go."""
 MOST_UNANSWERED: Final = 3
 UNANSWERED_S: Final = 60.0
 """With so many unanswered reads in so many seconds, a line gets the longer silence."""
@@ -90,8 +98,8 @@ class Dialogues:
         """Requests whose answers may still come, in order: function, address and number of registers."""
         self._unanswered: Final[deque[float]] = deque(maxlen=MOST_UNANSWERED)
         """The times of the last reads that were repeated because there was no answer."""
-        self._image: Sequence[int] = ()
-        """The last image that was acknowledged; empty after one that was not."""
+        self._image: Sequence[int] | None = None
+        """The last image that was acknowledged; empty after one that was not, None before the first."""
         self._status: Registers = ()
         """The newest status."""
         self._warned = -math.inf
@@ -152,8 +160,8 @@ class Dialogues:
         which it would decide is too old.
         """
         yield from self._ready()
-        if self.serves_23 is None and self._is_at_rest():
-            came_to = yield from self._tried(self._image)
+        if self.serves_23 is None and (in_force := self._image_in_force()):
+            came_to = yield from self._tried(in_force)
             if isinstance(came_to, Outcome) and not isinstance(came_to, Refused):
                 yield from self._again(came_to)
             return None
@@ -224,15 +232,25 @@ class Dialogues:
             self._note_unheard(came_to)
         return came_to
 
-    def _is_at_rest(self) -> bool:
-        """Whether a jaw shows the last image, and stands still."""
+    def _image_in_force(self) -> Sequence[int]:
+        """The image of a jaw that stands still: written again, it moves nothing. Empty if there is none.
+
+        It is the last one of this link, if the jaw shows it. Before the first one it is made of what the jaw
+        shows, which is at its target or stopped: it holds nothing, so speed and force do not matter.
+        """
         shown, image = self._status, self._image
-        if not (shown and image) or self._map.count == REGISTER_COUNT or reg.gFLT.read(shown):
-            return False
-        is_moving = reg.gGTO.read(shown) and not reg.gOBJ.read(shown)
+        if not shown or self._map.count == REGISTER_COUNT or reg.gFLT.read(shown):
+            return ()
+        goes, at_rest = reg.gGTO.read(shown), reg.gOBJ.read(shown)
+        if image is None:
+            target = reg.gPR[0].read(shown)
+            is_there = at_rest == AT_TARGET and abs(target - reg.gPO[0].read(shown)) <= TOLERANCE
+            is_active = reg.gACT.read(shown) and reg.gIMC.read(shown) == ACTIVE
+            adopted = (shown[0] & ECHOED, target, 0, 0, 0, 0, 0, 0)
+            return adopted if is_active and (is_there or not goes) else ()
         pairs = (reg.gACT, reg.rACT), (reg.gGTO, reg.rGTO), (reg.gPR[0], reg.rPR[0])
-        shows = all(echo.read(shown) == field.read(image) for echo, field in pairs)
-        return shows and not is_moving and not reg.rATR.read(image)
+        shows = image and all(echo.read(shown) == field.read(image) for echo, field in pairs)
+        return image if shows and not (goes and not at_rest) and not reg.rATR.read(image) else ()
 
     def _again(self, first: Answer | None) -> Dialogue[bytes]:
         assert isinstance(first, Outcome)

@@ -103,6 +103,21 @@ WITH_FUNCTION_23 = {
     )
     for lasts in ("once", "for 60")
 }
+WITH_FUNCTION_23 |= {
+    # The function is tried before the first command: what the trial loses, or shows, the command does not.
+    ("command pending", "silence once"): "done → RUNNING_IDLE",
+    ("command pending", "strict-silence for 60"): "done → RUNNING_IDLE",
+    ("command pending", "registers for 60"): "done → RUNNING_IDLE",
+    ("command pending", "drop for 60"): "ConnectionLost → RUNNING_IDLE",  # by function 16 from then on
+    ("command pending", "half for 60"): "ConnectionLost → RUNNING_IDLE",
+    ("command pending", "fault 9 for 60"): "GripperFault → RUNNING_IDLE",
+    **{("command pending", f"fault {code} for ever"): "GripperFault → FAULT" for code in (12, 13, 14)},
+    ("command pending", "interference for ever"): "GripperFault → FAULT",
+    ("command pending", "release"): "GripperFault → ATR_DONE",
+    ("command pending", "stranded"): "NotActivated → RESET",
+    ("command pending", "e-stop for 60"): "NotActivated → WF_ACTIVATION",
+    ("command pending", "e-stop 2 for 60"): "NotActivated → WF_ACTIVATION",
+}
 """Outcomes of cells on a serial line to a jaw, which is written with function 23."""
 WITH_HABIT = {
     "write-spacing": {
