@@ -189,6 +189,30 @@ def test_a_jaw_that_refuses_function_23_costs_nothing_more() -> None:
     assert dialogues.serves_23 is False
 
 
+@pytest.mark.parametrize(
+    ("status", "image"),
+    [
+        ((0xF900, 0x0064, 0x6600), "0900 0064 0000"),  # at its target
+        ((0x3100, 0x0064, 0x3000), "0100 0064 0000"),  # stopped on the way
+        ((0xF900, 0x0064, 0x6700), ""),  # not where it was to go: it might move
+        ((0xB900, 0x0064, 0x6000), ""),  # it presses: the force would change
+        ((0xD900, 0x0064, 0x6400), ""),  # it activates
+        ((0x0000, 0x0064, 0x6400), ""),  # it is reset
+    ],
+)
+def test_before_the_first_command_an_adopted_jaw_is_written_what_it_shows(
+    status: tuple[int, ...], image: str
+) -> None:
+    dialogues = speaker(is_sure=False)
+    said(dialogues.opening())
+    said(dialogues.read(), answer(PduExchange(bytes.fromhex("09 03 07d0 0003"), Timing(0.4)), status))
+    dialogue: Any = dialogues.write_and_read(lambda: IMAGE)
+    next(dialogue)
+    request = dialogue.send(None)
+    written = (23, bytes.fromhex(image)) if image else (16, bytes.fromhex("0900 00ff 4060"))
+    assert (request.frame[0], request.frame[-6:]) == written
+
+
 def test_noise_decides_nothing() -> None:
     dialogues, _, _ = tried(NOISE)
     assert dialogues.serves_23 is None

@@ -136,13 +136,7 @@ async def test_a_line_keeps_no_more_than_it_carries_for_a_while(monkeypatch: pyt
         ("3f", {"poll_interval": 0.01}, False, 100, 0),
         ("2f85", {}, False, 200, 0),
         ("2f85", {"write_function": 23}, True, 269.4, 269.4),
-        (
-            "2f85",
-            {},
-            True,
-            269.4,
-            269.4,
-        ),  # function 23 is tried before the first command: it never rests later
+        ("2f85", {}, True, 269.4, 269.4),  # it never rests: function 23 is tried before the first command
     ],
 )
 async def test_how_often_a_hand_polls(
