@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger, MoveTimeoutError, State
-from robotiq_async.fleet.remote.dialog import Settings
+from robotiq_async.fleet.remote.own_settings import OwnSettings
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import unpack_call
 from robotiq_async.fleet.wire.settings import Setting, asked_of, read_settings, settings_fields, settings_of
@@ -309,7 +309,7 @@ def forces(value: int) -> dict[Setting, int]:
 
 
 def test_only_what_was_carried_out_and_not_what_it_may_have_replaced_is_sent() -> None:
-    settings = Settings()
+    settings = OwnSettings()
     assert not settings.fields
     settings.note(2, {(A, "position"): 9, (A, "speed"): 3}, begun=True)
     assert settings.fields == {"1": {"speed": 3}}

@@ -7,8 +7,8 @@ import getpass
 import os
 import secrets
 import socket
-from collections.abc import Callable, Coroutine, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Coroutine
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Final
 
@@ -16,7 +16,6 @@ from ...values.checks import check_seconds
 from ...values.enums import Finger, StopLevel
 from ...values.errors import (
     AgentError,
-    ConnectionLostError,
     ControlLostError,
     MoveTimeoutError,
     NotAllowedError,
@@ -27,11 +26,12 @@ from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
 from ..network.bus import Bus, Urgency
 from ..wire.envelope import Answer, Call
 from ..wire.names import GripperName
-from ..wire.settings import Setting, moved_by, settings_fields, settings_of
+from ..wire.settings import moved_by
 from ..wire.values import Fields
 from .errand import HALT_S, Errand, NoAnswerError
 from .lease_state import ClientLease
 from .mirror import Mirror
+from .own_settings import OwnSettings
 
 OWN: Final = ("info", "lease", "halt", "cmd/cancel")
 """Requests whose arguments come from this library: a TypeError in the answer is not the user's."""
@@ -43,35 +43,6 @@ UNDER_WAY: Final = 4  # unanswered requests of a loop: enough for 200 a second u
 COMMAND_S: Final = 1.0  # seconds for the answer to a command of a loop
 MOTIONS: Final = ("move", "set_position", "hold")
 """Commands after whose cancellation axes are to be held. An activation, for example, continues."""
-
-
-@contextmanager
-def no_answer_as_lost_connection() -> Iterator[None]:
-    """Around public calls: report a missing answer as a lost connection."""
-    try:
-        yield
-    except NoAnswerError as error:
-        raise ConnectionLostError(str(error)) from error
-
-
-class Settings:
-    """The speeds and forces that were carried out, for an agent that has lost its record of them.
-
-    The agent is their keeper. What may have been carried out is left out, and so is what it replaced.
-    """
-
-    def __init__(self) -> None:
-        self._known: dict[Setting, tuple[int, int | None]] = {}
-        """By setting: the number of the newest request that was begun, and the value if that is certain."""
-
-    def note(self, number: int, asked: Mapping[Setting, int], begun: bool | None) -> None:
-        for setting, value in settings_of(asked).items():
-            if begun is not False and number > self._known.get(setting, (0, 0))[0]:
-                self._known[setting] = number, value if begun else None
-
-    @property
-    def fields(self) -> Fields:
-        return settings_fields({each: value for each, (_, value) in self._known.items() if value is not None})
 
 
 class Dialog:
@@ -112,7 +83,7 @@ class Dialog:
         if before is not None and before.process == self.process:
             self.client, self.number = before.client, before.number
         self.window: float = WINDOW_S
-        self.settings: Settings = Settings()
+        self.settings: OwnSettings = OwnSettings()
         self.is_over: bool = False
         self.has_ended: bool = False
         self._bus = bus

@@ -7,7 +7,8 @@ carries them out once, so a repetition costs nothing but its message. Only a hal
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, Final
 
@@ -42,6 +43,15 @@ class NoAnswerError(ConnectionLostError):
     def __init__(self, name: object, verb: str, why: str = "no answer") -> None:
         self.why = why
         super().__init__(f"{name}: {why}; {verb} may have been carried out")
+
+
+@contextmanager
+def no_answer_as_lost_connection() -> Iterator[None]:
+    """Around public calls: report a missing answer as a lost connection."""
+    try:
+        yield
+    except NoAnswerError as error:
+        raise ConnectionLostError(str(error)) from error
 
 
 def of_its_run(call: Call) -> Callable[[Reply], bool]:

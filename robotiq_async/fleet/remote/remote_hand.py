@@ -33,7 +33,8 @@ from ...values.stroke import Points
 from ..network.bus import Bus
 from ..network.route import parse_remote_address
 from ..wire.values import Fields, read_result, reading
-from .dialog import label, no_answer_as_lost_connection
+from .dialog import label
+from .errand import no_answer_as_lost_connection
 from .session import CONNECT_S, RemoteSession
 
 COMMAND_S: Final = 5.0  # seconds for commands that end with the acknowledgment of the gripper
