@@ -210,3 +210,17 @@ def test_a_reset_ends_what_may_press(scan: Scan) -> None:
     asked = scan.hold(A)
     scan.step()
     assert asked.is_answered
+
+
+def test_an_axis_that_has_moved_off_and_comes_past_is_held_at_once() -> None:
+    """It has shown nothing but motion since its contact, and shows it at that place."""
+    scan = holding()
+    scan.gripper.remove_object(A)
+    scan.command(A, position=20, speed=255)
+    scan.until(lambda: scan.latest.position(A) < PART - 20, poll=0.05)
+    scan.command(A, position=255, speed=0)
+    scan.until(lambda: scan.latest.position(A) == PART - 1)
+    asked = scan.hold(A)
+    scan.step()
+    assert asked.is_answered
+    assert scan.last_image.position(A) < PART + 5, "it is held, and does not press on"
