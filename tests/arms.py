@@ -216,11 +216,12 @@ CONTROLLERS: Final[dict[str, type[Arm]]] = {
 
 @asynccontextmanager
 async def arm_with_jaw(
-    name: str, delay: float = 0.0, device_id: int = 9
+    name: str, delay: float = 0.0, device_id: int = 9, gripper: SimulatedGripper | None = None
 ) -> AsyncIterator[tuple[Arm, RtuOverTcpSimulatorServer, Tunnel]]:
-    """An arm with a jaw at its tool, which is active, and the tunnel to it."""
-    gripper = SimulatedGripper(asyncio.get_running_loop().time, model=TWO_FINGER_85, spread=False)
-    await activate_beforehand(gripper)
+    """An arm with a jaw at its tool, and the tunnel to it; the jaw is active unless one is given."""
+    if gripper is None:
+        gripper = SimulatedGripper(asyncio.get_running_loop().time, model=TWO_FINGER_85, spread=False)
+        await activate_beforehand(gripper)
     async with RtuOverTcpSimulatorServer(gripper, device_id=device_id) as server:
         line = ToolLine(parse_address(server.address).port)
         async with CONTROLLERS[name](line, delay) as there:
