@@ -6,6 +6,7 @@ import asyncio
 import gc
 import sys
 import threading
+import time
 from asyncio.subprocess import PIPE
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
@@ -15,9 +16,10 @@ from typing import Any
 
 import pytest
 
-from robotiq_async import ConnectFailedError, Finger, NotStartedError, RobotiqHand, State, Transition
+from robotiq_async import ConnectFailedError, Finger, NotStartedError, RobotiqHand, State, Transition, Tunnel
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
 from tests.calls import COMMANDS, called
+from tests.link.test_tunnel import Arm
 from tests.patience import patience
 from tests.serial_line import SerialLine
 from tests.virtual import run
@@ -219,7 +221,7 @@ def address() -> Iterator[str]:
         yield address
 
 
-def abandoned(address: str) -> RobotiqHand:
+def abandoned(address: str | Tunnel) -> RobotiqHand:
     """A hand whose loop has been closed while it ran."""
     hand = RobotiqHand(address)
     loop = asyncio.new_event_loop()
@@ -232,10 +234,15 @@ def abandoned(address: str) -> RobotiqHand:
 NO_LINE = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo terminals")
 
 
-@pytest.fixture(params=["tcp", pytest.param("rtu", marks=NO_LINE), "sim"])
-def place(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+@pytest.fixture(params=["tcp", pytest.param("rtu", marks=NO_LINE), "sim", "tunnel"])
+def place(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str | Tunnel]:
     if request.param == "sim":
         yield "sim://"
+        return
+    if request.param == "tunnel":
+        tunnel = Arm(SimulatedGripper(time.monotonic))
+        yield tunnel
+        assert (tunnel.opened, tunnel.closed) == (2, 1), "nothing is called for a loop that is closed"
         return
     with served(over_tcp if request.param == "tcp" else partial(over_a_line, tmp_path)) as address:
         yield address
@@ -250,7 +257,7 @@ class TestClosedLoop:
         yield
         gc.collect()
 
-    def test_every_call_says_so_and_another_hand_takes_the_gripper_over(self, place: str) -> None:
+    def test_every_call_says_so_and_another_hand_takes_the_gripper_over(self, place: str | Tunnel) -> None:
         """A serial port that the closed loop had left open was that of another program for ever."""
         left: RobotiqHand | None = abandoned(place)
         assert left is not None

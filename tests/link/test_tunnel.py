@@ -32,7 +32,7 @@ READ, WRITE, WRITE_AND_READ = 3, 16, 23
 
 
 class Arm:
-    """A tunnel to a simulated jaw.
+    """A tunnel to a simulated gripper, a jaw unless another is given.
 
     Attributes:
         pdus: the requests, in order, as exchange() was called with them.
@@ -41,8 +41,10 @@ class Arm:
         serves: the functions that it carries.
     """
 
-    def __init__(self) -> None:
-        self.gripper = SimulatedGripper(asyncio.get_running_loop().time, model=TWO_FINGER_85, spread=False)
+    def __init__(self, gripper: SimulatedGripper | None = None) -> None:
+        self.gripper = gripper or SimulatedGripper(
+            asyncio.get_running_loop().time, model=TWO_FINGER_85, spread=False
+        )
         self.pdus: list[bytes] = []
         self.carried: list[bytes] = []
         self.serves = {READ, WRITE, WRITE_AND_READ}
@@ -166,13 +168,47 @@ async def test_a_missing_or_wrong_answer_costs_a_read_and_not_the_link(what: str
     assert tunnel.opened == 1
 
 
+@pytest.mark.parametrize("what", ["a time-out", "half"])
+async def test_a_tunnel_that_has_no_answer_at_once_costs_no_time_out(what: str) -> None:
+    tunnel = await arm()
+    async with RobotiqHand(tunnel, model="2f85", response_timeout=2.0) as hand:
+        statuses = hand.statuses()
+        before = (await anext(statuses)).timestamp
+        tunnel.trouble[READ] = NO_ANSWER[what]
+        for _ in range(3):
+            after = (await anext(statuses)).timestamp
+            assert after - before < 0.05
+            before = after
+        assert not tunnel.trouble
+
+
+async def test_an_answer_to_a_request_that_was_given_up_is_dropped() -> None:
+    """It swallows its cancellation, and brings a status of long ago in the middle of another exchange."""
+    tunnel = await arm()
+    old = tunnel.answer(bytes((READ, 0x07, 0xD0, 0, 3)))
+
+    async def late(_: bytes) -> bytes:
+        with contextlib.suppress(asyncio.CancelledError):
+            await asyncio.Event().wait()
+        return old
+
+    async with RobotiqHand(tunnel, model="2f85", response_timeout=0.1) as hand:
+        await hand.move(200)
+        statuses = hand.statuses(1000)
+        tunnel.trouble[READ] = late
+        await asyncio.sleep(1)
+        assert not tunnel.trouble
+        assert {status.position(JAW) for status in statuses.drain()} == {200}
+        assert hand.statistics.reconnects == 0
+
+
 @pytest.mark.parametrize("what", LOSSES)
 async def test_what_is_raised_ends_the_link_and_it_comes_back(what: str) -> None:
     tunnel = await arm()
     async with RobotiqHand(tunnel, model="2f85") as hand:
         tunnel.trouble[READ] = LOSSES[what]
-        await hand.wait_for_state(State.DISCONNECTED)
-        await hand.wait_for_state(State.RUNNING_IDLE)
+        await hand.wait_for_state(State.DISCONNECTED, timeout=5)
+        await hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
     assert (tunnel.opened, tunnel.closed) == (2, 2)
 
 
