@@ -29,9 +29,17 @@ it, which can block for as long. Clients repeat their requests."""
 class _Last:
     """Those of a kind that comes last."""
 
-    def __init__(self) -> None:
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self.deliveries: deque[Callable[[], None]] = deque()
         self.due = 0.0  # when the next may be delivered
+        self._loop = loop
+
+    def deliver_one(self, deliver: Callable[[Callable[[], None]], None]) -> None:
+        """And then none for as long as its share demands. Nothing that moves fingers waits for it."""
+        if self.deliveries and self._loop.time() >= self.due:
+            begun = time.perf_counter()
+            deliver(self.deliveries.popleft())
+            self.due = self._loop.time() + (time.perf_counter() - begun) * (1 / SHARE - 1)
 
 
 class Mailbox:
@@ -46,7 +54,7 @@ class Mailbox:
         self._loop = asyncio.get_running_loop()
         self._halts: deque[Callable[[], None]] = deque()
         self._deliveries: deque[Callable[[], None]] = deque()
-        self._last = {Kind.OTHERS: _Last(), Kind.QUESTION: _Last()}
+        self._last = {kind: _Last(self._loop) for kind in (Kind.OTHERS, Kind.QUESTION)}
         self._is_due = False
         self._gathering: asyncio.TimerHandle | None = None
         self._opened_at = 0.0
@@ -87,7 +95,7 @@ class Mailbox:
                 break
         else:
             for last in self._last.values():
-                self._deliver_one(last)
+                last.deliver_one(self._deliver)
         # A delivery may have put another one, so _is_due may be set again.
         if (self._halts or self._deliveries) and not self._is_due:
             self._is_due = True
@@ -99,13 +107,6 @@ class Mailbox:
         elif count and not self._is_due and self._opened_at - before < 2 * GATHER_S:
             self._is_due = True
             self._gathering = self._loop.call_later(GATHER_S, self._open)
-
-    def _deliver_one(self, last: _Last) -> None:
-        # And then none for as long as its share demands. Nothing that moves fingers waits for it.
-        if last.deliveries and self._loop.time() >= last.due:
-            begun = time.perf_counter()
-            self._deliver(last.deliveries.popleft())
-            last.due = self._loop.time() + (time.perf_counter() - begun) * (1 / SHARE - 1)
 
     def _deliver(self, delivery: Callable[[], None]) -> None:
         try:
