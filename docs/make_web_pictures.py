@@ -46,7 +46,7 @@ async def main() -> None:
     try:
         async with SimulatorServer(gripper, port=5020) as server, RobotiqHand(server.address) as hand:
             settings = PageSettings(port=0, control=True, addresses=(hand.address,), speed=128, force=64)
-            async with PageServer([hand], settings, operators=[Operator(hand)]) as page:
+            async with PageServer([hand], settings, operators=[Operator(hand, who="the page")]) as page:
                 await resize(browser, 1040, 600)
                 await browser.open(page.url)
                 await browser.says("statistics", "polls")

@@ -14,7 +14,7 @@ from ..values.errors import (
     RobotiqError,
 )
 from ..values.model import Model
-from ..values.status import NO_REQUEST
+from ..values.status import NO_REQUEST, RobotiqStatus
 
 STATE_WORDS: Final = {
     State.DISCONNECTED: "lost",
@@ -58,6 +58,14 @@ JAW_NAME: Final = "jaw"
 def axis_name(axis: Finger, model: Model) -> str:
     """The names for people of axes of a model."""
     return JAW_NAME if len(model.axes) == 1 else str(axis.name)
+
+
+def holding_words(status: RobotiqStatus) -> str:
+    """The part that is held: ``holding 43 mm``, of a 3-Finger ``holding``; empty for none."""
+    part = status.part
+    if part is None:
+        return ""
+    return "holding" if part.width_mm is None else f"holding {part.width_mm:.0f} mm"
 
 
 def inhibit_words(fields: Mapping[str, Any]) -> str:

@@ -79,6 +79,14 @@ class Browser:
         self.driver.quit()
         shutil.rmtree(self._profile, ignore_errors=True)
 
+    def resize(self, width: int, height: int) -> None:
+        """Show the page at a size, that of a phone too: a window is not narrower than 500 pixels."""
+        metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+
+    def is_dark(self) -> bool:
+        return "body--dark" in str(self.driver.find_element(By.TAG_NAME, "body").get_attribute("class"))
+
     async def do(self, work: Callable[[], T]) -> T:
         """Drive it, in a thread."""
         return await asyncio.to_thread(work)

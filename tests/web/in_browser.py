@@ -9,7 +9,7 @@ import signal
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import pytest
 import pytest_asyncio
@@ -21,7 +21,16 @@ from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
-from robotiq_async import OPEN, WIDTH_NORMAL, Fault, Finger, RobotiqHand, RobotiqStatus, State
+from robotiq_async import (
+    OPEN,
+    WIDTH_NORMAL,
+    Fault,
+    Finger,
+    MotionInhibitedError,
+    RobotiqHand,
+    RobotiqStatus,
+    State,
+)
 from robotiq_async.hand import Hand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import Operator
@@ -29,14 +38,16 @@ from robotiq_async.tools.description import hand_model
 from robotiq_async.tools.description.kinematics import JOINTS, joint_angles, joint_names
 from robotiq_async.tools.description.simulated import bodies_of
 from robotiq_async.tools.web.page.widgets.controls import ROWS
-from robotiq_async.tools.web.server import PageServer
+from robotiq_async.tools.web.server import PageServer, serve_page
 from robotiq_async.tools.web.settings import PageSettings
 from robotiq_async.values.enums import DEFAULT_SPEED, JAW
 from robotiq_async.values.model import THREE_FINGER
 from tests.conftest import watched
+from tests.docs.pages import blocks, read
 from tests.fake_hand import FakeHand
 from tests.virtual import HoldWatch
 from tests.web.browser import BROWSER, COLORS, DRIVER, GEOMETRY, MISSING, SMALL, VISIBLE, Browser, Pace
+from tests.web.measures import CONTRAST, COVERED, WIDE
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
@@ -46,7 +57,7 @@ FAST, SLOW = 20.0, 0.25
 @contextlib.asynccontextmanager
 async def shown(*hands: Hand, control: bool = True) -> AsyncIterator[PageServer]:
     """The page of some hands."""
-    operators = [Operator(hand) for hand in hands] if control else []
+    operators = [Operator(hand, who="the page") for hand in hands] if control else []
     settings = PageSettings(port=0, control=control, addresses=tuple(hand.address for hand in hands))
     async with PageServer(hands, settings, operators=operators) as page:
         yield page
@@ -66,6 +77,8 @@ class Stage:
         """Restore the state before the first test."""
         self.pace.set(FAST)
         self.gripper.remove_object()
+        self.gripper.clear_faults()
+        await self.hand.permit()
         async with asyncio.timeout(20):
             await anext(self.hand.statuses())  # a busy machine may have cost the link
         if self.hand.state is State.FAULT:
@@ -128,6 +141,7 @@ def shared_browser() -> Iterator[Browser]:
 def window(shared_browser: Browser) -> Iterator[Browser]:
     """The browser, with one window, and nothing in its logs."""
     driver = shared_browser.driver
+    driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
     driver.set_window_size(*SMALL)
     shared_browser.requested()
     shared_browser.complaints()
@@ -309,10 +323,93 @@ async def test_halt_stops_it_and_so_does_the_space_bar(browser: Browser, stage: 
     status = await seen(hand, moving=False, go=False)
     assert status.position(Finger.A) < 200
     await browser.says("events", "halt: every axis has stopped")
+    # It stays: whatever is pressed, and whatever the program asks.
+    await browser.says("banner", "motion is inhibited: HALT was pressed (the page)")
+    with pytest.raises(MotionInhibitedError):
+        await hand.close()
+    assert not await browser.do(browser.find("close").is_enabled)
+    await permit(browser, hand)
     # While the button that was clicked has the focus: the space bar would press it again.
     await press(browser, hand, "close")
     await browser.press_keys(" ")
     await seen(hand, moving=False, go=False)
+
+
+async def permit(browser: Browser, hand: RobotiqHand) -> None:
+    """By the button that stands first, and its question."""
+
+    def insist() -> bool:  # a yes does not count before it can have been read
+        with contextlib.suppress(WebDriverException):
+            browser.find("yes-permit" if browser.has("yes-permit") else "helps").click()
+        return hand.inhibited is None
+
+    await browser.until(insist)
+
+
+async def test_the_loop_of_a_service_moves_nothing_after_an_operators_halt(
+    window: Browser, stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The page of the documentation, word for word, beside the real page: it grasped again after a second."""
+    names: dict[str, Any] = {}
+    address = f"sim://?speedup={FAST}"
+    monkeypatch.setenv("GRIPPER", address)
+    exec(compile(blocks(read("how-to/service.md"), "python")[0].text, "service.md", "exec"), names)
+    hand: RobotiqHand = names["hand"]
+    async with shown(hand) as page:
+        running = asyncio.create_task(names["main"]())
+        await seen(hand, moving=True)
+        await window.open(page.url)
+        await window.in_touch()
+        await window.click("halt")
+        await window.says("state", "inhibited")
+        halted = hand.status
+        positions = [halted.position(axis) for axis in THREE_FINGER.axes]
+        async for status in hand.statuses(lost_after=10):
+            assert [status.position(axis) for axis in THREE_FINGER.axes] == positions
+            if status.timestamp > halted.timestamp + 3:  # the loop tries again each second
+                break
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+        await hand.stop()
+
+
+async def test_a_password_lets_a_person_in(window: Browser, hand: RobotiqHand) -> None:
+    """A browser sent the form without an origin, and was refused whatever the password."""
+    async with serve_page(hand, port=0, password="correct horse") as page:
+        await window.open(page.url)
+        await window.do(lambda: login(window, "wrong password"))
+        await window.until(lambda: "not the password" in window.driver.page_source)
+        await window.do(lambda: login(window, "correct horse"))
+        await window.says("state", "ready")
+
+
+def login(window: Browser, password: str) -> None:
+    window.driver.find_element("name", "password").send_keys(password, Keys.ENTER)
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (1024, 768), (390, 844)], ids=str)
+async def test_nothing_covers_anything_and_all_text_can_be_read(
+    browser: Browser, stage: Stage, size: tuple[int, int]
+) -> None:
+    await browser.do(lambda: browser.resize(*size))
+    stage.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    await browser.says("banner", Fault.SCISSOR_BLOCKED.description)
+    first = await browser.run("return document.querySelector('.nicegui-content button').textContent")
+    assert first == "recover...", "what helps stands first"
+    assert await browser.run(WIDE) == 0
+    assert await browser.run(COVERED) == []
+    for mode in ("light_mode", "dark_mode"):
+        await browser.do(browser.find(mode).click)
+        await browser.until(partial(shows_mode, browser, mode))
+        assert [each for each in await browser.run(CONTRAST) if each[1] < 4.5] == []
+    await browser.do(browser.find("light_mode").click)
+    await stage.hand.recover()
+
+
+def shows_mode(browser: Browser, mode: str) -> bool:
+    """Whether the page is dark or light by now, and its colours do not fade any more."""
+    fading = browser.driver.execute_script("return document.getAnimations().length")
+    return browser.is_dark() is (mode == "dark_mode") and not fading
 
 
 async def test_a_halt_is_not_under_a_question_that_is_open(browser: Browser, stage: Stage) -> None:

@@ -21,6 +21,7 @@ except ModuleNotFoundError as error:
 from ...runtime.log import printable
 from ...values.calibration.csv_tables import RunsTable
 from ...values.calibration.scales import ForceCalibration, SpeedCalibration, mean, newton
+from ..description.palette import AXIS_COLORS
 from ..recording.payloads import is_command
 from ..recording.table import CURRENT
 from ..wording import JAW_NAME
@@ -33,8 +34,8 @@ if TYPE_CHECKING:
 
 OURS: Final = "#0b6ea8"
 THEIRS: Final = "#d1731f"
-COLOURS: Final = ("#0b6ea8", "#2a8f4c", "#b03a6b")
-"""Colours of the fingers A, B and C."""
+COLOURS: Final = tuple(AXIS_COLORS.values())
+"""Colours of the fingers A, B and C, and of the scissor."""
 WIDTHS: Final = {"A": 4.2, "B": 2.6, "C": 1.1, "SCISSOR": 1.4}  # line widths in the plot of a recording
 DRAWN: Final = ("position", "requested_position", CURRENT)
 LABEL: Final = 0.012  # width of a label, as a share of the picture's

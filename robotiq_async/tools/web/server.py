@@ -1,6 +1,6 @@
 """Shows hands on a page during a block: starts its process, sends updates, receives commands.
 
-    async with PageServer(hands, settings) as page:
+    async with serve_page(hand, control=True) as page:
         print(page.url)
 
 The two processes exchange lines of JSON through two pipes.
@@ -14,7 +14,8 @@ import os
 import sys
 from asyncio.subprocess import PIPE, Process
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import AsyncIterator, Iterator, Sequence
+from contextlib import asynccontextmanager
 from importlib.util import find_spec
 from itertools import zip_longest
 from pathlib import Path
@@ -30,9 +31,9 @@ from ...values.status import RobotiqStatus
 from ..actions import Operator
 from ..description.simulated import bodies_of
 from ..recording.feed import Timeline
-from ..recording.payloads import Properties, is_command
+from ..recording.payloads import Properties, is_command, title
 from .commands import PageCommands
-from .settings import PageSettings
+from .settings import LOOPBACK, PORT, PageSettings
 
 if find_spec("nicegui") is None:
     from ...runtime.extras import install
@@ -53,6 +54,7 @@ BUFFER: Final = 64
 EVENTS: Final = 200
 """Events kept for a page that does not read."""
 STATISTICS_S: Final = 1.0
+SHORTEST: Final = 8  # characters of a password
 
 
 class HandUpdates:
@@ -270,6 +272,52 @@ class PageServer:
         line = await self._process.stdout.readline()
         message: Properties | None = json.loads(line) if line else None
         return message
+
+
+@asynccontextmanager
+async def serve_page(
+    *hands: Hand,
+    control: bool = False,
+    port: int = PORT,
+    host: str = LOOPBACK,
+    password: str = "",
+    certificate: str = "",
+    key: str = "",
+) -> AsyncIterator[PageServer]:
+    """Serve the page of a program's own hands during a block; yields the page, with its url.
+
+    HALT on the page is :meth:`Hand.inhibit` of these very hands: no call of the program moves a finger then,
+    until a person permits it. The hands are the program's, which starts and stops them.
+
+    Args:
+        hands: at least one, started or not.
+        control: whether the page may command; False only watches.
+        port: 0 takes a free one.
+        host: the interface to listen on; all but 127.0.0.1 need a password or a certificate.
+        password: every user must give it, 8 characters or more. Empty for a token in the url, new each time.
+        certificate: PEM file for https; empty for http.
+        key: PEM file with its private key.
+
+    Raises:
+        ValueError: no hand, or settings that do not fit.
+        ViewerError: the port is taken, there is no such interface, or no process can be started.
+    """
+    if not hands:
+        raise ValueError("hands must name at least one hand, got none")
+    if password and len(password) < SHORTEST:
+        raise ValueError(f"password must have {SHORTEST} characters or more, got {len(password)}")
+    settings = PageSettings(
+        host=host,
+        port=port,
+        control=control,
+        addresses=tuple(title(hand) for hand in hands),
+        password=password,
+        certificate=certificate,
+        key=key,
+    )
+    operators = [Operator(hand, who="the page") for hand in hands] if control else []
+    async with PageServer(hands, settings, operators=operators) as page:
+        yield page
 
 
 def _patience() -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from time import monotonic
 from typing import Final
 
@@ -12,15 +12,17 @@ from nicegui.events import GenericEventArguments
 from .heartbeat import BEAT_MS, SCRIPT, Heartbeat
 from .mirror import HandMirror, PageMirror
 from .widgets.controls import Controls
-from .widgets.panels import AxesPanel, Curves, Events, StatePanel, StatisticsPanel
+from .widgets.panels import AxesPanel, Banner, Curves, Events, StatePanel, StatisticsPanel
 from .widgets.scene import HandScene
 from .widgets.words import timed
 
 REFRESH_S: Final = 0.05
-STAGE: Final = "h-[36vh] lg:h-[calc(100vh-13rem)] lg:sticky lg:top-16 min-h-[250px]"
+STAGE: Final = "h-[36vh] lg:h-[calc(100dvh-14rem)] lg:sticky lg:top-0 min-h-[250px]"
 """Size of the scene: part of a phone, the free height of a wide window."""
 SCENES_MAX: Final = 12
 """Tiles with a scene: with more than about sixteen, browsers drop the first ones."""
+THEME: Final = {"primary": "#1a5fb4", "positive": "#1b7a34", "negative": "#b3261e", "warning": "#7d5200"}
+"""Backgrounds of white text: a contrast of 4.5 and more."""
 STYLE: Final = """
 <style>
 .rq-axes { display: grid; gap: .35rem; width: 100%; }
@@ -32,16 +34,25 @@ STYLE: Final = """
 .rq-bar u { position: absolute; top: -3px; bottom: -3px; width: 3px; background: currentColor; }
 .rq-number { text-align: right; }
 .rq-does { grid-column: 2 / -1; font-size: .75rem; opacity: .75; min-height: 1rem; }
+.rq-patch { display: inline-block; width: .7rem; height: .7rem; border-radius: 2px; margin-right: .35rem; }
+.rq-name { border-left: .7rem solid transparent; padding-left: .35rem; line-height: 1; }
 .rq-contact { border-color: #ff5a1f; }
-.rq-contact .rq-does { color: #ff5a1f; opacity: 1; font-weight: 600; }
-.rq-stale { opacity: .45; }
+.rq-contact .rq-does { color: #b93c0c; opacity: 1; font-weight: 600; }
+.body--dark .rq-contact .rq-does { color: #ff8a5c; }
+.rq-banner { background: #b00020; color: #fff; padding: .5rem .75rem; border-radius: 4px; }
+.rq-helps { background: #fff !important; color: #8c0019 !important; font-weight: 700; }
+.rq-stale { opacity: .66; filter: grayscale(1); }
+.rq-stale .rq-does { opacity: 1; }
 @media (min-width: 1200px) {
   .rq-line .rq-axis { grid-template-columns: 4.2rem 1fr 2.2rem 3.6rem 4.2rem 8.5rem; min-height: 1.7rem; }
   .rq-line .rq-does { grid-column: auto; min-height: 0; }
 }
-.rq-foot { z-index: 7000; pointer-events: none; }
-.rq-foot > * { pointer-events: auto; }
-.rq-halt { min-height: 4rem; font-size: 1.5rem !important; font-weight: 700; letter-spacing: .1em; }
+/* The foot covers nothing: what is above it scrolls by itself. */
+.rq-foot { z-index: 7000; height: 5rem; background: #fff; }
+.body--dark .rq-foot { background: #121212; }
+.rq-halt { min-height: 4rem; font-size: 1.5rem !important; font-weight: 700; letter-spacing: .1em;
+  background: #b3121d !important; color: #fff !important; }
+.rq-halt.rq-vain { background: #5b6169 !important; font-size: 1.1rem !important; letter-spacing: 0; }
 .rq-stage { border-radius: 4px; overflow: hidden; }
 .body--dark .rq-stage { filter: brightness(.8); }
 .rq-red { color: #c10015; }
@@ -53,13 +64,18 @@ STYLE: Final = """
 .rq-cut .nicegui-content { opacity: .4; filter: grayscale(1); }
 .rq-cut .rq-halt { filter: grayscale(1); }
 #popup { display: none; }
-.nicegui-content { padding: .75rem; padding-bottom: 6rem; }
+.nicegui-content { padding: .75rem; height: calc(100dvh - 3.25rem); overflow-y: auto; }
+body:has(.rq-foot) .nicegui-content { height: calc(100dvh - 8.25rem); }
+.q-header { height: 3.25rem; }
 </style>
 """
 CUT: Final = """
 <div class="rq-cut-words" role="alert" data-testid="cut">
 No connection to robotiq-async: what is shown is old{}.</div>
 """
+HALTS: Final = (
+    "stops every axis, and motion stays refused until a person permits it; the space bar does it, too"
+)
 PRESSED: Final = ", and nothing that is pressed here arrives, HALT neither"
 
 
@@ -125,6 +141,7 @@ def register(mirror: PageMirror) -> None:
 
 
 def _frame(title: str, mirror: PageMirror, *, home: bool) -> None:
+    ui.colors(**THEME)
     ui.add_head_html(STYLE)
     ui.add_body_html(CUT.format(PRESSED if mirror.control else "") + SCRIPT)
     dark = ui.dark_mode(None)
@@ -146,8 +163,10 @@ def _hand_page(mirror: PageMirror, hand: HandMirror, client: Client, sessions: P
     _frame(hand.address, mirror, home=len(mirror.hands) > 1)
     heartbeat = sessions.begin(client)
     shown: list[Callable[[], None]] = []
+    controls: list[Controls] = []
     with ui.element("div").classes("grid w-full gap-3 grid-cols-1 lg:grid-cols-2"):
         with ui.column().classes("w-full gap-2"):
+            banner = Banner((lambda name: controls[0].ask(name)) if mirror.control else None)
             with ui.row().classes("w-full items-center gap-3"):
                 state = StatePanel()
             with ui.element("div").classes(f"{STAGE} w-full rq-stage"):
@@ -158,6 +177,7 @@ def _hand_page(mirror: PageMirror, hand: HandMirror, client: Client, sessions: P
             curves = Curves()
             events, statistics = Events(), StatisticsPanel()
     shown += [
+        lambda: banner.show(hand, is_quiet=mirror.is_quiet),
         lambda: state.show(hand, is_quiet=mirror.is_quiet),
         lambda: scene.show(hand),
         lambda: axes.show(hand),
@@ -167,9 +187,10 @@ def _hand_page(mirror: PageMirror, hand: HandMirror, client: Client, sessions: P
     ]
     if mirror.control:
         with place:
-            controls = Controls(mirror, hand, client.id, heartbeat, lambda words: events.add(timed(words)))
-        shown.append(controls.show)
-        _halt_button("halt", "stops every axis", controls.halt)
+            of_hand = Controls(mirror, hand, client.id, heartbeat, lambda words: events.add(timed(words)))
+        controls.append(of_hand)
+        shown.append(of_hand.show)
+        shown.append(_halt_button("halt", of_hand.halt, mirror, [hand]))
     else:
         with place:
             hint = ui.label("This page only watches. To command from a page: robotiq-async web --control")
@@ -177,12 +198,26 @@ def _hand_page(mirror: PageMirror, hand: HandMirror, client: Client, sessions: P
     ui.timer(REFRESH_S, lambda: [show() for show in shown])
 
 
-def _halt_button(name: str, what: str, halt: Callable[[], None]) -> None:
+def _halt_button(
+    name: str, halt: Callable[[], None], mirror: PageMirror, hands: Sequence[HandMirror]
+) -> Callable[[], None]:
     # At the foot of the window, however the page is scrolled, and above an open question.
     ui.on("space", halt)
-    with ui.footer().classes("p-2 bg-transparent rq-foot"):
-        button = ui.button(name, on_click=halt, color="red-8").classes("w-full rq-halt")
-        button.props("data-testid=halt").tooltip(f"{what}; the space bar does it too")
+    with ui.footer().classes("p-2 rq-foot"):
+        button = ui.button(name, on_click=halt, color=None).classes("w-full rq-halt")
+        button.props(f'data-testid=halt title="{HALTS}"')
+    shown: list[str] = [name]
+
+    def show() -> None:
+        # It is pressed all the same: what moves is held once the link is back, and motion stays refused.
+        arrives = not mirror.is_quiet and not all(hand.is_lost or hand.problem for hand in hands)
+        words = name if arrives else f"{name}: does not arrive now"
+        if words != shown[0]:
+            shown[0] = words
+            button.set_text(words)
+            button.classes(add="" if arrives else "rq-vain", remove="rq-vain" if arrives else "")
+
+    return show
 
 
 def _tiles(mirror: PageMirror, client: Client, sessions: PageSessions) -> None:
@@ -191,7 +226,7 @@ def _tiles(mirror: PageMirror, client: Client, sessions: PageSessions) -> None:
     with ui.element("div").classes("grid w-full gap-3 grid-cols-1 sm:grid-cols-2 xl:grid-cols-3"):
         shown = [_tile(mirror, hand) for hand in mirror.hands]
     if mirror.control:
-        _halt_button("halt all", "stops every axis of every hand", lambda: _halt_all(mirror, client.id))
+        shown.append(_halt_button("halt all", lambda: _halt_all(mirror, client.id), mirror, mirror.hands))
     ui.timer(2 * REFRESH_S, lambda: [show() for show in shown])
 
 

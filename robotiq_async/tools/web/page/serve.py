@@ -30,17 +30,27 @@ MESSAGE_MAX: Final = 65_536
 
 
 class _Connection(H11Protocol):
-    """A connection that has to ask something soon. Strangers must not keep those of the browsers away."""
+    """A connection that has to ask something soon. Strangers must not keep those of the browsers away.
+
+    Of too many the oldest that has asked nothing goes: a browser asks at once, and gets in.
+    """
+
+    since = 0.0
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as in the base
         super().connection_made(transport)
+        self.since = self.loop.time()
         if len(self.connections) > MOST:
-            transport.abort()
-        else:
-            self.loop.call_later(HEAD_S, self._close_if_silent)
+            silent = [each for each in self.connections if isinstance(each, _Connection) and each.is_silent]
+            min(silent, key=lambda each: each.since, default=self).transport.abort()
+        self.loop.call_later(HEAD_S, self._close_if_silent)
+
+    @property
+    def is_silent(self) -> bool:
+        return self.cycle is None and not self.transport.is_closing()
 
     def _close_if_silent(self) -> None:
-        if self.cycle is None and self in self.connections:  # else it is another protocol's, or lost
+        if self.is_silent and self in self.connections:  # else it is another protocol's, or lost
             self.transport.abort()
 
 

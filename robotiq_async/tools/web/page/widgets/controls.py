@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from html import escape
 from time import monotonic
 from typing import Any, Final
 
@@ -13,6 +14,7 @@ from ....actions import ACTIONS, Action
 from ....wording import JAW_NAME
 from ..heartbeat import PRESS, PRESS_WITH_VALUE, Heartbeat
 from ..mirror import HandMirror, PageMirror
+from .allowed import why_not
 from .words import COLORS, NAMES
 
 ARMED_S: Final = 0.3
@@ -52,6 +54,7 @@ class Positions:
         self._touched: set[str] = set()
         """Sliders that were moved and not sent yet."""
         self._is_placing = False
+        self.buttons: list[ui.button] = []
         columns = "auto 1fr minmax(2rem, auto) auto"
         with ui.grid(columns=columns).classes("w-full items-center gap-x-3 gap-y-1"):
             for name, axes, color in ROWS:
@@ -100,14 +103,15 @@ class Positions:
             self._pressed("move", {"position": self._targets.get(name), "fingers": words}, event.args)
             self._touched.discard(name)
 
-        title = ui.label(name).classes("font-bold").style(f"color:{color}")
+        title = ui.label(name).classes("font-bold rq-name").style(f"border-color:{color}")
         slider = Slider(min=OPEN, max=CLOSED, value=OPEN).props(f"data-testid=position-{name}")
         slider.on_value_change(touch)
         slider.on("change", let_go, js_handler=PRESS_WITH_VALUE)
         number = ui.label().bind_text_from(slider, "value", self._target_words)
         number.classes("text-right whitespace-nowrap")
         button = ui.button("move").props(f"dense no-caps data-testid=move-{name}").classes("px-3")
-        button.tooltip(f"{name} to this position: 0 is open, 255 closed")
+        self.buttons.append(button)
+        button.props(f'title="{name} to this position: 0 is open, 255 closed"')
         button.on("click", send, js_handler=PRESS)
         self._sliders[name], self._titles[name] = slider, title
         self._rows[name] = title, slider, number, button
@@ -127,10 +131,15 @@ class Controls:
         self._mirror, self._hand, self._page = mirror, hand, page
         self._heartbeat, self._report = heartbeat, report
         self._dialogs: list[ui.dialog] = []
+        self._asking: dict[str, Callable[[], None]] = {}
+        self._pressable: dict[str, list[Slider | ui.button]] = {}
+        self._why: dict[str, str] = {}
         with ui.row().classes("w-full gap-2"):
             buttons = {name: self._button(ACTIONS[name]) for name in DIRECT}
         self._widths = [buttons[name] for name in WIDTHS]
+        self._reason = ui.label("").classes("text-sm").props("data-testid=why")
         self._positions = Positions(hand, self._pressed)
+        self._pressable["move"] = [*self._positions.buttons]
         with ui.grid(columns="auto 1fr auto").classes("w-full items-center gap-x-3 gap-y-0"):
             self._slider("speed", SPEED_MAX, mirror.speed)
             self._slider("force", FORCE_MAX, mirror.force)
@@ -145,6 +154,25 @@ class Controls:
             if button.visible is not has_scissor:
                 button.set_visibility(has_scissor)
         self._positions.show()
+        self._enable()
+
+    def _enable(self) -> None:
+        """Let the buttons follow the state, each with its reason."""
+        is_quiet = self._mirror.is_quiet
+        for name, elements in self._pressable.items():
+            why = why_not(name, self._hand, is_quiet=is_quiet)
+            if self._why.get(name) == why:
+                continue
+            self._why[name] = why
+            for element in elements:
+                element.set_enabled(not why)
+                # A tip of the browser: a button that is disabled has no other.
+                element.props(f'title="{escape(why)}"') if why else element.props(remove="title")
+        self._reason.set_text(f"no motion: {self._why['open']}" if self._why["open"] else "")
+
+    def ask(self, name: str) -> None:
+        """Open the question of an action."""
+        self._asking[name]()
 
     def halt(self) -> None:
         """Stop every axis, without a question and however old the press is. Closes open questions."""
@@ -154,7 +182,7 @@ class Controls:
 
     def _button(self, action: Action) -> ui.button:
         button = ui.button(action.name).props(f"data-testid={action.name} no-caps").classes("grow")
-        button.tooltip(action.what)
+        self._pressable[action.name] = [button]
         button.on("click", lambda e: self._pressed(action.name, {}, e.args), js_handler=PRESS)
         return button
 
@@ -175,11 +203,13 @@ class Controls:
             ui.label(f"{action.name.capitalize()}: {action.what}").classes("text-lg")
             ui.label(action.warning).classes("rq-red")
             with ui.row().classes("w-full justify-end"):
-                ui.button("no", on_click=dialog.close).props("flat no-caps")
+                ui.button("no", on_click=dialog.close, color=None).props("flat no-caps")
                 sure = ui.button(f"yes, {action.name}", color="negative").props("no-caps")
                 sure.props(f"data-testid=yes-{action.name}").on("click", yes, js_handler=PRESS)
         self._dialogs.append(dialog)
-        ui.button(f"{action.name}...", on_click=ask).props(f"outline no-caps data-testid={action.name}")
+        self._asking[action.name] = ask
+        button = ui.button(f"{action.name}...", on_click=ask, color=None)
+        self._pressable[action.name] = [button.props(f"outline no-caps data-testid={action.name}")]
 
     def _slider(self, what: str, highest: int, value: int) -> None:
         def change(event: events.GenericEventArguments) -> None:
@@ -188,6 +218,7 @@ class Controls:
 
         ui.label(what)
         slider = Slider(min=0, max=highest, value=value).props(f"data-testid={what}")
+        self._pressable[what] = [slider]
         # Sent when the slider is released, and not for every value on the way.
         slider.on("change", change, js_handler=PRESS_WITH_VALUE)
         ui.label().bind_text_from(slider, "value", lambda each: f"{each:.0f}").classes("w-8 text-right")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from html import escape
 from time import monotonic
 from typing import Any, Final
@@ -9,11 +10,13 @@ from typing import Any, Final
 from nicegui import ui
 
 from ..mirror import HISTORY_S, HandMirror
+from .allowed import what_helps
 from .words import (
     COLORS,
     NAMES,
     axis_title,
     axis_words,
+    banner_words,
     event_words,
     fault_words,
     opening_words,
@@ -42,6 +45,37 @@ class StatePanel:
         words, is_serious = fault_words(hand)
         self._fault.set_text(words)
         self._fault.classes(add="rq-red" if is_serious else "", remove="" if is_serious else "rq-red")
+
+
+class Banner:
+    """What needs a person, above everything: an inhibit or a fault, and the button that helps.
+
+    ``ask`` opens the question of an action; a page that only watches has none.
+    """
+
+    def __init__(self, ask: Callable[[str], None] | None) -> None:
+        self._ask = ask
+        self._shown: tuple[str, str] = ("", "")
+        self._card = ui.row().classes("w-full items-center gap-3 rq-banner").props("data-testid=banner")
+        with self._card:
+            self._words = ui.label("").classes("grow min-w-0").style("flex-basis:12rem")
+            self._button = ui.button("", on_click=self._press, color=None)
+            self._button.props("no-caps unelevated data-testid=helps").classes("rq-helps")
+        self._card.set_visibility(False)
+
+    def show(self, hand: HandMirror, *, is_quiet: bool) -> None:
+        helps = what_helps(hand, is_quiet=is_quiet)
+        words = banner_words(hand) if helps else ""
+        if (words, helps) != self._shown:
+            self._shown = words, helps
+            self._words.set_text(words)
+            self._button.set_text(f"{helps}...")
+            self._button.set_visibility(self._ask is not None)
+            self._card.set_visibility(bool(words))
+
+    def _press(self) -> None:
+        if self._ask is not None and self._shown[1]:
+            self._ask(self._shown[1])
 
 
 class AxesPanel:
@@ -74,10 +108,10 @@ def _axis_row(hand: HandMirror, index: int) -> str:
     contact = " rq-contact" if axis & status.contacts and not hand.is_lost else ""
     stale = " rq-stale" if hand.is_lost else ""
     color, name = COLORS[index], axis_title(hand, index)
-    does = ", ".join(filter(None, (opening_words(hand), axis_words(hand, axis))))
+    does = ", ".join(filter(None, (opening_words(hand, axis), axis_words(hand, axis))))
     return (
         f'<div class="rq-axis{contact}{stale}" data-axis="{name}" data-position="{position}">'
-        f'<b style="color:{color}">{name}</b>'
+        f'<b><i class="rq-patch" style="background:{color}"></i>{name}</b>'
         f'<span class="rq-bar"><i style="width:{position / 2.55:.1f}%;background:{color}"></i>'
         f'<u style="left:calc((100% - 3px) * {wanted / 255:.3f})"></u></span>'
         f'<span class="rq-number">{position}</span><span class="rq-wanted">&rarr; {wanted}</span>'

@@ -8,11 +8,12 @@ from typing import Any, Final
 
 from .....values.enums import JAW, Fault, Finger, Severity, State
 from .....values.status import NO_REQUEST
-from ....wording import AXIS_WORDS, JAW_NAME, STATE_WORDS, inhibit_words
+from ....description.palette import AXIS_COLORS
+from ....wording import AXIS_WORDS, JAW_NAME, STATE_WORDS, holding_words, inhibit_words
 from ..mirror import HandMirror
 
 NAMES: Final = tuple("scissor" if axis is Finger.SCISSOR else str(axis.name) for axis in Finger.ALL)
-COLORS: Final = ("#3b82f6", "#22a35a", "#e8890c", "#a855f7")
+COLORS: Final = tuple(AXIS_COLORS.values())
 """Colours of A, B, C and the scissor, for light and dark pages."""
 
 
@@ -21,12 +22,13 @@ def axis_title(hand: HandMirror, index: int) -> str:
     return JAW_NAME if len(hand.model.axes) == 1 else NAMES[index]
 
 
-def opening_words(hand: HandMirror) -> str:
-    """The opening of a jaw, and the source of the figure; empty for a 3-Finger."""
+def opening_words(hand: HandMirror, axis: Finger = JAW) -> str:
+    """The opening at an axis, of a jaw with the source of the figure; empty for the scissor."""
     status = hand.status
-    if status is None or len(status.model.axes) > 1:
+    if status is None or axis is Finger.SCISSOR:
         return ""
-    return f"{status.opening_mm(JAW):.1f} mm ({status.stroke.source})"
+    source = f" ({status.stroke.source})" if len(status.model.axes) == 1 else ""
+    return f"{status.opening_mm(axis):.1f} mm{source}"
 
 
 def state_words(hand: HandMirror, *, is_quiet: bool) -> tuple[str, str]:
@@ -36,11 +38,16 @@ def state_words(hand: HandMirror, *, is_quiet: bool) -> tuple[str, str]:
     if hand.problem:
         return "not reached", "negative"
     words = STATE_WORDS[hand.state]
+    if hand.inhibited is not None and hand.state in (State.RUNNING_IDLE, State.RUNNING_CC):
+        holding = "" if hand.status is None else holding_words(hand.status)
+        return ", ".join(filter(None, ("inhibited", holding))), "negative"
     if hand.state in (State.DISCONNECTED, State.FAULT):
         return words, "negative"
     if hand.state in (State.RUNNING_IDLE, State.RUNNING_CC):
-        moving = hand.status is not None and hand.status.is_moving
-        return ("moving", "primary") if moving else (words, "positive")
+        if hand.status is not None and hand.status.is_moving:
+            return "moving", "primary"
+        holding = "" if hand.status is None else holding_words(hand.status)
+        return holding or words, "positive"
     return words, "warning"
 
 
@@ -61,6 +68,16 @@ def fault_words(hand: HandMirror) -> tuple[str, bool]:
         f"0x{int(fault):02X} {fault.severity.value}: {fault.description}",
         fault.severity is not Severity.PRIORITY,
     )
+
+
+def banner_words(hand: HandMirror) -> str:
+    """What needs a person, in a sentence: an inhibit, a fault, a reset."""
+    if hand.inhibited is not None:
+        since = timed("", hand.inhibited.since).partition(".")[0]
+        return f"{hand.inhibited}, since {since}"
+    if hand.state is State.RESET:
+        return "The gripper is not active: an activation moves its fingers to their stops."
+    return fault_words(hand)[0]
 
 
 def axis_words(hand: HandMirror, axis: Finger) -> str:

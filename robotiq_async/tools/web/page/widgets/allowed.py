@@ -1,0 +1,62 @@
+"""Which buttons of the page may be pressed now, and why not: a table of state, inhibit and link. Pure.
+
+What a state refuses is asked of the state machine's own table, so that a button never differs from the hand.
+"""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+from typing import Final
+
+from .....control.state_machine import MOVES, RUNNING, TABLE, Verdict
+from .....values.enums import State, Trigger
+from ....wording import STATE_WORDS
+from ..mirror import HandMirror
+
+COMMANDS: Final = ("open", "close", "wide", "normal", "pinch", "move", "force", "speed")
+"""What is a command for the state machine."""
+TRIGGERS: Final = MappingProxyType(
+    {
+        **dict.fromkeys(COMMANDS, Trigger.ASK_COMMAND),
+        "activate": Trigger.ASK_ACTIVATE,
+        "reset": Trigger.ASK_RESET,
+        "release": Trigger.ASK_RELEASE,
+    }
+)
+"""What each button asks of the state machine. Recover is steps, and permit asks nothing of it."""
+HELPS: Final = MappingProxyType(
+    {State.FAULT: "recover", State.ATR_DONE: "reset", State.RESET: "activate"},
+)
+"""The button that helps in a state: it stands first."""
+QUIET: Final = "the program that watches the gripper is silent"
+LOST: Final = "no connection to the gripper"
+INHIBITED: Final = "motion is inhibited: permit it first"
+_IDLE: Final = {"activate": "it is active", "recover": "there is nothing to recover from"}
+
+
+def why_not(name: str, hand: HandMirror, *, is_quiet: bool) -> str:
+    """Why a button cannot be pressed now; empty if it can. A halt always can."""
+    if is_quiet:
+        return QUIET
+    if name == "permit":
+        return "" if hand.inhibited is not None else "motion is not inhibited"
+    if hand.problem or hand.is_lost:
+        return LOST
+    trigger, state = TRIGGERS.get(name), hand.state
+    if hand.inhibited is not None and name != "speed" and (name == "recover" or trigger in MOVES):
+        return INHIBITED
+    if state in RUNNING:
+        return _IDLE.get(name, "") or ("only in a fault" if name == "release" else "")
+    if trigger is None or isinstance(verdict := TABLE[state][trigger], State):
+        return ""
+    if verdict is Verdict.IGNORED:
+        return "it is under way"
+    helps = HELPS.get(state)
+    return f"not while it is {STATE_WORDS[state]!r}" + (f": press {helps}" if helps else "")
+
+
+def what_helps(hand: HandMirror, *, is_quiet: bool) -> str:
+    """The button that helps now: permit, recover, reset or activate; empty for none."""
+    if not is_quiet and hand.inhibited is not None:
+        return "permit"
+    return "" if is_quiet or hand.problem or hand.is_lost else HELPS.get(hand.state, "")
