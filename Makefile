@@ -27,7 +27,7 @@ unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH PYTHONSTARTUP PIP_USER P
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo show smoke test-core test test-web test-ros2 test-lerobot test-urcap test-upstream race test-urdf pages docs dist pythons canary soak habits fuzz explore bench lint check format constraints clean
+.PHONY: help demo show smoke test-core test test-web test-ros2 test-lerobot test-urcap test-upstream race test-urdf pages docs dist pythons canary typed soak habits fuzz explore bench lint check format constraints clean
 
 help:  ## Show this list; times are those of two idle cores, without setting up the environment (once, a minute)
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -83,6 +83,9 @@ pythons: $(RELEASE)/.complete  ## Test the core on other Pythons (PYTHONS="3.12 
 
 canary: $(RELEASE)/.complete  ## Test with the newest of all dependencies, in an environment that is thrown away (PYMODBUS="pymodbus>=4.0.0.dev0")
 	@PYMODBUS="$(PYMODBUS)" $(RELEASE)/bin/python -m tests.release.canary
+
+typed: $(RELEASE)/.complete  ## Count the names whose type pyright knows; fewer than 98 % fail (a minute; needs the package index and npm's)
+	@$(RELEASE)/bin/python -m tests.release.typed
 
 soak: $(STAMP)  ## Move a MODEL=3f under random faults for MINUTES=30 over LINK=tcp (rtu, urcap, tunnel), and print figures
 	@$(BIN)/python -m tests.adversity.soak --minutes $(MINUTES) --link $(LINK) --model $(MODEL) --hands $(HANDS) --silent $(SILENT)
