@@ -40,7 +40,7 @@ class FaultNews:
     """
 
     def __init__(self, machine: StateMachine) -> None:
-        self.shown = 0
+        self.shown: int = 0
         self._machine = machine
         self._fault = Fault.NONE  # logged last
         self._controller_fault = 0

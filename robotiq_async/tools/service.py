@@ -141,7 +141,7 @@ class Signals:
     """
 
     def __init__(self) -> None:
-        self.received = 0
+        self.received: int = 0
 
     def note(self, number: int) -> None:
         """A signal has come."""

@@ -161,9 +161,9 @@ class MotionInhibitedError(RobotiqStateError):
     """
 
     def __init__(self, inhibit: Inhibit) -> None:
-        self.reason = inhibit.reason
-        self.who = inhibit.who
-        self.since = inhibit.since
+        self.reason: str = inhibit.reason
+        self.who: str = inhibit.who
+        self.since: float = inhibit.since
         super().__init__(
             str(inhibit), advice="a person permits it again: on the page, in the monitor, by fleet permit"
         )

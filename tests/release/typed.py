@@ -22,11 +22,7 @@ def main() -> None:
     """Install, and count."""
     with tempfile.TemporaryDirectory(prefix="robotiq_async_typed") as folder:
         python = make(Path(folder) / "venv", *CONSTRAINTS, "pyright[nodejs]", f"{ROOT}[all]")
-        known = {
-            **os.environ,
-            "PATH": f"{python.parent}:{os.environ['PATH']}",
-            "VIRTUAL_ENV": f"{folder}/venv",
-        }
+        path = f"{python.parent}{os.pathsep}{os.environ['PATH']}"  # pyright asks the first Python there
         count = ("-m", "pyright", "--verifytypes", "robotiq_async", "--ignoreexternal")
         said = run(str(python), *count, folder=Path(folder), code=1, variables={**os.environ, "PATH": path})
     (symbols,) = re.findall(r'^Symbols exported by "robotiq_async": (\d+)', said, re.MULTILINE)

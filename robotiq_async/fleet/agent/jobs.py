@@ -48,8 +48,8 @@ class Job:
         self.task: asyncio.Task[MoveResult | None] | None = None
         self.reason: str = ""
         self.asked: dict[Setting, int] = asked_of(name, call.arguments)
-        self.is_shown = False
-        self.was_refused = False
+        self.is_shown: bool = False
+        self.was_refused: bool = False
         self.says: Callable[[], Fields] = says
 
     @property

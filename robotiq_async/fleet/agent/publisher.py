@@ -36,7 +36,7 @@ class HandPublisher:
     """
 
     def __init__(self, name: GripperName, hand: RobotiqHand, bus: Bus, epoch: int, lease: Lease) -> None:
-        self.problem = ""
+        self.problem: str = ""
         self._name = name
         self._mark = name.mark
         self._hand = hand

@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Final
 
+from ...runtime.log import Log
 from ...values.checks import check_seconds
 from ...values.enums import Finger, StopLevel
 from ...values.errors import (
@@ -75,7 +76,7 @@ class Dialog:
         self.name = name
         self.loop: asyncio.AbstractEventLoop = asyncio.get_running_loop()
         self.mirror = mirror
-        self.log = mirror.log
+        self.log: Log = mirror.log
         self.lease: ClientLease = ClientLease(str(name))
         self.process: int = os.getpid()
         self.client: str = secrets.token_hex(8)
