@@ -27,12 +27,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 from collections.abc import Callable, Generator
 from enum import Enum
 from typing import Final, TypeVar
-from weakref import WeakSet, WeakValueDictionary
+from weakref import WeakKeyDictionary, WeakValueDictionary
 
 from ..runtime.limit import Limit
+from ..runtime.log import Log, log
 from ..values.errors import ConnectFailedError, ConnectionLostError, ProtocolError, RobotiqConnectionError
 from .address import Address
 from .canonical import canonical_address
@@ -106,11 +108,12 @@ class Line:
         *,
         wire: Wire | None = None,
         shares: bool = False,
+        log: Log = log,
     ) -> None:
         """Keep the settings; opens nothing.
 
         ``stray`` says what bytes without a request mean. ``wire`` is that to the address unless given. With
-        ``shares`` the line may have several users at a time.
+        ``shares`` the line may have several users at a time. ``log`` is that of its only user.
         """
         self.state, self.why = CLOSED, None
         self.forgives: bool = address.is_rtu
@@ -123,7 +126,8 @@ class Line:
         self._shares: Final = shares
         self._turns: Final = asyncio.Lock()
         self._users: Final[set[object]] = set()
-        self._holders: Final[WeakSet[object]] = WeakSet()
+        self._log: Final = log
+        self._holders: Final[WeakKeyDictionary[object, Log]] = WeakKeyDictionary()
         """Those whose line it is, and who open it again after a loss, whether they are users now or not."""
         self._patience: Final = Patience()
         self._speaker: object = None
@@ -139,6 +143,11 @@ class Line:
     why: Outcome | None
 
     def _become(self, state: LineState, why: Outcome | None = None) -> None:
+        """Change the state; the log of each hand that has the line tells, at DEBUG."""
+        if state is not self.state and self._log.isEnabledFor(logging.DEBUG):
+            reason = "" if why is None else f" ({why.error})"
+            for each in list(self._holders.values()) or [self._log]:
+                each.debug("line: %s -> %s%s", self.state.name, state.name, reason)
         self.state, self.why = state, why
 
     @property
@@ -210,14 +219,14 @@ class Line:
         if self.why is not None:
             raise renewed(self.why.error)
 
-    def hold(self, user: object) -> None:
+    def hold(self, user: object, log: Log) -> None:
         """Keep the line at this rate until :meth:`release`, also while the connection is down."""
-        self._holders.add(user)
+        self._holders[user] = log
 
     def release(self, user: object) -> None:
         """End the use of the line for good."""
-        self._holders.discard(user)
         self.leave(user)
+        self._holders.pop(user, None)
 
     def leave(self, user: object) -> None:
         """End the use of the line, between two exchanges; the last user closes it."""
@@ -414,10 +423,10 @@ def _close_abandoned() -> None:
 _shared: Final[WeakValueDictionary[tuple[asyncio.AbstractEventLoop, str], Line]] = WeakValueDictionary()
 
 
-def shared_line(address: Address, user: object) -> Line:
+def shared_line(address: Address, user: object, log: Log) -> Line:
     """The line at an address, which all its users in the running event loop share.
 
-    Held for ``user`` from here on.
+    Held for ``user``, who has ``log``, from here on.
 
     Raises:
         ConnectFailedError: others hold it with another rate, parity or number of stop bits.
@@ -428,5 +437,5 @@ def shared_line(address: Address, user: object) -> Line:
         _shared[place] = line = Line(address, shares=True)
     elif line.address.line != address.line:
         raise ConnectFailedError(str(address), f"the port is in use as {line.address}")
-    line.hold(user)
+    line.hold(user, log)
     return line

@@ -67,7 +67,8 @@ class ModbusTransport:
         if tunnel is None and address.scheme:
             tunnel = tunnel_to(address, registers.device_id)
         self._tunnel: Final = None if tunnel is None else TunnelWire(tunnel, address, log)
-        self._line = Line(address, wire=self._tunnel)
+        self._log: Final = log
+        self._line = Line(address, wire=self._tunnel, log=log)
         self._number = secrets.randbelow(LAST_NUMBER)
         """Transaction id of the last request; starts at random to differ from those of other programs."""
         make: Callable[[bytes, Timing], Exchange] = self._over_a_line if address.is_rtu else self._over_tcp
@@ -118,7 +119,7 @@ class ModbusTransport:
         """
         self._line.leave(self)
         if self._shares_line:
-            self._line = shared_line(self._address, self)
+            self._line = shared_line(self._address, self, self._log)
             self._dialogues.move_to(self._line)
         await self._line.open(self, self._connect_timeout)
         await self._line.talk(self, self._dialogues.opening())

@@ -239,6 +239,18 @@ async def test_an_end_of_the_connection_is_the_end_for_both(
     assert len(reasons) == 1, "both say what has happened"
 
 
+async def test_the_log_tells_each_hand_what_becomes_of_its_line(
+    bus: Bus, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.DEBUG, logger="robotiq_async")
+    async with bus.hand(LEFT, name="left"), bus.hand(RIGHT, name="right") as right:
+        caplog.clear()
+        bus.pull()
+        await right.wait_for_state(State.DISCONNECTED, timeout=1)
+    said = [each.getMessage() for each in caplog.records if "line: IN_STEP -> CLOSED" in each.getMessage()]
+    assert [each.partition(": ")[0] for each in said] == ["left", "right"]
+
+
 async def test_a_cancelled_start_leaves_the_other_alone(bus: Bus) -> None:
     async with bus.hand(RIGHT) as right:
         nobody = bus.hand(33)

@@ -135,6 +135,24 @@ async def test_a_line_that_does_not_answer_a_write_gets_the_longer_silence(devic
     await transport.close()
 
 
+async def test_the_log_has_each_change_of_a_line(device: Device, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.DEBUG, "robotiq_async")
+    transport = unopened(VirtualLine.NEAR)
+    await transport.open()
+    device.loses = 1
+    await transport.read()
+    await transport.close()
+    said = [each.getMessage().partition("line: ")[2].partition(" (")[0] for each in caplog.records]
+    assert [each for each in said if each] == [
+        "CLOSED -> OPENING",
+        "OPENING -> IN_STEP",
+        "IN_STEP -> DISTURBED",
+        "DISTURBED -> HUSHING",
+        "HUSHING -> IN_STEP",
+        "IN_STEP -> CLOSED",
+    ]
+
+
 # -- the first exchange --------------------------------------------------------------------------------------
 
 

@@ -151,7 +151,7 @@ class UrcapTransport:
         self._gripper: Final = gripper
         self._connect_timeout: Final = connect_timeout
         self._timing: Final = Timing(response_timeout)
-        self._line: Final = Line(address, stray=lines.stray)
+        self._line: Final = Line(address, stray=lines.stray, log=log)
         self._unanswered = ""
         """The first question that has no answer; that of a connection that has ended, too."""
         self._unreadable = ""
