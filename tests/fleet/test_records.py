@@ -127,3 +127,29 @@ async def test_a_full_disk_is_said_once_and_the_next_agent_knows_nothing(
     await hand.set_force(202, A)
     await written(records)
     assert force_of(tmp_path, hand) == 202
+
+
+@inside(lab, "records")
+async def test_without_a_thread_there_is_rather_no_record_than_an_older_one(
+    here: Lab,
+    hand: RemoteHand,
+    records: FileRecords,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """The log said that no client would come back by itself, and the older record let one."""
+
+    def start(_: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    await hand.set_force(10, A)
+    await written(records)
+    with monkeypatch.context() as short:
+        short.setattr(threading.Thread, "start", start)
+        await hand.set_force(200, A)
+    assert FileRecords(tmp_path).read(LEFT) is None
+    assert "can't start new thread" in caplog.text
+    await hand.set_force(201, A)
+    await written(records)
+    assert force_of(tmp_path, hand) == 201

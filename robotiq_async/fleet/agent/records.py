@@ -103,6 +103,9 @@ class FileRecords:
     def _end(self, name: GripperName, done: asyncio.Future[None]) -> None:
         del self._writing[name]
         error = None if done.cancelled() else done.exception()
+        if error is not None:  # an outdated record could admit a barred client
+            with suppress(OSError):
+                self._path(name).unlink(missing_ok=True)
         if error is not None and not self._has_failed:
             self._has_failed = True
             log.warning(
@@ -116,16 +119,12 @@ class FileRecords:
     def _write(self, path: Path, data: bytes) -> None:
         self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         new = path.with_suffix(".new")
-        try:
-            with suppress(FileNotFoundError):
-                new.unlink()
-            file = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-            with os.fdopen(file, "wb") as opened:
-                opened.write(data)
-            new.replace(path)
-        except OSError:
-            path.unlink(missing_ok=True)  # an outdated record could admit a barred client
-            raise
+        with suppress(FileNotFoundError):
+            new.unlink()
+        file = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with os.fdopen(file, "wb") as opened:
+            opened.write(data)
+        new.replace(path)
 
     def _path(self, name: GripperName) -> Path:
         # Names cannot contain a plus.
