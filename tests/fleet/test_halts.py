@@ -21,7 +21,7 @@ from tests.fleet.cell import ask, ending, move_slowly
 from tests.fleet.lab import LEFT, Between, Garbling, Lab, Spoiling, lab
 from tests.fleet.world import World, motions, world
 from tests.grippers import Restless
-from tests.virtual import inside, until, virtual
+from tests.virtual import VirtualLoop, inside, until, virtual
 
 # -- halts -------------------------------------------------------------------------------------------------
 
@@ -309,6 +309,21 @@ async def test_a_grip_is_kept_when_the_lease_is_given_back(here: Lab, hand: Remo
     await hand.acquire()
     await hand.release()
     assert not here.gripper.grips
+
+
+@pytest.mark.parametrize("turns", range(1, 30, 4))
+@inside(lab)
+async def test_a_grip_is_kept_by_an_agent_whose_loop_is_held_up(
+    here: Lab, hand: RemoteHand, turns: int
+) -> None:
+    """The time to come to rest passed with the block: the fingers were halted, and the part was dropped."""
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualLoop)
+    here.gripper.place_object(Finger.ABC, 100)
+    await hand.close()
+    loop.after_turns(turns, lambda: loop.hold_up(0.8))
+    await hand.release(keep_grip=True)
+    assert here.gripper.grips == Finger.ABC
 
 
 class Unstoppable(SimulatedGripper):

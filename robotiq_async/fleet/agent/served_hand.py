@@ -9,11 +9,12 @@
 #   lease        acquire a free one, take it from its holder, renew or release one's own; permit motion again
 #   cmd/NAME     the holder alone, in order, with a fresh stamp of the agent (Admission)
 #
-# Work that takes time is a task in Requests, which gives each repetition of its message the same answer.
+# Work that takes time is a task in Jobs, which gives each repetition of its message the same answer.
 #
 # The lease ends in end_lease() alone: released, expired, taken, halted by another client, or closed. That
-# cancels the holder's requests, drops those that were not sent, and holds the axes in _commanded. If the link
-# is down then, they wait in _to_hold until the gripper is reached, unless the next holder moves them first.
+# cancels the holder's requests, drops those that were not sent, and holds the axes that it has commanded. If
+# the link is down then, they wait until the gripper is reached, unless the next holder moves them first
+# (Fingers).
 #
 # run() starts the hand again every RETRY_S while the gripper cannot be reached. Fingers that move at a start
 # are held: no client is there for them. At its end the hand is stopped, whichever client holds the lease.
@@ -22,8 +23,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import time
-from contextlib import suppress
 from dataclasses import replace
 from inspect import signature
 from typing import Final
@@ -34,9 +33,8 @@ from ...runtime.clock import now
 from ...runtime.log import Log
 from ...runtime.version import __version__
 from ...values.amounts import UNITS
-from ...values.enums import Finger
-from ...values.errors import AgentError, ControlLostError, RobotiqConnectionError, RobotiqError
-from ...values.inhibit import LONGEST, Inhibit
+from ...values.errors import AgentError, ControlLostError, RobotiqError
+from ...values.inhibit import Inhibit
 from ...values.move_result import MoveResult
 from ..control.admission import Admission
 from ..control.lease import Lease
@@ -44,16 +42,15 @@ from ..network.bus import Bus, Query
 from ..wire.envelope import Answer, Call, failure, unpack_call
 from ..wire.names import GripperName
 from ..wire.settings import check_changes, moved_by, read_settings, settings_of
-from ..wire.values import Fields, inhibit_fields, read_inhibit, words
+from ..wire.values import Fields, inhibit_fields
+from .fingers import Fingers
+from .inhibits import inhibit_asked, inhibit_kept, signed
 from .jobs import Job, Jobs, Work, label_of
 from .kept_settings import KeptSettings
 from .publisher import HandPublisher
 from .records import Records
 
 RETRY_S: Final = 1.0  # seconds between two attempts to reach the gripper
-REST_S: Final = (
-    0.5  # for a hand that keeps its grip to come to rest, as long as a stop that keeps one gives it
-)
 COMMANDS: Final = frozenset(
     {"set_position", "set_speed", "set_force", "move", "hold", "activate", "reset", "atr", "recover"}
 )
@@ -76,9 +73,7 @@ class ServedHand:
         self._admission = Admission(name.base, epoch, self._lease)
         self.publisher: HandPublisher = HandPublisher(name, hand, bus, epoch, self._lease)
         self._jobs = Jobs(self.publisher, epoch, self._log, self._job_ended)
-        self._commanded = Finger(0)  # axes that the holder has commanded: they are held when its lease ends
-        self._to_hold = Finger(0)
-        """Axes to hold when the gripper is reached again: the link was down when they should have been."""
+        self._fingers = Fingers(hand, self._log)
         self._expiry: asyncio.TimerHandle | None = None
         self._is_ending = False
 
@@ -92,7 +87,7 @@ class ServedHand:
             except (AttributeError, KeyError, TypeError, ValueError) as error:
                 self._log.warning("the record of the gripper cannot be read: %r", error)
         if (kept := self._records.read_inhibit(self.name)) is not None:
-            self._hand.resume_inhibit(_inhibit_kept(kept))
+            self._hand.resume_inhibit(inhibit_kept(kept))
         self._keep_record()
 
     def _keep_record(self) -> None:
@@ -132,23 +127,16 @@ class ServedHand:
             self._hand.assume(self._settings.in_gripper)
             await self._hand.start(activate=False)
             self.publisher.note_problem("")
-            await self._hold_what_moves()
+            await self._fingers.hold_what_moves()
             async for transition in self._hand.transitions():
-                if transition.target in RUNNING and self._to_hold:
-                    await self._hold(self._to_hold)
+                if transition.target in RUNNING:
+                    await self._fingers.hold_as_due()
         except RobotiqError as error:
             if error.message != self.publisher.problem:
                 self._log.warning("%s", error.message)
             self.publisher.note_problem(error.message)
             await self._hand.stop(halt=False)
             await asyncio.sleep(RETRY_S)
-
-    async def _hold_what_moves(self) -> None:
-        # The client that started the motion is gone: its agent was killed, for example.
-        if self._hand.state in RUNNING and self._hand.is_moving:
-            self._log.warning("the fingers moved when the agent started; they are held")
-            with suppress(RobotiqConnectionError):
-                await self._hand.hold(Finger.ALL)
 
     # -- requests --------------------------------------------------------------------------------------
 
@@ -267,27 +255,16 @@ class ServedHand:
         leaves = call.arguments.get("halt") is False
         keeps = call.arguments.get("keep_grip") is True and self._hand.state in RUNNING
         if leaves:
-            self._commanded = Finger(0)
+            self._fingers.forget()
         self.end_lease("released", leaves=leaves)
 
         async def release() -> None:
-            if keeps and not leaves:
-                await self._come_to_rest()
-            elif not leaves:
-                await self._hand.halt()
+            # What does not come to rest is halted, unless a client has acquired the lease since.
+            if leaves or (keeps and (await self._fingers.come_to_rest() or self._lease.holder is not None)):
+                return
+            await self._hand.halt()
 
         self._jobs.begin(Job("release", call, query), release())
-
-    async def _come_to_rest(self) -> None:
-        # After the time limit it halts, unless a client has acquired the lease since.
-        await self._hand.hold(Finger.ALL)
-        with suppress(TimeoutError):
-            async with asyncio.timeout(REST_S):
-                async for _ in self._hand.statuses():
-                    if not self._hand.is_moving:
-                        return
-        if self._lease.holder is None:
-            await self._hand.halt()
 
     def end_lease(self, reason: str, by: str = "", *, leaves: bool = False) -> None:
         """Take the lease from its holder. What it set in motion is held; contacts keep their grip."""
@@ -305,20 +282,10 @@ class ServedHand:
         # A hold affects only what moves. A speed or a force that is not written yet would take effect under
         # the next holder, or, after a freeze of this process, seconds late.
         self._hand.drop_requests(f"the lease has ended: {reason}")
-        axes, self._commanded = self._commanded, Finger(0)
+        axes = self._fingers.forget()
         if axes and not self._is_ending:  # else stop() stops the fingers
-            self._jobs.spawn(self._hold(axes))
+            self._jobs.spawn(self._fingers.hold(axes))
         self.publisher.add({"kind": "lease", "number": self._lease.number, "holder": None, "reason": reason})
-
-    async def _hold(self, axes: Finger) -> None:
-        self._to_hold &= ~axes
-        try:
-            await self._hand.hold(axes)
-        except RobotiqConnectionError as error:
-            self._to_hold |= axes
-            self._log.warning("the fingers will be held when the gripper is reached: %s", error.message)
-        except RobotiqError as error:
-            self._log.warning("the fingers could not be held: %s", error.message)
 
     def wake(self) -> None:
         # After the machine was suspended, no client has proven to be there.
@@ -344,7 +311,7 @@ class ServedHand:
 
     def _halt(self, call: Call, query: Query) -> None:
         # Accepted from any client, in any state, and never treated as a repetition.
-        inhibit = _inhibit_asked(call)
+        inhibit = inhibit_asked(call)
         if inhibit is not None:
             self._hand.resume_inhibit(inhibit)  # in this turn: what is admitted from here on is refused
         self._lease.intervene(call.client, "halted")
@@ -363,7 +330,7 @@ class ServedHand:
         self.publisher.add_inhibit()
 
     def _begin_to_permit(self, call: Call, query: Query) -> None:
-        who = _signed(call)
+        who = signed(call)
 
         async def permit() -> None:
             await self._hand.permit(who=who)
@@ -392,13 +359,13 @@ class ServedHand:
         self._admission.admit(call, now())
         job = Job(name, call, query)
         work = self._work(job)  # raises for invalid arguments, before anything changes
-        self._commanded |= moved_by(job.asked)
+        self._fingers.command(moved_by(job.asked))
         self._jobs.begin(job, work)
 
     def _job_ended(self, job: Job, is_done: bool) -> None:
         self._settings.end(settings_of(job.asked), is_done=is_done)
-        if is_done:  # a new command replaces the hold that its axes still wait for
-            self._to_hold &= ~moved_by(job.asked)
+        if is_done:
+            self._fingers.are_commanded(moved_by(job.asked))
 
     def _work(self, job: Job) -> Work:
         name, arguments = job.name, job.call.arguments
@@ -427,46 +394,17 @@ class ServedHand:
         self._settings.ask(job.asked)
         for fingers, changes in asked.items():
             self._hand.command(fingers, **changes)
-        self._to_hold &= ~moved_by(job.asked)
+        self._fingers.are_commanded(moved_by(job.asked))
 
     def _cancel(self, call: Call, query: Query) -> None:
         self._admission.renew(call, now())
         number = call.arguments.get("number", -1)
         job, left = self._jobs.find(call, number), self._jobs.left_of(number)
         if left:  # the move has failed, and its client left before it could see that
-            self._jobs.spawn(self._hold(left))
+            self._jobs.spawn(self._fingers.hold(left))
         elif job is not None:
             job.cancel()
         else:
             # The cancellation may have overtaken the command: refuse it when it arrives.
             self._admission.bar(Call(call.to, call.client, number=int(call.arguments.get("number", 0))))
         self._reply(query, Answer(call.to, call.number, self._epoch, {}))
-
-
-def _inhibit_asked(call: Call) -> Inhibit | None:
-    """The inhibit that a halt asks for; None for a halt alone. Nothing malformed keeps it from halting."""
-    reason = call.arguments.get("inhibit")
-    if reason is None:
-        return None
-    return Inhibit(_short(reason) or "a halt", _signed(call), time.time())
-
-
-def _inhibit_kept(record: object) -> Inhibit:
-    """An inhibit of the run before. One that cannot be read counts as well."""
-    try:
-        return read_inhibit(record) or _UNREADABLE  # type: ignore[arg-type]
-    except (AttributeError, KeyError, TypeError, ValueError):
-        return _UNREADABLE
-
-
-_UNREADABLE: Final = Inhibit("the record of an inhibit cannot be read", "", 0.0)
-
-
-def _signed(call: Call) -> str:
-    """Who asks: what the client says, and its label."""
-    who = _short(call.arguments.get("who", ""))
-    return _short(f"{who}, {label_of(call)}" if who else label_of(call))
-
-
-def _short(text: object) -> str:
-    return words(str(text))[:LONGEST]

@@ -1,0 +1,40 @@
+"""Inhibits of motion: as a halt asks for one, and as the record of the run before has it."""
+
+from __future__ import annotations
+
+import time
+from typing import Final
+
+from ...values.inhibit import LONGEST, Inhibit
+from ..wire.envelope import Call
+from ..wire.values import read_inhibit, words
+from .jobs import label_of
+
+
+def inhibit_asked(call: Call) -> Inhibit | None:
+    """The inhibit that a halt asks for; None for a halt alone. Nothing malformed keeps it from halting."""
+    reason = call.arguments.get("inhibit")
+    if reason is None:
+        return None
+    return Inhibit(_short(reason) or "a halt", signed(call), time.time())
+
+
+def inhibit_kept(record: object) -> Inhibit:
+    """An inhibit of the run before. One that cannot be read counts as well."""
+    try:
+        return read_inhibit(record) or _UNREADABLE  # type: ignore[arg-type]
+    except (AttributeError, KeyError, TypeError, ValueError):
+        return _UNREADABLE
+
+
+_UNREADABLE: Final = Inhibit("the record of an inhibit cannot be read", "", 0.0)
+
+
+def signed(call: Call) -> str:
+    """Who asks: what the client says, and its label."""
+    who = _short(call.arguments.get("who", ""))
+    return _short(f"{who}, {label_of(call)}" if who else label_of(call))
+
+
+def _short(text: object) -> str:
+    return words(str(text))[:LONGEST]
