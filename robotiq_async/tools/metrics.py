@@ -32,9 +32,10 @@ from ..runtime.concurrency import in_a_thread, wait_shielded
 from ..runtime.log import log
 from ..runtime.sockets import listen
 from ..values.checks import check_int
-from ..values.enums import State
+from ..values.enums import Fault, State
 from ..values.errors import NotStartedError
 from ..values.statistics import Statistics
+from .service import health
 
 LOOPBACK: Final = "127.0.0.1"
 TIMEOUT_S: Final = 5.0
@@ -60,6 +61,13 @@ _GAUGES: Final = {
     "status_age_p50": "Median time from asking for a status to the write that was decided on it.",
     "status_age_p99": "99th percentile of the time from asking for a status to the write decided on it.",
 }
+_NOW: Final = {
+    "ready": "1 while the hand takes motion commands.",
+    "inhibited": "1 while a person has the hand refuse motion.",
+    "holds": "Number of fingers that hold a part.",
+    "status_age_seconds": "Time since the newest status was read; of a hand that has read one.",
+}
+_FAULT: Final = "1 for the fault in the newest status, 0 for every other one of the model."
 _SHARES: Final = {"link_use": "Share of the time in which the hand waits for an answer, 0..1."}
 
 
@@ -109,6 +117,28 @@ class HandCollector(Collector):
         yield moves
         yield state
         yield self._controller_faults()
+        yield from self._conditions()
+
+    def _conditions(self) -> Iterator[Metric]:
+        """What alarms ask. The series of a hand are few and always the same: one of faults a code."""
+        families = {
+            name: GaugeMetricFamily(f"robotiq_{name}", text, labels=["hand"]) for name, text in _NOW.items()
+        }
+        faults = GaugeMetricFamily("robotiq_fault", _FAULT, labels=["hand", "code", "name", "severity"])
+        for hand in self._hands:
+            found = health(hand)
+            families["ready"].add_metric([hand.name], float(found.is_ready))
+            families["inhibited"].add_metric([hand.name], float(found.inhibited is not None))
+            if found.status_age is None:
+                continue
+            families["holds"].add_metric([hand.name], float(len(found.holds)))
+            families["status_age_seconds"].add_metric([hand.name], found.status_age)
+            for code, fault in enumerate(hand.model.faults):
+                if fault is not Fault.NONE:
+                    labels = [hand.name, f"0x{code:02X}", fault.name, fault.severity.name]
+                    faults.add_metric(labels, float(fault is found.fault))
+        yield from families.values()
+        yield faults
 
     def _controller_faults(self) -> Metric:
         """The kFLT of each hand with a status: a hand without one has no figure."""
