@@ -12,7 +12,7 @@ import pytest
 
 from docs import make_tables
 from robotiq_async import RobotiqHand, sync
-from robotiq_async.cli.arguments import USUAL, LinkOptions
+from robotiq_async.cli.arguments import USUAL_LINK, LinkOptions
 from robotiq_async.fleet.agent.agent_file import AgentFileError, read_agent_file
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_parameter, check_settings
 from robotiq_async.session.options import OPTIONS, HandOptions, Option, Place, offered
@@ -106,7 +106,7 @@ def test_the_parameters_of_ros() -> None:
 def test_the_arguments_of_the_command_line() -> None:
     there = offered(Place.COMMAND_LINE)
     assert [each.name for each in fields(LinkOptions)] == list(there)
-    assert USUAL.options() == {name: DEFAULTS[name] for name in there}
+    assert USUAL_LINK.options() == {name: DEFAULTS[name] for name in there}
     for each in fields(LinkOptions):
         (parameter,) = each.type.__metadata__  # type: ignore[union-attr]
         assert parameter.help.startswith(there[each.name].help)

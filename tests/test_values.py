@@ -57,7 +57,7 @@ from robotiq_async.tools.doctor import Finding, Level
 from robotiq_async.tools.verify.catalogue import EndError
 from robotiq_async.tools.web.settings import PageSettings
 from robotiq_async.values.calibration import ForceCalibration, SpeedCalibration
-from robotiq_async.values.calibration.csv_tables import SPEED, TableError
+from robotiq_async.values.calibration.csv_tables import SPEED_LAYOUT, TableError
 from robotiq_async.values.conventions import Convention
 from robotiq_async.values.frozen_mapping import FrozenMapping
 from robotiq_async.values.model import HAND_E
@@ -128,7 +128,7 @@ VALUES: list[object] = [
     parse_address("sim://?speedup=10&object=150").simulation,
     TCP_REGISTERS,
     gDT[0],
-    SPEED,
+    SPEED_LAYOUT,
     Finding(Level.GOOD, "port", "open"),
     Trouble("late", at=1.0),
     LEFT,

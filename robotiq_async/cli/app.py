@@ -27,7 +27,7 @@ from .commands.verify import verify
 from .commands.view import view
 from .commands.web import web
 
-COMMANDS: Final = (
+SUBCOMMANDS: Final = (
     *(demo, simulate, status, move, monitor, web, view, ports, doctor, verify),
     *(record, replay, export, plot, recover, agent),
 )
@@ -71,7 +71,7 @@ def build(arguments: Sequence[str] = ()) -> App:
         arguments: If the first is a sub-command, only that one is added: all of them take 7 ms.
     """
     app = _app("robotiq-async", _HELP)
-    ways: dict[str, Callable[[], object]] = {each.__name__: partial(_add, app, each) for each in COMMANDS}
+    ways: dict[str, Callable[[], object]] = {each.__name__: partial(_add, app, each) for each in SUBCOMMANDS}
     ways |= {"measure": lambda: app.command(_measure()), "fleet": lambda: app.command(_fleet())}
     named = next(iter(arguments), "")
     for add in [ways[named]] if named in ways else ways.values():

@@ -46,7 +46,7 @@ def _integers(name: str, low: int, high: int) -> Callable[[object, Sequence[Toke
     return convert
 
 
-UNITS: Final = {"": "counts", "mm": "mm", "mm/s": "mm_per_s", "N": "label_n"}
+AMOUNT_UNITS: Final = {"": "counts", "mm": "mm", "mm/s": "mm_per_s", "N": "label_n"}
 """The units of amounts on the command line, and the arguments of a hand, and of ``values.amounts``, that they
 are. A new one is a row here, and one more unit where it may be typed: :data:`Position` and below."""
 
@@ -64,7 +64,7 @@ class Amount(NamedTuple):
     @property
     def argument(self) -> dict[str, Any]:
         """The amount as an argument of ``values.amounts``."""
-        return {UNITS[self.unit]: self.value}
+        return {AMOUNT_UNITS[self.unit]: self.value}
 
 
 def _amount(name: str, *units: str, metavar: str | None = None) -> Parameter:
@@ -159,4 +159,4 @@ class LinkOptions(_Arguments):  # type: ignore[misc]  # made from the table of o
         return asdict(self)
 
 
-USUAL: Final = LinkOptions()
+USUAL_LINK: Final = LinkOptions()

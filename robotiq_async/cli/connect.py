@@ -11,13 +11,13 @@ from ..link.address import is_remote
 from ..session.options import POLL_INTERVAL_S
 from ..tools.actions import Operator
 from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED
-from .arguments import USUAL, LinkOptions, need
+from .arguments import USUAL_LINK, LinkOptions, need
 from .failures import UsageError, usage
 
 
 def make_hand(
     address: str,
-    link: LinkOptions = USUAL,
+    link: LinkOptions = USUAL_LINK,
     *,
     poll_interval: float = POLL_INTERVAL_S,
     speed: int = DEFAULT_SPEED,
@@ -30,7 +30,7 @@ def make_hand(
     """
     if is_remote(address):
         need("zenoh", "fleet")
-        if link != USUAL:
+        if link != USUAL_LINK:
             raise UsageError("a gripper on another host is set up there: its agent's file has these options")
         from ..fleet.remote.remote_hand import RemoteHand
 
@@ -48,7 +48,7 @@ def make_operator(address: str, link: LinkOptions, who: str, *, speed: int, forc
 
 @asynccontextmanager
 async def connected(
-    address: str, link: LinkOptions = USUAL, *, halt: bool, keep_grip: bool = False
+    address: str, link: LinkOptions = USUAL_LINK, *, halt: bool, keep_grip: bool = False
 ) -> AsyncIterator[Hand]:
     """A started hand; nothing has been written to the gripper.
 

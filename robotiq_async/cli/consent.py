@@ -16,11 +16,11 @@ from weakref import WeakKeyDictionary
 from .addresses import full_address, is_simulated
 from .failures import CommandError, UsageError
 
-LONGEST: Final = 1000
+LONGEST_ANSWER: Final = 1000
 """Bytes of a line at most."""
 _typed: Final[WeakKeyDictionary[TextIO, bytearray]] = WeakKeyDictionary()
 """The bytes that came from a stream after the last line that was read."""
-NOTE = "Nothing here has run on real hardware yet: keep a hand on the emergency stop."
+NEVER_RUN_NOTE = "Nothing here has run on real hardware yet: keep a hand on the emergency stop."
 
 
 def consent(address: str, what: str, *, yes: bool) -> None:
@@ -37,7 +37,7 @@ def consent(address: str, what: str, *, yes: bool) -> None:
     if screen is None:
         raise UsageError(f"this moves the gripper at {gripper}; without a terminal to ask at it needs --yes")
     forget_keys()
-    print(f"{gripper}: {what}\n{NOTE}\nContinue? [y/N] ", end="", file=screen, flush=True)
+    print(f"{gripper}: {what}\n{NEVER_RUN_NOTE}\nContinue? [y/N] ", end="", file=screen, flush=True)
     if read_line().strip().lower() not in ("y", "yes"):
         raise CommandError(f"nothing was sent to the gripper at {gripper}: the answer was not yes")
 
@@ -58,7 +58,7 @@ def read_line() -> str:
     try:
         line = _next_line(sys.stdin.fileno(), _typed.setdefault(sys.stdin, bytearray()))
     except (OSError, ValueError):  # Windows waits for sockets only
-        line = sys.stdin.buffer.readline(LONGEST)
+        line = sys.stdin.buffer.readline(LONGEST_ANSWER)
     return line.decode(errors="replace")
 
 
@@ -66,14 +66,14 @@ def _next_line(stream: int, typed: bytearray) -> bytes:
     # Not by the stream itself. A signal that comes just before its read blocks, or that the system hands to
     # another thread, does not interrupt it: Ctrl-C would be lost. And a thread that waits in it holds its
     # lock, without which the interpreter cannot end: it aborts.
-    while b"\n" not in typed and len(typed) < LONGEST:
+    while b"\n" not in typed and len(typed) < LONGEST_ANSWER:
         while not select.select([stream], [], [], 0.1)[0]:
             pass
-        if not (data := os.read(stream, LONGEST)):
+        if not (data := os.read(stream, LONGEST_ANSWER)):
             break
         typed.extend(data)
     end = (typed.find(b"\n") + 1) or len(typed)
-    line = bytes(typed[: min(end, LONGEST)])
+    line = bytes(typed[: min(end, LONGEST_ANSWER)])
     del typed[: len(line)]
     return line
 

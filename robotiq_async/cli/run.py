@@ -23,13 +23,13 @@ from ..runtime.signals import ending_signals
 from ..session.options import LATE_POLLS
 from ..values.errors import RobotiqError
 from .app import build
-from .arguments import UNITS
+from .arguments import AMOUNT_UNITS
 from .commands.ports import with_ports
 from .failures import CommandError, UsageError
 from .output.messages import forget, forwarded_warnings, tell
 
 SUCCESS, FAILURE, WRONG_USAGE, SIGNALLED = 0, 1, 2, 128
-INSIST_S = 10.0
+EXIT_INSIST_S = 10.0
 """Seconds after the first signal in which a further Ctrl-C is ignored. A stop takes 2 s at most, a report of
 verify a few more."""
 
@@ -105,7 +105,7 @@ def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | No
 
 def _check_units(arguments: Sequence[str]) -> None:
     """Refuse ``40 mm``: the unit would be taken for the address. And ``-1mm``, which looks like an option."""
-    units = [unit for unit in UNITS if unit]
+    units = [unit for unit in AMOUNT_UNITS if unit]
     for number, unit in pairwise(arguments):
         if unit in units and re.fullmatch(r"[+-]?[0-9.,]+", number):
             raise UsageError(f"a number and its unit are one word: {number}{unit}")
@@ -126,7 +126,7 @@ class _Signals:
     could not handle an exception there.
     """
 
-    def __init__(self, insist_s: float = INSIST_S) -> None:
+    def __init__(self, insist_s: float = EXIT_INSIST_S) -> None:
         self.received = 0
         self._insist_s = insist_s
         self._received_at = 0.0

@@ -13,7 +13,9 @@ from ..values.errors import NotStartedError, RobotiqConnectionError
 from ..values.status import RobotiqStatus
 
 T = TypeVar("T")
-FRESH_S: Final = 0.03  # a status of this age answers at once: a jaw moves up to 12 counts in that time
+RECENT_STATUS_S: Final = (
+    0.03  # a status of this age answers at once: a jaw moves up to 12 counts in that time
+)
 SHORTEST_S: Final = 0.01  # that a stream can be limited to
 
 
@@ -21,7 +23,7 @@ class Patience:
     """The seconds, 0.05..3600, that calls of a started blocking hand wait while the link is down."""
 
     def __init__(
-        self, hand: RobotiqHand, seconds: float, name: str = "seconds", fresh: float = FRESH_S
+        self, hand: RobotiqHand, seconds: float, name: str = "seconds", fresh: float = RECENT_STATUS_S
     ) -> None:
         self._hand = hand
         self.seconds: float = check_seconds(name, seconds, 0.05, 3600.0)

@@ -45,10 +45,10 @@ try:
 except ImportError as error:
     raise ImportError(f"the gripper server needs grpcio: {install('grpc')}") from error
 
-PORT: Final = 50052
+POLYMETIS_PORT: Final = 50052
 PATIENCE_S: Final = 2.0
 ACTIVATION_S: Final = 60.0  # that a Goto waits for it
-RESPONSE_TIMEOUT_S: Final = 0.1  # a lost reply costs one and a half of DROID's cycles, at 15 Hz
+LOOP_RESPONSE_S: Final = 0.1  # a lost reply costs one and a half of DROID's cycles, at 15 Hz
 HZ: Final = 60  # as polymetis says; DROID does not use it
 SLOWEST, FASTEST = 0.013, 0.1  # "m/s"
 THREADS: Final = 8
@@ -140,7 +140,9 @@ def _counts(share: float) -> int:
     return min(max(int(share * 255), 0), 255)
 
 
-def serve(address: str, *, host: str = "localhost", port: int = PORT, activate: bool = True) -> None:
+def serve(
+    address: str, *, host: str = "localhost", port: int = POLYMETIS_PORT, activate: bool = True
+) -> None:
     """Serve a gripper until the program is interrupted. **The fingers of one that is reset MOVE**.
 
     Leaving stops fingers that move, and keeps a grip.
@@ -156,7 +158,7 @@ def serve(address: str, *, host: str = "localhost", port: int = PORT, activate: 
         GripperFaultError: the gripper is in fault.
         RobotiqError: as :meth:`RobotiqHand.start`.
     """
-    hand = RobotiqHand(address, keep_grip=True, response_timeout=RESPONSE_TIMEOUT_S)
+    hand = RobotiqHand(address, keep_grip=True, response_timeout=LOOP_RESPONSE_S)
     service = GripperService(hand)
     server = grpc.server(ThreadPoolExecutor(THREADS), options=[("grpc.so_reuseport", 0)])
     server.add_generic_rpc_handlers((service.handlers,))
@@ -188,7 +190,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("address", help="of the gripper, with its model: rtu:///dev/ttyUSB0?model=2f85")
     parser.add_argument("--yes", action="store_true", help="move without a question")
     parser.add_argument("--host", default="localhost", help="where to listen (%(default)s)")
-    parser.add_argument("--port", type=int, default=PORT, help="where to listen (%(default)s)")
+    parser.add_argument("--port", type=int, default=POLYMETIS_PORT, help="where to listen (%(default)s)")
     given = parser.parse_args(arguments)
     if not (given.yes or given.address.startswith("sim:") or _agrees(given.address, parser)):
         return 1

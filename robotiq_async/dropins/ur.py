@@ -43,9 +43,9 @@ from ..values.status import RobotiqStatus
 from .patience import Patience
 
 TEXT_PORT: Final = 63352
-REST_S: Final = 0.1  # the fingers have stopped if their positions stay for so long
+UR_REST_S: Final = 0.1  # the fingers have stopped if their positions stay for so long
 HAND_OVER_S: Final = 1.0  # disconnect() waits so long for a request that is on its way
-ACTIVATION_S: Final = 90.0  # as recover()
+UR_ACTIVATION_S: Final = 90.0  # as recover()
 
 
 class RobotiqGripper:
@@ -147,7 +147,7 @@ class RobotiqGripper:
         """
         check_flag("auto_calibrate", auto_calibrate)
         if not self.is_active():
-            self._patience.call(_activate, ACTIVATION_S)
+            self._patience.call(_activate, UR_ACTIVATION_S)
         if auto_calibrate:
             self.auto_calibrate()
 
@@ -331,7 +331,7 @@ def _rested(hand: RobotiqHand, target: int, limit: float, *, lost_after: float) 
             raise MoveSupersededError("another client commands the gripper")
         if status.is_moving or since is None or _position(status) != _position(since):
             since = None if status.is_moving else status
-        elif status.timestamp - since.timestamp >= REST_S:
+        elif status.timestamp - since.timestamp >= UR_REST_S:
             return status
         if status.timestamp - first.timestamp > limit:
             raise MoveTimeoutError(f"the fingers still moved after {limit:.1f} s", status)

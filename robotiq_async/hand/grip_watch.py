@@ -35,7 +35,7 @@ SLIP_COUNTS: Final = 3
 """Counts that an axis in contact may move without an event: more than the 2 by which positions and requests
 differ (manual). No slip has been measured on real hardware."""
 
-LATE_S: Final = 1.0
+LATE_GRIP_S: Final = 1.0
 """A status that is older than the last one by more than this is from another clock."""
 
 
@@ -116,7 +116,7 @@ class GripWatch:
         changed: it counts, or the watch would report nothing until the old time is reached again.
         """
         last = self._last
-        if last is not None and 0 < last.timestamp - status.timestamp < LATE_S:
+        if last is not None and 0 < last.timestamp - status.timestamp < LATE_GRIP_S:
             return []
         self._last = status
         judged = self._evidence.judged(status, status.timestamp)

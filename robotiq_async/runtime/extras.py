@@ -13,8 +13,8 @@ from typing import Final
 
 from .shell import quoted
 
-NAME: Final = "robotiq-async"
-_NESTED: Final = re.compile(rf"{NAME}\[(.+)\]$")
+DISTRIBUTION: Final = "robotiq-async"
+_NESTED: Final = re.compile(rf"{DISTRIBUTION}\[(.+)\]$")
 
 
 def install(extra: str) -> str:
@@ -22,7 +22,7 @@ def install(extra: str) -> str:
     from importlib import metadata  # noqa: PLC0415  # a tenth of the time that a command needs to begin
 
     try:
-        command = pip_command(extra, metadata.requires(NAME) or [])
+        command = pip_command(extra, metadata.requires(DISTRIBUTION) or [])
     except metadata.PackageNotFoundError:  # runs from a clone that is not installed
         command = f"pip install {quoted(f'.[{extra}]')} in the clone"
     return f"{command}, where this program is frozen, and freeze it again" if is_frozen() else command

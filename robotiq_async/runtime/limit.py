@@ -25,7 +25,7 @@ from .clock import resolution_of
 
 HELD_S: Final = 0.01  # a timer or tick that fires this late shows that the event loop was held up
 SLICE_S: Final = 0.1  # between two looks at the clock
-GRACE_S: Final = 0.25
+LIMIT_GRACE_S: Final = 0.25
 """A poll or two on a slow line (0.1 s each)."""
 
 
@@ -59,7 +59,7 @@ class Limit:
         self._scope = anyio.CancelScope(shield=self._is_shield)
         self._scope.__enter__()
         if self.left <= 0:
-            self.restart(GRACE_S)
+            self.restart(LIMIT_GRACE_S)
         elif not self._timers:
             self._wait()
         return self
@@ -127,6 +127,6 @@ class Limit:
         """Move the end by the time for which the loop was held up."""
         now = self._loop.time()
         self._end += now - self._look_at
-        if self._end < now + GRACE_S and not self._has_grace:
-            self._end, self._has_grace = now + GRACE_S, True
+        if self._end < now + LIMIT_GRACE_S and not self._has_grace:
+            self._end, self._has_grace = now + LIMIT_GRACE_S, True
         self._wait()

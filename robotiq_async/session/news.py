@@ -23,8 +23,10 @@ DOES: Final = {
     "resets and activates: it DROPS the part and MOVES the fingers",
 }
 """What the fingers do in a fault, and what helps."""
-UNKNOWN: Final = f"{_HELD}; no manual names it: recover() waits, reset() may clear it and DROPS the part"
-OTHERS: Final = {
+UNKNOWN_FAULT: Final = (
+    f"{_HELD}; no manual names it: recover() waits, reset() may clear it and DROPS the part"
+)
+OTHER_FAULTS: Final = {
     Fault.AUTOMATIC_RELEASE: "all axes OPEN slowly, what they hold DROPS; halt() ends it, by a reset",
     Fault.AUTOMATIC_RELEASE_DONE: "what was held has DROPPED; recover() activates it: the fingers MOVE",
 }
@@ -75,5 +77,5 @@ class FaultNews:
 
 def fault_words(fault: Fault) -> str:
     """Code, name and description of a fault, what the fingers do, and what helps."""
-    does = OTHERS.get(fault) or (DOES[fault.severity] if fault.is_known else UNKNOWN)
+    does = OTHER_FAULTS.get(fault) or (DOES[fault.severity] if fault.is_known else UNKNOWN_FAULT)
     return f"0x{int(fault):02X} {fault.name}: {fault.description}; {does}"

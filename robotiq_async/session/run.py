@@ -57,7 +57,7 @@ with contextlib.suppress(ImportError):
     importlib.import_module("anyio._backends._asyncio")
 
 STOP_PAUSE_S: Final = 0.05  # between two attempts to stop the fingers
-SOON_S: Final = 0.05
+WRITE_SOON_S: Final = 0.05
 """Callers and listeners wait for a write that is expected within this time. A slow gateway takes longer."""
 
 
@@ -131,7 +131,7 @@ class Run:
         publisher.publish_changes()
 
     def _is_soon(self, write: NextWrite) -> bool:
-        return self.state is RunState.POLLING and self._poller.delay_of(write) <= SOON_S
+        return self.state is RunState.POLLING and self._poller.delay_of(write) <= WRITE_SOON_S
 
     def request_stop(self, *, halt: bool, keep_grip: bool = False) -> None:
         """End the task as a :class:`StopLevel` says; the strongest of several requests counts. Never blocks.

@@ -35,7 +35,7 @@ from ..runtime.log import log
 T = TypeVar("T")
 Function = Callable[[], Coroutine[Any, Any, T]]
 
-NAME: Final = "robotiq_async"  # of the thread
+THREAD_NAME: Final = "robotiq_async"  # of the thread
 HOLD_AFTER_S: Final = 0.1
 """Seconds that an interrupted call has to end before the fingers are held: most calls hold what they moved
 themselves, and one that waits for a disk does not keep them moving."""
@@ -145,7 +145,7 @@ class LoopThread:
             )
         answer: SimpleQueue[_Server | OSError] = SimpleQueue()
         try:
-            threading.Thread(target=self._serve, args=(call, answer), name=NAME, daemon=True).start()
+            threading.Thread(target=self._serve, args=(call, answer), name=THREAD_NAME, daemon=True).start()
         except RuntimeError as error:
             raise RuntimeError(f"the event loop of the hand cannot be started: {error}") from error
         server = answer.get()

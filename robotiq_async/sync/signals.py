@@ -18,7 +18,7 @@ from ..values.errors import NotStartedError
 from .loop_thread import LOOP_THREAD
 from .robotiq_hand import RobotiqHand, caller_of
 
-STOP_S: Final = 4.0  # a stop takes 2 s at most
+SIGNAL_STOP_S: Final = 4.0  # a stop takes 2 s at most
 
 
 class _SignalError(BaseException):
@@ -85,4 +85,4 @@ def _stop(hands: tuple[RobotiqHand, ...]) -> None:
                 log.error("a hand could not be stopped: %r", stopped)
 
     with suppress(LateError):
-        LOOP_THREAD.call(stop, limit=STOP_S)
+        LOOP_THREAD.call(stop, limit=SIGNAL_STOP_S)

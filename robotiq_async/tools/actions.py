@@ -30,7 +30,7 @@ from ..values.move_result import MoveResult
 
 HALTED: Final = "HALT was pressed"
 """The reason of a person's halt."""
-STAYS: Final = "motion is refused until a person permits it"
+INHIBIT_STAYS: Final = "motion is refused until a person permits it"
 CANCELS_RECOVERY: Final = frozenset({"halt", "reset", "release"})
 """Actions that cancel a recovery which waits for a fault to clear."""
 
@@ -250,7 +250,7 @@ async def _halt(operator: Operator) -> str:
     hand = operator.hand
     await (hand.inhibit(HALTED, who=operator.who) if operator.who else hand.halt())
     words = "every axis has stopped" + (": the gripper is reset" if hand.state is State.RESET else "")
-    return f"{words}; {STAYS}" if operator.who else words
+    return f"{words}; {INHIBIT_STAYS}" if operator.who else words
 
 
 async def _permit(operator: Operator) -> str:

@@ -41,7 +41,7 @@ LOOPBACK: Final = "127.0.0.1"
 TIMEOUT_S: Final = 5.0
 """Seconds for which a scrape waits for an event loop that is blocked."""
 IDLE_S: Final = 2.0  # seconds for which a connection may send nothing
-MOST: Final = 16  # scrapes at a time; further connections are closed
+MOST_SCRAPES: Final = 16  # scrapes at a time; further connections are closed
 
 _COUNTERS: Final = {
     "polls": "Statuses read.",
@@ -170,7 +170,7 @@ class _Server(ThreadingMixIn, TCPServer):
         super().__init__((host, port), _Handler.factory(registry), bind_and_activate=False)
         self.socket.close()
         self.socket = listen(host, port)
-        self._free = threading.Semaphore(MOST)
+        self._free = threading.Semaphore(MOST_SCRAPES)
 
     def process_request(self, request: Any, client_address: Any) -> None:  # noqa: ANN401  # as in the base
         if not self._free.acquire(blocking=False):

@@ -40,7 +40,7 @@ from ..values.errors import NotStartedError
 from ..values.inhibit import Inhibit
 from ..values.status import RobotiqStatus
 
-FRESH_S: Final = 1.0
+HEALTH_S: Final = 1.0
 """A status that is older proves nothing about the gripper: two hundred polls have brought none."""
 
 
@@ -119,7 +119,7 @@ def _problem(state: State, age: float | None, status: RobotiqStatus | None) -> s
         return "the hand is not started"
     if status is None or age is None:
         return "no status has been read yet"
-    if state is State.DISCONNECTED or age > FRESH_S:
+    if state is State.DISCONNECTED or age > HEALTH_S:
         return f"the link is down: no status for {age:.1f} s"
     if status.controller_fault:
         return status.controller_fault_text

@@ -41,13 +41,13 @@ from .description import Pose, Shape, hand_model, urdf
 from .description.joint_states import ENCAPSULATION, add_string
 from .description.kinematics import joint_angles, joint_names
 from .description.simulated import bodies_of, joints_and_parts
-from .recording.feed import EVENT, JOINTS, TOPICS, Feed, Message, Topic, compact, json_topic
+from .recording.feed import EVENT, JOINTS_TOPIC, TOPICS, Feed, Message, Topic, compact, json_topic
 from .recording.payloads import INTEGER, NUMBER, SCHEMAS, STRING, object_schema, state_fields, title
 
 LOOPBACK: Final = "127.0.0.1"
-PORT: Final = 8765
+VIEWER_PORT: Final = 8765
 """The default of Foxglove's own dialog."""
-STATE: Final = json_topic("state", SCHEMAS["state"])
+STATE_TOPIC: Final = json_topic("state", SCHEMAS["state"])
 DESCRIPTION: Final = Topic("/robot_description", "cdr", "std_msgs/msg/String", "ros2msg", b"string data\n")
 _TIME: Final = {"title": "time", **object_schema(sec=INTEGER, nsec=INTEGER)}
 _XYZ: Final = object_schema(**dict.fromkeys("xyz", NUMBER))
@@ -78,12 +78,12 @@ _ENTITY: Final = object_schema(
 _SCENE_SCHEMA: Final = json.dumps(object_schema(entities={"type": "array", "items": _ENTITY})).encode()
 PARTS: Final = Topic("/gripper/parts", "json", "foxglove.SceneUpdate", "jsonschema", _SCENE_SCHEMA)
 _YELLOW: Final = {"r": 0.95, "g": 0.76, "b": 0.19, "a": 1.0}
-SHOWN: Final = (*TOPICS, STATE, DESCRIPTION, TRANSFORMS, PARTS)
+SHOWN_TOPICS: Final = (*TOPICS, STATE_TOPIC, DESCRIPTION, TRANSFORMS, PARTS)
 TRANSFORMS_S: Final = 0.05
 """Interval of ``/tf``: smooth to the eye, a tenth of the polls."""
 STATE_S: Final = 1.0
 """Interval of ``/gripper/state`` when nothing happens."""
-STOP_S: Final = 1.0
+VIEWER_STOP_S: Final = 1.0
 """Time for the server to close its connections; a client that does not read could delay it for ever."""
 
 
@@ -99,7 +99,7 @@ class Viewer:
         ValueError: port is outside 0..65535.
     """
 
-    def __init__(self, hand: Hand, *, host: str = LOOPBACK, port: int = PORT) -> None:
+    def __init__(self, hand: Hand, *, host: str = LOOPBACK, port: int = VIEWER_PORT) -> None:
         self.host = host
         self.port: int = check_int("port", port, 0, 65535)
         self._hand = hand
@@ -126,7 +126,7 @@ class Viewer:
             ViewerError: the port is taken, or the interface does not exist.
         """
         self._context = Context()
-        self._channels = {topic: _channel(topic, self._context) for topic in SHOWN}
+        self._channels = {topic: _channel(topic, self._context) for topic in SHOWN_TOPICS}
         starting = in_a_thread(self._start_server)
         try:
             await wait_shielded(starting)
@@ -164,7 +164,7 @@ class Viewer:
         )
 
     async def _stop_server(self) -> None:
-        await asyncio.wait({in_a_thread(self._server.stop)}, timeout=STOP_S)
+        await asyncio.wait({in_a_thread(self._server.stop)}, timeout=VIEWER_STOP_S)
 
     # -- publishing ------------------------------------------------------------------------------------
 
@@ -175,7 +175,7 @@ class Viewer:
             self._publish_state()
 
         is_due = message.nanoseconds - self._transformed_at >= TRANSFORMS_S * 1e9
-        if message.topic is JOINTS and is_due:
+        if message.topic is JOINTS_TOPIC and is_due:
             self._transformed_at = message.nanoseconds
             self._publish_bodies(message.nanoseconds)
 
@@ -195,7 +195,7 @@ class Viewer:
         self._published_state = self._hand.state
         at = now()
         data = compact(state_fields(self._hand, at))
-        self._channels[STATE].log(data, log_time=self._feed.nanoseconds(at))
+        self._channels[STATE_TOPIC].log(data, log_time=self._feed.nanoseconds(at))
 
     async def _publish_periodically(self) -> None:
         while True:

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from .checks import as_float, repr_of
 
-LONGEST: Final = 200  # characters of a reason, and of who gave it
+LONGEST_REASON: Final = 200  # characters of a reason, and of who gave it
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,5 +47,7 @@ class Inhibit:
 def _check(name: str, value: object, least: int) -> None:
     if not isinstance(value, str):
         raise TypeError(f"{name} must be a str, got {repr_of(value)}")
-    if not least <= len(value) <= LONGEST or not value.isprintable():
-        raise ValueError(f"{name} must be {least}..{LONGEST} printable characters, got {value[:300]!r}")
+    if not least <= len(value) <= LONGEST_REASON or not value.isprintable():
+        raise ValueError(
+            f"{name} must be {least}..{LONGEST_REASON} printable characters, got {value[:300]!r}"
+        )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async.cli.app import COMMANDS
+from robotiq_async.cli.app import SUBCOMMANDS
 from robotiq_async.cli.commands.measure import speed
 from robotiq_async.cli.commands.measure_force import force
 from robotiq_async.cli.commands.measure_stroke import stroke
@@ -171,7 +171,7 @@ def test_nothing_is_asked_when_there_is_nothing_left_to_measure(call: Call, file
 
 
 def test_every_command_that_moves_takes_yes() -> None:
-    commands: list[Callable[..., object]] = [*COMMANDS, speed, force, stroke]
+    commands: list[Callable[..., object]] = [*SUBCOMMANDS, speed, force, stroke]
     moving = {each for each in commands if "FINGERS MOVE" in (each.__doc__ or "")}
     assert {each.__name__ for each in moving} == {"demo", "move", "speed", "force", "stroke", "verify"}
     # verify asks before each stage that moves, and takes no consent to one beforehand.

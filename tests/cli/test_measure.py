@@ -15,7 +15,13 @@ import pytest
 from robotiq_async import JAW, TWO_FINGER_85
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.measure.campaigns import read_currents
-from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, read_stroke, read_table, thesis_table
+from robotiq_async.values.calibration.csv_tables import (
+    FORCE,
+    SPEED_LAYOUT,
+    read_stroke,
+    read_table,
+    thesis_table,
+)
 from robotiq_async.values.request import Request
 from tests.cli.conftest import draw_nothing, served
 
@@ -36,7 +42,7 @@ def test_speed_writes_table_and_pictures(call: Call, tmp_path: Path) -> None:
     written = [tmp_path / name for name in ("mine.csv", "mine.png", "mine.svg")]
     assert outcome.out.splitlines()[-3:] == [str(file) for file in written]
     assert files_in(tmp_path) == ["mine.csv", "mine.csv.origin.csv", "mine.png", "mine.svg"]
-    assert sorted(read_table(table, SPEED)) == [0, 128, 255]
+    assert sorted(read_table(table, SPEED_LAYOUT)) == [0, 128, 255]
     for line in ("speed 0: ", "speed 128: ", "speed 255: "):
         assert line in outcome.out
     # Complete: nothing is measured again, the pictures are made again, byte for byte.
@@ -234,7 +240,7 @@ def test_ctrl_c_keeps_the_rows_and_stops_the_fingers(
     options = ("--output", str(table), "--runs", "1", "--no-plot", "--speedup", "30")
     call("measure", "speed", "sim://", *options).assert_failed(130, "interrupted")
     assert not Request.from_registers(interrupted[0].writes[-1].registers).go
-    rows = read_table(table, SPEED)
+    rows = read_table(table, SPEED_LAYOUT)
     assert 0 in rows
     assert files_in(tmp_path) == ["t.csv", "t.csv.origin.csv"]
 
@@ -322,4 +328,4 @@ def test_a_file_that_cannot_be_written_is_one_line(call: Call, tmp_path: Path) -
     table = tmp_path / "t.csv"
     outcome = call(*(each for each in SPEEDS if each != "--no-plot"), "--output", str(table))
     assert (outcome.code, "t.png" in outcome.err, "Traceback" in outcome.err) == (1, True, False)
-    assert len(read_table(table, SPEED)) == 2
+    assert len(read_table(table, SPEED_LAYOUT)) == 2

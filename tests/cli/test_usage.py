@@ -14,7 +14,7 @@ import pytest
 
 import robotiq_async
 from robotiq_async.cli import main
-from robotiq_async.cli.app import COMMANDS as FUNCTIONS
+from robotiq_async.cli.app import SUBCOMMANDS as FUNCTIONS
 from robotiq_async.cli.commands.fleet import fleet, halt, keys
 from robotiq_async.cli.commands.measure import speed
 from robotiq_async.cli.commands.measure_force import force

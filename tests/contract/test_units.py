@@ -13,7 +13,7 @@ from robotiq_async import HAND_E, THREE_FINGER, TWO_FINGER_85, RobotiqHand, Unit
 from robotiq_async.fleet import RemoteHand
 from robotiq_async.hand import Hand
 from robotiq_async.values.calibration import ForceCalibration, SpeedCalibration
-from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, write_table
+from robotiq_async.values.calibration.csv_tables import FORCE, SPEED_LAYOUT, write_table
 
 THESIS = Units()
 HANDS: list[Callable[..., Hand]] = [RobotiqHand, partial(RemoteHand, "zenoh://lab/cell/left")]
@@ -24,7 +24,7 @@ def test_a_hand_has_them_before_it_is_started() -> None:
 
 
 def test_they_are_by_the_owners_calibrations(tmp_path: Path) -> None:
-    write_table(tmp_path / "speed.csv", SPEED, {0: (20_000,), 255: (5_000,)})
+    write_table(tmp_path / "speed.csv", SPEED_LAYOUT, {0: (20_000,), 255: (5_000,)})
     write_table(tmp_path / "force.csv", FORCE, {50: (1000,), 100: (3000,)})
     speeds = SpeedCalibration.from_csv(tmp_path / "speed.csv")
     forces = ForceCalibration.from_csv(tmp_path / "force.csv")
@@ -40,7 +40,7 @@ def test_they_are_by_the_owners_calibrations(tmp_path: Path) -> None:
 
 
 def test_a_calibration_of_another_model_is_refused(tmp_path: Path) -> None:
-    write_table(tmp_path / "speed.csv", SPEED, {0: (4_000,), 255: (1_000,)}, HAND_E)
+    write_table(tmp_path / "speed.csv", SPEED_LAYOUT, {0: (4_000,), 255: (1_000,)}, HAND_E)
     write_table(tmp_path / "force.csv", FORCE, {0: (1000,), 255: (3000,)}, TWO_FINGER_85)
     speeds = SpeedCalibration.from_csv(tmp_path / "speed.csv")
     forces = ForceCalibration.from_csv(tmp_path / "force.csv")

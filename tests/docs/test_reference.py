@@ -6,7 +6,7 @@ import re
 
 import robotiq_async
 from robotiq_async import Fault, ObjectStatus, State
-from robotiq_async.cli.app import COMMANDS
+from robotiq_async.cli.app import SUBCOMMANDS
 from tests.docs.pages import ROOT, read
 
 REFERENCE = read("reference.md")
@@ -52,4 +52,4 @@ def _line_of(text: str, name: str) -> int:
 
 def test_the_readme_names_every_command() -> None:
     named = set(re.findall(r"^robotiq-async (\w+)", read(ROOT / "README.md"), re.MULTILINE))
-    assert {command.__name__ for command in COMMANDS} | {"fleet", "measure"} <= named
+    assert {command.__name__ for command in SUBCOMMANDS} | {"fleet", "measure"} <= named

@@ -20,8 +20,8 @@ from robotiq_async import (
     StateTimeoutError,
 )
 from robotiq_async.ros2.gripper.connection import (
-    COMMANDS,
     MOST_CALLS,
+    NODE_COMMANDS,
     PENDING_S,
     GripperConnection,
     PendingStop,
@@ -96,7 +96,7 @@ async def settled(gripper: SimulatedGripper) -> int:
 async def test_an_inactive_node_takes_a_halt_and_nothing_else(
     inactive: GripperConnection, gripper: SimulatedGripper
 ) -> None:
-    others = set(COMMANDS) - {"halt", "inhibit", "permit"}
+    others = set(NODE_COMMANDS) - {"halt", "inhibit", "permit"}
     await refuses("the node is not active", *map(inactive.command, others), begin(inactive))
     assert not gripper.writes
     assert await inactive.command("halt")

@@ -10,7 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async import HAND_E, JAW, TWO_FINGER_85, TWO_FINGER_140, Finger, Model, RobotiqStatus
-from robotiq_async.ros2.translation.joints import LIMITS, GoalError, Motion, joint_names, positions, targets
+from robotiq_async.ros2.translation.joints import (
+    JOINT_LIMITS,
+    GoalError,
+    Motion,
+    joint_names,
+    positions,
+    targets,
+)
 from robotiq_async.tools.description import hand_model
 from robotiq_async.tools.description.kinematics import JOINTS, joint_angles
 from tests.register_words import status_of
@@ -37,7 +44,7 @@ def test_the_names_stand_behind_the_prefix() -> None:
 @given(byte, byte, byte, byte)
 def test_every_joint_is_inside_its_limits(a: int, b: int, c: int, scissor: int) -> None:
     for name, angle in zip(JOINTS, positions(reading(a, b, c, scissor)), strict=True):
-        low, high = LIMITS[name]
+        low, high = JOINT_LIMITS[name]
         assert low <= angle <= high, name
 
 
@@ -50,8 +57,8 @@ OF_ROS = {"_joint_1": (0.0495, 1.2218), "_joint_2": (0.0, 1.5708), "_joint_3": (
 
 def test_the_limits_are_inside_those_of_both_urdfs() -> None:
     packaged = {joint.name: (joint.lower, joint.upper) for joint in hand_model().moving}
-    assert packaged.keys() == LIMITS.keys()
-    for name, (low, high) in LIMITS.items():
+    assert packaged.keys() == JOINT_LIMITS.keys()
+    for name, (low, high) in JOINT_LIMITS.items():
         (theirs,) = (limits for end, limits in OF_ROS.items() if name.endswith(end))
         for least, most in (packaged[name], theirs):
             assert least <= low < high <= most, name

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from robotiq_async.ros2.gripper.connection import COMMANDS
+from robotiq_async.ros2.gripper.connection import NODE_COMMANDS
 from robotiq_async.ros2.translation.settings import PARAMETERS
 from robotiq_async.tools.description import urdf
 
@@ -55,7 +55,7 @@ def test_arguments_of_the_launch_file_are_parameters() -> None:
 def test_the_page_has_every_parameter_and_service() -> None:
     rows = set(re.findall(r"`([^`]+)`", "".join(re.findall(r"^\| `[^|]*\||^- `[^`]+`", PAGE, re.MULTILINE))))
     assert set(PARAMETERS) <= rows
-    assert {f"~/{name}" for name in COMMANDS} <= rows
+    assert {f"~/{name}" for name in NODE_COMMANDS} <= rows
 
 
 def test_the_description_for_robot_state_publisher_is_one(capsys: pytest.CaptureFixture[str]) -> None:

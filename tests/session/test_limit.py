@@ -8,7 +8,7 @@ import math
 import anyio
 import pytest
 
-from robotiq_async.runtime.limit import GRACE_S, SLICE_S, Limit
+from robotiq_async.runtime.limit import LIMIT_GRACE_S, SLICE_S, Limit
 from tests.virtual import VirtualLoop
 
 pytestmark = pytest.mark.virtual_time
@@ -20,8 +20,8 @@ pytestmark = pytest.mark.virtual_time
         (1.4, [], 1.4),
         (0.01, [], 0.01),
         (1.4, [(0.3, 1.5)], 2.8),
-        (1.4, [(1.35, 7.0)], 8.35 + GRACE_S),
-        (0.05, [(0.01, 2.0)], 2.01 + GRACE_S),
+        (1.4, [(1.35, 7.0)], 8.35 + LIMIT_GRACE_S),
+        (0.05, [(0.01, 2.0)], 2.01 + LIMIT_GRACE_S),
         (1.4, [(0.3, SLICE_S / 2)], 1.4),
         # Held up again and again: a grace is given once.
         (1.0, [(each * 0.2, 0.2) for each in range(100)], 2.4),

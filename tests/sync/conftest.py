@@ -17,7 +17,7 @@ import pytest
 
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.sync import RobotiqHand, caller
-from robotiq_async.sync.loop_thread import NAME
+from robotiq_async.sync.loop_thread import THREAD_NAME
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.errors import ConnectionLostError
 from robotiq_async.values.registers import Registers
@@ -186,7 +186,7 @@ def no_thread_is_left() -> Iterator[None]:
 
 
 def loop_threads() -> list[threading.Thread]:
-    return [each for each in threading.enumerate() if each.name == NAME]
+    return [each for each in threading.enumerate() if each.name == THREAD_NAME]
 
 
 def until(condition: Callable[[], bool]) -> None:

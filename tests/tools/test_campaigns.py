@@ -15,7 +15,7 @@ from robotiq_async.simulator.physics.axis import peak
 from robotiq_async.simulator.physics.scale import SimulatedScale
 from robotiq_async.tools.measure.campaigns import (
     GRASP_S,
-    REST_S,
+    RUN_PAUSE_S,
     Campaign,
     expected_seconds,
     force_campaign,
@@ -29,7 +29,13 @@ from robotiq_async.tools.measure.campaigns import (
     write_currents,
 )
 from robotiq_async.values.calibration import SpeedCalibration
-from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, TableError, read_table, thesis_table
+from robotiq_async.values.calibration.csv_tables import (
+    FORCE,
+    SPEED_LAYOUT,
+    TableError,
+    read_table,
+    thesis_table,
+)
 from robotiq_async.values.calibration.motion_profile import PRESSING_S
 from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.errors import MeasuringError
@@ -53,7 +59,7 @@ async def active(
 
 
 def test_the_values_are_those_of_the_thesis_in_its_order() -> None:
-    assert speed_values() == sorted(thesis_table("closing_time_ms", SPEED))
+    assert speed_values() == sorted(thesis_table("closing_time_ms", SPEED_LAYOUT))
     assert speed_values(100) == [0, 100, 200, 255]
     assert force_values() == [0, 50, 100, 150, 200, 250, 225, 175, 125, 75, 25]
     assert sorted(force_values()) == sorted(thesis_table("force_foam_grams", FORCE))
@@ -77,7 +83,7 @@ async def test_closing_times_are_those_of_the_thesis(speedup: float, speeds: tup
 def test_the_time_of_a_run_is_that_of_the_model() -> None:
     """The bar of a 2F-85 took the 10 s of a 3-Finger for its slowest closing, which takes 4.3."""
     fast = SpeedCalibration.usual(TWO_FINGER_85).closing_time(255)
-    assert expected_seconds(TWO_FINGER_85, 0) == pytest.approx(4.3 + fast + REST_S, abs=0.1)
+    assert expected_seconds(TWO_FINGER_85, 0) == pytest.approx(4.3 + fast + RUN_PAUSE_S, abs=0.1)
     assert expected_seconds(THREE_FINGER, 0) > 10
 
 
@@ -204,14 +210,14 @@ async def test_an_interrupted_campaign_goes_on_where_it_was(tmp_path: Path) -> N
 
     with pytest.raises(PowerCutError):
         await speed_campaign(file, step=85, runs=2).measure(measure)
-    assert read_table(file, SPEED) == {0: (1000, 2000), 85: (1085, 2085)}
+    assert read_table(file, SPEED_LAYOUT) == {0: (1000, 2000), 85: (1085, 2085)}
     asked.clear()
     asked.append((170, 2))
     again = speed_campaign(file, step=85, runs=2)
     assert again.left == [170, 255]
     await again.measure(measure)
     assert asked[1:] == [(170, 1), (170, 2), (255, 1), (255, 2)]
-    assert sorted(read_table(file, SPEED)) == [0, 85, 170, 255]
+    assert sorted(read_table(file, SPEED_LAYOUT)) == [0, 85, 170, 255]
     assert speed_campaign(file, step=85, runs=2).left == []
 
 

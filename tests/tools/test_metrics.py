@@ -14,7 +14,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from robotiq_async import TWO_FINGER_85, Finger, GripperFaultError, MoveSupersededError, RobotiqHand, State
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.tools.metrics import MOST, serve_metrics
+from robotiq_async.tools.metrics import MOST_SCRAPES, serve_metrics
 from tests.patience import patience
 
 Samples = dict[tuple[str, str], float]
@@ -106,9 +106,9 @@ async def test_connections_that_ask_nothing_use_up_neither_threads_nor_files(han
     """Each kept a thread and a file of the program that polls: then no link could be opened again."""
     async with serve_metrics(hand, port=0) as where, asyncio.timeout(patience(20)):
         threads = threading.active_count()
-        opened = [await asyncio.open_connection(*where) for _ in range(2 * MOST)]
+        opened = [await asyncio.open_connection(*where) for _ in range(2 * MOST_SCRAPES)]
         opened[0][1].write(b"GET /metr")
-        assert threading.active_count() <= threads + MOST
+        assert threading.active_count() <= threads + MOST_SCRAPES
         for reader, writer in opened:
             with contextlib.suppress(ConnectionResetError):
                 assert not await reader.read()
@@ -136,7 +136,7 @@ async def test_a_want_of_threads_uses_up_nothing(hand: RobotiqHand, monkeypatch:
 
         with monkeypatch.context() as patch:
             patch.setattr(threading.Thread, "start", start)
-            for _ in range(2 * MOST):
+            for _ in range(2 * MOST_SCRAPES):
                 reader, writer = await asyncio.open_connection(*where)
                 with contextlib.suppress(ConnectionError):
                     assert await reader.read() == b""

@@ -11,9 +11,9 @@ from pathlib import Path
 from robotiq_async import Finger
 from robotiq_async.tools.measure.campaigns import force_values
 from robotiq_async.tools.measure.plots import (
-    LONGEST,
+    LONGEST_LABEL,
+    PLOT_ROWS,
     ROW,
-    ROWS,
     _curves,
     _placed,
     _right,
@@ -65,7 +65,7 @@ def test_currents_over_time_are_drawn_near_the_usual_force_values(tmp_path: Path
     assert names == ["force 0", "force 85", "force 255"]
 
 
-LONG = "X" * 2 * LONGEST
+LONG = "X" * 2 * LONGEST_LABEL
 
 
 def recorded() -> list[RecordedMessage]:
@@ -89,7 +89,7 @@ def test_events_are_written_above_the_curves(tmp_path: Path) -> None:
     _, picture = plot_recording(tmp_path / "it", recorded())
     text = picture.read_text(encoding="utf-8")
     places = [text.index(f'id="{each}"') for each in ("axes_1", "axes_2", "axes_3")]
-    for name in ("FIRST", "SECOND", LONG[: LONGEST - 3] + "..."):
+    for name in ("FIRST", "SECOND", LONG[: LONGEST_LABEL - 3] + "..."):
         assert places[0] < text.index(f"<!-- {name} -->") < places[1], "not above the positions"
     assert all(before < after for before, after in pairwise(places))
     assert Finger.A.name in words(picture)
@@ -114,11 +114,11 @@ def test_labels_take_as_many_rows_as_they_need_and_no_third_of_the_picture() -> 
     apart = _placed([(0.0, "READY", False), (5.0, "FAULT", True), (10.0, "READY", False)], 0.0, 10.0)
     assert [each.row for each in apart] == [0, 0, 0]
     assert apart[-1].left < 1, "the last one ends with the picture"
-    close = _placed([(each / 10, "X" * LONGEST, False) for each in range(20)], 0.0, 10.0)
-    assert {each.row for each in close} == set(range(ROWS))
-    assert ROW * ROWS / (ROW * ROWS + 6) < 0.15
+    close = _placed([(each / 10, "X" * LONGEST_LABEL, False) for each in range(20)], 0.0, 10.0)
+    assert {each.row for each in close} == set(range(PLOT_ROWS))
+    assert ROW * PLOT_ROWS / (ROW * PLOT_ROWS + 6) < 0.15
     whole = [each for each in close if not each.words.endswith("…")]
-    assert len(whole) == ROWS, "the last one of each row"
-    for row in range(ROWS):
+    assert len(whole) == PLOT_ROWS, "the last one of each row"
+    for row in range(PLOT_ROWS):
         inside = [each for each in close if each.row == row]
         assert all(_right(one) <= other.left + 0.03 for one, other in pairwise(inside))

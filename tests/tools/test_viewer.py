@@ -19,7 +19,7 @@ from robotiq_async.tools.description import hand_model, urdf
 from robotiq_async.tools.description.kinematics import JOINTS, joint_angles, joint_names
 from robotiq_async.tools.description.simulated import bodies_of
 from robotiq_async.tools.recording.payloads import SCHEMAS
-from robotiq_async.tools.viewer import SHOWN, Viewer
+from robotiq_async.tools.viewer import SHOWN_TOPICS, Viewer
 from robotiq_async.values.errors import ViewerError
 from robotiq_async.values.model import MODELS
 from tests.foxglove_client import Client, client
@@ -293,4 +293,4 @@ def test_the_layout_shows_what_there_is() -> None:
 
     assert sorted(placed(layout["layout"])) == sorted(panels)
     topics = {topic for config in panels.values() for topic in config.get("topics", ())}
-    assert topics <= {topic.name for topic in SHOWN}
+    assert topics <= {topic.name for topic in SHOWN_TOPICS}

@@ -13,7 +13,13 @@ import pytest
 from robotiq_async import Finger, MoveTimeoutError, RobotiqHand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.calibration import ForceCalibration, SpeedCalibration
-from robotiq_async.values.calibration.csv_tables import FORCE, SPEED, TableError, thesis_table, write_table
+from robotiq_async.values.calibration.csv_tables import (
+    FORCE,
+    SPEED_LAYOUT,
+    TableError,
+    thesis_table,
+    write_table,
+)
 from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.model import THREE_FINGER
 from tests.virtual import virtual
@@ -33,7 +39,7 @@ def test_opening() -> None:
 def test_the_thesis_is_the_default_of_the_time_outs() -> None:
     thesis = SpeedCalibration.thesis()
     assert [thesis.closing_time(speed) for speed in range(256)] == [*map(closing_time, range(256))]
-    for speed, runs in thesis_table("closing_time_ms", SPEED).items():
+    for speed, runs in thesis_table("closing_time_ms", SPEED_LAYOUT).items():
         assert thesis.closing_time(speed) == pytest.approx(mean(runs) / 1000)
 
 
@@ -71,7 +77,7 @@ def test_a_speed_that_no_value_has_is_refused(mm_per_s: float) -> None:
 
 def test_an_owners_table(tmp_path: Path) -> None:
     file = tmp_path / "mine.csv"
-    write_table(file, SPEED, {10: (9000, 11000), 20: (5000, 5000)})
+    write_table(file, SPEED_LAYOUT, {10: (9000, 11000), 20: (5000, 5000)})
     mine = SpeedCalibration.from_csv(file)
     assert mine.source == str(file)
     assert mine.closing_time(10) == 10
@@ -83,7 +89,7 @@ def test_an_owners_table(tmp_path: Path) -> None:
         ({0: (5,)}, "at least two speed values"),
         ({0: (5,), 9: (0,)}, "longer than 0 ms"),
     ):
-        write_table(file, SPEED, table)
+        write_table(file, SPEED_LAYOUT, table)
         with pytest.raises(TableError, match=words):
             SpeedCalibration.from_csv(file)
 
@@ -108,7 +114,7 @@ class Lame:
 
 @virtual
 async def test_the_default_time_out_of_a_move_comes_from_the_calibration(tmp_path: Path) -> None:
-    write_table(tmp_path / "slow.csv", SPEED, {0: (90_000,), 255: (60_000,)})
+    write_table(tmp_path / "slow.csv", SPEED_LAYOUT, {0: (90_000,), 255: (60_000,)})
     slow = SpeedCalibration.from_csv(tmp_path / "slow.csv")
     for calibration, seconds in ((None, 2.119), (slow, 60)):
         clock = Lame()
@@ -127,7 +133,7 @@ async def test_the_default_time_out_of_a_move_comes_from_the_calibration(tmp_pat
 
 
 def test_a_calibration_that_does_not_reach_over_all_speeds_is_refused(tmp_path: Path) -> None:
-    write_table(tmp_path / "part.csv", SPEED, {0: (9000,), 200: (5000,)})
+    write_table(tmp_path / "part.csv", SPEED_LAYOUT, {0: (9000,), 200: (5000,)})
     with pytest.raises(ValueError, match=r"must reach over the speed values 0\.\.255, got 0\.\.200"):
         RobotiqHand(calibration=SpeedCalibration.from_csv(tmp_path / "part.csv"))
 

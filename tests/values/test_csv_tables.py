@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from robotiq_async.values.calibration.csv_tables import (
     FORCE,
-    SPEED,
+    SPEED_LAYOUT,
     Layout,
     TableError,
     read_table,
@@ -28,7 +28,7 @@ def file(tmp_path: Path) -> Path:
     return tmp_path / "table.csv"
 
 
-def refusal(file: Path, text: str, layout: Layout = SPEED) -> str:
+def refusal(file: Path, text: str, layout: Layout = SPEED_LAYOUT) -> str:
     file.write_text(text, encoding="utf-8")
     with pytest.raises(TableError) as caught:
         read_table(file, layout)
@@ -41,7 +41,10 @@ def refusal(file: Path, text: str, layout: Layout = SPEED) -> str:
 @given(
     st.integers(1, 4).flatmap(
         lambda runs: st.dictionaries(
-            st.integers(0, 255), st.tuples(*[st.integers(0, SPEED.high)] * runs), min_size=1, max_size=20
+            st.integers(0, 255),
+            st.tuples(*[st.integers(0, SPEED_LAYOUT.high)] * runs),
+            min_size=1,
+            max_size=20,
         )
     )
 )
@@ -49,12 +52,12 @@ def test_a_table_is_read_as_it_was_written(
     tmp_path_factory: pytest.TempPathFactory, table: dict[int, tuple[int, ...]]
 ) -> None:
     file = tmp_path_factory.getbasetemp() / "table.csv"
-    write_table(file, SPEED, table)
-    assert read_table(file, SPEED) == table
+    write_table(file, SPEED_LAYOUT, table)
+    assert read_table(file, SPEED_LAYOUT) == table
 
 
 def test_the_thesis_tables_are_there() -> None:
-    closing = thesis_table("closing_time_ms", SPEED)
+    closing = thesis_table("closing_time_ms", SPEED_LAYOUT)
     assert sorted(closing) == [*range(0, 256, 4), 255]
     assert closing[0] == (10021, 10021, 10021)
     for surface in ("foam", "rigid"):
@@ -88,44 +91,44 @@ def test_a_bad_table_is_refused_with_file_line_and_reason(file: Path, text: str,
 
 def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
     with pytest.raises(TableError, match="cannot be read: No such file"):
-        read_table(tmp_path / "nowhere.csv", SPEED)
+        read_table(tmp_path / "nowhere.csv", SPEED_LAYOUT)
     with pytest.raises(TableError, match="cannot be read: Is a directory"):
-        read_table(tmp_path, SPEED)
+        read_table(tmp_path, SPEED_LAYOUT)
     with pytest.raises(TableError, match="/dev/zero, line 1: it has more than 10000 characters"):
-        read_table("/dev/zero", SPEED)
+        read_table("/dev/zero", SPEED_LAYOUT)
     (tmp_path / "latin").write_bytes(b"speed_value,run_1_ms\n0,\xff\n")
     with pytest.raises(TableError, match="cannot be read"):
-        read_table(tmp_path / "latin", SPEED)
+        read_table(tmp_path / "latin", SPEED_LAYOUT)
 
 
 def test_tables_of_spreadsheets_are_read(file: Path) -> None:
     file.write_bytes(b"\xef\xbb\xbfspeed_value,run_1_ms\r\n0, 10\r\n")
-    assert read_table(file, SPEED) == {0: (10,)}
+    assert read_table(file, SPEED_LAYOUT) == {0: (10,)}
 
 
 def test_rows_are_sorted_and_what_was_there_is_replaced_whole(file: Path) -> None:
     file.write_text("something longer that was there before\n" * 10, encoding="utf-8")
-    write_table(file, SPEED, {255: (1,), 0: (2,)})
+    write_table(file, SPEED_LAYOUT, {255: (1,), 0: (2,)})
     assert file.read_text(encoding="utf-8") == "speed_value,run_1_ms\n0,2\n255,1\n"
     assert [path.name for path in file.parent.iterdir()] == [file.name]
 
 
 def test_a_failed_write_leaves_what_was_there_and_nothing_else(file: Path) -> None:
-    write_table(file, SPEED, {0: (1,)})
+    write_table(file, SPEED_LAYOUT, {0: (1,)})
     with pytest.raises(RuntimeError):
-        write_table(file, SPEED, {0: (2,), 4: Unwritable()})
-    assert read_table(file, SPEED) == {0: (1,)}
+        write_table(file, SPEED_LAYOUT, {0: (2,), 4: Unwritable()})
+    assert read_table(file, SPEED_LAYOUT) == {0: (1,)}
     assert [path.name for path in file.parent.iterdir()] == [file.name]
 
 
 def test_a_new_file_has_the_mode_that_the_umask_leaves_and_keeps_another(file: Path) -> None:
     before = os.umask(0o027)
     try:
-        write_table(file, SPEED, {0: (1,)})
+        write_table(file, SPEED_LAYOUT, {0: (1,)})
         assert stat.S_IMODE(file.stat().st_mode) == 0o640
         for mode in (0o600, 0o660):
             file.chmod(mode)
-            write_table(file, SPEED, {0: (2,)})
+            write_table(file, SPEED_LAYOUT, {0: (2,)})
             assert stat.S_IMODE(file.stat().st_mode) == mode
     finally:
         os.umask(before)
@@ -136,18 +139,18 @@ def test_a_planted_link_is_not_followed(file: Path) -> None:
     victim = file.with_name("victim")
     victim.write_text("precious", encoding="utf-8")
     file.with_name(f".{file.name}.{os.getpid()}").symlink_to(victim)
-    write_table(file, SPEED, {0: (1,)})
+    write_table(file, SPEED_LAYOUT, {0: (1,)})
     assert victim.read_text(encoding="utf-8") == "precious"
-    assert read_table(file, SPEED) == {0: (1,)}
+    assert read_table(file, SPEED_LAYOUT) == {0: (1,)}
 
 
 def test_a_link_to_the_table_stays_one(file: Path) -> None:
-    write_table(file, SPEED, {0: (1,)})
+    write_table(file, SPEED_LAYOUT, {0: (1,)})
     link = file.with_name("link.csv")
     link.symlink_to(file)
-    write_table(link, SPEED, {0: (2,)})
+    write_table(link, SPEED_LAYOUT, {0: (2,)})
     assert link.is_symlink()
-    assert read_table(file, SPEED) == {0: (2,)}
+    assert read_table(file, SPEED_LAYOUT) == {0: (2,)}
 
 
 class Unwritable(tuple[int, ...]):

@@ -111,7 +111,7 @@ class Helper:
             return answer
         if question == soft_part.AGAIN:
             self._server.gripper.place_object(Finger.ABC, FOAM)
-        if question == soft_part.STAYS:
+        if question == soft_part.HELD_QUESTION:
             return "y" if self._server.gripper.holds else "n"
         if question == loss.CABLE:
             await self._meanwhile(Trouble("refuse"))

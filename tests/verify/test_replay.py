@@ -15,7 +15,7 @@ from robotiq_async.simulator.physics.habits import Habits
 from robotiq_async.simulator.troubles.like_hardware import like_hardware, own_habits
 from robotiq_async.tools.recording.recordings import read_recording
 from robotiq_async.tools.verify import Plan, Runner, pictures
-from robotiq_async.tools.verify.files import NAME, Folder
+from robotiq_async.tools.verify.files import RECORDING_NAME, Folder
 from robotiq_async.tools.verify.pictures import segments
 from robotiq_async.values.enums import ObjectStatus
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
@@ -57,7 +57,7 @@ def recording(**options: Any) -> Any:
     def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         folder = tmp_path_factory.mktemp("recording")
         run(lambda: record(folder, **options))
-        return folder / NAME
+        return folder / RECORDING_NAME
 
     return made
 

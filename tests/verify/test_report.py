@@ -23,7 +23,7 @@ from robotiq_async.ros2.translation.settings import PARAMETERS, check_parameter
 from robotiq_async.simulator import SimulatorServer, Trouble
 from robotiq_async.tools.recording.recordings import read_recording
 from robotiq_async.tools.verify import CATALOGUE, ENDINGS, Check, CheckVerdict, Plan, Report, Runner
-from robotiq_async.tools.verify.files import JSON, NAME, PAGE, Folder, Recording, Scrubber
+from robotiq_async.tools.verify.files import JSON, PAGE, RECORDING_NAME, Folder, Recording, Scrubber
 from robotiq_async.tools.verify.recorded_link import RecordedExchange
 from robotiq_async.tools.verify.report import SCHEMA, lines, page, sentences
 from tests.docs.pages import read, table
@@ -121,7 +121,7 @@ def test_without_the_extra_for_pictures_the_page_says_so(kept: Kept) -> None:
 
 
 def test_the_recording_has_every_frame(kept: Kept) -> None:
-    entries = [(entry.topic, json.loads(entry.data)) for entry in read_recording(kept.path / NAME)]
+    entries = [(entry.topic, json.loads(entry.data)) for entry in read_recording(kept.path / RECORDING_NAME)]
     for topic, kind in (("/gripper/status", "status"), ("/gripper/command", "command")):
         registers = [fields["registers"] for name, fields in entries if name == topic]
         assert registers == [list(frame.registers) for frame in kept.frames if frame.kind == kind]
@@ -149,7 +149,7 @@ async def test_no_address_host_or_user_is_in_it(tmp_path: Path, trouble: str) ->
         said = f"{report.words} {[check.found for check in report.checks.values()]}"
         assert server.address in said, "nothing was to be hidden"
     files = [(tmp_path / name).read_text() for name in (JSON, PAGE)]
-    files += [entry.data.decode() for entry in read_recording(tmp_path / NAME)]
+    files += [entry.data.decode() for entry in read_recording(tmp_path / RECORDING_NAME)]
     for text in files:
         for secret in (address.host, str(address.port), platform.node(), str(Path.home())):
             assert secret not in text
@@ -169,12 +169,12 @@ def test_the_address_is_hidden_everywhere() -> None:
 
 
 async def test_a_folder_that_has_a_report_or_cannot_be_made_is_refused(tmp_path: Path) -> None:
-    (tmp_path / NAME).write_bytes(b"the first hour")
+    (tmp_path / RECORDING_NAME).write_bytes(b"the first hour")
     with pytest.raises(FileExistsError):
         Folder(tmp_path, parse_address("127.0.0.1"))
-    assert (tmp_path / NAME).read_bytes() == b"the first hour"
+    assert (tmp_path / RECORDING_NAME).read_bytes() == b"the first hour"
     with pytest.raises(NotADirectoryError):
-        Folder(tmp_path / NAME / "report", parse_address("127.0.0.1"))
+        Folder(tmp_path / RECORDING_NAME / "report", parse_address("127.0.0.1"))
 
 
 @contextmanager
@@ -202,14 +202,14 @@ async def test_a_full_disk_ends_the_run_after_the_stage(tmp_path: Path) -> None:
         assert len(report.stages) < 10
         assert not server.gripper.is_moving
         assert not server.gripper.status_registers()[0] & 0x0800
-    assert list(read_recording(tmp_path / NAME)), "what was written before is lost"
+    assert list(read_recording(tmp_path / RECORDING_NAME)), "what was written before is lost"
 
 
 async def test_a_report_that_cannot_be_written_leaves_no_part_of_it(tmp_path: Path) -> None:
     folder = Folder(tmp_path, parse_address("192.0.2.1"))
     with full_disk(100), pytest.raises(OSError, match="large"):
         folder.save(report_with())
-    assert {path.name for path in tmp_path.iterdir()} == {NAME}  # noqa: ASYNC240
+    assert {path.name for path in tmp_path.iterdir()} == {RECORDING_NAME}  # noqa: ASYNC240
     await folder.recording.end()
 
 
@@ -283,7 +283,7 @@ def test_the_lines_to_paste_are_taken(tmp_path: Path, model: Model) -> None:
     assert hand.model is model
     file = tmp_path / "FLEET.toml"
     file.write_text('site = "lab"\n' + said["FLEET.toml"])
-    settings = read_agent_file(file).grippers["NAME"]
+    settings = read_agent_file(file).grippers["RECORDING_NAME"]
     assert settings.model is model
     assert {name: getattr(settings, name) for name in EVERY} == EVERY
     given = dict(re.findall(r"-p (\w+):=(\S+)", said["ROS 2"]))

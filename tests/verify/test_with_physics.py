@@ -10,7 +10,7 @@ from robotiq_async.session.options import units_of
 from robotiq_async.simulator import Habits, Physics, SimulatedGripper
 from robotiq_async.tools.verify import CheckVerdict
 from robotiq_async.tools.verify.stages import soft_part
-from robotiq_async.tools.verify.stages.full_strokes import SHARE
+from robotiq_async.tools.verify.stages.full_strokes import SPEED_SHARE
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
 from robotiq_async.values.request import AxisRequest, Request
@@ -59,7 +59,7 @@ def test_a_stroke_of_three_fingers_and_of_the_scissor_is_as_assumed() -> None:
     moved(0, 128)
     opened, _ = moved(0, 128)
     closed, took = moved(255, 128)
-    assert took == pytest.approx(units_of(None, None, THREE_FINGER).closing_s(255), rel=SHARE)
+    assert took == pytest.approx(units_of(None, None, THREE_FINGER).closing_s(255), rel=SPEED_SHARE)
     fingers = [axis for axis in THREE_FINGER.axes if axis in Finger.ABC]
     usual = range(THREE_FINGER.stroke.open_reading, THREE_FINGER.open_reading_max + 1)
     assert all(opened.position(axis) in usual for axis in fingers)

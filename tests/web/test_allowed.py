@@ -12,7 +12,14 @@ from robotiq_async.tools.actions import ACTIONS
 from robotiq_async.tools.description.palette import AXIS_COLORS
 from robotiq_async.tools.web.page.mirror import HandMirror
 from robotiq_async.tools.web.page.pages import THEME
-from robotiq_async.tools.web.page.widgets.allowed import INHIBITED, LOST, QUIET, TRIGGERS, what_helps, why_not
+from robotiq_async.tools.web.page.widgets.allowed import (
+    INHIBITED,
+    NO_CONNECTION,
+    QUIET,
+    TRIGGERS,
+    what_helps,
+    why_not,
+)
 from robotiq_async.tools.web.page.widgets.words import banner_words, state_words
 from robotiq_async.values.model import TWO_FINGER_85
 from robotiq_async.values.status import RobotiqStatus
@@ -48,7 +55,7 @@ def test_what_may_be_pressed(state: State) -> None:
         whys = {name: why_not(name, hand, is_quiet=False) for name in BUTTONS}
         assert {name for name, why in whys.items() if not why} == set(allowed.split())
         if hand.is_lost:
-            assert {why for name, why in whys.items() if name != "permit"} == {LOST}
+            assert {why for name, why in whys.items() if name != "permit"} == {NO_CONNECTION}
         elif inhibit:
             assert whys["open"] == INHIBITED
         assert {why_not(name, hand, is_quiet=True) for name in BUTTONS} == {QUIET}

@@ -157,12 +157,14 @@ async def test_headers_without_end_are_not_kept(page: PageServer) -> None:
 
 async def test_connections_that_ask_nothing_keep_nobody_out(page: PageServer) -> None:
     """A thousand of them took the files of the page, and browsers that were there lost their connection."""
-    from robotiq_async.tools.web.page.serve import MOST  # noqa: PLC0415  # it imports NiceGUI
+    from robotiq_async.tools.web.page.serve import MOST_CONNECTIONS  # noqa: PLC0415  # it imports NiceGUI
 
     folder, cookie = await let_in(page)
     parts = urlsplit(page.url)
     async with asyncio.timeout(patience(30)):
-        opened = [await asyncio.open_connection(parts.hostname, parts.port) for _ in range(2 * MOST)]
+        opened = [
+            await asyncio.open_connection(parts.hostname, parts.port) for _ in range(2 * MOST_CONNECTIONS)
+        ]
         opened[-1][1].write(b"GET / HTTP/1.1\r\n")
         answer, stranger = opened[-2]  # the oldest are gone
         stranger.write(f"GET / HTTP/1.1\r\nHost: {parts.netloc}\r\n\r\n".encode())
@@ -186,12 +188,12 @@ def files_of(process: int) -> list[str]:
 
 async def test_a_browser_gets_in_while_strangers_keep_every_connection(page: PageServer) -> None:
     """Two hundred silent ones kept the operators out: 3 of 78 requests were answered."""
-    from robotiq_async.tools.web.page.serve import MOST  # noqa: PLC0415  # it imports NiceGUI
+    from robotiq_async.tools.web.page.serve import MOST_CONNECTIONS  # noqa: PLC0415  # it imports NiceGUI
 
     folder, cookie = await let_in(page)
     parts = urlsplit(page.url)
     async with asyncio.timeout(patience(30)):
-        opened = [await asyncio.open_connection(parts.hostname, parts.port) for _ in range(MOST)]
+        opened = [await asyncio.open_connection(parts.hostname, parts.port) for _ in range(MOST_CONNECTIONS)]
         for _ in range(20):
             opened.append(await asyncio.open_connection(parts.hostname, parts.port))
             assert (await ask(page.url, folder, Cookie=cookie)).status == 200

@@ -23,8 +23,8 @@ from robotiq_async import CLOSED, HAND_E, Fault, Finger, RobotiqHand, RobotiqSta
 from robotiq_async.control.state_machine import TABLE, Verdict, refusal
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import Operator
-from robotiq_async.tools.web.commands import BUTTONS, FRESH_S, MAX_COMMANDS, PageCommands
-from robotiq_async.tools.web.page.heartbeat import LOST_S, Heartbeat
+from robotiq_async.tools.web.commands import BUTTONS, COMMAND_AGE_S, MAX_COMMANDS, PageCommands
+from robotiq_async.tools.web.page.heartbeat import PAGE_LOST_S, Heartbeat
 from robotiq_async.tools.web.page.mirror import HISTORY_S, HandMirror, PageMirror
 from robotiq_async.tools.web.page.widgets.words import event_words, fault_words, state_words
 from robotiq_async.tools.web.server import HandUpdates, PageServer
@@ -137,7 +137,7 @@ MOVING: tuple[tuple[str, dict[str, Any]], ...] = (
 )
 
 
-@pytest.mark.parametrize("ago", [FRESH_S + 0.1, 1e9, -1.0])
+@pytest.mark.parametrize("ago", [COMMAND_AGE_S + 0.1, 1e9, -1.0])
 async def test_late_requests_move_nothing_but_a_halt_is_never_too_late(hand: RobotiqHand, ago: float) -> None:
     """It may have waited in the browser, on the network, or for this loop, which something had held up."""
     await assert_only_a_halt(Pages(hand), hand, "arrived too late", ago=ago)
@@ -348,14 +348,14 @@ def test_any_heartbeat_of_a_browser_is_tolerated() -> None:
 def test_a_browser_is_lost_once_and_found_again() -> None:
     heartbeat = Heartbeat()
     assert not heartbeat.check()
-    heartbeat._newest -= LOST_S + 1
+    heartbeat._newest -= PAGE_LOST_S + 1
     assert heartbeat.check()
     assert not heartbeat.check(), "reported once"
-    heartbeat.heard(monotonic() - LOST_S - 1)
+    heartbeat.heard(monotonic() - PAGE_LOST_S - 1)
     assert heartbeat.is_lost, "what it sent was long under way"
     heartbeat.heard(monotonic())
     assert not heartbeat.is_lost
-    heartbeat._newest -= LOST_S + 1
+    heartbeat._newest -= PAGE_LOST_S + 1
     assert heartbeat.check(), "and lost once more, with whatever it has set in motion since"
 
 

@@ -17,9 +17,9 @@ from ..browser import opened
 from ..consent import consent
 from ..failures import CommandError
 
-PATIENCE_S: Final = 60.0
+DEMO_PATIENCE_S: Final = 60.0
 """Seconds for which the demo waits for a browser."""
-LOOK_S: Final = 2.0
+DEMO_LOOK_S: Final = 2.0
 """Seconds for the user to find the window."""
 
 
@@ -62,15 +62,15 @@ async def _shown(hand: Hand) -> AsyncIterator[None]:
     ):
         print(f"Watch it move: {page.url}")
         where = "Your browser opens it; if none does" if is_opened else "No browser could be opened here"
-        print(f"{where}: open it yourself. The demo begins then, or in {PATIENCE_S:g} s.", flush=True)
+        print(f"{where}: open it yourself. The demo begins then, or in {DEMO_PATIENCE_S:g} s.", flush=True)
         try:
-            async with asyncio.timeout(PATIENCE_S):
+            async with asyncio.timeout(DEMO_PATIENCE_S):
                 await page.seen()
-            await asyncio.sleep(LOOK_S)
+            await asyncio.sleep(DEMO_LOOK_S)
         except TimeoutError:
             print("No browser has opened the page; it begins.", flush=True)
         yield
-        await asyncio.sleep(LOOK_S)  # time to see the end
+        await asyncio.sleep(DEMO_LOOK_S)  # time to see the end
 
 
 def _program() -> ModuleType:

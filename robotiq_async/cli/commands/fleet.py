@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ...fleet.fleet import Fleet, Member
     from ...fleet.keys.access import Role
 
-SETTLE_S = 1.5
+DISCOVERY_S = 1.5
 """Seconds to collect: agents publish a summary of each gripper once a second."""
 _ROW = "{:<27} {:<13} {:<6} {:<17} {}"  # 80 columns, unless a name is long
 
@@ -59,7 +59,7 @@ async def fleet(
         seen = Fleet(site)
     show = _print_object if as_json else _print_row
     async with seen:
-        await asyncio.sleep(SETTLE_S)
+        await asyncio.sleep(DISCOVERY_S)
         if not as_json:
             print(_ROW.format("GRIPPER", "STATE", "FAULT", "COMMANDED BY", "AGE, PROBLEM"))
         if watch:

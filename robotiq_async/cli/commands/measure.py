@@ -171,7 +171,7 @@ def print_files(files: list[Path]) -> None:
         print(file)
 
 
-WARNING = """the fingers MOVE: they open and close fully, {count} times. Nothing may be between them.
+SPEED_WARNING = """the fingers MOVE: they open and close fully, {count} times. Nothing may be between them.
 If it is not active yet it is activated first, and what it holds drops."""
 
 
@@ -218,7 +218,7 @@ def speed(
         origin = {"gripper": full_address(address), "fingers": str(fingers.name)}
         campaign = speed_campaign(output, step, runs, **origin)
     if campaign.left:
-        consent(address, WARNING.format(count=runs * len(campaign.left)), yes=yes)
+        consent(address, SPEED_WARNING.format(count=runs * len(campaign.left)), yes=yes)
     return _measure(address, campaign, fingers, factor, not no_plot)
 
 

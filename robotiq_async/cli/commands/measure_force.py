@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ...tools.measure.campaigns import Campaign, Currents
     from ...values.calibration.csv_tables import RunsTable
 
-WARNING = """the fingers MOVE: they open and close on what lies between them, {count} times.
+FORCE_WARNING = """the fingers MOVE: they open and close on what lies between them, {count} times.
 If it is not active yet it is activated first, and what it holds drops."""
 MOST_GRAMS = 100_000
 
@@ -86,7 +86,7 @@ def force(
     read_scale = _scale(address, surface, readings, campaign.left, runs)
     typed_in = readings is None and not is_simulated(address)
     if campaign.left:
-        consent(address, WARNING.format(count=runs * len(campaign.left)), yes=yes)
+        consent(address, FORCE_WARNING.format(count=runs * len(campaign.left)), yes=yes)
     return _measure(
         address, surface, campaign, currents, read_scale, speed, factor, bar=not typed_in, plot=not no_plot
     )

@@ -23,10 +23,11 @@ if TYPE_CHECKING:
     from ...hand import Hand
     from ...values.stroke import Point, Points
 
-WARNING: Final = """the jaw MOVES to {count} positions, from open to closed, at its least force, and waits at
-each for the figure of a calliper. Nothing but the calliper may be between the fingertips; take it out before
-you answer. If the gripper is not active yet the jaw opens and closes first, and what it holds drops."""
-QUESTION: Final = "At {position} counts: what does the calliper show between the fingertips, in mm?"
+STROKE_WARNING: Final = """the jaw MOVES to {count} positions, from open to closed, at its least force, and
+waits at each for the figure of a calliper. Nothing but the calliper may be between the fingertips; take it
+out before you answer. If the gripper is not active yet the jaw opens and closes first, and what it holds
+drops."""
+CALLIPER_QUESTION: Final = "At {position} counts: what does the calliper show between the fingertips, in mm?"
 MET: Final = """The fingertips met at {position} counts: that is the closed end. If they met something else,
 press Ctrl-C, take it out and begin again."""
 OPEN_IS_ZERO: Final = "an open jaw cannot have an opening of 0 mm"
@@ -36,7 +37,7 @@ calliper is not in millimetres, press Ctrl-C and begin again: nothing is written
 DOUBTFUL: Final = 2.0
 """The ratio of a fall to the nominal one, either way, that is doubted. Fingertips of one's own make the
 opening wider or narrower, and hardly change by how much it falls."""
-FORM: Final = r"[0-9]{1,3}(?:\.[0-9]{1,2})?"
+OPENING_FORM: Final = r"[0-9]{1,3}(?:\.[0-9]{1,2})?"
 
 Calliper = Callable[[int], Awaitable[float]]  # takes the position, in counts
 
@@ -78,7 +79,7 @@ def stroke(
         raise UsageError(f"a width is measured between the fingertips of a jaw; {address} names a 3-Finger")
     if not os.access(output.parent, os.W_OK):  # before somebody has measured for nothing
         raise CommandError(f"{output}: its folder does not exist, or cannot be written to")
-    consent(address, WARNING.format(count=points), yes=yes)
+    consent(address, STROKE_WARNING.format(count=points), yes=yes)
     return _measure(address, output, points)
 
 
@@ -159,7 +160,7 @@ def _calliper(address: str, hand: Hand) -> Calliper:
 
 async def _typed(position: int) -> float:
     while True:
-        text = await prompt(QUESTION.format(position=position))
-        if re.fullmatch(FORM, text):
+        text = await prompt(CALLIPER_QUESTION.format(position=position))
+        if re.fullmatch(OPENING_FORM, text):
             return float(text)
         print("Millimetres with at most two decimals, such as 42.5, please.", flush=True)

@@ -16,7 +16,7 @@ from ...hand import Hand
 from ...tools.recording.payloads import reading_fields
 from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..addresses import gripper_words
-from ..arguments import USUAL, AddressArgument, Byte, Flag, LinkOptions, need
+from ..arguments import USUAL_LINK, AddressArgument, Byte, Flag, LinkOptions, need
 from ..consent import forget_keys
 from ..failures import CommandError, UsageError, normal_end
 from ..output.messages import forget, forwarded_warnings, tell
@@ -33,7 +33,7 @@ async def monitor(
     as_json: Annotated[Flag, Parameter(name="--json")] = False,
     speed: Byte = DEFAULT_SPEED,
     force: Byte = DEFAULT_FORCE,
-    link: LinkOptions = USUAL,
+    link: LinkOptions = USUAL_LINK,
 ) -> None:
     """Show a gripper while it works, and move it by keys. Nothing moves until a key is pressed.
 
@@ -137,7 +137,7 @@ async def status(
     /,
     *,
     as_json: Annotated[Flag, Parameter(name="--json")] = False,
-    link: LinkOptions = USUAL,
+    link: LinkOptions = USUAL_LINK,
 ) -> None:
     """Read the gripper once and print its status. Nothing moves and nothing is written.
 

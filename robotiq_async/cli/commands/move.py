@@ -15,7 +15,7 @@ from ...values.checks import check_timeout
 from ...values.enums import Finger
 from ..addresses import gripper_words, is_simulated
 from ..arguments import (
-    USUAL,
+    USUAL_LINK,
     AddressArgument,
     Amount,
     Fingers,
@@ -48,7 +48,7 @@ def move(
     timeout: Annotated[float | None, Parameter(metavar="SECONDS")] = None,
     keep: Flag = False,
     yes: Yes = False,
-    link: LinkOptions = USUAL,
+    link: LinkOptions = USUAL_LINK,
 ) -> Coroutine[None, None, None]:
     """Move axes and wait until they have stopped. THE FINGERS MOVE.
 

@@ -15,7 +15,7 @@ from cyclopts import Parameter
 from ...runtime.log import printable
 from ...values.conventions import CONVENTIONS, Convention
 from ..addresses import gripper_words
-from ..arguments import USUAL, AddressArgument, Flag, LinkOptions, need
+from ..arguments import USUAL_LINK, AddressArgument, Flag, LinkOptions, need
 from ..failures import CommandError, UsageError, file_errors, normal_end
 from ..output.lines import FORMATTERS, brief_line, clock
 
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from ...tools.recording.recordings import RecordedMessage
 
 Overwrite = Annotated[Flag, Parameter(help="Replace an existing file.")]
-COUNTS: Final = "COUNTS"  # the numbers that a table has anyway
-KINDS: Final = {"statuses": "status", "commands": "command", "events": "event"}
+COUNTS_COLUMNS: Final = "COUNTS_COLUMNS"  # the numbers that a table has anyway
+TOPIC_KINDS: Final = {"statuses": "status", "commands": "command", "events": "event"}
 
 
 def replay(
@@ -146,7 +146,7 @@ def export(
         raise UsageError(f"{file} is the table itself: name the recording")
     _keep(table, overwrite=overwrite)
     with file_errors(table):
-        rows = write(entries, KINDS[of], table, named)
+        rows = write(entries, TOPIC_KINDS[of], table, named)
     if not rows:
         raise CommandError(f"{file}: it contains no {of}")
     print(f"{rows} {of} in {table}")
@@ -158,8 +158,8 @@ def _convention(name: str | None, of: str) -> Convention | None:
         if name is not None:
             raise UsageError(f"--convention is for statuses: {of} have no opening")
         return None
-    if name is None or name.upper() not in (COUNTS, *CONVENTIONS):
-        known = f"{COUNTS} (the gripper's own, 0 open .. 255 closed), {', '.join(CONVENTIONS)}"
+    if name is None or name.upper() not in (COUNTS_COLUMNS, *CONVENTIONS):
+        known = f"{COUNTS_COLUMNS} (the gripper's own, 0 open .. 255 closed), {', '.join(CONVENTIONS)}"
         got = "none: nobody should guess a sign" if name is None else name
         raise UsageError(f"--convention must be one of {known}; got {got}")
     return CONVENTIONS.get(name.upper())
@@ -245,7 +245,7 @@ async def record(
     seconds: Annotated[float | None, Parameter(metavar="SECONDS")] = None,
     ros2: Flag = False,
     as_csv: Annotated[Flag, Parameter(name="--csv")] = False,
-    link: LinkOptions = USUAL,
+    link: LinkOptions = USUAL_LINK,
 ) -> None:
     """Record every poll, command, transition and fault in a file, until Ctrl-C.
 

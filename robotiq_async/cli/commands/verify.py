@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ...tools.verify.files import Folder
 
 HARMLESS = 2
-NOTE = (
+FIRST_RUN_NOTE = (
     "None of this has run on real hardware: yours may be the first. It is no safety function: have an "
     "emergency stop in reach that cuts the gripper's power. While a stage runs ANY KEY stops the fingers."
 )
@@ -109,7 +109,7 @@ async def verify(
         except OSError as error:
             raise CommandError(f"{error.filename}: {error.strerror}: nothing was sent") from error
         person: Person = stack.enter_context(Keyboard()) if has_person else Unattended()
-        person.tell(NOTE)
+        person.tell(FIRST_RUN_NOTE)
         await _run(plan, person, folder)
 
 

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from ...runtime.sockets import is_loopback
 from ..addresses import gripper_words
-from ..arguments import USUAL, AddressArgument, Host, LinkOptions, Port, need
+from ..arguments import USUAL_LINK, AddressArgument, Host, LinkOptions, Port, need
 from ..failures import file_errors, normal_end
 from ..output.messages import tell
 
@@ -23,7 +23,7 @@ async def view(
     port: Port = 8765,
     host: Host = "127.0.0.1",
     layout: Annotated[Path | None, Parameter(metavar="FILE")] = None,
-    link: LinkOptions = USUAL,
+    link: LinkOptions = USUAL_LINK,
 ) -> None:
     """Show a gripper in Foxglove or Lichtblick until Ctrl-C. Viewers only look; web --control also moves.
 

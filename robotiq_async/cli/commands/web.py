@@ -16,7 +16,7 @@ from ...tools.recording.payloads import title
 from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ...values.errors import RobotiqError
 from ..addresses import gripper_words
-from ..arguments import USUAL, AddressArgument, Byte, Flag, Host, LinkOptions, Port, need
+from ..arguments import USUAL_LINK, AddressArgument, Byte, Flag, Host, LinkOptions, Port, need
 from ..browser import opened
 from ..failures import CommandError, UsageError, file_errors, normal_end, usage
 from ..output.messages import tell
@@ -40,7 +40,7 @@ async def web(
     key: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     speed: Byte = DEFAULT_SPEED,
     force: Byte = DEFAULT_FORCE,
-    link: LinkOptions = USUAL,
+    link: LinkOptions = USUAL_LINK,
 ) -> None:
     """Show grippers on a page in the browser, the hand in three dimensions, until Ctrl-C.
 

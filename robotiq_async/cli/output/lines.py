@@ -21,7 +21,7 @@ from .messages import forwarded_warnings
 if TYPE_CHECKING:
     from ...hand import Hand
 
-NOTHING: Final = "-"
+NO_VALUE: Final = "-"
 """The text for a state without a meaning."""
 _NAMES: Final = [str(axis.name) for axis in Finger.ALL]
 
@@ -57,7 +57,7 @@ def _opening(name: str, fields: Properties) -> str:
 
 def axis_words(state: str) -> str:
     """The state of an axis; ``-`` where it means nothing."""
-    return NOTHING if state == NO_REQUEST else state
+    return NO_VALUE if state == NO_REQUEST else state
 
 
 def command_line(fields: Properties) -> str:
@@ -111,16 +111,16 @@ FORMATTERS: Final[dict[str, Callable[[Properties], str]]] = {
 """The formatter of each topic."""
 
 
-BUFFER: Final = 4000
+LINES_BUFFER: Final = 4000
 """Statuses kept for a slow reader: 20 s."""
 JSON_INTERVAL_S: Final = 0.02
 WATCH_INTERVAL_S: Final = 0.1
-EVENTS: Final = ("transition", "fault", "inhibit", "log")
+EVENT_KINDS: Final = ("transition", "fault", "inhibit", "log")
 
 Formatter = Callable[[list[Properties]], list[str]]
 
 
-async def print_objects(hand: Hand, buffer: int = BUFFER) -> None:
+async def print_objects(hand: Hand, buffer: int = LINES_BUFFER) -> None:
     """Print every status, transition and fault as a line of JSON until the hand is stopped.
 
     ``kind`` is the kind of the line, ``time`` is in seconds since 1970. A slow reader loses the oldest
@@ -132,7 +132,7 @@ async def print_objects(hand: Hand, buffer: int = BUFFER) -> None:
 async def watch(hand: Hand) -> None:
     """Print the state; then every transition and fault, and the newest status if its line has changed."""
     await _write(f"{clock(time.time())} state    {hand.state.name}\n".encode())
-    await _print(_History(hand, BUFFER), _TextLines(), WATCH_INTERVAL_S)
+    await _print(_History(hand, LINES_BUFFER), _TextLines(), WATCH_INTERVAL_S)
 
 
 async def _print(history: _History, formatter: Formatter, interval: float) -> None:
@@ -156,7 +156,7 @@ class _History:
 
     def __init__(self, hand: Hand, buffer: int) -> None:
         self.hand = hand
-        self._warnings: deque[tuple[float, str]] = deque(maxlen=BUFFER)
+        self._warnings: deque[tuple[float, str]] = deque(maxlen=LINES_BUFFER)
         self._timeline = Timeline(hand, buffer)
         self._state = hand.state.name
         self._missed = 0
@@ -189,7 +189,7 @@ class _TextLines:
         self._shown = ""
 
     def __call__(self, new: list[Properties]) -> list[str]:
-        lines = [f"{clock(each['time'])} {event_line(each)}" for each in new if each["kind"] in EVENTS]
+        lines = [f"{clock(each['time'])} {event_line(each)}" for each in new if each["kind"] in EVENT_KINDS]
         newest = next((each for each in reversed(new) if each["kind"] == "status"), None)
         if newest is not None and (line := status_line(newest)) != self._shown:
             self._shown = line

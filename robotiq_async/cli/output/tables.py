@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ... import MoveResult, RobotiqStatus
     from ...hand import Hand
 
-WIDTH: Final = 80
+TABLE_WIDTH: Final = 80
 """Columns that a table may have in any window, as in a pipe."""
 
 
@@ -89,5 +89,5 @@ def _print_table(
         table.add_row(axis_name(axis, status.model), *map(str, row))
     console = Console()
     # In a narrow window the terminal breaks the lines: an elided number would look like another one.
-    console.width = max(console.width, WIDTH)
+    console.width = max(console.width, TABLE_WIDTH)
     console.print(table)

@@ -16,7 +16,7 @@ from textual.drivers.linux_driver import LinuxDriver
 
 from ...runtime.concurrency import write_all
 
-BACKLOG: Final = 30
+TERMINAL_BACKLOG: Final = 30
 """Writes queued for the terminal; further ones are dropped."""
 CLOSING_S: Final = 0.5
 """Seconds for which closing waits for the terminal."""
@@ -47,7 +47,7 @@ class NonblockingDriver(LinuxDriver):
         """Queue output for the terminal."""
         if not self._thread.is_alive() and self._thread.ident is None:
             self._thread.start()
-        if self._waiting.qsize() >= BACKLOG:
+        if self._waiting.qsize() >= TERMINAL_BACKLOG:
             self.is_behind = True
         else:
             self._waiting.put(data.encode())

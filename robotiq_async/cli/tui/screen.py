@@ -39,11 +39,11 @@ FRAMES: Final = 12
 """Paints of the screen a second."""
 FIGURES_S: Final = 0.5
 """Seconds between two updates of the polling statistics."""
-BUFFER: Final = 400
+SCREEN_BUFFER: Final = 400
 """Statuses kept for the next paint: two seconds."""
 HALTING: Final = frozenset({"space", "h"})
 """Keys that halt, also during a question."""
-STEP: Final = 16
+KEY_STEP: Final = 16
 """Change of speed or force for one press of a key."""
 LOG_LINES: Final = 2000
 
@@ -78,10 +78,10 @@ class Monitor(App[None]):
         ("v", "act('recover')", "recover"),
         ("m", "act('permit')", "permit"),
         ("p", "position", "position"),
-        ("plus,equals_sign", f"speed({STEP})", "faster"),
-        ("minus", f"speed(-{STEP})", "slower"),
-        ("right_square_bracket", f"force({STEP})", "stronger"),
-        ("left_square_bracket", f"force(-{STEP})", "weaker"),
+        ("plus,equals_sign", f"speed({KEY_STEP})", "faster"),
+        ("minus", f"speed(-{KEY_STEP})", "slower"),
+        ("right_square_bracket", f"force({KEY_STEP})", "stronger"),
+        ("left_square_bracket", f"force(-{KEY_STEP})", "weaker"),
         ("q,ctrl+c", "quit", "quit"),
     ]
 
@@ -91,7 +91,7 @@ class Monitor(App[None]):
         self._hand = operator.hand
         self._lines: deque[tuple[float, str, str]] = deque(maxlen=LOG_LINES)
         """Lines for the log at the next paint: time, text, style."""
-        self._timeline = Timeline(operator.hand, BUFFER)
+        self._timeline = Timeline(operator.hand, SCREEN_BUFFER)
         self._newest = operator.hand.status
         # Kept here and not looked up: a paint may come while the screen is closing.
         self._top = TextLine(id="state")

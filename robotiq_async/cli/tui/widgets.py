@@ -38,7 +38,7 @@ STILL: Final = 4
 LEVELS: Final = "▁▂▃▄▅▆▇█"
 FIXED: Final = 47
 """Columns of a line that are neither bar nor sparkline."""
-OPENING: Final = 9
+OPENING_WIDTH: Final = 9
 """Columns of the opening of a jaw."""
 _STYLES: Final = {
     NO_REQUEST: "dim",
@@ -93,7 +93,7 @@ class Axes(Widget):
 
     def render(self) -> Text:
         # Bar and sparkline share the rest of the width.
-        fixed = FIXED + OPENING * self._is_jaw
+        fixed = FIXED + OPENING_WIDTH * self._is_jaw
         bar = max((self.size.width - fixed) // 2, 8)
         where, current = (f"{words:{bar}.{bar}}" for words in ("is █, asked ▼", "current, 5 s"))
         opening = f"{self._status.stroke.source:>8} " if self._is_jaw else " "

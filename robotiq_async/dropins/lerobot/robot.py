@@ -28,7 +28,7 @@ from ...values.conventions import Convention
 from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from .gripper_part import LOST_AFTER_S, GripperPart
 
-RESPONSE_TIMEOUT_S: Final = 0.1
+LOOP_RESPONSE_S: Final = 0.1
 """A lost reply is noticed after so long: three frames at 30 Hz. The usual 0.4 s would cost twelve."""
 
 
@@ -60,7 +60,7 @@ class RobotiqGripperConfig(RobotConfig):  # type: ignore[misc]  # LeRobot is not
     clamp: bool = True
     cameras: dict[str, CameraConfig] = field(default_factory=dict)
     lost_after: float = LOST_AFTER_S
-    response_timeout: float = RESPONSE_TIMEOUT_S
+    response_timeout: float = LOOP_RESPONSE_S
 
 
 class RobotiqGripper(Robot):  # type: ignore[misc]  # LeRobot is not here

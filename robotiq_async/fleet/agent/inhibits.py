@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import Final
 
-from ...values.inhibit import LONGEST, Inhibit
+from ...values.inhibit import LONGEST_REASON, Inhibit
 from ..wire.envelope import Call
 from ..wire.values import read_inhibit, words
 from .jobs import label_of
@@ -37,4 +37,4 @@ def signed(call: Call) -> str:
 
 
 def _short(text: object) -> str:
-    return words(str(text))[:LONGEST]
+    return words(str(text))[:LONGEST_REASON]

@@ -40,7 +40,7 @@ from ..translation.joints import Targets
 from ..translation.settings import NodeSettings
 from .goals import GoalOutcome, GoalRunner
 
-COMMANDS: Final = ("activate", "reset", "halt", "recover", "release", "inhibit", "permit")
+NODE_COMMANDS: Final = ("activate", "reset", "halt", "recover", "release", "inhibit", "permit")
 """Names of the services, and of the actions that they carry out."""
 PERSON: Final = "~/inhibit"
 """Who asks, in what others hear of an inhibit."""
@@ -126,7 +126,7 @@ class GripperConnection:
     # -- commands --------------------------------------------------------------------------------------
 
     async def command(self, name: str) -> str:
-        """Carry out one of :data:`COMMANDS`; returns its outcome as a text.
+        """Carry out one of :data:`NODE_COMMANDS`; returns its outcome as a text.
 
         Raises:
             RefusedError: the node is not active, too many commands run, or a stop took over; never for a

@@ -18,14 +18,14 @@ from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
 from ...values.errors import RobotiqError
-from ..gripper.connection import COMMANDS, GripperConnection, RefusedError, make_hand
+from ..gripper.connection import NODE_COMMANDS, GripperConnection, RefusedError, make_hand
 from ..translation.description import robot_description
 from . import parameters
 from .bridge import Bridge, ClosedError
 from .gripper_action import Configured, GripperAction
 from .publishing import JointStates, Publishing
 
-NAME: Final = "gripper"
+NODE_NAME: Final = "gripper"
 _CALLS: Final = QoSProfile(depth=100)
 """Calls that may wait for the executor. With ROS's default of 10 a busy client displaces those of others."""
 _SUCCESS, _FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -38,7 +38,7 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
     """
 
     def __init__(self, context: Context, bridge: Bridge, failed: Callable[[BaseException], object]) -> None:
-        super().__init__(NAME, context=context)
+        super().__init__(NODE_NAME, context=context)
         self._bridge = bridge
         self._current: Configured | None = None  # set while the node is configured; the loop reads it too
         parameters.declare(self)
@@ -48,7 +48,7 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
         group = ReentrantCallbackGroup()
         self._publishing = Publishing(self, failed)
         self._action = GripperAction(self, group, bridge, self._configured)
-        for name in COMMANDS:
+        for name in NODE_COMMANDS:
             serve = partial(self._serve, name)
             self.create_service(Trigger, f"~/{name}", serve, qos_profile=_CALLS, callback_group=group)
         self._answer_illegal_transitions()

@@ -31,14 +31,14 @@ from ...values.enums import JAW, Finger
 from ...values.model import HAND_E, THREE_FINGER, Model
 from ...values.status import RobotiqStatus
 
-FINGERS: Final = "fingers"
+FINGERS_JOINT: Final = "fingers"
 """Name for all three fingers in a goal: one angle, the sum of base and middle joint."""
 _PALM_JOINT: Final = "palm_finger_1_joint"
 _BASE_LIMITS: Final = (0.0495, 1.2217)
 _MIDDLE_LIMITS: Final = (0.0, 1.5708)
 _TIP_LIMITS: Final = (-0.9599, -0.0523)
 
-LIMITS: Final = MappingProxyType(
+JOINT_LIMITS: Final = MappingProxyType(
     {name: _BASE_LIMITS for name in JOINTS if name.endswith("_joint_1")}
     | {name: _MIDDLE_LIMITS for name in JOINTS if name.endswith("_joint_2")}
     | {name: _TIP_LIMITS for name in JOINTS if name.endswith("_joint_3")}
@@ -51,20 +51,22 @@ scissor.
 The angles exceed them at the ends: a finger below 6 counts, a scissor above 232. Consumers reject a joint
 outside its limits, so published angles are clamped.
 """
-_LIMITS: Final = tuple(LIMITS[name] for name in JOINTS)
+_LIMITS: Final = tuple(JOINT_LIMITS[name] for name in JOINTS)
 
 CLOSING_END: Final = 2.8
 """End of the closing angle of all fingers: 70 degrees of the base and 90 of the middle joint, rounded up."""
-TOLERANCE: Final = 1e-3  # radians that a goal may be outside its range, because clients round
+GOAL_TOLERANCE: Final = 1e-3  # radians that a goal may be outside its range, because clients round
 JAW_TOLERANCE: Final = 0.01
 """Share of its range that a goal for a jaw may be outside. Clients round, and close a 2F-85 to 0.8, the limit
 of its joint in public descriptions."""
 _STOP_TOLERANCE: Final = 0.1
 """Radians that the base joint of a goal may be off its stop while the middle one bends."""
 
-LONGEST_NAME: Final = 80  # characters of an unknown name in an error
+LONGEST_JOINT_NAME: Final = 80  # characters of an unknown name in an error
 
-VELOCITY_S: Final = 0.04  # seconds over which a velocity is computed, at least: one count is half a degree
+JOINT_VELOCITY_S: Final = (
+    0.04  # seconds over which a velocity is computed, at least: one count is half a degree
+)
 
 
 class GoalError(ValueError):
@@ -110,7 +112,7 @@ class Motion:
         seen, at, there = self._seen, status.timestamp, positions(status)
         if not seen or at > seen[-1][0]:
             seen.append((at, there))
-        while len(seen) > 2 and at - seen[1][0] >= VELOCITY_S:
+        while len(seen) > 2 and at - seen[1][0] >= JOINT_VELOCITY_S:
             seen.popleft()
         before, past = seen[0]
         if past is there or before >= at:
@@ -138,17 +140,17 @@ def targets(
     asked = _pairs(names, angles, prefix, _COMMANDED)
     counts: dict[Finger, int] = {}
     for name, angle in asked.items():
-        if name == FINGERS:
+        if name == FINGERS_JOINT:
             for finger in FINGER_NAMES:
                 counts[finger] = _closing_counts(angle)
         elif name == _PALM_JOINT:
-            counts[Finger.SCISSOR] = _counts(name, angle, LIMITS[name], PALM)
+            counts[Finger.SCISSOR] = _counts(name, angle, JOINT_LIMITS[name], PALM)
     for finger, name in FINGER_NAMES.items():
         base, middle = asked.get(f"{name}_joint_1"), asked.get(f"{name}_joint_2")
         if base is None and middle is None:
             continue
         if finger in counts:
-            raise GoalError(f"two positions for one finger: {FINGERS!r} and {name!r}")
+            raise GoalError(f"two positions for one finger: {FINGERS_JOINT!r} and {name!r}")
         counts[finger] = _finger_counts(name, base, middle)
     return Targets(
         tuple(
@@ -195,9 +197,9 @@ def _plain_name(name: str, prefix: str, commanded: Sequence[str]) -> str:
     if name.startswith(prefix) and plain in commanded:
         return plain
     these = ", ".join(prefix + each for each in commanded)
-    if name.startswith(prefix) and plain in JOINTS and FINGERS in commanded:
+    if name.startswith(prefix) and plain in JOINTS and FINGERS_JOINT in commanded:
         raise GoalError(f"{name!r} follows other joints and takes no goal; these do: {these}")
-    shown = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."  # of any length
+    shown = name if len(name) <= LONGEST_JOINT_NAME else f"{name[:LONGEST_JOINT_NAME]}..."  # of any length
     raise GoalError(f"there is no joint {shown!r}; these take goals: {these}")
 
 
@@ -205,7 +207,7 @@ def _finger_counts(name: str, base: float | None, middle: float | None) -> int:
     # One motor turns both: the base joint up to its stop, the middle one beyond that.
     if middle is not None:
         counts = _counts(f"{name}_joint_2", middle, _MIDDLE_LIMITS, MIDDLE)
-        if middle > TOLERANCE:
+        if middle > GOAL_TOLERANCE:
             if base is not None and base < radians(BASE[-1][1]) - _STOP_TOLERANCE:
                 raise GoalError(
                     f"two positions for one finger: {name}_joint_2 bends only once {name}_joint_1 is at its "
@@ -221,15 +223,15 @@ def _finger_counts(name: str, base: float | None, middle: float | None) -> int:
 
 
 def _closing_counts(angle: float) -> int:
-    if not -TOLERANCE <= angle <= CLOSING_END + TOLERANCE:
-        raise GoalError(f"{FINGERS!r} must be in 0..{CLOSING_END} rad, got {angle:.4f}")
+    if not -GOAL_TOLERANCE <= angle <= CLOSING_END + GOAL_TOLERANCE:
+        raise GoalError(f"{FINGERS_JOINT!r} must be in 0..{CLOSING_END} rad, got {angle:.4f}")
     stop = radians(BASE[-1][1])
     return _between(angle, BASE) if angle <= stop else _between(angle - stop, MIDDLE)
 
 
 def _counts(name: str, angle: float, limits: tuple[float, float], points: AngleTable) -> int:
     low, high = limits
-    if not low - TOLERANCE <= angle <= high + TOLERANCE:
+    if not low - GOAL_TOLERANCE <= angle <= high + GOAL_TOLERANCE:
         raise GoalError(f"{name!r} must be in {low}..{high} rad, got {angle:.4f}")
     return _between(angle, points)
 
@@ -245,5 +247,5 @@ _BASE_RANGE: Final = (0.0, _BASE_LIMITS[1])
 _COMMANDED: Final = (
     *(f"{name}_joint_{number}" for name in FINGER_NAMES.values() for number in (1, 2)),
     _PALM_JOINT,
-    FINGERS,
+    FINGERS_JOINT,
 )

@@ -15,7 +15,7 @@ from ...values.checks import check_int, check_number
 from ...values.model import model_of
 
 Value = str | int | float | bool
-USUAL: Final = -1  # represents None: a parameter of ROS always has a value
+AS_USUAL: Final = -1  # represents None: a parameter of ROS always has a value
 OF_HAND: Final = offered(Place.ROS)  # the parameters that are options of the hand
 
 
@@ -37,8 +37,8 @@ def _of_hand(name: str, option: Option) -> Parameter:
     if option.is_file:
         return Parameter("", f"{text}; empty for nominal ones.")
     if default is None:  # it depends on the link
-        text += f"; {USUAL} stands for {option.tcp} over TCP, {option.rtu} on a serial line"
-        low = default = USUAL
+        text += f"; {AS_USUAL} stands for {option.tcp} over TCP, {option.rtu} on a serial line"
+        low = default = AS_USUAL
     # A plain float: ROS does not accept subclasses.
     default = float(default) if isinstance(default, float) else default
     return Parameter(default, f"{text}.", low, option.high, live=name in ("speed", "force"))  # type: ignore[arg-type]
@@ -120,8 +120,10 @@ def check_parameter(name: str, value: object) -> Value:
             return text if check is None else check(str(text))
         if isinstance(parameter.default, int):
             number = check_int(name, value, int(parameter.low), int(parameter.high))
-            if USUAL < number < (low := int(OF_HAND[name].low)):
-                raise ValueError(f"{name} must be {USUAL} or in {low}..{int(parameter.high)}, got {value!r}")
+            if AS_USUAL < number < (low := int(OF_HAND[name].low)):
+                raise ValueError(
+                    f"{name} must be {AS_USUAL} or in {low}..{int(parameter.high)}, got {value!r}"
+                )
             return number
         what = "seconds" if name in OF_HAND else "a number"
         return check_number(name, value, parameter.low, parameter.high, what)

@@ -13,7 +13,7 @@ from .kinematics import JOINTS
 
 SCHEMA_NAME: Final = "sensor_msgs/msg/JointState"
 _RULE: Final = "=" * 80
-SCHEMA: Final = f"""std_msgs/Header header
+JOINT_STATE_SCHEMA: Final = f"""std_msgs/Header header
 string[] name
 float64[] position
 float64[] velocity

@@ -23,12 +23,12 @@ from ...values.status import RobotiqStatus
 from .findings import Finding, GiveUpError, Level, ReportFinding
 from .gripper import report_state
 
-ANSWER_S: Final = 1.0
-TRIES: Final = 3  # attempts: just after a connection was made the first answers may be empty
-PROBES: Final = 100  # requests for measuring the round trip
+AGENT_ANSWER_S: Final = 1.0
+PROBE_TRIES: Final = 3  # attempts: just after a connection was made the first answers may be empty
+AGENT_PROBES: Final = 100  # requests for measuring the round trip
 WATCH_S: Final = 2.0  # seconds of listening to statuses
 _READ: Final = frozenset({"version", "window", "statistics", "problem", "state", "address", "holder"})
-LOST: Final = 0.01  # accepted share of lost statuses
+LOST_SHARE: Final = 0.01  # accepted share of lost statuses
 
 
 async def examine_agent(name: GripperName, bus: Bus, report: ReportFinding) -> None:
@@ -68,12 +68,12 @@ class _Asker:
         call = Call(self._name.base, self._client, number=self._number)
         asked, key = now(), self._name.question(self._bus.who or self._client)
         reply = await self._bus.ask(
-            key, call.pack(), timeout=ANSWER_S, urgency=Urgency.QUESTION, decides=of_its_run(call)
+            key, call.pack(), timeout=AGENT_ANSWER_S, urgency=Urgency.QUESTION, decides=of_its_run(call)
         )
-        if reply is None and now() - asked < ANSWER_S / 2:
+        if reply is None and now() - asked < AGENT_ANSWER_S / 2:
             raise NotAllowedError("the agent is running, but does not answer info: access denied")
         if reply is None:
-            raise ConnectionLostError(f"no answer to info within {ANSWER_S:g} s")
+            raise ConnectionLostError(f"no answer to info within {AGENT_ANSWER_S:g} s")
         answer = unpack_answer(reply.payload)
         if answer.to != self._name.base or answer.number not in (0, call.number):
             raise AgentError("the answer to info belongs to another request")
@@ -109,7 +109,7 @@ class _Listener:
 
 async def _describe(asker: _Asker, report: ReportFinding) -> Fields:
     why: RobotiqError | None = None
-    for _ in range(TRIES):
+    for _ in range(PROBE_TRIES):
         try:
             return await asker.info()
         except (ConnectionLostError, NotAllowedError) as error:
@@ -131,12 +131,12 @@ async def _describe(asker: _Asker, report: ReportFinding) -> Fields:
 
 async def _round_trips(asker: _Asker, ends: float) -> list[float]:
     times: list[float] = []
-    while len(times) < PROBES and (now() < ends or not times):
+    while len(times) < AGENT_PROBES and (now() < ends or not times):
         asked = now()
         try:
             await asker.info()
         except RobotiqError:
-            times.append(ANSWER_S)
+            times.append(AGENT_ANSWER_S)
         else:
             times.append(now() - asked)
     return sorted(times)
@@ -182,7 +182,7 @@ def _report_statuses(listener: _Listener, seconds: float, info: Fields, report: 
     period = 1000 * info["statistics"]["period_p99"]
     found = f"{len(sequences) / seconds:.0f} a second, {100 * lost:.1f} % lost on the way"
     found += f"; 99 % of the agent's polls within {period:.1f} ms"
-    if lost < LOST:
+    if lost < LOST_SHARE:
         report(Finding(Level.GOOD, "statuses", found))
     else:
         advice = "Commands are safe, the newest counts; streams and recordings have gaps. A wired network?"

@@ -31,8 +31,10 @@ ANSWER_S: Final = 0.5
 """Timeout for a reply; the last attempt with the usual registers waits as long as a hand ever does."""
 LET_GO_S: Final = 0.5
 """Pause after a failed attempt: a gateway that serves one client must notice that this one has gone."""
-TRIES: Final = 3  # attempts with the usual unit id and registers, before others are tried: replies get lost
-UNITS: Final = (2, 9, 1, 0, 255)
+PROBE_TRIES: Final = (
+    3  # attempts with the usual unit id and registers, before others are tried: replies get lost
+)
+PROBED_UNITS: Final = (2, 9, 1, 0, 255)
 """Unit ids to try when the usual one does not answer; 0 and 255 are not valid on a serial line."""
 ALONE: Final = "It may serve one client at a time"
 LOST_PORT: Final = (
@@ -81,7 +83,7 @@ async def find_gripper(address: Address, usual: RegisterMap, report: ReportFindi
                 _report_port(address, report)
             failure = failure or error
             echoes = echoes or _echoes(link)
-            await asyncio.sleep(LET_GO_S if number < TRIES else 0)
+            await asyncio.sleep(LET_GO_S if number < PROBE_TRIES else 0)
             continue
         if number == 0:
             _report_port(address, report)
@@ -117,7 +119,7 @@ async def _ask_again(
     would else be taken for those of the gripper.
     """
     await other.close()
-    for _ in range(TRIES):
+    for _ in range(PROBE_TRIES):
         await asyncio.sleep(LET_GO_S)
         link = _link(address, usual, ANSWER_S)
         try:
@@ -143,19 +145,19 @@ def _attempts(address: Address, usual: RegisterMap) -> Iterator[tuple[RegisterMa
     if address.kind == "sim":
         yield usual, ANSWER_S
         return
-    units = UNITS[:-2] if address.is_rtu else UNITS
+    units = PROBED_UNITS[:-2] if address.is_rtu else PROBED_UNITS
     others = [replace(usual, read_function=7 - usual.read_function)]
     others += [replace(usual, device_id=unit) for unit in units]
     for kind in (RTU_REGISTERS, TCP_REGISTERS):
         for function in dict.fromkeys((usual.read_function, 3, 4)):
             moved = replace(usual, request=kind.request, status=kind.status, read_function=function)
             others += [replace(moved, device_id=unit) for unit in dict.fromkeys((usual.device_id, *units))]
-    for number in range(TRIES):
-        yield usual, ANSWER_S if number < TRIES - 1 else LONGEST_RESPONSE_S
+    for number in range(PROBE_TRIES):
+        yield usual, ANSWER_S if number < PROBE_TRIES - 1 else LONGEST_RESPONSE_S
     for each in dict.fromkeys(others):
         if each != usual:
             yield each, ANSWER_S
-    for _ in range(TRIES):  # by now a line that loses the first requests may let them through
+    for _ in range(PROBE_TRIES):  # by now a line that loses the first requests may let them through
         yield usual, ANSWER_S
 
 

@@ -23,7 +23,7 @@ from ...values.errors import ConnectFailedError
 from .agent import examine_agent
 from .findings import Finding, GiveUpError, Level, ReportFinding
 
-LOOK_S: Final = 3.0  # seconds of looking for the agent
+FLEET_LOOK_S: Final = 3.0  # seconds of looking for the agent
 ROUND_S: Final = 0.3  # duration of one look
 
 
@@ -75,7 +75,7 @@ async def _examine(name: GripperName, bus: Bus, report: ReportFinding) -> None:
 
 async def _find(name: GripperName, bus: Bus, report: ReportFinding) -> None:
     loop = asyncio.get_running_loop()
-    ends = loop.time() + LOOK_S
+    ends = loop.time() + FLEET_LOOK_S
     own: set[str] = set()
     others: set[GripperName] = set()
     while not own and loop.time() < ends:
@@ -106,7 +106,7 @@ async def _find(name: GripperName, bus: Bus, report: ReportFinding) -> None:
         report(Finding(Level.GOOD, "agent", "one serves this gripper"))
 
 
-SOON: Final = timedelta(days=30)
+EXPIRES_SOON: Final = timedelta(days=30)
 _MAY: Final = {
     Role.READ: "may watch",
     Role.HALT: "may watch and halt",
@@ -139,7 +139,7 @@ def _report_dates(begins: datetime, ends: datetime, now: datetime, report: Repor
     if now > ends:
         report(Finding(Level.BAD, "certificate", f"ended on {ends:%Y-%m-%d}", _NEW))
         raise GiveUpError
-    if ends - now < SOON:
+    if ends - now < EXPIRES_SOON:
         report(Finding(Level.DOUBT, "certificate", f"ends on {ends:%Y-%m-%d}", _NEW))
     else:
         report(Finding(Level.GOOD, "certificate", f"holds until {ends:%Y-%m-%d}"))

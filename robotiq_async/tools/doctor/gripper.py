@@ -27,7 +27,7 @@ from .answer import DAMAGED, LOST_PORT, REACH_S, find_gripper, long_enough
 from .findings import Finding, GiveUpError, Level, ReportFinding
 from .urcap import find_urcap
 
-PROBES: Final = 300  # reads for measuring round trip and rate
+LINK_PROBES: Final = 300  # reads for measuring round trip and rate
 WATCH_S: Final = 2.0  # seconds of watching for another client
 LONGEST_PERIOD_S: Final = 0.1  # the longest poll_interval of a hand
 
@@ -101,7 +101,7 @@ async def _resolve(address: Address, report: ReportFinding) -> None:
 async def _timing(address: Address, link: Link, report: ReportFinding) -> None:
     loop = asyncio.get_running_loop()
     times, began = [], loop.time()
-    for _ in range(PROBES):
+    for _ in range(LINK_PROBES):
         asked = loop.time()
         await link.read()
         times.append(loop.time() - asked)

@@ -18,7 +18,7 @@ from ...hand import Hand
 from ...runtime.clock import now
 from ...values.calibration.csv_tables import (
     FORCE,
-    SPEED,
+    SPEED_LAYOUT,
     Layout,
     RunsTable,
     TableError,
@@ -33,7 +33,7 @@ from ...values.enums import SPEED_MAX, Finger
 from ...values.errors import MeasuringError
 from ...values.model import THREE_FINGER, Model
 
-REST_S: Final = 0.3
+RUN_PAUSE_S: Final = 0.3
 """Pause between runs, in the gripper's time: a finger that has just stopped may still swing."""
 ATTEMPTS: Final = 20  # attempts at a run: one in which the event loop was blocked is repeated
 TOLERATED: Final = 0.01  # share of a run for which the event loop may be blocked, apart from two polls
@@ -80,7 +80,7 @@ async def time_closing(hand: Hand, speed: int, fingers: Finger, speedup: float =
     open_below, closed_above = hand.model.open_reading_max + SLACK, hand.model.closed_reading_min - SLACK
     for _ in range(ATTEMPTS):
         opened = await hand.open(fingers, speed=255)
-        await asyncio.sleep(REST_S / speedup)
+        await asyncio.sleep(RUN_PAUSE_S / speedup)
         before = hand.statistics
         closed = await hand.close(fingers, speed=speed)
         for result in (opened, closed):
@@ -103,7 +103,7 @@ async def time_closing(hand: Hand, speed: int, fingers: Finger, speedup: float =
 def expected_seconds(model: Model, speed: int) -> float:
     """Estimated duration of one run, in the gripper's time: for progress bars."""
     closing_time = SpeedCalibration.usual(model).closing_time
-    return closing_time(speed) + closing_time(SPEED_MAX) + REST_S
+    return closing_time(speed) + closing_time(SPEED_MAX) + RUN_PAUSE_S
 
 
 # -- force -------------------------------------------------------------------------------------------------
@@ -121,7 +121,7 @@ async def grasp(hand: Hand, force: int, speed: int, speedup: float = 1.0) -> lis
     opened = await hand.open(speed=255)
     if opened.object_detected:
         raise MeasuringError(f"something blocks the opening ({opened.contacts!r})")
-    await asyncio.sleep(REST_S / speedup)
+    await asyncio.sleep(RUN_PAUSE_S / speedup)
     with _sampling(hand, speedup) as samples:
         result = await hand.close(speed=speed, force=force)
         await asyncio.sleep(GRASP_S / speedup)
@@ -234,7 +234,7 @@ class Campaign:
 
 def speed_campaign(path: Path, step: int = 4, runs: int = 3, **origin: str) -> Campaign:
     """A campaign of closing times, for speed values in steps."""
-    return Campaign(path, SPEED, speed_values(step), runs, origin)
+    return Campaign(path, SPEED_LAYOUT, speed_values(step), runs, origin)
 
 
 def force_campaign(path: Path, step: int = 25, runs: int = 3, **origin: str) -> Campaign:

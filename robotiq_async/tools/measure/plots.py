@@ -23,7 +23,7 @@ from ...values.calibration.csv_tables import RunsTable
 from ...values.calibration.scales import ForceCalibration, SpeedCalibration, mean, newton
 from ..description.palette import AXIS_COLORS
 from ..recording.payloads import is_command
-from ..recording.table import CURRENT
+from ..recording.table import CURRENT_COLUMN
 from ..wording import JAW_NAME
 from .campaigns import Currents, peak_currents
 
@@ -32,17 +32,17 @@ if TYPE_CHECKING:
 
     from ..recording.recordings import RecordedMessage
 
-OURS: Final = "#0b6ea8"
+OURS_COLOR: Final = "#0b6ea8"
 THEIRS: Final = "#d1731f"
 COLOURS: Final = tuple(AXIS_COLORS.values())
 """Colours of the fingers A, B and C, and of the scissor."""
-WIDTHS: Final = {"A": 4.2, "B": 2.6, "C": 1.1, "SCISSOR": 1.4}  # line widths in the plot of a recording
-DRAWN: Final = ("position", "requested_position", CURRENT)
-LABEL: Final = 0.012  # width of a label, as a share of the picture's
-LONGEST: Final = 40  # characters of a label
-LETTER: Final = 0.0092  # width of a character of a label, as a share of the picture's
+LINE_WIDTHS: Final = {"A": 4.2, "B": 2.6, "C": 1.1, "SCISSOR": 1.4}  # line widths in the plot of a recording
+DRAWN: Final = ("position", "requested_position", CURRENT_COLUMN)
+LABEL_SIZE: Final = 0.012  # width of a label, as a share of the picture's
+LONGEST_LABEL: Final = 40  # characters of a label
+LETTER_SIZE: Final = 0.0092  # width of a character of a label, as a share of the picture's
 ROW: Final = 0.17  # height of a row of labels, where that of the positions is 3
-ROWS: Final = 6  # of labels, at most; where they do not suffice, labels are cut
+PLOT_ROWS: Final = 6  # of labels, at most; where they do not suffice, labels are cut
 SHOWN_FORCES: Final = (0, 125, 250)  # force values whose currents are drawn over time, or the nearest to them
 
 Event = tuple[float, str, bool]  # time, text, and whether it is about a fault
@@ -62,13 +62,13 @@ def plot_speed(path: Path, table: RunsTable, label: str) -> list[Path]:
         low = [mean_ - min(table[v]) / 1000 for v, mean_ in zip(values, means, strict=True)]
         high = [max(table[v]) / 1000 - mean_ for v, mean_ in zip(values, means, strict=True)]
         spread: Any = {"yerr": (low, high), "fmt": ".", "ms": 4, "lw": 1}
-        times.errorbar(values, means, color=OURS, label=f"{label}: mean and spread", **spread)
+        times.errorbar(values, means, color=OURS_COLOR, label=f"{label}: mean and spread", **spread)
         times.set_ylabel("closing time, s")
         times.set_ylim(bottom=0)
         times.legend()
         off = [100 * (m / thesis.closing_time(v) - 1) for v, m in zip(values, means, strict=True)]
         apart.axhline(0, color=THEIRS, lw=1)
-        apart.plot(values, off, ".", ms=4, color=OURS)
+        apart.plot(values, off, ".", ms=4, color=OURS_COLOR)
         apart.set_ylabel("apart, %")
         apart.set_xlabel("speed value")
         reach = max(2.0, 1.1 * max(map(abs, off)))
@@ -87,8 +87,8 @@ def plot_force(path: Path, table: RunsTable, surface: str, label: str) -> list[P
         for number, runs in enumerate(zip(*(table[value] for value in values), strict=True)):
             forces = [newton(reading) for reading in runs]
             name = "" if number else f"{label}: runs"
-            axes.plot(values, forces, "o", ms=4, mfc="none", color=OURS, label=name)
-        axes.plot(values, [newton(mean(table[v])) for v in values], color=OURS, label=f"{label}: mean")
+            axes.plot(values, forces, "o", ms=4, mfc="none", color=OURS_COLOR, label=name)
+        axes.plot(values, [newton(mean(table[v])) for v in values], color=OURS_COLOR, label=f"{label}: mean")
         axes.set_xlabel("force value")
         axes.set_ylabel("force, N (F = m g, g = 9.81 m/s²)")
         axes.set_ylim(bottom=0)
@@ -157,7 +157,7 @@ def plot_recording(
     seconds = array("d")
     first: int | None = None
     events: list[Event] = []
-    drawn = {axis: {what: array("f") for what in DRAWN} for axis in WIDTHS}
+    drawn = {axis: {what: array("f") for what in DRAWN} for axis in LINE_WIDTHS}
     openings = array("d")  # of a jaw
 
     def take(status: dict[str, Any]) -> None:
@@ -165,7 +165,9 @@ def plot_recording(
             if axis != "A" and axis not in status:
                 continue  # of a sibling of the 3-Finger, which has the one
             for what, column in columns.items():
-                column.append(status[axis].get(what, math.nan) if what == CURRENT else status[axis][what])
+                column.append(
+                    status[axis].get(what, math.nan) if what == CURRENT_COLUMN else status[axis][what]
+                )
         if "B" not in status and "opening_mm" in status["A"]:
             openings.append(status["A"]["opening_mm"])
 
@@ -181,7 +183,7 @@ def plot_recording(
             seconds.append(at)
     if not seconds:
         return []
-    labels = list(_labels(events, apart=LABEL * (seconds[-1] - seconds[0])))
+    labels = list(_labels(events, apart=LABEL_SIZE * (seconds[-1] - seconds[0])))
     placed = _placed(labels, seconds[0], seconds[-1])
     height = ROW * max((each.row for each in placed), default=0) + ROW
     panels = 3 if len(openings) == len(seconds) else 2
@@ -193,7 +195,7 @@ def plot_recording(
             panel.set_ylim(bottom=0)
         is_jaw = not drawn["B"]["position"]
         # Fingers that move together overlap: the first curve is the widest and shows at the sides.
-        for (name, width), colour in zip(WIDTHS.items(), (*COLOURS, "0.5"), strict=True):
+        for (name, width), colour in zip(LINE_WIDTHS.items(), (*COLOURS, "0.5"), strict=True):
             line: Any = {"color": colour, "lw": width}
             dotted: Any = {"color": colour, "lw": 0.8, "ls": ":", "drawstyle": "steps"}
             if not drawn[name]["position"]:
@@ -236,12 +238,12 @@ def _placed(labels: Iterable[Event], begin: float, end: float) -> list[Label]:
     last: dict[int, Label] = {}  # of each row
     for at, words, is_fault in labels:
         share = (at - begin) / (end - begin) if end > begin else 0.0
-        left = max(0.0, min(share, 1 - LETTER * len(words)))
-        row = next((n for n in range(ROWS) if n not in last or _right(last[n]) <= left), None)
+        left = max(0.0, min(share, 1 - LETTER_SIZE * len(words)))
+        row = next((n for n in range(PLOT_ROWS) if n not in last or _right(last[n]) <= left), None)
         if row is None:
             row = min(last, key=lambda n: last[n].left)
             cut = last[row]
-            room = max(1, int((left - cut.left) / LETTER) - 1)
+            room = max(1, int((left - cut.left) / LETTER_SIZE) - 1)
             placed[placed.index(cut)] = cut._replace(words=cut.words[:room].rstrip(", ") + "…")
         last[row] = Label(at, left, row, words, is_fault)
         placed.append(last[row])
@@ -249,7 +251,7 @@ def _placed(labels: Iterable[Event], begin: float, end: float) -> list[Label]:
 
 
 def _right(label: Label) -> float:
-    return label.left + LETTER * (len(label.words) + 1)
+    return label.left + LETTER_SIZE * (len(label.words) + 1)
 
 
 def _write_labels(strip: Axes, labels: Iterable[Label], begin: float, end: float) -> None:
@@ -295,7 +297,7 @@ def _labels(events: Iterable[Event], apart: float) -> Iterator[Event]:
 
 
 def _short(words: str) -> str:
-    return words if len(words) <= LONGEST else f"{words[: LONGEST - 3]}..."
+    return words if len(words) <= LONGEST_LABEL else f"{words[: LONGEST_LABEL - 3]}..."
 
 
 def _shown(currents: Currents) -> list[int]:

@@ -21,11 +21,11 @@ from ...values.errors import RobotiqConnectionError
 from ...values.events import SentRequest, Transition
 from ...values.model import THREE_FINGER
 from ...values.status import RobotiqStatus
-from ..description.joint_states import SCHEMA, SCHEMA_NAME, JointStateEncoder
+from ..description.joint_states import JOINT_STATE_SCHEMA, SCHEMA_NAME, JointStateEncoder
 from ..description.kinematics import joint_angles, joint_names, joint_velocities
 from .payloads import SCHEMAS, InhibitEvents, Properties, efforts, fault_event, mark_fields, transition_fields
 
-BUFFER: Final = 100_000
+FEED_BUFFER: Final = 100_000
 """Statuses kept while the event loop is busy with something else: minutes."""
 REOPEN_S: Final = 0.2
 """Pause before reopening the streams of a hand that has given up on its link."""
@@ -57,8 +57,8 @@ def compact(fields: Properties) -> bytes:
 STATUS: Final = json_topic("status", SCHEMAS["status"])
 COMMAND: Final = json_topic("command", SCHEMAS["command"])
 EVENT: Final = json_topic("event", SCHEMAS["event"])
-JOINTS: Final = Topic("/joint_states", "cdr", SCHEMA_NAME, "ros2msg", SCHEMA.encode())
-TOPICS: Final = (STATUS, COMMAND, EVENT, JOINTS)
+JOINTS_TOPIC: Final = Topic("/joint_states", "cdr", SCHEMA_NAME, "ros2msg", JOINT_STATE_SCHEMA.encode())
+TOPICS: Final = (STATUS, COMMAND, EVENT, JOINTS_TOPIC)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ class Feed:
         self._epoch = 0.0
         self._counts = {COMMAND: 0, EVENT: 0}
         self._sources: tuple[_Source, ...] = (
-            _Source(lambda: hand.statuses(BUFFER), self._publish_status),
+            _Source(lambda: hand.statuses(FEED_BUFFER), self._publish_status),
             _Source(hand.requests, self._publish_request),
             _Source(hand.transitions, self._publish_transition),
         )
@@ -195,7 +195,7 @@ class Feed:
         velocities = joint_velocities(self._before[0], status) if seconds else (0.0,) * len(angles)
         stamp = self.nanoseconds(status.timestamp)
         data = self._encoder.encode(stamp, angles, velocities, efforts(status))
-        self._publish(Message(JOINTS, stamp, data, status.sequence))
+        self._publish(Message(JOINTS_TOPIC, stamp, data, status.sequence))
 
     def _publish_request(self, sent: SentRequest) -> None:
         self._publish_json(COMMAND, sent.timestamp, sent.as_dict())

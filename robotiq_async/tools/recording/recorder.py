@@ -31,7 +31,7 @@ from ...runtime.log import Log
 from ...sync.robotiq_hand import RobotiqHand as BlockingHand
 from ...sync.robotiq_hand import caller_of
 from ...values.errors import RecordingError
-from .feed import JOINTS, Feed, Message
+from .feed import JOINTS_TOPIC, Feed, Message
 from .table import CsvFile
 
 _missing = ""
@@ -261,7 +261,7 @@ class Recorder:
         if self._failed.done():
             return
         self._format.take(message)
-        self.recorded += message.topic is JOINTS  # the last of a poll
+        self.recorded += message.topic is JOINTS_TOPIC  # the last of a poll
 
     # -- the disk --------------------------------------------------------------------------------------
 

@@ -28,7 +28,7 @@ except ModuleNotFoundError as error:
 from ...runtime.log import log
 from ...runtime.version import __version__
 from ...values.errors import RecordingError
-from .feed import JOINTS, TOPICS, Topic
+from .feed import JOINTS_TOPIC, TOPICS, Topic
 from .feed import Message as FeedMessage
 
 NOTE: Final = "never run on real hardware"
@@ -66,7 +66,7 @@ class McapFile:
         self._writer.start(profile="ros2" if ros2 else "", library=f"robotiq_async {__version__}")
         about = {"version": __version__, "name": name, "address": address, "note": NOTE}
         self._writer.add_metadata("robotiq_async", about)
-        self._channels = {topic: self._channel(topic) for topic in ((JOINTS,) if ros2 else TOPICS)}
+        self._channels = {topic: self._channel(topic) for topic in ((JOINTS_TOPIC,) if ros2 else TOPICS)}
 
     def _channel(self, topic: Topic) -> int:
         schema = self._writer.register_schema(topic.schema_name, topic.schema_encoding, topic.schema)

@@ -31,7 +31,7 @@ _MAY_LACK: Final = ("B", "C", "SCISSOR")
 """The axes that a sibling of the 3-Finger does not have."""
 _NEW: Final = ("opening_mm", "open_fraction")
 """Columns that recordings of earlier versions do not have."""
-CURRENT: Final = "current_ma"
+CURRENT_COLUMN: Final = "current_ma"
 """The column that recordings over a URCap do not have."""
 STATE: Final = "state"
 """The column with the state of the hand as of the last event; the JSON of a status does not have it."""
@@ -107,7 +107,7 @@ def _value(fields: Properties, name: str, kind: str) -> Any:  # noqa: ANN401  # 
         return fields.get(name)
     if axis not in fields and axis in _MAY_LACK:
         return None
-    if key in _NEW or key == CURRENT:
+    if key in _NEW or key == CURRENT_COLUMN:
         return fields[axis].get(key)
     return fields[axis][key] if axis else fields[name]
 

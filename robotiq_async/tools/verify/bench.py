@@ -20,7 +20,7 @@ from .catalogue import CATALOGUE, NO_OPTIONS, Check, CheckVerdict, EndError, Fig
 from .recorded_link import RecordedExchange, RecordedLink
 from .watch import Person, StageWatch
 
-CONNECT_S: Final = 2.0  # for a connection; short, so that a stop over a lost link is soon tried again
+BENCH_CONNECT_S: Final = 2.0  # for a connection; short, so that a stop over a lost link is soon tried again
 SPACING_S: Final = 0.02  # twice the time between two writes in the manual
 
 
@@ -78,7 +78,7 @@ class Bench:
         if there is not None:  # function 23 is what is examined
             sure = replace(there, write_function=23, is_sure=True)
             make = partial(ModbusTransport, self.address, sure)
-        link = make(connect_timeout=CONNECT_S, response_timeout=RESPONSE_TIMEOUT_S)
+        link = make(connect_timeout=BENCH_CONNECT_S, response_timeout=RESPONSE_TIMEOUT_S)
         return RecordedLink(link, keep or self.keep, self.model)
 
     @property

@@ -30,7 +30,7 @@ from .catalogue import STAGE
 from .recorded_link import RecordedExchange
 from .report import Report, page
 
-NAME: Final = "recording.mcap"
+RECORDING_NAME: Final = "recording.mcap"
 
 
 class Recording:
@@ -38,7 +38,7 @@ class Recording:
 
     def __init__(self, folder: Path, clean: Callable[[str], str], model: Model) -> None:
         self.failure: str = ""  # why writing has ended; empty while it runs
-        self._file = FileIO(folder / NAME, "x")
+        self._file = FileIO(folder / RECORDING_NAME, "x")
         self._outbox = Outbox()
         self._format = McapFile(self._outbox, name="verify", address="")
         self._clean = clean
@@ -187,4 +187,4 @@ class Folder:
         except ImportError as error:
             self._why_no_pictures = str(error)
         else:
-            self._pictures = draw(self.path, self.path / NAME, report)
+            self._pictures = draw(self.path, self.path / RECORDING_NAME, report)

@@ -89,7 +89,7 @@ async def go(
     )
 
 
-APART_S: Final = (0.02, 0.05, 0.1, 0.25, 0.5)
+PAUSES_S: Final = (0.02, 0.05, 0.1, 0.25, 0.5)
 """Seconds between tries: at first twice the manual's time between writes, in case one was forgotten;
 at last more than the slowest known device takes to follow."""
 UNREACHED: Final = "THE FINGERS MAY STILL MOVE: {}. Press the emergency stop, or cut the power."
@@ -112,7 +112,7 @@ async def stop_fingers(
     """
     stop = replace(image, go=False, release=False)
     has_alarmed = False
-    for apart in APART_S:
+    for apart in PAUSES_S:
         try:
             if not link.is_open:
                 await link.open()

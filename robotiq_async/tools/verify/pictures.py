@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 FAR: Final = 10  # counts that make a motion: more than an axis ends beside its request
 BEFORE_S: Final = 0.05
-AFTER_S: Final = 0.4
+PICTURE_AFTER_S: Final = 0.4
 """Seconds drawn after the request of one axis: longer than a hand waits for an object status (0.25 s)."""
 
 
@@ -135,7 +135,7 @@ def _echo(axes: tuple[Axes, ...], segment: Segment) -> bool:
     if found is None:
         return False
     sent, finger = found
-    near = [(s - sent, status) for s, status in segment.statuses if -BEFORE_S <= s - sent <= AFTER_S]
+    near = [(s - sent, status) for s, status in segment.statuses if -BEFORE_S <= s - sent <= PICTURE_AFTER_S]
     times, shown = [seconds for seconds, _ in near], [status for _, status in near]
     name = "S" if finger is Finger.SCISSOR else finger.name
     echo, words = axes

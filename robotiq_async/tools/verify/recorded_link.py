@@ -19,7 +19,7 @@ from ...values.status import RobotiqStatus
 
 T = TypeVar("T")
 
-RECENT_S: Final = 2.0
+RECENT_EXCHANGES_S: Final = 2.0
 """Seconds that an image may take to act: ten times those of a slow gripper."""
 
 
@@ -114,7 +114,7 @@ class RecordedLink:
 
     def expected(self) -> list[Echo]:
         """The echoes that the gripper may have now: of the last image, and of those in the last seconds."""
-        since = asyncio.get_running_loop().time() - RECENT_S
+        since = asyncio.get_running_loop().time() - RECENT_EXCHANGES_S
         while len(self._echoes) > 1 and self._echoes[1][0] < since:
             self._echoes.popleft()
         return [echo for _, echo in self._echoes]

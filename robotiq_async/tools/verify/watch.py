@@ -44,7 +44,7 @@ Envelope = Mapping[Finger, tuple[int, int]]  # the lowest and the highest positi
 ANYWHERE: Final[Envelope] = dict.fromkeys(Finger.ALL, (0, 255))
 LASTING: Final = 3
 """Reads in a row that make 0x09 a fault: siblings report it once after a second of silence."""
-SLICE_S: Final = 0.05  # seconds between two checks of the person while nothing is sent
+WATCH_SLICE_S: Final = 0.05  # seconds between two checks of the person while nothing is sent
 STILL_S: Final = 0.15
 """An axis rests once it has not moved for this long: the slowest takes 43 ms for a count (thesis, A1.1)."""
 LIMITS: Final = 20, 225
@@ -146,7 +146,7 @@ class StageWatch:
         end = self._loop.time() + seconds
         while (left := end - self._loop.time()) > 0:
             self.check_stop()
-            await asyncio.sleep(min(SLICE_S, left))
+            await asyncio.sleep(min(WATCH_SLICE_S, left))
         self.check_stop()
 
     def check_stop(self) -> None:

@@ -26,7 +26,7 @@ BUTTONS: Final = {
     State.RESET: "press activate",
 }
 """The button that helps in a state."""
-FRESH_S: Final = 1.5
+COMMAND_AGE_S: Final = 1.5
 """Maximum age of a command; a halt is never too old."""
 Arguments = Mapping[str, Any]
 RunCommand = Callable[[Operator, Arguments], Awaitable[str]]
@@ -49,7 +49,7 @@ async def call(operator: Operator, name: str, arguments: Arguments) -> str:
         TypeError: an argument of the wrong type.
         RobotiqError: it could not be carried out.
     """
-    command = COMMANDS.get(name)
+    command = PAGE_COMMANDS.get(name)
     if command is None:
         raise ValueError(f"there is no command {reprlib.repr(name)}")
     if arguments.keys() != command.takes:
@@ -82,7 +82,7 @@ def _set(setting: Callable[[Operator, int], Awaitable[str]]) -> RunCommand:
     return run
 
 
-COMMANDS: Final = MappingProxyType(
+PAGE_COMMANDS: Final = MappingProxyType(
     {
         **{name: _of(action) for name, action in ACTIONS.items()},
         "move": PageCommand(_move, frozenset({"position", "fingers"})),
@@ -160,7 +160,7 @@ class PageCommands:
             raise ValueError("this page only watches; to command from a page: robotiq-async web --control")
         if name != HALT and self.is_ending:
             raise ValueError("the page is closing: it takes no command but halt")
-        if name != HALT and not 0 <= monotonic() - request["at"] <= FRESH_S:
+        if name != HALT and not 0 <= monotonic() - request["at"] <= COMMAND_AGE_S:
             raise ValueError("this arrived too late and was not carried out: the connection was delayed")
         if name != HALT and len(self._tasks.get(page, ())) > MAX_COMMANDS:
             raise ValueError(f"{MAX_COMMANDS} commands of this page are already running")

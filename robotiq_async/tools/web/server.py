@@ -33,7 +33,7 @@ from ..description.simulated import bodies_of
 from ..recording.feed import Timeline
 from ..recording.payloads import Properties, is_command, title
 from .commands import PageCommands
-from .settings import LOOPBACK, PORT, PageSettings
+from .settings import LOOPBACK, PAGE_PORT, PageSettings
 
 if find_spec("nicegui") is None:
     from ...runtime.extras import install
@@ -43,15 +43,15 @@ if find_spec("nicegui") is None:
 UPDATE_S: Final = 0.05
 START_S: Final = 30.0
 """Importing NiceGUI takes a second, on a busy machine several."""
-STOP_S: Final = 2.0
+PAGE_STOP_S: Final = 2.0
 BACKLOG: Final = 16_384
 """Bytes that the page has not read yet. Beyond this there are no updates until it has read them."""
 LINE: Final = 65_536
-SILENCE_S: Final = 2.0
+PAGE_SILENCE_S: Final = 2.0
 """The page's process sends four heartbeats a second; after this silence its motions are held."""
-BUFFER: Final = 64
+PAGE_BUFFER: Final = 64
 """Statuses between two calls of gather(), for the peaks of the currents: a third of a second."""
-EVENTS: Final = 200
+EVENTS_KEPT: Final = 200
 """Events kept for a page that does not read."""
 STATISTICS_S: Final = 1.0
 SHORTEST: Final = 8  # characters of a password
@@ -63,8 +63,8 @@ class HandUpdates:
     def __init__(self, hand: Hand) -> None:
         self.hand = hand
         self.problem = ""  # why the hand could not be started; empty if it was
-        self._timeline = Timeline(hand, BUFFER)
-        self._events: deque[Properties] = deque(maxlen=EVENTS)
+        self._timeline = Timeline(hand, PAGE_BUFFER)
+        self._events: deque[Properties] = deque(maxlen=EVENTS_KEPT)
         self._peaks = [0] * len(hand.model.axes)
         self._counted_at = 0.0
 
@@ -216,7 +216,7 @@ class PageServer:
         assert self._process.stdin is not None
         self._process.stdin.close()  # that ends it
         try:
-            async with asyncio.timeout(STOP_S):
+            async with asyncio.timeout(PAGE_STOP_S):
                 await self._process.wait()
         except TimeoutError:
             self._process.kill()
@@ -229,7 +229,7 @@ class PageServer:
         while not self._over.is_set():
             for updates in self.updates:
                 updates.gather()
-            if self._commands.under_way and now() - self._heard_at > SILENCE_S:
+            if self._commands.under_way and now() - self._heard_at > PAGE_SILENCE_S:
                 self._commands.all_gone()
             if self._process.stdin.transport.get_write_buffer_size() < BACKLOG:
                 hands = [updates.take(index) for index, updates in enumerate(self.updates)]
@@ -278,7 +278,7 @@ class PageServer:
 async def serve_page(
     *hands: Hand,
     control: bool = False,
-    port: int = PORT,
+    port: int = PAGE_PORT,
     host: str = LOOPBACK,
     password: str = "",
     certificate: str = "",

@@ -15,7 +15,7 @@ from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 LOOPBACK: Final = "127.0.0.1"
 EVERYWHERE: Final = ("0.0.0.0", "::", "")
 """Hosts that mean every interface: the URL has the name of this machine."""
-PORT: Final = 8766
+PAGE_PORT: Final = 8766
 """Next to the viewers' port."""
 
 
@@ -39,7 +39,7 @@ class PageSettings:
     """
 
     host: str = LOOPBACK
-    port: int = PORT
+    port: int = PAGE_PORT
     control: bool = False
     addresses: tuple[str, ...] = ()
     speed: int = DEFAULT_SPEED

@@ -50,9 +50,9 @@ class Layout:
         return [self.value, *(f"run_{number}_{self.unit}" for number in range(1, runs + 1))]
 
 
-SPEED: Final = Layout("speed_value", "ms", 600_000)  # closing times, at most 10 minutes
+SPEED_LAYOUT: Final = Layout("speed_value", "ms", 600_000)  # closing times, at most 10 minutes
 FORCE: Final = Layout("force_value", "g", 100_000)  # readings of a scale between the fingers, at most 100 kg
-LONGEST: Final = 10_000
+LONGEST_ROW: Final = 10_000
 """Characters of a line at most, so that a large file without line ends is not read into memory."""
 NEW: Final = 0o666  # mode of a new file, before the umask
 
@@ -226,10 +226,10 @@ def read_rows(path: Path | str) -> list[CsvRow]:
 
 def _lines(path: Path | str, file: TextIO) -> Iterator[str]:
     number = 0
-    while line := file.readline(LONGEST + 1):
+    while line := file.readline(LONGEST_ROW + 1):
         number += 1
-        if len(line) > LONGEST:
-            raise TableError(path, number, f"it has more than {LONGEST} characters")
+        if len(line) > LONGEST_ROW:
+            raise TableError(path, number, f"it has more than {LONGEST_ROW} characters")
         yield line
 
 

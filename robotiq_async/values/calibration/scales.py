@@ -22,7 +22,7 @@ from typing import Final
 from ..checks import check_byte, check_number
 from ..model import THREE_FINGER, Model
 from ..stroke import Stroke
-from .csv_tables import FORCE, SPEED, Layout, RunsTable, TableError, read_measured, thesis_table
+from .csv_tables import FORCE, SPEED_LAYOUT, Layout, RunsTable, TableError, read_measured, thesis_table
 from .motion_profile import MotionProfile, profile_of
 
 GRAVITY: Final = 9.81  # m/s2, the thesis's value
@@ -88,7 +88,9 @@ class SpeedCalibration:
     @cache
     def thesis(cls) -> SpeedCalibration:
         """The thesis's table A1.1: the mean of three runs for every fourth value. Read from its file once."""
-        return cls.from_table("thesis, table A1.1", thesis_table("closing_time_ms", SPEED), THREE_FINGER)
+        return cls.from_table(
+            "thesis, table A1.1", thesis_table("closing_time_ms", SPEED_LAYOUT), THREE_FINGER
+        )
 
     @classmethod
     def from_csv(cls, path: Path | str) -> SpeedCalibration:
@@ -97,7 +99,7 @@ class SpeedCalibration:
         Raises:
             TableError: the file is not such a table, or has fewer than two rows.
         """
-        table, model = _read_curve(path, SPEED)
+        table, model = _read_curve(path, SPEED_LAYOUT)
         if any(not all(runs) for runs in table.values()):
             raise TableError(path, None, "a closing takes longer than 0 ms")
         return cls.from_table(str(path), table, model)

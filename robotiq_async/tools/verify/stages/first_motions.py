@@ -50,7 +50,7 @@ QUESTION: Final = (
     "Which finger has moved, there and back? Left and right are those of the palm, seen from its front with "
     "the single finger at the bottom."
 )
-ANSWERS: Final = {
+FINGER_ANSWERS: Final = {
     "a": "the single finger",
     "l": "the left finger of the pair",
     "r": "the right finger of the pair",
@@ -81,7 +81,7 @@ async def single_axis(bench: Bench) -> None:
         await _there_and_back(bench, axis, found)
         await _ask_what_moved(bench, axis, found.answers)
     if has_several:
-        side = ANSWERS[found.answers[Finger.B]]
+        side = FINGER_ANSWERS[found.answers[Finger.B]]
         bench.as_assumed("axis.finger", f"each moved as named; B is {side}", b_is=side)
         bench.as_assumed("axis.alone", "the other axes did not move")
     else:
@@ -90,7 +90,9 @@ async def single_axis(bench: Bench) -> None:
 
 
 async def _ask_what_moved(bench: Bench, axis: Finger, before: dict[Finger, str]) -> None:
-    question, answers = (QUESTION, ANSWERS) if len(bench.model.axes) > 1 else (JAW_QUESTION, JAW_ANSWERS)
+    question, answers = (
+        (QUESTION, FINGER_ANSWERS) if len(bench.model.axes) > 1 else (JAW_QUESTION, JAW_ANSWERS)
+    )
     answer = await bench.person.chooses(question, answers)
     if answer is None:
         raise EndError("declined", "the question was not answered")

@@ -19,7 +19,7 @@ SECONDS: Final = 180.0
 SPEEDS: Final = (0, 64, 255)
 STROKE_S: Final = 20.0  # twice the time of the slowest one
 SCISSOR_SPEED: Final = 64
-SHARE: Final = 0.2
+SPEED_SHARE: Final = 0.2
 PRESSING_SPEED: Final = 64
 GIVE: Final = 7  # counts: one 2F-85 reads 225 or 226 at the least force, and 230 from 80 on
 PART_OF_STROKE: Final = 0.9
@@ -108,10 +108,10 @@ def _judge_times(bench: Bench, times: dict[int, float]) -> None:
     usual = units_of(None, None, bench.model).closing_s
     share = max(abs(took / usual(speed) - 1) for speed, took in times.items())
     words = ", ".join(f"{took:.2f} s at speed {speed}" for speed, took in times.items())
-    if share > SHARE:
+    if share > SPEED_SHARE:
         words += f"; up to {100 * share:.0f} % off what is assumed"
     follows = "Run robotiq-async measure speed, and give its table to the hand as calibration."
-    bench.judge("stroke.time", share <= SHARE, words, follows, **figures)
+    bench.judge("stroke.time", share <= SPEED_SHARE, words, follows, **figures)
 
 
 def _judge_openings(bench: Bench, times: dict[int, float]) -> None:
@@ -119,11 +119,11 @@ def _judge_openings(bench: Bench, times: dict[int, float]) -> None:
     assert profile is not None, "a jaw has one"
     share = max(abs(took / profile.opening_s(counts, speed) - 1) for speed, took in times.items())
     words = ", ".join(f"{took:.2f} s at speed {speed}" for speed, took in times.items())
-    if share > SHARE:
+    if share > SPEED_SHARE:
         words += f"; up to {100 * share:.0f} % off what is assumed"
     follows = "No option is needed: no time limit is that short. Please report this."
     figures: dict[str, Figure] = {f"speed_{speed}_s": took for speed, took in times.items()}
-    bench.judge("stroke.opening", share <= SHARE, words, follows, **figures)
+    bench.judge("stroke.opening", share <= SPEED_SHARE, words, follows, **figures)
 
 
 def _judge_readings(bench: Bench, readings: list[list[int]]) -> None:

@@ -16,11 +16,11 @@ from ..motions import MARGIN, activate, are_near, in_place, motion_envelope
 from ..watch import ENTER, StageWatch
 
 SECONDS: Final = 900.0
-STEP: Final = 60
-GONE_S: Final = 4.0  # longer than the motion takes
+LOSS_STEP: Final = 60
+CLIENT_AWAY_S: Final = 4.0  # longer than the motion takes
 BEGINS_S: Final = 1.0
 BACK_S: Final = 60.0  # a gripper may take this long to boot
-RETRY_S: Final = 0.5
+LOSS_RETRY_S: Final = 0.5
 AFTER_S: Final = 3.0
 RESETS: Final = 2
 
@@ -33,7 +33,7 @@ ESTOP: Final = "Nothing moves now. Press the emergency stop, wait three seconds,
 POWER: Final = (
     "Nothing moves now. Switch the gripper's power off, wait five seconds, switch it on, and press Enter."
 )
-AGAIN: Final = (
+RESET_AGAIN: Final = (
     "ALL FINGERS MOVE: the gripper is reset and activated again, as in stage 3. Hands away? Enter begins."
 )
 
@@ -61,7 +61,7 @@ async def _client(bench: Bench) -> None:
     watch = bench.watch(60.0)
     start = await watch.look()
     image, home = in_place(start), {Finger.A: start.position(Finger.A)}
-    far = {Finger.A: home[Finger.A] + (STEP if home[Finger.A] < 128 else -STEP)}
+    far = {Finger.A: home[Finger.A] + (LOSS_STEP if home[Finger.A] < 128 else -LOSS_STEP)}
     await watch.write(image)
     watch.envelope = motion_envelope(start, far)
     away = replace(image, go=True).with_positions(far)
@@ -69,12 +69,12 @@ async def _client(bench: Bench) -> None:
     if await watch.until(lambda status: not are_near(status, home, MARGIN), 3.0) is None:
         raise EndError("time", f"{bench.first} did not begin to move within 3 s")
     await bench.link.close()
-    await watch.pause(GONE_S)
+    await watch.pause(CLIENT_AWAY_S)
     await bench.link.open()
     if not (status := await bench.link.read()).is_activated:
         bench.inconclusive("loss.client", "the activation was lost: there is no motion to judge")
-        report_lost_activation(bench, f"after {GONE_S:g} s without a client", GONE_S)
-        raise EndError("inactive", f"the activation was lost after {GONE_S:g} s without a client")
+        report_lost_activation(bench, f"after {CLIENT_AWAY_S:g} s without a client", CLIENT_AWAY_S)
+        raise EndError("inactive", f"the activation was lost after {CLIENT_AWAY_S:g} s without a client")
     status = await watch.look()
     where = status.position(Finger.A)
     went_on = are_near(status, far, MARGIN)
@@ -147,7 +147,7 @@ async def _back(bench: Bench) -> tuple[list[RobotiqStatus], float]:
             await bench.link.close()
             if loop.time() - began > BACK_S:
                 raise EndError("link", f"the gripper did not answer within {BACK_S:g} s: {error}") from error
-            await watch.pause(RETRY_S)
+            await watch.pause(LOSS_RETRY_S)
     answered = loop.time() - began
     while loop.time() - began - answered < AFTER_S:
         statuses.append(await bench.link.read())
@@ -207,7 +207,7 @@ async def _power(bench: Bench) -> None:
 
 async def _activated_again(bench: Bench) -> bool:
     """Ask the person, reset and activate; return whether it is active then."""
-    if not await bench.person.consents(AGAIN):
+    if not await bench.person.consents(RESET_AGAIN):
         raise EndError("declined", "the new activation was not confirmed")
     watch = bench.watch(SECONDS)
     watch.allows_faults = True

@@ -23,7 +23,7 @@ from ..watch import LASTING, show_echo
 
 TIMERS: Final = 300
 SLEEP_S: Final = 0.002
-LATE_S: Final = 0.001
+READ_LATE_S: Final = 0.001
 KEPT_MS: Final = 2
 
 
@@ -43,7 +43,7 @@ async def host(bench: Bench) -> None:
         "worst_ms": 1000 * late[-1],
     }
     follows = "This computer adds to the times below: stop other programs on it."
-    bench.judge("host.timer", p99 < LATE_S, found, follows, **figures)
+    bench.judge("host.timer", p99 < READ_LATE_S, found, follows, **figures)
     _adapter(bench)
 
 
@@ -63,13 +63,13 @@ def _adapter(bench: Bench) -> None:
     bench.judge("host.adapter", kept <= KEPT_MS, found, follows, latency_ms=kept)
 
 
-UNITS: Final = (0, 1, 2, 9, 255)
+ANSWERED_UNITS: Final = (0, 1, 2, 9, 255)
 NOWHERE: Final = 3000  # no source has registers of a 3-Finger there
 PERIODS_S: Final = (0.02, 0.01)  # between reads, beside the usual interval
 LET_GO_S: Final = 0.5  # for a gateway that serves one client to notice that it has gone
-GONE_S: Final = 0.05  # for a gripper to notice a closed connection
+CLOSED_S: Final = 0.05  # for a gripper to notice a closed connection
 LONGEST_INTERVAL_S: Final = 0.1
-OTHERS: Final = 2
+EXTRA_CONNECTIONS: Final = 2
 QUANTILES: Final = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99, 1.0)
 
 
@@ -120,7 +120,11 @@ async def _others(bench: Bench) -> None:
     assert found is not None
     await bench.link.close()
     await asyncio.sleep(LET_GO_S)
-    units = UNITS if not bench.address.is_rtu else tuple(unit for unit in UNITS if 1 <= unit <= 247)
+    units = (
+        ANSWERED_UNITS
+        if not bench.address.is_rtu
+        else tuple(unit for unit in ANSWERED_UNITS if 1 <= unit <= 247)
+    )
     answering: list[Figure] = [
         unit for unit in units if await _answers(bench, replace(found, device_id=unit))
     ]
@@ -157,7 +161,7 @@ async def _answers(bench: Bench, registers: RegisterMap) -> bool:
         await link.close()
     asked = f"unit {registers.device_id}, function {registers.read_function} at {registers.status}"
     bench.keep(RecordedExchange(began, loop.time(), "probe", words=f"{asked}: {words}"))
-    await asyncio.sleep(GONE_S)
+    await asyncio.sleep(CLOSED_S)
     return bool(block)
 
 
@@ -230,7 +234,7 @@ async def _connections(bench: Bench) -> None:
     others: list[RecordedLink] = []
     why = ""
     try:
-        for _ in range(OTHERS):
+        for _ in range(EXTRA_CONNECTIONS):
             others.append(bench.another_link())
             await others[-1].open()
             await others[-1].read()

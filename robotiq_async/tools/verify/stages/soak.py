@@ -17,7 +17,7 @@ from ..catalogue import EndError, Figure
 from ..motions import MARGIN, are_near, go, in_place, resting_envelope
 from ..watch import StageWatch
 
-RATES: Final = (10, 20, 50, 100)
+SOAK_RATES: Final = (10, 20, 50, 100)
 SPEED: Final = 64
 SWING: Final = 15
 FAILED: Final = 1e-4
@@ -73,7 +73,7 @@ async def _command(bench: Bench) -> None:
     """Move finger A back and forth a little; at each rate the last command must be followed."""
     if not bench.link.is_open:  # the last read failed
         await bench.link.open()
-    watch = bench.watch(len(RATES) * (bench.lengths.commands + 20))
+    watch = bench.watch(len(SOAK_RATES) * (bench.lengths.commands + 20))
     start = await watch.look()
     image = in_place(start, speed=SPEED)
     await watch.write(image)
@@ -83,7 +83,7 @@ async def _command(bench: Bench) -> None:
     watch.envelope = resting_envelope(start, (Finger.A,)) | {Finger.A: (min(reached), max(reached))}
     envelope = watch.envelope
     achieved: list[Figure] = []
-    for rate in RATES:
+    for rate in SOAK_RATES:
         sent, seconds, ends = await _burst(bench, watch, image, home, step, rate)
         achieved.append([rate, sent / seconds])
         if not ends:

@@ -13,7 +13,7 @@ from ..motions import MARGIN, are_near, in_place, resting_envelope
 from ..watch import ENTER, AxesAtRest, StageWatch
 
 SECONDS: Final = 60.0
-CLOSE_S: Final = 15.0
+FOAM_CLOSE_S: Final = 15.0
 LEFT_S: Final = 5.0
 STANDS_S: Final = 0.5
 
@@ -29,7 +29,7 @@ OVERRUN: Final = 10
 EARLY: Final = 2
 """Counts: one 2F-85 showed a contact with or before its last motion in 3 of 9, once by 13 counts, which may
 come from asking for its position first."""
-STAYS: Final = "rGTO has been 0 for some seconds. Is the foam still held?"
+HELD_QUESTION: Final = "rGTO has been 0 for some seconds. Is the foam still held?"
 ANSWERS: Final = {"y": "yes, it is held", "n": "no, it is loose or has fallen"}
 
 
@@ -48,7 +48,7 @@ async def soft_part(bench: Bench) -> None:
     _judge_standstill(bench, closing)
     await watch.write(replace(in_place(held)).with_positions(dict.fromkeys(bench.fingers, CLOSED)))
     left = await watch.watch_for(LEFT_S)
-    answer = await person.chooses(STAYS, ANSWERS) if held.contacts else "?"
+    answer = await person.chooses(HELD_QUESTION, ANSWERS) if held.contacts else "?"
     if answer is None or not await person.consents(RELEASE):
         raise EndError("declined", "the fingers were not opened: they are still closed, with rGTO = 0")
     _judge_halt(bench, answer, held, left)
@@ -61,8 +61,8 @@ async def _open(bench: Bench, home: dict[Finger, int]) -> None:
     watch = bench.watch(SECONDS)
     now = await watch.look()
     await watch.write(replace(in_place(now), go=True).with_positions(home))
-    if await watch.until(lambda status: are_near(status, home, MARGIN), CLOSE_S) is None:
-        raise EndError("time", f"the fingers did not open within {CLOSE_S:g} s")
+    if await watch.until(lambda status: are_near(status, home, MARGIN), FOAM_CLOSE_S) is None:
+        raise EndError("time", f"the fingers did not open within {FOAM_CLOSE_S:g} s")
     await watch.until_still(2.0)
 
 
@@ -125,8 +125,8 @@ async def _close(bench: Bench, watch: StageWatch, start: RobotiqStatus, speed: i
     await watch.write(replace(image, go=True).with_positions(dict.fromkeys(bench.fingers, CLOSED)))
     # gDT just after a write may be from before it.
     closing = _Closing(bench.fingers, await watch.watch_for(0.3))
-    if await watch.until(closing.is_over, CLOSE_S) is None:
-        raise EndError("time", f"the fingers did not come to rest within {CLOSE_S:g} s")
+    if await watch.until(closing.is_over, FOAM_CLOSE_S) is None:
+        raise EndError("time", f"the fingers did not come to rest within {FOAM_CLOSE_S:g} s")
     return closing
 
 

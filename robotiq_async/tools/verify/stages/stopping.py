@@ -17,7 +17,7 @@ from ..watch import AxesAtRest, StageWatch
 
 SECONDS: Final = 90.0
 SPEED: Final = 64
-STROKE: Final = 80
+STOPPING_COUNTS: Final = 80
 LEG_S: Final = 12.0
 COUNTS: Final = 10
 """Counts of a stop over a quick link. A slow one adds the way of its exchanges: 11 counts in 80 ms."""
@@ -32,7 +32,7 @@ async def stopping(bench: Bench) -> None:
     home = {finger: start.position(finger) for finger in bench.fingers}
     image = in_place(start, speed=SPEED)
     await watch.write(image)
-    far = {finger: home[finger] + STROKE for finger in bench.fingers}
+    far = {finger: home[finger] + STOPPING_COUNTS for finger in bench.fingers}
     watch.envelope = motion_envelope(start, far)
     away = replace(image, go=True).with_positions(far)
     await _halt(bench, watch, away, home)
@@ -54,7 +54,7 @@ async def _until_past(watch: StageWatch, is_past: Callable[[RobotiqStatus], bool
 async def _halt(bench: Bench, watch: StageWatch, away: Request, home: dict[Finger, int]) -> None:
     await watch.write(away)
     status = await _until_past(
-        watch, lambda s: all(s.position(f) >= home[f] + STROKE // 2 for f in bench.fingers)
+        watch, lambda s: all(s.position(f) >= home[f] + STOPPING_COUNTS // 2 for f in bench.fingers)
     )
     stop = await _stop(bench, watch, replace(away, go=False), status)
     words = f"{stop.counts} counts and {1000 * stop.seconds:.0f} ms at speed {SPEED}{stop.on_the_way}"
@@ -123,14 +123,14 @@ async def _half_way_home(
     near = {finger: home[finger] + 10 for finger in bench.fingers}
     await watch.write(replace(image, go=True).with_positions(near))
     return await _until_past(
-        watch, lambda s: all(s.position(f) <= home[f] + STROKE - 30 for f in bench.fingers)
+        watch, lambda s: all(s.position(f) <= home[f] + STOPPING_COUNTS - 30 for f in bench.fingers)
     )
 
 
 async def _new_target(bench: Bench, watch: StageWatch, image: Request, home: dict[Finger, int]) -> None:
     """Move towards home; half way back out a little."""
     await _half_way_home(bench, watch, image, home)
-    turned = {finger: home[finger] + STROKE - 10 for finger in bench.fingers}
+    turned = {finger: home[finger] + STOPPING_COUNTS - 10 for finger in bench.fingers}
     await watch.write(replace(image, go=True).with_positions(turned))
     turns = await watch.until(lambda status: are_near(status, turned, MARGIN), LEG_S) is not None
     found = "the fingers turn, and stop at the new target" if turns else "the new request is ignored"

@@ -18,8 +18,8 @@ from ..motions import as_found
 from ..watch import StageWatch, describe
 
 SECONDS: Final = 60.0
-STILL_S: Final = 1.0
-PROBES: Final = 20
+WRITE_STILL_S: Final = 1.0
+WRITE_PROBES: Final = 20
 ECHO_S: Final = 0.02
 LONGEST_ECHO_S: Final = 1.0
 APART_S: Final = 0.1  # between two probes, so that none is forgotten
@@ -29,7 +29,7 @@ PAIRS: Final = 5
 MOST_PAIRS: Final = 25  # tried at one distance until PAIRS of them count
 LATE: Final = 1.5
 READ_WRITE: Final = 23
-LATE_S: Final = 0.0005  # a first image was late if it took LATE times the usual, and this much more
+WRITE_LATE_S: Final = 0.0005  # a first image was late if it took LATE times the usual, and this much more
 
 
 async def writing(bench: Bench) -> None:
@@ -86,8 +86,8 @@ async def _motion(bench: Bench, watch: StageWatch, image: Request) -> None:
         )
         return bool(moved)
 
-    if await watch.until(moves, STILL_S) is None:
-        bench.as_assumed("write.motion", f"nothing moved within {STILL_S:g} s")
+    if await watch.until(moves, WRITE_STILL_S) is None:
+        bench.as_assumed("write.motion", f"nothing moved within {WRITE_STILL_S:g} s")
     else:
         await watch.write(image)
         follows = "Keep away from the fingers, and report this: a stop may not stop them."
@@ -101,7 +101,7 @@ async def _echo(bench: Bench, watch: StageWatch, image: Request) -> float:
         The usual seconds until a write is acknowledged.
     """
     times, lost, writes, sent = list[float](), 0, list[float](), list[float]()
-    for number in range(PROBES):
+    for number in range(WRITE_PROBES):
         await asyncio.sleep(APART_S)
         marked = _marked(image, number)
         acknowledged = await watch.write(marked)
@@ -112,7 +112,9 @@ async def _echo(bench: Bench, watch: StageWatch, image: Request) -> float:
             times.append(bench.link.asked - acknowledged)
             sent.append(bench.link.asked - bench.link.wrote)
     if not times:
-        bench.inconclusive("write.echo", f"none of {PROBES} images was echoed within {LONGEST_ECHO_S:g} s")
+        bench.inconclusive(
+            "write.echo", f"none of {WRITE_PROBES} images was echoed within {LONGEST_ECHO_S:g} s"
+        )
         return percentile(sorted(writes), 0.5)
     times.sort()
     p50, worst = percentile(times, 0.5), times[-1]
@@ -121,10 +123,10 @@ async def _echo(bench: Bench, watch: StageWatch, image: Request) -> float:
         "worst_ms": 1000 * worst,
         "from_sending_p50_ms": 1000 * percentile(sorted(sent), 0.5),
         "lost": lost,
-        "probes": PROBES,
+        "probes": WRITE_PROBES,
     }
     found = f"after {1000 * p50:.0f} ms, at most {1000 * worst:.0f} ms"
-    found += f"; {lost} of {PROBES} never" if lost else ""
+    found += f"; {lost} of {WRITE_PROBES} never" if lost else ""
     follows = "No option is needed: a hand waits for the echo. Commands and stops act that much later."
     bench.judge("write.echo", not lost and p50 <= ECHO_S, found, follows, **figures)
     return percentile(sorted(writes), 0.5)
@@ -145,7 +147,7 @@ async def _spacing(bench: Bench, watch: StageWatch, image: Request, usual: float
         acted = counted = 0
         for number in range(MOST_PAIRS):
             took, acts = await _pair(bench, watch, image, gap, number)
-            if took <= LATE * usual + LATE_S:
+            if took <= LATE * usual + WRITE_LATE_S:
                 acted, counted = acted + acts, counted + 1
             if counted == PAIRS:
                 break
@@ -180,7 +182,7 @@ async def _pair(
 async def _function_23(bench: Bench, watch: StageWatch, image: Request) -> None:
     """Write marked images with function 23; one that is refused is written with function 16."""
     loop, times = asyncio.get_running_loop(), list[float]()
-    for number in range(PROBES):
+    for number in range(WRITE_PROBES):
         if not await _is_answered(bench, watch, _marked(image, number), is_first=not times):
             follows = "No option is needed: a 3-Finger is written with function 16."
             options: Options = NO_OPTIONS

@@ -16,7 +16,7 @@ from typing import Final
 BEAT_MS: Final = 250
 CUT_MS: Final = 1500
 """Silence in ms after which a page warns that its values are old."""
-LOST_S: Final = 2.0
+PAGE_LOST_S: Final = 2.0
 """Silence in seconds after which a browser counts as lost. It wakes up a background tab once a second."""
 SCRIPT: Final = f"""
 <script>
@@ -80,13 +80,13 @@ class Heartbeat:
         """Note a heartbeat or a press; returns the time that was sent back."""
         at = _time(sent_back)
         self._newest = max(self._newest, at)
-        if self.is_lost and monotonic() - self._newest < LOST_S:
+        if self.is_lost and monotonic() - self._newest < PAGE_LOST_S:
             self.is_lost = False
         return at
 
     def check(self) -> bool:
         """Whether the browser has just been lost."""
-        was_lost, self.is_lost = self.is_lost, self.is_lost or monotonic() - self._newest > LOST_S
+        was_lost, self.is_lost = self.is_lost, self.is_lost or monotonic() - self._newest > PAGE_LOST_S
         return self.is_lost and not was_lost
 
 

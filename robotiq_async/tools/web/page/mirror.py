@@ -22,8 +22,8 @@ from ...description.simulated import joints_and_parts
 HISTORY_S: Final = 30.0
 SAMPLE_S: Final = 0.2
 """Interval of the points of a curve: 150 points."""
-EVENTS: Final = 100
-LONGEST: Final = 4096  # characters of the arguments of a command, as JSON
+EVENTS_SHOWN: Final = 100
+LONGEST_ARGUMENTS: Final = 4096  # characters of the arguments of a command, as JSON
 QUIET_S: Final = 1.5
 """Seconds without updates after which the other process counts as silent."""
 
@@ -57,7 +57,7 @@ class HandMirror:
     inhibited: Inhibit | None = None  # why a person has the hand refuse motion
     statistics: dict[str, Any] = field(default_factory=dict)  # the newest
     samples: deque[CurvePoint] = field(default_factory=deque)  # of the last 30 s
-    events: deque[tuple[int, dict[str, Any]]] = field(default_factory=lambda: deque(maxlen=EVENTS))
+    events: deque[tuple[int, dict[str, Any]]] = field(default_factory=lambda: deque(maxlen=EVENTS_SHOWN))
     peaks: list[int] = field(default_factory=list)  # of the currents since the last sample
     changes: int = 0  # number of updates
     event_count: int = 0
@@ -167,7 +167,7 @@ class PageMirror:
 
         ``at`` is the time of this process that the browser had received.
         """
-        if len(json.dumps(arguments)) > LONGEST:  # a browser may send anything
+        if len(json.dumps(arguments)) > LONGEST_ARGUMENTS:  # a browser may send anything
             answered(False, "a command is not that long")
             return
         number = next(self._numbers)

@@ -17,7 +17,7 @@ from .widgets.scene import HandScene
 from .widgets.words import timed
 
 REFRESH_S: Final = 0.05
-STAGE: Final = "h-[36vh] lg:h-[calc(100dvh-14rem)] lg:sticky lg:top-0 min-h-[250px]"
+STAGE_CLASSES: Final = "h-[36vh] lg:h-[calc(100dvh-14rem)] lg:sticky lg:top-0 min-h-[250px]"
 """Size of the scene: part of a phone, the free height of a wide window."""
 SCENES_MAX: Final = 12
 """Tiles with a scene: with more than about sixteen, browsers drop the first ones."""
@@ -169,7 +169,7 @@ def _hand_page(mirror: PageMirror, hand: HandMirror, client: Client, sessions: P
             banner = Banner((lambda name: controls[0].ask(name)) if mirror.control else None)
             with ui.row().classes("w-full items-center gap-3"):
                 state = StatePanel()
-            with ui.element("div").classes(f"{STAGE} w-full rq-stage"):
+            with ui.element("div").classes(f"{STAGE_CLASSES} w-full rq-stage"):
                 scene = HandScene()
         with ui.column().classes("w-full gap-3"):
             axes = AxesPanel(wide=True)

@@ -23,7 +23,7 @@ from .pipes import Pipes
 
 BEAT_S: Final = 0.25
 HEAD_S: Final = 5.0  # seconds for the head of the first request of a connection
-MOST: Final = 200
+MOST_CONNECTIONS: Final = 200
 """Connections at a time: half of what fits into the usual limit of files, and enough for thirty browsers."""
 MESSAGE_MAX: Final = 65_536
 """Limit of a websocket message in bytes."""
@@ -40,7 +40,7 @@ class _Connection(H11Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as in the base
         super().connection_made(transport)
         self.since = self.loop.time()
-        if len(self.connections) > MOST:
+        if len(self.connections) > MOST_CONNECTIONS:
             silent = [each for each in self.connections if isinstance(each, _Connection) and each.is_silent]
             min(silent, key=lambda each: each.since, default=self).transport.abort()
         self.loop.call_later(HEAD_S, self._close_if_silent)

@@ -13,11 +13,11 @@ from .....values.enums import State, Trigger
 from ....wording import STATE_WORDS
 from ..mirror import HandMirror
 
-COMMANDS: Final = ("open", "close", "wide", "normal", "pinch", "move", "force", "speed")
+MOTION_BUTTONS: Final = ("open", "close", "wide", "normal", "pinch", "move", "force", "speed")
 """What is a command for the state machine."""
 TRIGGERS: Final = MappingProxyType(
     {
-        **dict.fromkeys(COMMANDS, Trigger.ASK_COMMAND),
+        **dict.fromkeys(MOTION_BUTTONS, Trigger.ASK_COMMAND),
         "activate": Trigger.ASK_ACTIVATE,
         "reset": Trigger.ASK_RESET,
         "release": Trigger.ASK_RELEASE,
@@ -29,7 +29,7 @@ HELPS: Final = MappingProxyType(
 )
 """The button that helps in a state: it stands first."""
 QUIET: Final = "the program that watches the gripper is silent"
-LOST: Final = "no connection to the gripper"
+NO_CONNECTION: Final = "no connection to the gripper"
 INHIBITED: Final = "motion is inhibited: permit it first"
 _IDLE: Final = {"activate": "it is active", "recover": "there is nothing to recover from"}
 
@@ -41,7 +41,7 @@ def why_not(name: str, hand: HandMirror, *, is_quiet: bool) -> str:
     if name == "permit":
         return "" if hand.inhibited is not None else "motion is not inhibited"
     if hand.problem or hand.is_lost:
-        return LOST
+        return NO_CONNECTION
     trigger, state = TRIGGERS.get(name), hand.state
     if hand.inhibited is not None and name != "speed" and (name == "recover" or trigger in MOVES):
         return INHIBITED

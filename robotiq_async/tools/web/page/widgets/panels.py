@@ -25,7 +25,7 @@ from .words import (
 )
 
 CURVES_S: Final = 0.5
-WIDTHS: Final = (6, 4, 2, 2)
+COLUMN_WIDTHS: Final = (6, 4, 2, 2)
 """Widths of the curves: fingers that move together overlap, and all of them stay visible."""
 CURRENT_MAX: Final = 600
 """Minimum range of the axis of the currents, in mA."""
@@ -163,7 +163,7 @@ def _options(title: str, highest: int, step: int) -> dict[str, Any]:
             "color": color,
             "animation": False,
         }
-        for name, color, width in zip(NAMES, COLORS, WIDTHS, strict=True)
+        for name, color, width in zip(NAMES, COLORS, COLUMN_WIDTHS, strict=True)
     ]
     quiet = {"color": "#8a8f98"}
     return {

@@ -30,12 +30,12 @@ SCALE: Final = 10.0
 """Scale: three.js works best with objects of size 1."""
 GLOW: Final = "#ff5a1f"
 GHOST: Final = "#0ea5e9"
-STAGE: Final = "#b9c3cf"
+STAGE_COLOR: Final = "#b9c3cf"
 """Background of the hand, which is grey and black, on a light and on a dark page."""
 HALO: Final = "text-shadow:0 0 2px #fff,0 0 2px #fff,0 0 4px #fff"
 """Style around a letter, for any background."""
-LETTER: Final = "font:bold 17px sans-serif"
-NAME: Final = "font:11px sans-serif;font-size:clamp(0px,(100vw - 640px) * 9,11px);padding-top:2.2em"
+LETTER_FONT: Final = "font:bold 17px sans-serif"
+NAME_FONT: Final = "font:11px sans-serif;font-size:clamp(0px,(100vw - 640px) * 9,11px);padding-top:2.2em"
 """Style of the name below the letter, at the same point; a phone has no room for it."""
 HELD: Final = "#f2c230"
 STALE: Final = 0.25
@@ -196,7 +196,7 @@ class Drawing:
         for axis, color in zip(Finger.ALL, COLORS, strict=True):
             if axis in FINGER_NAMES:
                 with self.figure.group(f"{FINGER_NAMES[axis]}_link_3"):
-                    for words, font in ((str(axis.name), LETTER), (FINGER_NAMES[axis], NAME)):
+                    for words, font in ((str(axis.name), LETTER_FONT), (FINGER_NAMES[axis], NAME_FONT)):
                         ui.scene.text(words, f"color:{color};{font};{HALO}").move(0.052, 0.032, 0.0)
 
 
@@ -204,7 +204,7 @@ class HandScene:
     """A scene with a gripper, its request, and the object that it holds; for a tile without the request."""
 
     def __init__(self, *, compact: bool = False) -> None:
-        with ui.scene(grid=(4, 16), background_color=STAGE, fps=30).classes("w-full h-full") as scene:
+        with ui.scene(grid=(4, 16), background_color=STAGE_COLOR, fps=30).classes("w-full h-full") as scene:
             self.scene = scene
         self._compact = compact
         self._drawing: Drawing | None = None
