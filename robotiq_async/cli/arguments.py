@@ -112,7 +112,7 @@ StageNumber = Annotated[int, Parameter(converter=_integer("the stage", 0, 9), me
 Runs = Annotated[int, Parameter(converter=_integer("the runs", 1, 100), metavar="N")]
 StepCounts = Annotated[int, Parameter(converter=_integer("the step", 1, 255), metavar="N")]
 PointCount = Annotated[int, Parameter(converter=_integer("the points", 2, 50), metavar="N")]
-Fingers = Annotated[
+FingersArgument = Annotated[
     Finger,
     Parameter(
         converter=_fingers,

@@ -14,7 +14,7 @@ from ...link.address import Simulation, parse_address
 from ...values.enums import Finger
 from ...values.errors import MeasuringError
 from ..addresses import full_address, gripper_words, is_simulated, named_model
-from ..arguments import AddressArgument, Fingers, Flag, Runs, StepCounts, Yes, need
+from ..arguments import AddressArgument, FingersArgument, Flag, Runs, StepCounts, Yes, need
 from ..consent import consent
 from ..failures import CommandError, UsageError
 
@@ -182,7 +182,7 @@ def speed(
     output: Annotated[Path, Parameter(metavar="FILE.csv")] = Path("closing_time_ms.csv"),
     step: StepCounts = 4,
     runs: Runs = 3,
-    fingers: Fingers = Finger.ABC,
+    fingers: FingersArgument = Finger.ABC,
     speedup: Speedup = None,
     no_plot: NoPlot = False,
     yes: Yes = False,
