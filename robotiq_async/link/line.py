@@ -319,6 +319,8 @@ class Line:
             return answer
         self._exchange = exchange
         self._watchdog.watch(self._allowed(exchange), exchange.timing.by)
+        if self._shares:
+            self._patience.asked(self.now())
         try:
             self._send(exchange.frame)
         except OSError as error:
@@ -384,7 +386,7 @@ class Line:
         assert exchange is not None, "in flight"
         if type(answer) is bytes:
             if self._shares:
-                self._patience.answered(self._speaker)
+                self._patience.answered(self._speaker, self.now())
             if exchange.extra is not None:
                 self._note(exchange.extra)
         elif not isinstance(answer, bytes | Refused) and self.state is not CLOSED:

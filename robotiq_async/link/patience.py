@@ -6,7 +6,8 @@ for 60 ms again, for a gripper that answers slowly. The silence after it takes a
 misses a user rests for a second between two questions, so a silent gripper costs the others 5 % of their
 rate, and 80 ms at a time.
 
-A response timeout that is longer than the usual one means a slow line, and lengthens the questions alike.
+A response timeout that is longer than the usual one means a slow line, and lengthens the questions alike. So
+do answers that have just taken long, of whichever gripper: the adapter, a server or a busy machine is slow.
 """
 
 # Misses in a row    The next question waits for    and comes, after the last one,
@@ -28,6 +29,10 @@ QUESTION_S: Final = 0.06
 SHORT_S: Final = 0.024
 """An adapter may keep a reply for 16 ms (the usual latency timer of FTDI chips)."""
 LONG_EVERY: Final = 8
+SLACK: Final = 4.0
+"""A question waits for so many times as long as the slowest answer of late."""
+FADES: Final = 0.98
+"""What is left of the slowest answer after the next one."""
 SOON: Final = 4
 """Misses of a link that is not lost yet."""
 SOON_S: Final = 0.1
@@ -46,12 +51,18 @@ class Patience:
 
     def __init__(self) -> None:
         self._silent: Final[WeakKeyDictionary[object, _Silent]] = WeakKeyDictionary()
+        self._asked = 0.0
+        self._slowest = 0.0
+        """The slowest answer of late, in seconds."""
+
+    def asked(self, now: float) -> None:
+        self._asked = now
 
     def seconds(self, user: object, response_s: float) -> float:
         """The longest time for the next answer; ``response_s`` is the response timeout."""
         misses = self._silent[user].misses if user in self._silent else 0
         usual = SHORT_S if misses % LONG_EVERY else QUESTION_S
-        return min(response_s, usual * max(1.0, response_s / USUAL_RESPONSE_S))
+        return min(response_s, max(usual * max(1.0, response_s / USUAL_RESPONSE_S), SLACK * self._slowest))
 
     def missed(self, user: object, now: float) -> None:
         """There was no answer."""
@@ -59,7 +70,8 @@ class Patience:
         rest = 0.0 if misses == 1 else SOON_S if misses <= SOON else REST_S
         self._silent[user] = _Silent(misses, now + rest)
 
-    def answered(self, user: object) -> None:
+    def answered(self, user: object, now: float) -> None:
+        self._slowest = max(now - self._asked, FADES * self._slowest)
         self._silent.pop(user, None)
 
     def until(self, user: object) -> float:
