@@ -55,7 +55,7 @@ class ToolLine:
             self._writer.write(data)
 
     async def read(self, seconds: float) -> bytes:
-        """What has come; nothing if nothing comes in that time."""
+        """The bytes that have come; none if none come in that time."""
         try:
             async with asyncio.timeout(seconds):
                 while self._writer is not None:

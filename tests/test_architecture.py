@@ -57,6 +57,18 @@ def test_no_function_is_longer_than_sixty_lines() -> None:
     assert not long
 
 
+def test_no_docstring_begins_with_what() -> None:
+    """A noun says sooner of what it speaks."""
+    found = [
+        f"{path.relative_to(PACKAGE)}: {each.value.value.splitlines()[0]}"
+        for path in PACKAGE.rglob("*.py")
+        for each in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(each, ast.Expr) and isinstance(each.value, ast.Constant)
+        if isinstance(each.value.value, str) and each.value.value.startswith("What ")
+    ]
+    assert not found
+
+
 def statements(node: ast.AST) -> Iterator[ast.AST]:
     """Statements of a module, down to the innermost block, without those in expressions."""
     for block in ("body", "handlers", "orelse", "finalbody", "cases"):

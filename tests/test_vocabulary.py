@@ -16,7 +16,7 @@ MOST_WORDS = 60
 SAME_ON_PURPOSE = {"RobotiqHand", "Stream", "RobotiqGripper"}
 """The blocking hand and its streams; the names that ur_rtde's users and those of LeRobot look for."""
 OF_EACH = {"SECONDS"}
-"""What each stage of verify has."""
+"""The limit of time that each stage of verify has."""
 # Those that wait for a better name.
 CLASSES_LEFT = {
     "Answer",

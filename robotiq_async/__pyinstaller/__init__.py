@@ -1,4 +1,4 @@
-"""What PyInstaller is told of this package. It finds the folder by the entry point ``pyinstaller40``."""
+"""Hooks of this package for PyInstaller, which finds the folder by the entry point ``pyinstaller40``."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ DIRECTION_WAIT_S: Final = 0.1
 
 
 class Adoption(NamedTuple):
-    """What an adopted gripper has shown until the hand writes its own first image."""
+    """The requests of an adopted gripper, as it shows them until the hand writes its own first image."""
 
     since: Moment  # from then on a moving axis has time to show its direction, and a late gDT to come
     first: RobotiqStatus

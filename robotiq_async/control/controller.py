@@ -54,7 +54,7 @@ class NextWrite(NamedTuple):
 
 
 class Left(NamedTuple):
-    """What a session leaves to the next one of the same gripper: what may still act, and the contacts."""
+    """For the next session of the same gripper: the writes that may still act, and the contacts."""
 
     ledger: Ledger
     activation: Begun | None
@@ -256,7 +256,7 @@ class Controller:
         return self._evidence.passed
 
     def left(self) -> Left:
-        """What the next session of this gripper must know."""
+        """The part of the ledger that the next session of this gripper needs."""
         return Left(self._ledger, self._activation)
 
     @property
@@ -455,7 +455,7 @@ class Controller:
         return self._ledger.in_flight
 
     def next_write(self, now: float) -> NextWrite | None:
-        """What there is to write; None if there is nothing. It changes nothing, and makes no image."""
+        """The next write; None if nothing is due. It changes nothing, and makes no image."""
         stop, status, pending = self._stop, self._evidence.status, self._requests.pending
         is_command = stop is None and self._procedure is None
         if is_command and pending.is_empty:

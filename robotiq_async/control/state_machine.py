@@ -140,7 +140,7 @@ SEQUENCES: Final = frozenset(
 """The states of an activation, a release and a reset. Clearing rGTO ends none of these."""
 
 MOVES: Final = frozenset({Trigger.ASK_COMMAND, Trigger.ASK_ACTIVATE, Trigger.ASK_RELEASE})
-"""What an inhibit refuses. Of a command a speed alone passes; HALT, HOLD, RESET and STOP always do."""
+"""Triggers that an inhibit refuses. A command of speed alone passes; HALT, HOLD, RESET and STOP always do."""
 
 
 def states_allowing(trigger: Trigger) -> frozenset[State]:

@@ -225,7 +225,7 @@ _SCHEME: Final = re.compile("[a-z][a-z0-9+.-]*")
 
 
 def entry_of(scheme: str) -> EntryPoint | None:
-    """What an installed package names under a scheme; None if there is nothing. It is not loaded.
+    """The entry point of an installed package under a scheme; None if there is none. It is not loaded.
 
     Raises:
         ValueError: several packages name the same.

@@ -1,4 +1,4 @@
-"""What is said to a gripper over Modbus: one generator for each thing that a hand wants of its link.
+"""Dialogues with a gripper over Modbus: one generator for each thing that a hand wants of its link.
 
 A dialogue yields steps (line.py) and gets what they come to. It returns what was read or written. Where it
 raises, it gives the line up, and the next one begins with an opening. No I/O and no event loop: a line
@@ -61,7 +61,7 @@ Part = Generator[Exchange | Step, Answer | None, Outcome | None]
 
 
 class Dialogues:
-    """What is said to one gripper, over all connections to it.
+    """The dialogues with one gripper, over all connections to it.
 
     Attributes:
         line: the line to it.
@@ -197,7 +197,7 @@ class Dialogues:
     # -- parts of them -------------------------------------------------------------------------------------
 
     def _ready(self) -> Dialogue[None]:
-        """What follows leaves at once: a write must not meet what is left of a disturbance."""
+        """Make sure that a write leaves at once: it must not meet what is left of a disturbance."""
         obstacle = yield Step.READY
         if isinstance(obstacle, Outcome) and self._can_repeat(obstacle):
             if (worse := (yield from self._in_step())) is not None:

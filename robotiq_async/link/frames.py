@@ -167,7 +167,7 @@ class Expected(NamedTuple):
 
 
 def after_others(received: bytes, unit: int) -> bytes:
-    """What has arrived after whole replies of other units than this one; nothing while one is not whole."""
+    """The bytes after whole replies of other units than this one; none while a reply is not whole."""
     while received and received[0] != unit and (size := _reply_size(received)):
         if len(received) < size:
             return b""

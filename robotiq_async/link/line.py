@@ -58,7 +58,7 @@ T = TypeVar("T")
 
 
 class LineState(Enum):
-    """What may arrive on a line."""
+    """The state of a line, by the bytes that may arrive on it."""
 
     CLOSED = "nothing: there is no wire"
     OPENING = "what is left over from an earlier connection; only the end of the opening leads on"
@@ -74,7 +74,7 @@ _IS_NEWS: Final = (OPENING, IN_STEP)
 
 
 class Step(Enum):
-    """What a dialogue may want but an exchange."""
+    """A wish of a dialogue other than an exchange."""
 
     READY = "all that a request waits for; comes to what prevents one, if anything does"
     HUSH = "silence; comes to noise if there is none"
@@ -135,7 +135,7 @@ class Line:
         self._exchange: Exchange | None = None
         """The exchange in flight."""
         self._answer: asyncio.Future[Answer]
-        """What it comes to."""
+        """The answer, or the outcome."""
         self._send: Send
         self._watchdog: Watchdog
 
@@ -333,7 +333,7 @@ class Line:
         return self._patience.seconds(self._speaker, seconds) if self._shares and self.is_shared else seconds
 
     def _obstacle(self, user: object) -> Outcome | None:
-        """What keeps this user from sending."""
+        """The obstacle to a request of this user."""
         if self.state is CLOSED and self.why is not None:
             return Lost(renewed(self.why.error))
         return self.why if user in self._users else Lost(self._not_connected())

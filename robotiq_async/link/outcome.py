@@ -1,4 +1,4 @@
-"""What a request came to, other than an answer. A dialogue decides by the kind, and by nothing else.
+"""Outcomes of requests without an answer. A dialogue decides by the kind, and by nothing else.
 
 ======== ============================================ ===================================
 outcome  what happened                                what may still come

@@ -47,7 +47,7 @@ class _Silent(NamedTuple):
 
 
 class Patience:
-    """What each user of a line may take of it. Users are told apart, and forgotten with their objects."""
+    """The share of a line that each user may take. Users are told apart, and forgotten with their objects."""
 
     def __init__(self) -> None:
         self._silent: Final[WeakKeyDictionary[object, _Silent]] = WeakKeyDictionary()

@@ -1,4 +1,4 @@
-"""What a hand needs of the connection to its gripper, whatever the wire."""
+"""The connection to a gripper as a hand needs it, on any wire."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ OPENING: Final[Table] = {
 
 
 class Wire(Protocol):
-    """What carries the frames of a line. It may be opened again after it was closed."""
+    """The carrier of a line's frames. It may be opened again after it was closed."""
 
     @property
     def may_echo(self) -> bool:

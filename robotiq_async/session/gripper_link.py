@@ -219,7 +219,7 @@ class Claims(Generic[T, L]):
                 self._left.popitem(last=False)
 
     def left(self, gripper: Gripper) -> L | None:
-        """What the last owner of a gripper has left."""
+        """The part that the last owner of a gripper has left."""
         newest_first = reversed([*self._left.items()])
         return next((left for each, left in newest_first if each.may_be(gripper)), None)
 

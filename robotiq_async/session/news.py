@@ -22,7 +22,7 @@ DOES: Final = {
     Severity.MAJOR: "the fingers stop, a part stays held until the reset; free what blocks, then recover() "
     "resets and activates: it DROPS the part and MOVES the fingers",
 }
-"""What the fingers do in a fault, and what helps."""
+"""The motion of the fingers in a fault, and the remedy."""
 UNKNOWN_FAULT: Final = (
     f"{_HELD}; no manual names it: recover() waits, reset() may clear it and DROPS the part"
 )

@@ -120,7 +120,7 @@ class HandCollector(Collector):
         yield from self._conditions()
 
     def _conditions(self) -> Iterator[Metric]:
-        """What alarms ask. The series of a hand are few and always the same: one of faults a code."""
+        """The series for alarms. Those of a hand are few and always the same: one of faults a code."""
         families = {
             name: GaugeMetricFamily(f"robotiq_{name}", text, labels=["hand"]) for name, text in _NOW.items()
         }

@@ -221,7 +221,7 @@ async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator
 
 
 def _without_stopped(error: NotStartedError | BaseExceptionGroup[BaseException]) -> BaseException | None:
-    """What a stop does not explain; None for nothing. Each task of a group has an error of its own."""
+    """Errors that a stop does not explain; None if there are none. Each task of a group has its own."""
     return error.split(NotStartedError)[1] if isinstance(error, BaseExceptionGroup) else None
 
 

@@ -142,7 +142,7 @@ def single(value: object) -> object:
 
 
 def _element(value: object) -> object:
-    """What an array of numpy without dimensions holds; everything else is itself.
+    """The number in an array of numpy without dimensions; anything else is itself.
 
     None for numpy's timedelta, which counts as an integer there.
     """

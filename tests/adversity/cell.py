@@ -287,7 +287,7 @@ def _rows(heading: str) -> Iterator[tuple[str, list[tuple[Phase, tuple[str, str]
 
 
 def _ends(outcome: str, rests_in: str) -> tuple[str, str]:
-    """What a cell says about TCP and about a serial line, each with the state that follows."""
+    """The words of a cell about TCP and about a serial line, each with the state that follows."""
     tcp, _, line = outcome.partition(" / ")
     tcp, line = (each if "→" in each else f"{each} → {rests_in}" for each in (tcp, line or tcp))
     return tcp, line

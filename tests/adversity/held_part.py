@@ -44,7 +44,7 @@ CYCLES_S: Final = (0.005, 0.03, 0.1, 0.2)
 
 @dataclass
 class Life:
-    """What has become of a part.
+    """The fate of a part.
 
     Attributes:
         title: the gripper and its device cycle.

@@ -32,7 +32,7 @@ CLOSED: Final = 255
 SETTLES_S: Final = 0.6
 """After a call the hand may have to write again, and what it has written shows."""
 LATER_S: Final = 1.5
-"""What was left on its way has moved a finger by then."""
+"""A request that was left on its way has moved a finger by then."""
 LOOK_S: Final = 0.03
 
 CYCLES_S: Final = (0.05, 0.1, 0.2)

@@ -35,7 +35,7 @@ TYPED = {
     "status": [],
     "view --layout": [],
 }
-"""What is typed, and what is added: there is nobody to answer and to press Ctrl-C."""
+"""Lines to type, with additions: there is nobody to answer and to press Ctrl-C."""
 CALLIPER = b"85\n66\n43\n21\n0\n"
 GRIPPERS = re.compile(r"(tcp|rtu|rtu\+tcp|urcap)://.*|192\.168\.1\.\d+|\$GRIPPER")
 """Addresses that stand for a gripper of the reader."""
@@ -48,7 +48,7 @@ def typed(page: Path) -> list[list[str]]:
 
 
 def adds(words: list[str]) -> list[str] | None:
-    """What is added to a line; None if it is not typed."""
+    """The addition to a line; None if it is not typed."""
     return TYPED.get(" ".join(words[:2]), TYPED.get(words[0]))
 
 

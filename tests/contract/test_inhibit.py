@@ -24,7 +24,7 @@ MOVES: dict[str, Callable[[Hand], Awaitable[object]]] = {
     "atr": lambda hand: hand.atr(),
     "recover": lambda hand: hand.recover(),
 }
-"""What may move or press."""
+"""Calls that may move or press."""
 
 
 async def stays(here: Bench, seconds: float = 0.5) -> None:

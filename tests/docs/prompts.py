@@ -50,7 +50,7 @@ def powershell(line: str) -> list[str]:
 
 
 def _split_by_the_program(line: str) -> list[str]:
-    """What the C library makes of a line without backslashes before quotes."""
+    """Split as the C library splits a line without backslashes before quotes."""
     if '\\"' in line:
         raise NotForThisPromptError("a backslash before a quote")
     return [word.replace('"', "") for word in re.findall(r'(?:"[^"]*"?|[^\s"])+', line)]

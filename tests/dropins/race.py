@@ -58,7 +58,7 @@ class Watched(SimulatedGripper):
 
 @dataclass
 class Tally:
-    """What a program has met.
+    """The experiences of a program.
 
     Attributes:
         calls: that were made.
@@ -94,7 +94,7 @@ def sweep(steps: int) -> Iterator[int]:
 
 
 class Loop:
-    """What programs do with the copied class, or with another that has its calls, until so many exchanges."""
+    """A loop of programs with the copied class, or another with its calls, until so many exchanges."""
 
     def __init__(self, driver: Any, gripper: Watched, exchanges: int, wait: Callable[[float], None]) -> None:
         self.tally = Tally()

@@ -34,7 +34,7 @@ from robotiq_async.dropins.polymetis import GripperService, main  # noqa: E402  
 
 
 class Aborted(Exception):  # noqa: N818  # as gRPC's own
-    """What abort() raises in a handler."""
+    """The error that abort() raises in a handler."""
 
     def __init__(self, code: Any, words: str) -> None:
         super().__init__(code.name, words)

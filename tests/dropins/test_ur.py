@@ -54,7 +54,7 @@ def near(target: int) -> Any:
 
 
 def stopped(gripper: RobotiqGripper) -> int:
-    """What the loop of programs gets that wait for the fingers."""
+    """The values that the loop of programs gets that wait for the fingers."""
     while (status := gripper._get_var("OBJ")) == 0:
         rest(0.005)
     return status

@@ -55,7 +55,7 @@ class Note(NamedTuple):
 
 
 class Image(NamedTuple):
-    """What was written for finger A, and when."""
+    """A write for finger A, and its time."""
 
     at: float
     position: int

@@ -1,4 +1,4 @@
-"""What became of a request is said truly, also late; settings are the agent's; questions come last."""
+"""The outcome of a request is said truly, also late; settings are the agent's; questions come last."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ A = Finger.A
 
 
 class Disk:
-    """What the system does when a new record is opened for writing.
+    """The behaviour of the system when a new record is opened for writing.
 
     Attributes:
         is_full: whether that fails.

@@ -1,4 +1,4 @@
-"""What a call takes is in its docstring: each parameter once, in the order of the signature."""
+"""The docstring of a call has its arguments: each parameter once, in the order of the signature."""
 
 from __future__ import annotations
 

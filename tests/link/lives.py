@@ -51,7 +51,7 @@ class Call(NamedTuple):
 
 
 class Life(NamedTuple):
-    """What has happened on a line."""
+    """The events on a line."""
 
     calls: list[Call]
     frames: list[str]
@@ -198,7 +198,7 @@ class _User:
 
 
 def _kind(result: object) -> str:
-    """What a call came to, in one word."""
+    """The outcome of a call, in one word."""
     if isinstance(result, str):
         return result.partition(":")[0].partition(" ")[0]
     return "done"

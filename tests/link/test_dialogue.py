@@ -36,7 +36,7 @@ class PduExchange(Exchange):
 
 
 class Place:
-    """What a dialogue knows of its line."""
+    """The line as a dialogue knows it."""
 
     address = "rtu://X"
     silence = Silence(10 / 115200)

@@ -28,7 +28,7 @@ class Case:
         self.function = function
 
     def verdict(self, frame: bytes) -> bytes | Refused | Noise | None:
-        """What the bytes of a reply so far come to."""
+        """The verdict on the bytes of a reply so far."""
         if self.serial:
             return expected_reply(self.request, checksum=CHECKSUM).verdict(frame)
         header, request = self.request[:4], self.request[6:]
@@ -104,7 +104,7 @@ def is_ever_complete(case: Case, frame: bytes) -> bool:
 
 
 def noise(case: Case, frame: bytes) -> str:
-    """What is said of bytes that are not the answer."""
+    """The words about bytes that are not the answer."""
     verdict = case.verdict(frame)
     assert isinstance(verdict, Noise), verdict
     return verdict.error.message

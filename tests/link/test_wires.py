@@ -1,4 +1,4 @@
-"""What can keep a wire from being opened, and serial ports beyond the descriptors that select() takes."""
+"""Obstacles to the opening of a wire, and serial ports beyond the descriptors that select() takes."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ IN_THE_WHEEL: Final = (
 PLUGIN: Final = "lerobot_robot_robotiq"
 """The second distribution, and its module: LeRobot looks for the name as it is written here."""
 METADATA: Final = "Metadata-Version: 2.4\n"
-"""What everything that uploads and installs understands."""
+"""The version of metadata that everything understands that uploads and installs."""
 LAST_PART: Final = "What the hand went through"
 """The demo's heading of its last part."""
 
@@ -77,7 +77,7 @@ def build() -> tuple[Path, Path, Path]:
 
 
 def _look(sdist: Path, wheel: Path) -> None:
-    """What the library's own two hold; keeps a copy of the bill of materials."""
+    """Look into the library's own two; keeps a copy of the bill of materials."""
     name = wheel.name.removesuffix("-py3-none-any.whl")
     with tarfile.open(sdist) as archive:
         files = {member.name.removeprefix(f"{name}/") for member in archive}

@@ -31,7 +31,7 @@ if __name__ == "__main__":
 """
 HOLDS: Final = "holds 43 mm"
 NEEDS: Final = {"web": "nicegui", "view": "foxglove", "ports": "serial"}
-"""What commands without their extras name."""
+"""The extras that commands name without them."""
 
 
 def try_frozen(wheel: Path, folder: Path) -> str:

@@ -28,7 +28,7 @@ MODELS = [THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, HAND_E]
 
 
 def lines(caplog: pytest.LogCaptureFixture, level: int = logging.WARNING) -> Iterator[str]:
-    """What has come at a level since the last look."""
+    """The messages of a level since the last look."""
     yield from [each.getMessage() for each in caplog.records if each.levelno == level]
     caplog.clear()
 

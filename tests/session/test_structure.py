@@ -17,7 +17,7 @@ from robotiq_async.session.session import Session
 
 PACKAGE = Path(robotiq_async.__file__).parent
 TOLD = ("__cause__", "__doc__")
-"""What Python lets only be set from outside."""
+"""Attributes that Python lets only be set from outside."""
 FOREIGN = {"client.ctx", "transport"}
 """Objects of pymodbus and asyncio that link/wires.py sets up."""
 SIMULATED = {"gripper", "self._target.gripper", "line", "error"}

@@ -24,7 +24,7 @@ Vector = dict[Labels, float]
 
 
 def vectors(text: str, up: float = 1.0) -> dict[str, Vector]:
-    """What Prometheus has after a scrape: by name, the value of each set of labels."""
+    """The series of Prometheus after a scrape: by name, the value of each set of labels."""
     target = {("instance", "cell:9100"), ("job", "robotiq")}
     found: dict[str, Vector] = {"up": {frozenset(target): up}}
     for family in text_string_to_metric_families(text):

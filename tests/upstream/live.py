@@ -47,7 +47,7 @@ def stub(name: str, **members: Any) -> types.ModuleType:
 
 
 class Arm:
-    """What ur.py uses of ur_rtde."""
+    """The part of ur_rtde that ur.py uses."""
 
     def __init__(self, *_: Any) -> None: ...
 
@@ -121,7 +121,7 @@ async def test_polymetis_own_client_at_our_server(tmp_path: Path) -> None:
 
 
 def drive(client: Any) -> None:
-    """What DROID does with it: half closed, in steps, blocking and not."""
+    """Drive it as DROID does: half closed, in steps, blocking and not."""
     assert client.metadata.max_width == pytest.approx(0.085)
     client.goto(width=0.0425, speed=0.05, force=0.1, blocking=False)
     client.goto(width=0.0425, speed=0.1, force=0.1)

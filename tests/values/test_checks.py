@@ -111,7 +111,7 @@ def test_a_small_integer_of_numpy_does_not_wrap_in_the_comparison() -> None:
 
 
 def test_an_array_of_numpy_without_dimensions_is_the_number_in_it() -> None:
-    """What ``array.sum()`` or ``array[i]`` of some libraries gives."""
+    """The result of ``array.sum()`` or ``array[i]`` of some libraries."""
     assert check_byte("force", np.array(7, np.uint8)) == 7
     assert check_mask(np.array(7)) is Finger.ABC
     assert check_axis(np.array(8)) is Finger.SCISSOR

@@ -1,4 +1,4 @@
-"""What is measured on the page in the browser: the contrast of text, and widgets that cover each other."""
+"""Measures of the page in the browser: the contrast of text, and widgets that cover each other."""
 
 from __future__ import annotations
 

@@ -118,7 +118,7 @@ class Errand:
         self._newest: Reply | None = None
         self._said: Answer | RobotiqError | None = None  # by that
         self._in_doubt: Answer | RobotiqError | None = None
-        """What is the outcome when the time is over."""
+        """The outcome when the time is over."""
         self.asked: dict[Setting, int] = asked_of(verb.removeprefix("cmd/"), call.arguments)
         self._loop = asyncio.get_running_loop()
         self._limit = Limit(timeout)

@@ -1,4 +1,4 @@
-"""What commands ask for: a position, a speed or a force of an axis. Speeds and forces are its settings."""
+"""Values in commands: a position, a speed or a force of an axis. Speeds and forces are its settings."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _USUAL: Final = {"move": 7}  # the axes of a command that names none; 15 of all 
 
 
 def asked_of(name: str, arguments: Mapping[str, Any]) -> dict[Setting, int]:
-    """What a command asks for, named without ``cmd/``; empty if its arguments are malformed."""
+    """The values that a command carries, named without ``cmd/``; empty if its arguments are malformed."""
     if name == "command":
         changes = arguments.get("axes", {})
     else:

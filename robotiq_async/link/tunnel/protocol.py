@@ -56,7 +56,7 @@ class Tunnel(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class TunnelPlace:
-    """What the address of a tunnel says, for the function that makes the tunnel.
+    """The parts of a tunnel's address, for the function that makes the tunnel.
 
     Attributes:
         host: name or IP address.

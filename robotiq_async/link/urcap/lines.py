@@ -23,8 +23,8 @@ DIGITS: Final = 3
 """The most digits of a value; the URCap's own script reads PRE with leading zeros."""
 ACKNOWLEDGED: Final = b"ack"
 UNREADABLE: Final = "?"
-"""What the port says for a value that it cannot read from the gripper: in an emergency stop of the arm, or
-when the tool has no power (ur_rtde's client expects it)."""
+"""The answer of the port for a value that it cannot read from the gripper: in an emergency stop of the arm,
+or when the tool has no power (ur_rtde's client expects it)."""
 _END: Final = b"\r\n"
 _LONGEST: Final = 16
 """More bytes than this are no line of this port."""

@@ -61,11 +61,11 @@ LOST_S: Final = 0.4
 """A SET that does not show for so long is lost. Half a second after a write control blames another client."""
 
 SHORT: Final = ("PRE", "OBJ", "POS")
-"""What changes in a motion."""
+"""The variables that change in a motion."""
 ALL: Final = ("ACT", "GTO", "PRE", "ACT", "GTO", "OBJ", "STA", "FLT", "POS")
 """Everything; activation and go before and after the echo."""
 CURRENT: Final = "COU"
-"""What a port says that does not know it is not known; perhaps nothing. So it is asked alone at first."""
+"""The answer of a port that does not know it is not known; perhaps none. So it is asked alone at first."""
 
 
 class Questions(Exchange):

@@ -29,7 +29,7 @@ _NEEDED: Final = {
     "contact": mujoco.mjtDisableBit.mjDSBL_CONTACT,
     "actuation": mujoco.mjtDisableBit.mjDSBL_ACTUATION,
 }
-"""What a file must not disable: no finger would move, or nothing would be met."""
+"""Flags that a file must not disable: no finger would move, or nothing would be met."""
 _CLEARANCE: Final = 0.006
 """Distance in metres between the table and the lowest point that the fingertips reach."""
 _FRICTION: Final = (0.6, 0.005, 0.0001)

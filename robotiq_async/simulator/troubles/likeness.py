@@ -75,7 +75,7 @@ class Server(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Likeness:
-    """What a report tells of a gripper and its link, as far as a simulator can have it. Immutable.
+    """The figures of a gripper and its link in a report, as far as a simulator can have it. Immutable.
 
     Attributes:
         model: of the gripper.

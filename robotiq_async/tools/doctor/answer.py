@@ -60,7 +60,7 @@ class Answering(NamedTuple):
 
 
 STRANGER: Final = "gripper"
-"""What a finding is about if a device answers that is no gripper."""
+"""The subject of a finding if a device answers that is no gripper."""
 
 
 async def find_gripper(address: Address, usual: RegisterMap, report: ReportFinding) -> Answering:

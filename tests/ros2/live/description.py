@@ -38,7 +38,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def read(program: Path, text: str, folder: Path) -> Any:
-    """What the parser makes of a URDF, if it takes it without a word."""
+    """The robot that the parser makes of a URDF, if it takes it without a word."""
     file = folder / "robot.urdf"
     file.write_text(text, encoding="utf-8")
     answer = subprocess.run([program, file], capture_output=True, text=True, check=True)

@@ -14,7 +14,7 @@ from ....wording import STATE_WORDS
 from ..mirror import HandMirror
 
 MOTION_BUTTONS: Final = ("open", "close", "wide", "normal", "pinch", "move", "force", "speed")
-"""What is a command for the state machine."""
+"""The buttons that are a command for the state machine."""
 TRIGGERS: Final = MappingProxyType(
     {
         **dict.fromkeys(MOTION_BUTTONS, Trigger.ASK_COMMAND),
@@ -23,7 +23,7 @@ TRIGGERS: Final = MappingProxyType(
         "release": Trigger.ASK_RELEASE,
     }
 )
-"""What each button asks of the state machine. Recover is steps, and permit asks nothing of it."""
+"""The trigger of each button. Recover is steps, and permit asks nothing of it."""
 HELPS: Final = MappingProxyType(
     {State.FAULT: "recover", State.ATR_DONE: "reset", State.RESET: "activate"},
 )

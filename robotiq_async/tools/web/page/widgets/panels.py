@@ -48,7 +48,7 @@ class StatePanel:
 
 
 class Banner:
-    """What needs a person, above everything: an inhibit or a fault, and the button that helps.
+    """Calls for a person, above everything: an inhibit or a fault, and the button that helps.
 
     ``ask`` opens the question of an action; a page that only watches has none.
     """

@@ -71,7 +71,7 @@ def fault_words(hand: HandMirror) -> tuple[str, bool]:
 
 
 def banner_words(hand: HandMirror) -> str:
-    """What needs a person, in a sentence: an inhibit, a fault, a reset."""
+    """The call for a person, in a sentence: an inhibit, a fault, a reset."""
     if hand.inhibited is not None:
         since = timed("", hand.inhibited.since).partition(".")[0]
         return f"{hand.inhibited}, since {since}"
