@@ -32,7 +32,7 @@ LONG_EVERY: Final = 8
 SLACK: Final = 4.0
 """A question waits for so many times as long as the slowest answer of late."""
 FADES: Final = 0.98
-"""What is left of the slowest answer after the next one."""
+"""The share of the slowest answer that is left after the next one."""
 SOON: Final = 4
 """Misses of a link that is not lost yet."""
 SOON_S: Final = 0.1
