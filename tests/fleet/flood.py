@@ -1,7 +1,8 @@
 """An operator beside a flood: what it gets done, the time of a halt, and whether its lease lasts.
 
 ``python -m tests.fleet.flood [SECONDS] [KIND...]``. A gripper, its agent, an operator and a flooder, each a
-process. The flood runs in every second block of BLOCK_S, so that what else happens on the machine is in both.
+process. In every second block of BLOCK_S the flood goes to the operator's agent, and in the others to another
+agent of this machine: so what the flood itself takes, and what else happens here, is in both.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from tests.grippers import active_gripper
 
 FLOOD: Final = "tests.fleet.flood"
 BLOCK_S: Final = 2.0
-HALT_EVERY_S: Final = 0.2
+HALT_EVERY_S: Final = 0.1
 TICK_S: Final = 0.01
 WAIT_S: Final = 0.3
 """For which a flooder waits for an answer, which it does not read."""
@@ -106,27 +107,29 @@ async def operator(endpoint: str, keys: str, begun: str, seconds: str) -> None:
     say(json.dumps({"calls": calls, "lost": lost}))
 
 
-async def flooder(endpoint: str, keys: str, kind: str, begun: str, seconds: str) -> None:
+async def flooder(endpoint: str, other: str, keys: str, kind: str, begun: str, seconds: str) -> None:
     _, rate, key, arguments = KINDS[kind]
     folder = Path(keys) / "read-alice" if keys else None
-    bus = await open_bus(client_configuration([endpoint], keys=folder), endpoint)
+    buses = [await open_bus(client_configuration([each], keys=folder), each) for each in (other, endpoint)]
     start, until, sent, due = float(begun), float(begun) + float(seconds), 0, 0.0
     say("ready")
     while (now := time.monotonic()) < until:
-        due = due + rate * TICK_S if is_flooded(now, start) else 0.0
+        bus = buses[is_flooded(now, start)]
+        due += rate * TICK_S if now > start else 0.0
         for _ in range(int(due)):
             sent += 1
             call = Call(LEFT.base, f"x{sent}", number=sent, arguments=arguments)
             bus.ask(key(sent), call.pack(), timeout=WAIT_S, urgency=Urgency.COMMAND)
         due -= int(due)
         await asyncio.sleep(max(0.0, now + TICK_S - time.monotonic()))
-    await bus.close()
+    for bus in buses:
+        await bus.close()
     say(json.dumps({"sent": sent}))
 
 
-async def started(role: str, *words: str, nice: int = 0, **environment: str) -> tuple[Process, str]:
+async def started(role: str, *words: str, **environment: str) -> tuple[Process, str]:
     process = await asyncio.create_subprocess_exec(
-        *("nice", "-n", str(nice), sys.executable, "-m", FLOOD, role, *words),
+        *(sys.executable, "-m", FLOOD, role, *words),
         cwd=ROOT,
         env=os.environ | environment,
         stdout=PIPE,
@@ -143,20 +146,21 @@ def make_keys(folder: Path) -> None:
 
 async def flood(kind: str, seconds: float) -> dict[str, Any]:
     has_keys = KINDS[kind][0]
-    endpoint = f"{'tls' if has_keys else 'tcp'}/127.0.0.1:{free_port()}"
+    endpoint, other = [f"{'tls' if has_keys else 'tcp'}/127.0.0.1:{free_port()}" for _ in range(2)]
     running: list[Process] = []
     with tempfile.TemporaryDirectory() as folder:
         keys = f"{folder}/keys" if has_keys else ""
         if keys:
             make_keys(Path(keys))
         try:
-            one, address = await started("gripper")
-            running.append(one)
-            running.append((await started("agent", endpoint, address, keys, STATE_DIRECTORY=folder))[0])
-            times = (str(time.monotonic() + 8.0), str(seconds))
+            for each in (endpoint, other):
+                one, address = await started("gripper")
+                state = f"{folder}/{each.rpartition(':')[2]}"
+                served, _ = await started("agent", each, address, keys, STATE_DIRECTORY=state)
+                running += [one, served]
+            times = (str(time.monotonic() + 12.0), str(seconds))
             asking, _ = await started("operator", endpoint, keys, *times)
-            # Its own work shall not take the place of what it does to the agent.
-            flooding, _ = await started("flooder", endpoint, keys, kind, *times, nice=5)
+            flooding, _ = await started("flooder", endpoint, other, keys, kind, *times)
             running += [asking, flooding]
             said = json.loads((await asking.communicate())[0].splitlines()[-1])
             sent = json.loads((await flooding.communicate())[0].splitlines()[-1])["sent"]
@@ -165,7 +169,7 @@ async def flood(kind: str, seconds: float) -> dict[str, Any]:
                 if process.returncode is None:
                     process.kill()
                     await process.wait()
-    return {"kind": kind, "asked/s": round(2 * sent / seconds), **judged(said)}
+    return {"kind": kind, "asked/s": round(sent / seconds), **judged(said)}
 
 
 def judged(said: dict[str, Any]) -> dict[str, Any]:
