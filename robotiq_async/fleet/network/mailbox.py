@@ -129,7 +129,13 @@ class ReplySender:
     that.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, pause: float = 0.0) -> None:
+        """``pause`` is in seconds: replies of so long a time go out together.
+
+        Each time that the thread wakes, the event loop may wait for the interpreter. On a busy machine that
+        lasts as long as the thread is kept from the processor.
+        """
+        self._pause = pause
         self._waiting: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         self._thread: threading.Thread | None = None
 
@@ -151,4 +157,6 @@ class ReplySender:
 
     def _run(self) -> None:
         while (send := self._waiting.get()) is not None:
+            if self._pause and self._waiting.empty():
+                time.sleep(self._pause)
             send()

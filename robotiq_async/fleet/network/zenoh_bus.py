@@ -33,6 +33,7 @@ from .mailbox import Mailbox, ReplySender
 
 CLOSE_S: Final = 1.0  # seconds for closing a session
 LAST_ANSWERS_S: Final = 0.2  # seconds to send the answers to requests that are cancelled at the end
+DROP_EVERY_S: Final = 0.02  # seconds: what is dropped is reported to its clients so often
 LONGEST: Final = 4096  # bytes of a request; a longer one is dropped unread
 _PRIORITY: Final = {
     Urgency.STOP: zenoh.Priority.REAL_TIME,
@@ -109,7 +110,7 @@ class ZenohBus:
         self._repliers = {
             kind: ReplySender() for kind in (Kind.HALT, Kind.REQUEST, Kind.OTHERS, Kind.QUESTION)
         }
-        self._dropping = ReplySender()
+        self._dropping = ReplySender(pause=DROP_EVERY_S)
         self._closing: asyncio.Future[None] | None = None
 
     def publisher(self, key: str, urgency: Urgency) -> Callable[[bytes], None]:
