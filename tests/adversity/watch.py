@@ -6,6 +6,7 @@ import asyncio
 import gc
 import selectors
 import time
+from collections import deque
 from collections.abc import Iterator
 
 from robotiq_async.values.model import Model
@@ -62,6 +63,7 @@ class WriteWatch:
         self._model = model
         self._past: list[set[AxisRequest]] = []
         self._number = 0
+        self._newest: deque[str] = deque(maxlen=20)
         self.forget()
 
     def next_settings(self) -> tuple[int, int]:
@@ -79,6 +81,7 @@ class WriteWatch:
         images, world.gripper.images = world.gripper.images, []
         for registers, positions in images:
             image = Request.from_registers(registers, self._model)
+            self._newest.append(f"{registers[:3]} at {positions}")
             if not image.go:
                 # No request moves an axis; and the next one must not be the one that was halted.
                 self._last = [None] * len(self._model.axes)
@@ -91,6 +94,7 @@ class WriteWatch:
                 if request in self._past[at] and not stays:
                     axis = self._model.axes[at]
                     yield f"{axis!r}, at {position}, was asked again for what it was before: {request}"
+                    yield f"after {' | '.join(self._newest)}"
                 self._past[at].add(request)
                 self._last[at] = request
 
