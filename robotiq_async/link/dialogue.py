@@ -24,13 +24,12 @@ from collections.abc import Callable, Generator, Sequence
 from typing import Final
 
 from ..runtime.log import Log
-from ..values import registers as reg
 from ..values.errors import ResponseTimeoutError, RobotiqConnectionError
-from ..values.model import TOLERANCE
 from ..values.registers import REGISTER_COUNT, RegisterMap, Registers
 from . import transport
 from .exchange import Answer, Exchange, Timing
 from .frames import read_request, registers_in, write_and_read_request, write_request
+from .in_force import image_in_force
 from .line import Dialogue, Line, Step
 from .outcome import Noise, Outcome, Refused, Silent
 
@@ -40,12 +39,6 @@ USUAL_RESPONSE_S: Final = 0.4
 """A longer response timeout means a slow line: a repeated read then gets that timeout instead of REPEAT_S."""
 SHORT_READS: Final = 3
 """Reads after the short silence, at opening, before a line is trusted with it."""
-AT_TARGET: Final = 3
-"""gOBJ of a jaw that has come to its target and holds nothing."""
-ACTIVE: Final = 3
-"""gIMC of a jaw that is active."""
-ECHOED: Final = 0x0900
-"""The bits of the first register that a request and a status share: activation and go."""
 MOST_UNANSWERED: Final = 3
 UNANSWERED_S: Final = 60.0
 """With so many unanswered reads in so many seconds, a line gets the longer silence."""
@@ -160,7 +153,7 @@ class Dialogues:
         which it would decide is too old.
         """
         yield from self._ready()
-        if self.serves_23 is None and (in_force := self._image_in_force()):
+        if self.serves_23 is None and (in_force := self._to_try()):
             came_to = yield from self._tried(in_force)
             if isinstance(came_to, Outcome) and not isinstance(came_to, Refused):
                 yield from self._again(came_to)
@@ -232,25 +225,9 @@ class Dialogues:
             self._note_unheard(came_to)
         return came_to
 
-    def _image_in_force(self) -> Sequence[int]:
-        """The image of a jaw that stands still: written again, it moves nothing. Empty if there is none.
-
-        It is the last one of this link, if the jaw shows it. Before the first one it is made of what the jaw
-        shows, which is at its target or stopped: it holds nothing, so speed and force do not matter.
-        """
-        shown, image = self._status, self._image
-        if not shown or self._map.count == REGISTER_COUNT or reg.gFLT.read(shown):
-            return ()
-        goes, at_rest = reg.gGTO.read(shown), reg.gOBJ.read(shown)
-        if image is None:
-            target = reg.gPR[0].read(shown)
-            is_there = at_rest == AT_TARGET and abs(target - reg.gPO[0].read(shown)) <= TOLERANCE
-            is_active = reg.gACT.read(shown) and reg.gIMC.read(shown) == ACTIVE
-            adopted = (shown[0] & ECHOED, target, 0, 0, 0, 0, 0, 0)
-            return adopted if is_active and (is_there or not goes) else ()
-        pairs = (reg.gACT, reg.rACT), (reg.gGTO, reg.rGTO), (reg.gPR[0], reg.rPR[0])
-        shows = image and all(echo.read(shown) == field.read(image) for echo, field in pairs)
-        return image if shows and not (goes and not at_rest) and not reg.rATR.read(image) else ()
+    def _to_try(self) -> Sequence[int]:
+        """The image with which function 23 may be tried, or empty."""
+        return image_in_force(self._status, self._image) if self._map.count < REGISTER_COUNT else ()
 
     def _again(self, first: Answer | None) -> Dialogue[bytes]:
         assert isinstance(first, Outcome)

@@ -1,0 +1,49 @@
+"""The image in force of a jaw that stands still: written again, it moves nothing. Pure.
+
+A link tries function 23 with it (dialogue.py). It is the last image that this link wrote, if the jaw shows
+it. Before the first one it is made of what the jaw shows. Then the jaw must be stopped, or within 2 counts of
+its target without a contact: it holds nothing, so speed and force do not matter until a command.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from ..values import registers as reg
+from ..values.model import TOLERANCE
+from ..values.registers import Registers
+
+AT_TARGET: Final = 3
+"""gOBJ of a jaw that has come to its target and holds nothing."""
+ACTIVE: Final = 3
+"""gIMC of a jaw that is active."""
+ECHOED: Final = 0x0900
+"""The bits of the first register that a request and a status share: activation and go."""
+_ECHOES: Final = ((reg.gACT, reg.rACT), (reg.gGTO, reg.rGTO), (reg.gPR[0], reg.rPR[0]))
+
+
+def image_in_force(shown: Registers, written: Sequence[int] | None) -> Sequence[int]:
+    """The image that may be written again, or empty.
+
+    Args:
+        shown: the newest status of a jaw; empty if there is none.
+        written: the last image that was acknowledged; empty after one that was not, None before the first.
+    """
+    if not shown or reg.gFLT.read(shown):
+        return ()
+    if written is None:
+        return _image_of(shown)
+    if not written or reg.rATR.read(written) or (reg.gGTO.read(shown) and not reg.gOBJ.read(shown)):
+        return ()
+    return written if all(echo.read(shown) == field.read(written) for echo, field in _ECHOES) else ()
+
+
+def _image_of(shown: Registers) -> Sequence[int]:
+    """The request that an adopted jaw shows, or empty."""
+    target = reg.gPR[0].read(shown)
+    is_there = reg.gOBJ.read(shown) == AT_TARGET and abs(target - reg.gPO[0].read(shown)) <= TOLERANCE
+    stands = is_there or not reg.gGTO.read(shown)
+    if not (stands and reg.gACT.read(shown) and reg.gIMC.read(shown) == ACTIVE):
+        return ()
+    return (shown[0] & ECHOED, target, 0, 0, 0, 0, 0, 0)
