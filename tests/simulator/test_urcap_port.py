@@ -57,7 +57,10 @@ async def port() -> AsyncIterator[Port]:
         (b"GET STA\n", b"STA 3\n"),
         (b"GET VER\n", b"VER DCU-2.0.0\n"),
         (b"GET DRI\n", b"DRI RUNNING\n"),
-        (b"GET SNU\n", b"SNU 0\n"),
+        *(
+            (b"GET %s\n" % name, b"%s 0\n" % name)
+            for name in (b"SNU", b"FWV", b"NCY", b"MOD", b"MSC", b"VST")
+        ),
         (b"GET XYZ\n", b"?"),
     ],
 )

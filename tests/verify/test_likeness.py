@@ -224,6 +224,13 @@ def test_an_empty_report_is_the_usual_gripper() -> None:
     assert not likeness.unknown
 
 
+@pytest.mark.parametrize(("units", "device_id"), [([0, 1, 9, 255], None), ([9], 9)])
+def test_a_gripper_that_answers_as_any_unit_does_so_again(units: list[int], device_id: int | None) -> None:
+    """A program with another unit than that of the report was not answered."""
+    report = _checks_of(read__others={"units": units}) | {"registers": {"device_id": 9}}
+    assert Likeness.from_report(report).device_id == device_id
+
+
 def test_what_no_simulator_can_have_is_named() -> None:
     likeness = Likeness.from_report(_checks_of(stop__resume={}, host__timer={}, read__silence={}))
     assert likeness.unknown == ("stop.resume",)

@@ -80,7 +80,7 @@ class Likeness:
     Attributes:
         model: of the gripper.
         link: "tcp", "rtu", "rtu+tcp", "urcap" or "tunnel".
-        device_id: the unit id that answered; None if the report has none.
+        device_id: the only unit id that answered; None if several did, or the report has none.
         habits: its habits.
         motion: its motion in time; None for the usual one.
         ends: its readings open, and closed with the least force; None for the usual ones.
@@ -189,7 +189,7 @@ class _Reading:
         return Likeness(
             self._model,
             self._link,
-            self._registers.get("device_id"),
+            self._device_id(),
             habits,
             self._motion(),
             self._ends() if is_jaw else None,
@@ -215,6 +215,10 @@ class _Reading:
         return bool(self._checks.get(check, {}).get("verdict") == "differs")
 
     # -- the gripper -----------------------------------------------------------------------------------------
+
+    def _device_id(self) -> int | None:
+        several = len(self._figure("read.others", "units") or ()) > 1
+        return None if several else self._registers.get("device_id")
 
     def _habits(self) -> Habits:
         activation, lag = self._figure("activation.time", "seconds"), self._seconds("axis.lag", "worst_ms")
