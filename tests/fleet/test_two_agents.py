@@ -121,6 +121,16 @@ async def test_a_halt_stops_both_and_says_so_only_then(here: Lab, reader: Remote
 
 
 @inside(lab)
+async def test_a_halt_is_done_although_another_agent_is_mute(here: Lab, hand: RemoteHand) -> None:
+    """Its gripper has stopped; of the other nobody knew when it was asked."""
+    async with another(here):
+        here.network.stream("client", "other agent").is_cut = True
+        await here.local.set_position(200, Finger.A)
+        await hand.halt()
+        assert not here.gripper.is_moving
+
+
+@inside(lab)
 async def test_the_halt_of_all_counts_agents_and_not_names(here: Lab) -> None:
     async with another(here), Fleet("lab", bus=here.network.bus("console")) as fleet:
         assert await fleet.halt_all() == {LEFT: "stopped"}

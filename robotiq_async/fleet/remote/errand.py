@@ -166,7 +166,7 @@ class Errand:
             await asyncio.wait(awaited, return_when=asyncio.FIRST_COMPLETED)
         if limit.is_over:
             self.fail(self._in_doubt)
-        elif not self.answered.done() or self.answered.cancelled():
+        if not self.answered.done() or self.answered.cancelled():
             raise NoAnswerError(self._name, self.verb, "the agent fell silent")
         said = self.answered.result()
         if isinstance(said, RobotiqError):
@@ -184,8 +184,9 @@ class Errand:
             # Of two agents both must confirm it.
             if _is_about(self.call, said):
                 self._confirmed.add(said.epoch)
-                missing = f"no answer from {self._agents - len(self._confirmed)} of {self._agents} agents"
-                self._in_doubt = NoAnswerError(self._name, self.verb, missing)
+                missing = self._agents - len(self._confirmed)
+                why = f"no answer from {missing} of {self._agents} agents"
+                self._in_doubt = NoAnswerError(self._name, self.verb, why) if missing > 0 else said
             return False
         return True
 
