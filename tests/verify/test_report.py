@@ -18,7 +18,7 @@ import pytest
 
 from robotiq_async import THREE_FINGER, TWO_FINGER_85, Model, RobotiqHand
 from robotiq_async.fleet.agent.agent_file import read_agent_file
-from robotiq_async.link.address import parse_address
+from robotiq_async.link.address import Address, parse_address
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_parameter
 from robotiq_async.simulator import SimulatorServer, Trouble
 from robotiq_async.tools.recording.recordings import read_recording
@@ -163,6 +163,8 @@ def test_the_address_is_hidden_everywhere() -> None:
     assert scrub({"a": [text, 3], "b": {"c": None}}) == {"a": [scrub(text), 3], "b": {"c": None}}
     scrub = Scrubber(parse_address("rtu:///dev/serial/by-id/usb-FTDI_A50285BI")).clean
     assert "A50285BI" not in scrub("rtu:///dev/serial/by-id/usb-FTDI_A50285BI did not answer within 0.4 s")
+    tunnel = Address("tunnel", "arm.example", 502, scheme="xarm", options=(("token", "s3cret"),))
+    assert Scrubber(tunnel).clean("arm.example refuses s3cret") == "HIDDEN refuses HIDDEN"
 
 
 # -- a disk that does not take it --------------------------------------------------------------------------

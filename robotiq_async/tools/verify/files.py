@@ -119,7 +119,7 @@ class Scrubber:
 
     def __init__(self, address: Address) -> None:
         names = [str(address), f"{address.host}:{address.port}" if address.port else "", address.host]
-        names += [platform.node(), os.path.expanduser("~")]
+        names += [platform.node(), os.path.expanduser("~"), *(value for _, value in address.options)]
         self._secrets = sorted({name for name in names if len(name) > 1}, key=len, reverse=True)
 
     def clean(self, what: T) -> T:
