@@ -285,7 +285,7 @@ def test_the_lines_to_paste_are_taken(tmp_path: Path, model: Model) -> None:
     assert hand.model is model
     file = tmp_path / "FLEET.toml"
     file.write_text('site = "lab"\n' + said["FLEET.toml"])
-    settings = read_agent_file(file).grippers["RECORDING_NAME"]
+    settings = read_agent_file(file).grippers["NAME"]
     assert settings.model is model
     assert {name: getattr(settings, name) for name in EVERY} == EVERY
     given = dict(re.findall(r"-p (\w+):=(\S+)", said["ROS 2"]))
