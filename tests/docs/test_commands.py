@@ -24,7 +24,7 @@ from tests.docs.prompts import NotForThisPromptError, command_prompt, powershell
 READ = [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
 COMMAND_LINE = build()
 OTHERS = {
-    *("cp", "curl", "export", "ls", "python3", "python3.12", "ros2", "socat", "source", "sudo"),
+    *("cp", "curl", "export", "ls", "printf", "python3", "python3.12", "ros2", "socat", "source", "sudo"),
     *("lerobot-record", "lerobot-replay", "lerobot-rollout", "lerobot-teleoperate", "lerobot-train"),
 }
 """Programs that are not ours: ``python3 -m venv``, and what ROS, LeRobot and the shell have."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import re
 import signal
 import sys
 from asyncio.subprocess import DEVNULL, PIPE, STDOUT
@@ -22,7 +21,6 @@ from tests.patience import patience
 
 PAGE = DOCS / "how-to" / "service.md"
 (PROGRAM,) = (each.text for each in blocks(read(PAGE), "python"))
-(UNIT,) = (each.text for each in blocks(read(PAGE), "ini"))
 
 
 @asynccontextmanager
@@ -90,9 +88,3 @@ async def test_it_waits_for_the_link_and_for_a_person(tmp_path: Path) -> None:
         process.send_signal(signal.SIGTERM)
         assert await process.wait() == 0
         assert not gripper.is_moving
-
-
-def test_the_unit_leaves_a_stop_its_time() -> None:
-    found = dict(re.findall(r"^(\w+)=(.*)$", UNIT, re.MULTILINE))
-    assert found["Type"] == "notify"
-    assert int(found["TimeoutStopSec"]) > 2
