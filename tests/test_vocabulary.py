@@ -18,46 +18,8 @@ SAME_ON_PURPOSE = {"RobotiqHand", "Stream", "RobotiqGripper"}
 OF_EACH = {"SECONDS"}
 """The limit of time that each stage of verify has."""
 # Those that wait for a better name.
-CLASSES_LEFT = {
-    "Answer",
-    "Call",
-    "Client",
-    "Controller",
-    "Course",
-    "Echo",
-    "Kind",
-    "Line",
-    "Link",
-    "Part",
-    "Patience",
-    "Questions",
-    "Reply",
-    "Setting",
-    "Table",
-    "Target",
-    "Write",
-}
-CONSTANTS_LEFT = {
-    "CLOSE_S",
-    "COMMAND_S",
-    "END_S",
-    "FORM",
-    "FORMS",
-    "HERE",
-    "KEPT",
-    "LONGEST",
-    "LOOK_S",
-    "LOOPBACK",
-    "OPENING",
-    "OPTIONS",
-    "REPEAT_S",
-    "REST_S",
-    "RETRY_S",
-    "SETTLE_S",
-    "SOON_S",
-    "TIMER_S",
-    "WINDOW_S",
-}
+CLASSES_LEFT = {"Answer", "Part"}
+CONSTANTS_LEFT = {"REST_S"}
 
 
 def public(name: str) -> bool:

@@ -19,7 +19,7 @@ RECENT_STATUS_S: Final = (
 SHORTEST_S: Final = 0.01  # that a stream can be limited to
 
 
-class Patience:
+class CallerPatience:
     """The seconds, 0.05..3600, that calls of a started blocking hand wait while the link is down."""
 
     def __init__(

@@ -37,7 +37,7 @@ from ..values.conventions import Convention
 from ..values.enums import Finger, State
 from ..values.errors import GripperFaultError, RobotiqConnectionError, RobotiqError
 from ..values.status import RobotiqStatus
-from .patience import Patience
+from .patience import CallerPatience
 from .protobuf import FieldValue, decoded, encoded
 
 try:
@@ -59,7 +59,7 @@ class GripperService:
 
     def __init__(self, hand: RobotiqHand) -> None:
         self._hand = hand
-        self._patience = Patience(hand, PATIENCE_S)
+        self._patience = CallerPatience(hand, PATIENCE_S)
         self._widths = Convention("polymetis", open=hand.units.mm(0) / 1000, closed=0.0)
         self._fingers = [axis for axis in hand.model.axes if axis is not Finger.SCISSOR]
         self.is_ready: threading.Event = threading.Event()

@@ -40,7 +40,7 @@ from ..values.errors import (
     RobotiqError,
 )
 from ..values.status import RobotiqStatus
-from .patience import Patience
+from .patience import CallerPatience
 
 TEXT_PORT: Final = 63352
 UR_REST_S: Final = 0.1  # the fingers have stopped if their positions stay for so long
@@ -80,7 +80,7 @@ class RobotiqGripper:
     def __init__(self, **options: Any) -> None:  # noqa: ANN401  # the hand checks them
         self._options = {"keep_grip": True, **options}
         self._hand: RobotiqHand | None = None
-        self._patience: Patience
+        self._patience: CallerPatience
         self._range = (OPEN, CLOSED)
         # Of the last move(): its target, the status before it, and when it is too late to send it again.
         self._target: int | None = None
@@ -106,7 +106,7 @@ class RobotiqGripper:
         bare = f"urcap://{hostname}:{check_int('port', port, 1, 65535)}?model=2f85"
         address = hostname if "://" in hostname else bare
         hand = RobotiqHand(address, **self._options)
-        patience = Patience(hand, socket_timeout, "socket_timeout")
+        patience = CallerPatience(hand, socket_timeout, "socket_timeout")
         hand.add_listener(self._see)
         hand.start(activate=False)
         self._hand, self._patience, self._target = hand, patience, None

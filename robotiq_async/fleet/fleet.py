@@ -28,7 +28,7 @@ from .wire.values import read_inhibit, reading, words
 
 LOOK_S: Final = 0.5  # seconds to wait for the tokens of agents
 LOOK_AGAIN_S: Final = 0.1  # seconds until the next look for agents, during a halt
-SETTLE_S: Final = 2.0  # seconds after which the links to all agents that can be reached are up
+FLEET_SETTLE_S: Final = 2.0  # seconds after which the links to all agents that can be reached are up
 STOPPED: Final = "stopped"
 
 
@@ -181,7 +181,7 @@ class Fleet:
                     if (name, member.agents) not in halting:
                         work = halt(bus, name, member.agents, inhibit)
                         halting[name, member.agents] = asyncio.ensure_future(work)
-                if now() - self._entered_at >= SETTLE_S:
+                if now() - self._entered_at >= FLEET_SETTLE_S:
                     break
                 await asyncio.sleep(LOOK_AGAIN_S)
             outcomes: dict[GripperName, str] = {}

@@ -70,7 +70,7 @@ NOTHING_SPECIAL: Final = Simulation()
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class LineSettings:
     """The settings of a serial port. It sends 8 data bits, as Modbus RTU wants them.
 
     Attributes:
@@ -89,18 +89,18 @@ class Line:
         return (9 + (self.parity != "N") + self.stopbits) / self.baud
 
     def __str__(self) -> str:
-        usual = Line()
+        usual = LineSettings()
         given = [name for name in LINE_OPTIONS if getattr(self, name) != getattr(usual, name)]
         return "?" + "&".join(f"{name}={getattr(self, name)}" for name in given) if given else ""
 
 
-USUAL_LINE: Final = Line()
+USUAL_LINE: Final = LineSettings()
 USUAL: Final = "without them 115200 baud, 8N1, as a gripper comes"
 
 
-Kind = Literal["tcp", "rtu", "rtu+tcp", "urcap", "sim", "tunnel"]
+LinkKind = Literal["tcp", "rtu", "rtu+tcp", "urcap", "sim", "tunnel"]
 
-_SOCKETS: Final[dict[str, tuple[Kind, int | None]]] = {
+_SOCKETS: Final[dict[str, tuple[LinkKind, int | None]]] = {
     "tcp": ("tcp", TCP_PORT),
     "rtu+tcp": ("rtu+tcp", None),
     "urcap": ("urcap", URCAP_PORT),
@@ -126,11 +126,11 @@ class Address:
         options: those that are for the tunnel alone, names and values.
     """
 
-    kind: Kind
+    kind: LinkKind
     host: str = ""
     port: int = 0
     simulation: Simulation = NOTHING_SPECIAL
-    line: Line = USUAL_LINE
+    line: LineSettings = USUAL_LINE
     model: Model | None = None
     stroke: str | None = None
     scheme: str = ""
@@ -305,11 +305,11 @@ _WINDOWS_PATH: Final = "\\\\?\\"
 """The path of a serial port may begin with this on Windows."""
 
 
-def _device_and_line(text: str) -> tuple[str, Line]:
+def _device_and_line(text: str) -> tuple[str, LineSettings]:
     """Split DEVICE?baud=...&parity=...&stopbits=..."""
     device, mark, query = _split(text)
     given = _options(query if mark else None, LINE_OPTIONS, f" ({USUAL})")
-    return device, Line(
+    return device, LineSettings(
         baud=_baud(given["baud"]) if "baud" in given else BAUD,
         parity=_one_of("parity", given.get("parity", "N"), "N", "E", "O"),
         stopbits=int(_one_of("stopbits", given.get("stopbits", "1"), "1", "2")),

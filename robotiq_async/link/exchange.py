@@ -90,7 +90,7 @@ class PduExchange(Exchange):
         return self._expected.verdict(data) or Noise(ProtocolError(f"half an answer: {frames.show(data)}"))
 
 
-class Echo:
+class EchoFilter:
     """The echo of a line, as far as it is known.
 
     Attributes:
@@ -115,7 +115,7 @@ class SerialExchange(Exchange):
     their questions.
     """
 
-    def __init__(self, request: bytes, timing: Timing, echo: Echo, *, has_others: bool = False) -> None:
+    def __init__(self, request: bytes, timing: Timing, echo: EchoFilter, *, has_others: bool = False) -> None:
         super().__init__(frames.serial_frame(request), timing)
         self._echo = echo
         self._has_others = has_others

@@ -38,7 +38,7 @@ from ..runtime.log import Log, log
 from ..values.errors import ConnectFailedError, ConnectionLostError, ProtocolError, RobotiqConnectionError
 from .address import Address
 from .canonical import canonical_address
-from .exchange import Answer, Echo, Exchange
+from .exchange import Answer, EchoFilter, Exchange
 from .frames import stray
 from .outcome import Lost, Noise, Outcome, Refused, Stray
 from .patience import Patience
@@ -119,7 +119,7 @@ class Line:
         self.forgives: bool = address.is_rtu
         self.keeps_silence: bool = address.kind == "rtu"
         self.silence: Silence = Silence(address.line.character_s)
-        self.echo: Echo = Echo()
+        self.echo: EchoFilter = EchoFilter()
         self.address: Final = address
         self._wire: Final = wire or wire_to(address)
         self._stray: Final = stray

@@ -35,8 +35,8 @@ FADES: Final = 0.98
 """The share of the slowest answer that is left after the next one."""
 SOON: Final = 4
 """Misses of a link that is not lost yet."""
-SOON_S: Final = 0.1
-REST_S: Final = 1.0
+TURN_SOON_S: Final = 0.1
+LINE_REST_S: Final = 1.0
 """A hand that stops has time for one try at least."""
 
 
@@ -67,7 +67,7 @@ class Patience:
     def missed(self, user: object, now: float) -> None:
         """There was no answer."""
         misses = 1 + (self._silent[user].misses if user in self._silent else 0)
-        rest = 0.0 if misses == 1 else SOON_S if misses <= SOON else REST_S
+        rest = 0.0 if misses == 1 else TURN_SOON_S if misses <= SOON else LINE_REST_S
         self._silent[user] = _Silent(misses, now + rest)
 
     def answered(self, user: object, now: float) -> None:

@@ -32,7 +32,7 @@ from .address import Address
 from .outcome import Lost, Outcome
 from .serial_ports import GONE, hasten, why_no_port
 
-Client = AsyncModbusTcpClient | AsyncModbusSerialClient
+ModbusClient = AsyncModbusTcpClient | AsyncModbusSerialClient
 AsyncioTransport = Any
 """Of a connection: one of asyncio's, or pymodbus's for serial ports, which is not typed."""
 Send = Callable[[bytes], None]
@@ -45,19 +45,19 @@ KEEPALIVE: Final = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 5}
 """TCP keepalive: seconds of silence before the first probe, seconds between probes, probes without an answer.
 A polling hand is never that silent. But while its program is suspended (a debugger, a sleeping machine),
 nothing else shows either end that the other is gone."""
-OPTIONS: Final[dict[str, Any]] = {"retries": 0, "reconnect_delay": 0}
+CLIENT_OPTIONS: Final[dict[str, Any]] = {"retries": 0, "reconnect_delay": 0}
 
-Table = Mapping[type[Exception], Callable[[Any], str]]
+ErrorTable = Mapping[type[Exception], Callable[[Any], str]]
 """The reason to show for each kind of error that a call may raise; the first kind that fits counts."""
-RESOLVING: Final[Table] = {
+RESOLVING: Final[ErrorTable] = {
     OSError: lambda error: f"the name cannot be resolved: {error.strerror or error}",
     Exception: lambda error: f"the name cannot be resolved: {error}",  # no host name, or no thread for it
 }
-CONNECTING: Final[Table] = {
+CONNECTING: Final[ErrorTable] = {
     OSError: lambda error: why_no_socket() or why_unreachable(error),
     Exception: lambda error: str(error) or repr(error),
 }
-OPENING: Final[Table] = {
+OPENING_ERRORS: Final[ErrorTable] = {
     ImportError: lambda _: f"serial ports need pyserial: {install('serial')}",
     OSError: why_no_port,
     Exception: lambda error: str(error) or repr(error),
@@ -93,7 +93,7 @@ def wire_to(address: Address) -> Wire:
 
 
 @contextlib.contextmanager
-def failing_as(table: Table, address: Address) -> Iterator[None]:
+def failing_as(table: ErrorTable, address: Address) -> Iterator[None]:
     """Turn what a call raises into a ConnectFailedError."""
     try:
         yield
@@ -107,7 +107,7 @@ def failing_as(table: Table, address: Address) -> Iterator[None]:
 class _ClientWire:
     """A connection of a pymodbus client."""
 
-    _client: Client | None = None
+    _client: ModbusClient | None = None
     _ending: str
     """How the end of the wire is told, after its address."""
 
@@ -124,7 +124,7 @@ class _ClientWire:
         return Lost(ConnectionLostError(f"{self._address}{self._ending}"))
 
     async def _connect(
-        self, make: Callable[[OnConnection], Client], on_data: OnData, on_end: OnEnd
+        self, make: Callable[[OnConnection], ModbusClient], on_data: OnData, on_end: OnEnd
     ) -> AsyncioTransport:
         """Connect a client; return its asyncio transport."""
         made = asyncio.get_running_loop().create_future()
@@ -168,8 +168,8 @@ class SocketWire(_ClientWire):
             *others, last = await addresses_of(address.host, address.port)
 
         async def connected(host: str) -> Send:
-            def make(on_connection: OnConnection) -> Client:
-                options = {**OPTIONS, "port": address.port, "trace_connect": on_connection}
+            def make(on_connection: OnConnection) -> ModbusClient:
+                options = {**CLIENT_OPTIONS, "port": address.port, "trace_connect": on_connection}
                 return AsyncModbusTcpClient(host, framer=framer, **options)
 
             send: Send = (await self._connect(make, on_data, on_end)).write
@@ -218,12 +218,12 @@ class SerialWire(_ClientWire):
         """Open the port with the settings of the address."""
         address, line = self._address, self._address.line
 
-        def make(on_connection: OnConnection) -> Client:
+        def make(on_connection: OnConnection) -> ModbusClient:
             form: dict[str, Any] = {"baudrate": line.baud, "parity": line.parity, "stopbits": line.stopbits}
-            options = {**OPTIONS, **form, "bytesize": 8, "trace_connect": on_connection}
+            options = {**CLIENT_OPTIONS, **form, "bytesize": 8, "trace_connect": on_connection}
             return AsyncModbusSerialClient(address.host, framer=FramerType.RTU, **options)
 
-        with failing_as(OPENING, address):
+        with failing_as(OPENING_ERRORS, address):
             import serial  # noqa: F401, PLC0415
 
             transport = await self._connect(make, on_data, on_end)

@@ -39,7 +39,7 @@ THREAD_NAME: Final = "robotiq_async"  # of the thread
 HOLD_AFTER_S: Final = 0.1
 """Seconds that an interrupted call has to end before the fingers are held: most calls hold what they moved
 themselves, and one that waits for a disk does not keep them moving."""
-LOOK_S: Final = 0.1  # between two checks that the loop still exists; on Windows Ctrl-C arrives only then
+LOOP_LOOK_S: Final = 0.1  # between two checks that the loop still exists; on Windows Ctrl-C arrives only then
 GIVE_UP_S: Final = 3.0  # for an interrupted call to end: stop() takes up to 2 s, a hold up to 1 s
 
 
@@ -295,7 +295,7 @@ class _Call(Generic[T]):
         while True:
             is_closed = loop.is_closed()
             with contextlib.suppress(Empty):
-                return self._ended.get(timeout=0 if is_closed else LOOK_S)
+                return self._ended.get(timeout=0 if is_closed else LOOP_LOOK_S)
             if is_closed:
                 return None
             if until is not None and time.monotonic() > until:

@@ -24,7 +24,7 @@ from robotiq_async.fleet import Agent, Fleet, GripperName, RemoteHand, Route
 from robotiq_async.fleet.network.bus import Query, Urgency
 from robotiq_async.fleet.network.configuration import agent_configuration, client_configuration
 from robotiq_async.fleet.network.zenoh_bus import ZenohBus, open_bus
-from robotiq_async.fleet.wire.envelope import Answer, unpack_call
+from robotiq_async.fleet.wire.envelope import AgentAnswer, unpack_call
 from robotiq_async.fleet.wire.status_message import StatusMessage
 from robotiq_async.hand import Hand
 from robotiq_async.values.statistics import Counters, percentile
@@ -265,7 +265,7 @@ def describe(question: Query) -> None:
     call = unpack_call(question.payload)
     of = GripperName.of_key(question.key)
     value = {"window": 1.0, "events": [], "epoch": 1, **summary(of)}
-    question.reply(Answer(of.base, call.number, 1, value).pack(), message(of, 0))
+    question.reply(AgentAnswer(of.base, call.number, 1, value).pack(), message(of, 0))
 
 
 def summary(of: GripperName) -> Figures:

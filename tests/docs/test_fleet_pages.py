@@ -17,7 +17,7 @@ from robotiq_async.fleet.agent.records import NoRecords
 from robotiq_async.fleet.agent.served_hand import COMMANDS, ServedHand
 from robotiq_async.fleet.control.lease import Lease
 from robotiq_async.fleet.wire import status_message
-from robotiq_async.fleet.wire.envelope import Answer, Call, failure
+from robotiq_async.fleet.wire.envelope import AgentAnswer, AgentCall, failure
 from robotiq_async.fleet.wire.names import ROOT
 from robotiq_async.fleet.wire.status_message import StatusMessage
 from robotiq_async.fleet.wire.values import request_fields, result_fields, transition_fields
@@ -63,8 +63,8 @@ RESULT: Final = MoveResult(
 IMAGE: Final = Request(activate=True, go=True, axes=(AxisRequest(100, 128, 64),) * 4)
 
 
-def call(number: int, lease: int = 3, **arguments: Any) -> Call:
-    return Call(NAME.base, CLIENT, EPOCH, lease, number, 812.4375, arguments)
+def call(number: int, lease: int = 3, **arguments: Any) -> AgentCall:
+    return AgentCall(NAME.base, CLIENT, EPOCH, lease, number, 812.4375, arguments)
 
 
 def event(index: int, what: dict[str, Any]) -> dict[str, Any]:
@@ -85,14 +85,16 @@ EXAMPLES: Final = [
     event(41, {"kind": "conflict", "key": NAME.key("alive", "77")}),
     event(42, {"kind": "inhibit", "stamp": 812.4375, "inhibited": INHIBIT.as_dict()}),
     json.loads(MOVE.pack()),
-    json.loads(Answer(NAME.base, 7, EPOCH, result_fields(RESULT)).pack()),
+    json.loads(AgentAnswer(NAME.base, 7, EPOCH, result_fields(RESULT)).pack()),
     json.loads(
         failure(
             MOVE, EPOCH, ControlLostError("the lease has ended (taken), ...", "taken"), begun=True
         ).pack(),
     ),
     json.loads(call(1, 0, what="acquire", label=LABEL).pack())["arguments"],
-    json.loads(Answer(NAME.base, 1, EPOCH, {"lease": 3, "window": 1.0, "settings": True}).pack())["value"],
+    json.loads(AgentAnswer(NAME.base, 1, EPOCH, {"lease": 3, "window": 1.0, "settings": True}).pack())[
+        "value"
+    ],
 ]
 """The objects in the order of the page."""
 

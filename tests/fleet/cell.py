@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 
 from robotiq_async import ConnectionLostError, Finger, RobotiqError, State
 from robotiq_async.fleet.network.bus import Urgency
-from robotiq_async.fleet.wire.envelope import Call, unpack_answer
+from robotiq_async.fleet.wire.envelope import AgentCall, unpack_answer
 from robotiq_async.values.errors import ControlLostError
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
@@ -470,7 +470,7 @@ async def move_slowly(here: World) -> asyncio.Task[str]:
     return doing.call
 
 
-async def ask(client: Client, verb: str, call: Call, key: str = "") -> RobotiqError | None:
+async def ask(client: Client, verb: str, call: AgentCall, key: str = "") -> RobotiqError | None:
     """Send a request by hand; return the error that refused it."""
 
     async def once() -> bytes:

@@ -24,7 +24,7 @@ from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.network.configuration import client_configuration
 from robotiq_async.fleet.network.zenoh_bus import open_bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.fleet.wire.envelope import Call
+from robotiq_async.fleet.wire.envelope import AgentCall
 from robotiq_async.simulator import SimulatorServer
 from robotiq_async.values.request import Request
 from tests.fleet.cuts import ENDPOINT, PROGRAMS, WAYS, Namespaces, kill, missing, report
@@ -97,7 +97,7 @@ async def curious() -> None:
         asked = []
         for _ in range(20):
             number += 1
-            call = Call("robotiq/v1/lab/cell/left", "curious", number=number)
+            call = AgentCall("robotiq/v1/lab/cell/left", "curious", number=number)
             asked.append(
                 bus.ask(f"{call.to}/info/{call.client}", call.pack(), timeout=0.2, urgency=Urgency.COMMAND)
             )

@@ -28,7 +28,7 @@ from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.network.configuration import agent_configuration, client_configuration
 from robotiq_async.fleet.network.zenoh_bus import open_bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.fleet.wire.envelope import Call
+from robotiq_async.fleet.wire.envelope import AgentCall
 from robotiq_async.simulator import SimulatorServer
 from tests.fleet.cuts import ROOT
 from tests.fleet.lab import LEFT
@@ -118,7 +118,7 @@ async def flooder(endpoint: str, other: str, keys: str, kind: str, begun: str, s
         due += rate * TICK_S if now > start else 0.0
         for _ in range(int(due)):
             sent += 1
-            call = Call(LEFT.base, f"x{sent}", number=sent, arguments=arguments)
+            call = AgentCall(LEFT.base, f"x{sent}", number=sent, arguments=arguments)
             bus.ask(key(sent), call.pack(), timeout=WAIT_S, urgency=Urgency.COMMAND)
         due -= int(due)
         await asyncio.sleep(max(0.0, now + TICK_S - time.monotonic()))

@@ -11,10 +11,10 @@ from typing import Any
 from robotiq_async import Finger, RobotiqHand
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.agent.records import Records
-from robotiq_async.fleet.network.bus import Reply, Urgency
+from robotiq_async.fleet.network.bus import BusReply, Urgency
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire import status_message
-from robotiq_async.fleet.wire.envelope import Answer, Call, unpack_answer, unpack_call
+from robotiq_async.fleet.wire.envelope import AgentAnswer, AgentCall, unpack_answer, unpack_call
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.fleet.wire.values import error_fields
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
@@ -79,7 +79,7 @@ class Lab:
         """The number of the lease, as in every status of the agent."""
         return status_message.unpack(self.agent.hands["left"].publisher.status_message()).lease
 
-    async def answer(self, verb: str, request: bytes) -> Answer:
+    async def answer(self, verb: str, request: bytes) -> AgentAnswer:
         """The agent's answer to a stranger's request."""
         bus = self.network.bus("stranger")
         reply = await bus.ask(LEFT.key(verb), request, timeout=1.0, urgency=Urgency.COMMAND)
@@ -160,17 +160,17 @@ class Spoiling(Between):
         bus: MemoryBus,
         verb: str = "/cmd/",
         *,
-        spoils: Callable[[Call], bool] = lambda _: True,
+        spoils: Callable[[AgentCall], bool] = lambda _: True,
         times: int = 1_000_000,
         answer: bytes | None = None,
         sends: bool = False,
     ) -> None:
         super().__init__(bus)
         self.left = times
-        self.commands: list[Call] = []
+        self.commands: list[AgentCall] = []
         self._verb, self._spoils, self._answer, self._sends = verb, spoils, answer, sends
 
-    def ask(self, key: str, payload: bytes, *, timeout: float, **how: Any) -> asyncio.Future[Reply | None]:
+    def ask(self, key: str, payload: bytes, *, timeout: float, **how: Any) -> asyncio.Future[BusReply | None]:
         call = unpack_call(payload)
         if "/cmd/" in key:
             self.commands.append(call)
@@ -182,7 +182,7 @@ class Spoiling(Between):
             self._bus.ask(key, payload, timeout=timeout, **how)
         return asyncio.ensure_future(self._spoiled(timeout))
 
-    async def _spoiled(self, timeout: float) -> Reply | None:
+    async def _spoiled(self, timeout: float) -> BusReply | None:
         if self._answer is None:
             await asyncio.sleep(timeout)
             return None
@@ -198,11 +198,11 @@ class Garbling(Between):
         self._others = others or {"value": None, "error": error_fields(TypeError("what?"))}
         self.verb = "nothing yet"
 
-    def ask(self, key: str, payload: bytes, **how: Any) -> asyncio.Future[Reply | None]:
+    def ask(self, key: str, payload: bytes, **how: Any) -> asyncio.Future[BusReply | None]:
         asking = self._bus.ask(key, payload, **how)
         return asyncio.ensure_future(self._garbled(asking)) if key.endswith(self.verb) else asking
 
-    async def _garbled(self, asking: asyncio.Future[Reply | None]) -> Reply | None:
+    async def _garbled(self, asking: asyncio.Future[BusReply | None]) -> BusReply | None:
         reply = await asking
         if reply is None:
             return None

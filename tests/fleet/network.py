@@ -17,10 +17,10 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from robotiq_async.fleet.network.bus import (
-    Kind,
+    BusReply,
+    MessageKind,
     PendingQuery,
     Query,
-    Reply,
     Undo,
     Urgency,
     is_any,
@@ -182,21 +182,21 @@ class _Query:
     """A request on its way to all who serve its key, until each has answered or is out of reach."""
 
     def __init__(
-        self, source: MemoryBus, targets: list[str], urgency: Urgency, decides: Callable[[Reply], bool]
+        self, source: MemoryBus, targets: list[str], urgency: Urgency, decides: Callable[[BusReply], bool]
     ) -> None:
         self.source = source
         self.asking = PendingQuery(decides)
         self._left = targets
         self._urgency = urgency
 
-    def carry_back(self, target: str, reply: Reply | None) -> None:
+    def carry_back(self, target: str, reply: BusReply | None) -> None:
         network = self.source.network
         size = 0 if reply is None else len(reply.payload) + len(reply.attachment)
         if not network.loop.is_closed():
             take = functools.partial(self.take, target, reply)
             network.carry(target, self.source, size, take, self._urgency)
 
-    def take(self, target: str, reply: Reply | None) -> None:
+    def take(self, target: str, reply: BusReply | None) -> None:
         """It is answered, or is not going to be."""
         if target in self._left:
             self._left.remove(target)
@@ -212,7 +212,7 @@ class _Query:
 
 
 class _Received:
-    def __init__(self, key: str, payload: bytes, reply: Callable[[Reply | None], None]) -> None:
+    def __init__(self, key: str, payload: bytes, reply: Callable[[BusReply | None], None]) -> None:
         self.key, self.payload, self._reply = key, payload, reply
         self._is_answered = False
 
@@ -286,7 +286,7 @@ class MemoryBus:
         self,
         expression: str,
         handler: Callable[[Query], None],
-        sort: Callable[[str, bytes], Kind | None] = is_request,
+        sort: Callable[[str, bytes], MessageKind | None] = is_request,
     ) -> Undo:
         return _entered(
             self.queryables,
@@ -300,13 +300,13 @@ class MemoryBus:
         *,
         timeout: float,
         urgency: Urgency,
-        decides: Callable[[Reply], bool] = is_any,
-    ) -> asyncio.Future[Reply | None]:
+        decides: Callable[[BusReply], bool] = is_any,
+    ) -> asyncio.Future[BusReply | None]:
         return asyncio.ensure_future(self._ask(key, payload, timeout, urgency, decides))
 
     async def _ask(
-        self, key: str, payload: bytes, timeout: float, urgency: Urgency, decides: Callable[[Reply], bool]
-    ) -> Reply | None:
+        self, key: str, payload: bytes, timeout: float, urgency: Urgency, decides: Callable[[BusReply], bool]
+    ) -> BusReply | None:
         network = self.network
         self.listen(key, payload)
         found = [

@@ -15,7 +15,7 @@ from zenoh.handlers import Callback
 
 from robotiq_async import RobotiqHand
 from robotiq_async.fleet.agent.agent import Agent
-from robotiq_async.fleet.network.bus import Kind, Query, Urgency
+from robotiq_async.fleet.network.bus import MessageKind, Query, Urgency
 from robotiq_async.fleet.network.configuration import (
     agent_configuration,
     client_configuration,
@@ -129,7 +129,7 @@ class Line:
 
         def tell(event: Any) -> None:
             is_there = event.kind == SampleKind.PUT
-            bus._mailbox.put((client.connected if is_there else client.disconnected).set, Kind.ANSWER)
+            bus._mailbox.put((client.connected if is_there else client.disconnected).set, MessageKind.ANSWER)
 
         listener = bus._session.info.declare_transport_events_listener(
             Callback(tell, indirect=False), history=True

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.fleet.agent.questions import EACH, Questions
+from robotiq_async.fleet.agent.questions import EACH, AgentQuestions
 from robotiq_async.fleet.control.admission import Admission
 from robotiq_async.fleet.control.lease import Holder, Lease
 from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.fleet.wire.envelope import Call
+from robotiq_async.fleet.wire.envelope import AgentCall
 from robotiq_async.values.errors import AgentError, ControlLostError
 from tests.fleet.lab import LEFT, Lab, lab
 from tests.virtual import inside
@@ -39,11 +39,11 @@ FLOOD = 8000
 # -- admission ---------------------------------------------------------------------------------------------
 
 
-def admission(holder: str = "anna", number: int = 1) -> tuple[Admission, Call]:
+def admission(holder: str = "anna", number: int = 1) -> tuple[Admission, AgentCall]:
     """An admission with a holder, and a call that is let in."""
     one = Admission(BASE, EPOCH, Lease(1.0))
-    lease = one.acquire(Call(BASE, holder, EPOCH, 0, number, NOW), holder)
-    return one, Call(BASE, holder, EPOCH, lease, number + 1, NOW)
+    lease = one.acquire(AgentCall(BASE, holder, EPOCH, 0, number, NOW), holder)
+    return one, AgentCall(BASE, holder, EPOCH, lease, number + 1, NOW)
 
 
 @pytest.mark.parametrize(
@@ -86,7 +86,7 @@ def test_under_a_lease_that_has_ended_says_why(reason: str) -> None:
     with pytest.raises(ControlLostError, match=f"ended .{reason}., no client commands") as caught:
         one.admit(call, NOW)
     assert caught.value.reason == reason
-    one.acquire(Call(BASE, "ben", EPOCH, 0, 1, NOW), "ben@cell")
+    one.acquire(AgentCall(BASE, "ben", EPOCH, 0, 1, NOW), "ben@cell")
     with pytest.raises(ControlLostError, match="ben@cell commands the gripper now"):
         one.admit(call, NOW)
     with pytest.raises(ControlLostError, match=r"^ben@cell commands the gripper$") as caught:
@@ -124,7 +124,7 @@ def test_a_bar() -> None:
 
 def test_a_repeated_request_for_the_lease() -> None:
     one = Admission(BASE, EPOCH, Lease(1.0))
-    asked = Call(BASE, "anna", EPOCH, 0, 5, NOW)
+    asked = AgentCall(BASE, "anna", EPOCH, 0, 5, NOW)
     assert not one.is_repeated(asked)
     one.acquire(asked, "anna")
     assert one.is_repeated(asked), "it has what it asked for"
@@ -139,7 +139,7 @@ def test_a_repeated_request_for_the_lease() -> None:
 def test_a_thousand_clients_are_remembered_and_not_more() -> None:
     one = Admission(BASE, EPOCH, Lease(1.0))
     for client in range(3000):
-        assert not one.is_repeated(Call(BASE, str(client), EPOCH, 0, 1, NOW))
+        assert not one.is_repeated(AgentCall(BASE, str(client), EPOCH, 0, 1, NOW))
     assert len(one._asked) <= 1000
 
 
@@ -169,7 +169,7 @@ def test_never_two_holders_and_never_an_old_lease(steps: list[tuple[str, str, in
     for what, client, old, leases_old, heard in steps:
         number += 1
         lease = model.given.get(client, 0) - leases_old
-        call = Call(BASE, client, EPOCH, max(0, lease), number - old, now + heard)
+        call = AgentCall(BASE, client, EPOCH, max(0, lease), number - old, now + heard)
         has_expired = model.holder is not None and now > model.proven + 1.0
         assert one.lease.has_expired(now) == has_expired
         if has_expired:
@@ -266,7 +266,7 @@ class Asked:
 
     def __init__(self) -> None:
         self.at = 1.0
-        self.questions = Questions(lambda: self.at)
+        self.questions = AgentQuestions(lambda: self.at)
 
     def read(self, who: str, count: int = FLOOD, step: float = 0.0) -> int:
         """How many are read of those that a client sends, so many seconds from one to the next."""
@@ -294,7 +294,7 @@ def test_the_memory_is_bounded() -> None:
 
 def test_dropped_questions_are_logged_now_and_then(caplog: pytest.LogCaptureFixture) -> None:
     at = 1.0
-    questions = Questions(lambda: at)
+    questions = AgentQuestions(lambda: at)
     with caplog.at_level(logging.WARNING):
         for _ in range(3000):  # for 15 s
             questions.sort("")
@@ -322,7 +322,7 @@ async def flood(here: Lab) -> int:
     """Send questions for half a second; return the number of answers."""
     bus, answers = here.network.bus("flooding"), []
     for number in range(FLOOD // 16):
-        call = Call(LEFT.base, "curious", number=number)
+        call = AgentCall(LEFT.base, "curious", number=number)
         answers += [
             bus.ask(LEFT.question("curious"), call.pack(), timeout=1.0, urgency=Urgency.COMMAND)
             for _ in range(8)

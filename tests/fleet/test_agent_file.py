@@ -14,7 +14,7 @@ from robotiq_async.fleet.agent.agent_file import (
     make_hand,
     read_agent_file,
 )
-from robotiq_async.fleet.network.configuration import LOOPBACK, LOOPBACK_TLS, agent_configuration
+from robotiq_async.fleet.network.configuration import LOOPBACK_ENDPOINT, LOOPBACK_TLS, agent_configuration
 from robotiq_async.fleet.wire.names import check_name
 from robotiq_async.values.calibration.csv_tables import write_stroke
 
@@ -39,7 +39,7 @@ def put_keys(folder: Path) -> Path:
 def test_the_least_there_can_be_listens_on_this_machine_only(tmp_path: Path) -> None:
     settings = read(tmp_path, f'site = "lab"\n{LEFT}')
     assert settings == AgentSettings("lab", settings.grippers)
-    assert (settings.listen, settings.connect, settings.keys) == ((LOOPBACK,), (), None)
+    assert (settings.listen, settings.connect, settings.keys) == ((LOOPBACK_ENDPOINT,), (), None)
     assert settings.host == machine_name() == check_name("host", settings.host)
 
 

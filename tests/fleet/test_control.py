@@ -17,7 +17,7 @@ from robotiq_async.fleet.agent import records
 from robotiq_async.fleet.agent.records import FileRecords, NoRecords, file_records
 from robotiq_async.fleet.control.lease import Holder, Lease
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.fleet.wire.envelope import Call
+from robotiq_async.fleet.wire.envelope import AgentCall
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.values.calibration.scales import SpeedCalibration
 from robotiq_async.values.errors import AgentError, ControlLostError
@@ -274,7 +274,7 @@ async def test_an_agent_that_is_ending_refuses_and_says_so(here: Lab, reader: Re
 @inside(lab)
 async def test_the_secret_of_the_holder_is_not_sent(here: Lab, reader: RemoteHand) -> None:
     async with here.client("first"):
-        answer = await here.answer("info/stranger", Call(LEFT.base, "stranger").pack())
+        answer = await here.answer("info/stranger", AgentCall(LEFT.base, "stranger").pack())
         assert b'"client"' not in answer.pack()
         assert reader.state is State.RUNNING_IDLE
 

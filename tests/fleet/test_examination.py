@@ -17,7 +17,7 @@ from robotiq_async.fleet.keys.access import Role
 from robotiq_async.fleet.keys.certificates import issue, make_authority
 from robotiq_async.fleet.network.bus import Query, Urgency
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.fleet.wire.envelope import Answer
+from robotiq_async.fleet.wire.envelope import AgentAnswer
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.hand.robotiq_hand import RobotiqHand
 from robotiq_async.simulator import SimulatorServer
@@ -191,7 +191,7 @@ async def examined_beside(said: Any) -> dict[str, Finding]:
         if isinstance(said, bytes):
             question.reply(said)
         elif said is not None:
-            question.reply(Answer(LEFT.base, number, 1, said).pack())
+            question.reply(AgentAnswer(LEFT.base, number, 1, said).pack())
 
     bus.serve(LEFT.key("info", "*"), hear)
     return await findings(str(LEFT), network.bus("doctor"))

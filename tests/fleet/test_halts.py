@@ -9,9 +9,9 @@ import pytest
 
 from robotiq_async import Finger, RobotiqError, State, StateTimeoutError
 from robotiq_async.fleet.fleet import Fleet
-from robotiq_async.fleet.network.bus import Reply
+from robotiq_async.fleet.network.bus import BusReply
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.fleet.wire.envelope import Answer, Call
+from robotiq_async.fleet.wire.envelope import AgentAnswer, AgentCall
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values import registers as reg
@@ -29,7 +29,7 @@ from tests.virtual import VirtualLoop, inside, until, virtual
 @inside(world)
 async def test_a_second_halt_is_not_dropped_as_a_duplicate(here: World) -> None:
     """strands-labs/robots 1617. The very same request, once more, stops what has been set going since."""
-    halt = Call(LEFT.base, "stranger", number=1)
+    halt = AgentCall(LEFT.base, "stranger", number=1)
     for _ in range(2):
         call = await move_slowly(here)
         assert await ask(here.other, "halt", halt) is None
@@ -155,7 +155,7 @@ class Denying(Between):
 
     copies = 0
 
-    def ask(self, key: str, payload: bytes, *, timeout: float, **how: Any) -> asyncio.Future[Reply | None]:
+    def ask(self, key: str, payload: bytes, *, timeout: float, **how: Any) -> asyncio.Future[BusReply | None]:
         if not key.endswith("/halt"):
             return self._bus.ask(key, payload, timeout=timeout, **how)
         self.copies += 1
@@ -261,7 +261,7 @@ async def test_a_cancelled_move_whose_axis_is_taken_over_does_not_go_on_with_the
 @inside(lab)
 async def test_a_cancelled_move_is_called_off_although_that_was_misrouted(here: Lab) -> None:
     """Any refusal counted as the end of the lease, and the fingers ran on under one that was renewed."""
-    answer = Answer("robotiq/v1/lab/cell/right", 3, 1, {}).pack()
+    answer = AgentAnswer("robotiq/v1/lab/cell/right", 3, 1, {}).pack()
     bus = Spoiling(here.network.bus("client"), "cmd/cancel", times=1, answer=answer)
     async with here.client_over(bus) as hand:
         await cut_off(hand)
@@ -272,7 +272,7 @@ async def test_a_cancelled_move_is_called_off_although_that_was_misrouted(here: 
 
 @inside(lab)
 async def test_a_move_whose_answer_was_anothers_is_called_off(here: Lab) -> None:
-    answer = Answer("robotiq/v1/lab/cell/right", 3, 1, {}).pack()
+    answer = AgentAnswer("robotiq/v1/lab/cell/right", 3, 1, {}).pack()
     bus = Spoiling(here.network.bus("client"), "cmd/move", answer=answer, sends=True)
     async with here.client_over(bus) as hand:
         with pytest.raises(AgentError, match="another answer"):

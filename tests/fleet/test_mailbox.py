@@ -10,7 +10,7 @@ from functools import partial
 
 import pytest
 
-from robotiq_async.fleet.network.bus import Kind
+from robotiq_async.fleet.network.bus import MessageKind
 from robotiq_async.fleet.network.mailbox import (
     GATHER_S,
     MOST,
@@ -37,7 +37,7 @@ class Postman:
         self.late: list[float] = []
         self.opened: list[int] = []
 
-    def bring(self, number: int, kind: Kind = Kind.TELEMETRY) -> None:
+    def bring(self, number: int, kind: MessageKind = MessageKind.TELEMETRY) -> None:
         self.mailbox.put(partial(self._open, number, self.loop.time()), kind)
 
     def _open(self, number: int, brought_at: float) -> None:
@@ -76,7 +76,7 @@ async def test_urgent_messages_do_not_wait_and_do_not_overtake() -> None:
         postman.bring(number)
         await asyncio.sleep(0.0001)
     postman.bring(22)
-    postman.bring(23, Kind.REQUEST)
+    postman.bring(23, MessageKind.REQUEST)
     await asyncio.sleep(0)
     await asyncio.sleep(0)
     assert postman.opened[-2:] == [22, 23]
@@ -90,7 +90,7 @@ async def test_urgent_messages_do_not_wait_and_do_not_overtake() -> None:
 @virtual
 async def test_a_letter_that_fails_keeps_no_other(caplog: pytest.LogCaptureFixture) -> None:
     postman = Postman()
-    postman.mailbox.put(partial(json.loads, "?"), Kind.TELEMETRY)
+    postman.mailbox.put(partial(json.loads, "?"), MessageKind.TELEMETRY)
     postman.bring(1)
     await asyncio.sleep(0.01)
     assert postman.opened == [1]
@@ -103,7 +103,7 @@ async def test_letters_of_another_thread() -> None:
     def work() -> None:
         for number in range(1000):
             postman.bring(number)
-        postman.mailbox.put(there.set, Kind.ANSWER)
+        postman.mailbox.put(there.set, MessageKind.ANSWER)
 
     thread = threading.Thread(target=work)
     thread.start()
@@ -117,7 +117,7 @@ def test_a_closed_loop_gets_no_messages() -> None:
     async def make() -> Mailbox:
         return Mailbox()
 
-    asyncio.run(make()).put(lambda: None, Kind.TELEMETRY)
+    asyncio.run(make()).put(lambda: None, MessageKind.TELEMETRY)
 
 
 @virtual
@@ -125,8 +125,8 @@ async def test_a_halt_comes_before_a_flood() -> None:
     """A reader that flooded the agent kept the halts of others waiting for seconds."""
     postman = Postman()
     for number in range(1000):
-        postman.bring(number, Kind.REQUEST)
-    postman.bring(-1, Kind.HALT)
+        postman.bring(number, MessageKind.REQUEST)
+    postman.bring(-1, MessageKind.HALT)
     await asyncio.sleep(0.1)
     assert postman.opened == [-1, *range(1000)]
 
@@ -135,8 +135,8 @@ async def test_a_halt_comes_before_a_flood() -> None:
 async def test_excess_messages_are_dropped_but_answers_are_not(caplog: pytest.LogCaptureFixture) -> None:
     postman = Postman()
     for number in range(MOST + 10):
-        postman.bring(number, Kind.REQUEST)
-    postman.bring(-1, Kind.ANSWER)
+        postman.bring(number, MessageKind.REQUEST)
+    postman.bring(-1, MessageKind.ANSWER)
     await asyncio.sleep(0.1)
     assert postman.opened == [*range(MOST), -1]
     assert "10 fleet messages dropped" in caplog.text
@@ -162,7 +162,7 @@ async def test_a_flood_leaves_the_loop_its_turns() -> None:
             asyncio.get_running_loop().call_soon(count)
 
     for _ in range(left):
-        mailbox.put(slow, Kind.REQUEST)
+        mailbox.put(slow, MessageKind.REQUEST)
     count()
     await done.wait()
     assert turns >= 50

@@ -27,7 +27,7 @@ from robotiq_async import (
     Transition,
 )
 from robotiq_async.fleet.wire import values
-from robotiq_async.fleet.wire.envelope import Answer, Call, failure, unpack_answer, unpack_call
+from robotiq_async.fleet.wire.envelope import AgentAnswer, AgentCall, failure, unpack_answer, unpack_call
 from robotiq_async.fleet.wire.status_message import SIZE, StatusMessage, unpack
 from robotiq_async.values import errors
 from robotiq_async.values.enums import Trigger
@@ -62,7 +62,7 @@ def trees(numbers: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
 GARBAGE = trees(st.integers() | st.floats())
 PLAIN = trees(st.integers(-(2**53), 2**53) | st.floats(allow_nan=False))
 CALLS = st.builds(
-    Call,
+    AgentCall,
     to=st.text(ANY, max_size=30),
     client=st.text(ANY, min_size=1, max_size=64),
     epoch=st.integers(0, 2**53),
@@ -71,7 +71,7 @@ CALLS = st.builds(
     seen=st.floats(allow_nan=False, allow_infinity=False),
     arguments=st.dictionaries(st.text(ANY, max_size=8), PLAIN, max_size=4),
 )
-CALL = Call("a", "me", 5, 6, 7, 8.5, {"speed": 9})
+CALL = AgentCall("a", "me", 5, 6, 7, 8.5, {"speed": 9})
 FIELDS = ["version", "to", "client", "epoch", "lease", "number", "seen", "arguments"]
 ODD: list[Any] = [
     *(None, True, -1, 0, 7, 10**400, 1.5, math.nan, math.inf, "", "x", "é" * 70),
@@ -120,20 +120,22 @@ MESSAGES = st.builds(
 @FEW
 @given(CALLS)
 @example(replace(CALL, seen=sys.float_info.max))
-def test_a_request(call: Call) -> None:
+def test_a_request(call: AgentCall) -> None:
     assert unpack_call(call.pack()) == call
 
 
 @FEW
-@given(st.builds(Answer, to=st.text(ANY), number=st.integers(0), epoch=st.integers(0, 2**53), value=PLAIN))
-def test_an_answer(answer: Answer) -> None:
+@given(
+    st.builds(AgentAnswer, to=st.text(ANY), number=st.integers(0), epoch=st.integers(0, 2**53), value=PLAIN)
+)
+def test_an_answer(answer: AgentAnswer) -> None:
     read = unpack_answer(answer.pack())
     assert read == answer
     assert read.outcome(instantly) == answer.value
 
 
 def test_the_answer_to_what_failed() -> None:
-    answer = unpack_answer(failure(Call("a", "me", number=7), 5, AgentError("no"), begun=False).pack())
+    answer = unpack_answer(failure(AgentCall("a", "me", number=7), 5, AgentError("no"), begun=False).pack())
     assert (answer.to, answer.number, answer.epoch) == ("a", 7, 5)
     with pytest.raises(AgentError, match="no"):
         answer.outcome(instantly)
@@ -166,10 +168,10 @@ def test_garbage(data: bytes) -> None:
         answer = unpack_answer(data)
     except (ProtocolError, AgentError):
         return
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, AgentAnswer)
 
 
-def answered(error: Any) -> Answer:
+def answered(error: Any) -> AgentAnswer:
     fields = {"version": 2, "to": "a", "number": 1, "epoch": 1, "value": 3, "error": error}
     return unpack_answer(json.dumps(fields).encode())
 
@@ -205,14 +207,14 @@ def test_huge_deep_or_empty_messages_are_refused(data: bytes) -> None:
 
 @pytest.mark.parametrize("seen", ["1" + "0" * 400, "1e999", "-1e999", "NaN", "true", '"1"', "null"])
 def test_a_malformed_time_is_refused(seen: str) -> None:
-    text = Call("a", "me", seen=0.125).pack().decode().replace("0.125", seen)
+    text = AgentCall("a", "me", seen=0.125).pack().decode().replace("0.125", seen)
     with pytest.raises(ProtocolError):
         unpack_call(text.encode())
 
 
 @pytest.mark.parametrize("version", [0, 1, "2", None, 2.5, [2]])
 def test_another_version_says_what_to_do(version: object) -> None:
-    data = json.dumps(json.loads(Call("a", "me").pack()) | {"version": version}).encode()
+    data = json.dumps(json.loads(AgentCall("a", "me").pack()) | {"version": version}).encode()
     for read in (unpack_call, unpack_answer):
         with pytest.raises(AgentError, match="update the older side"):
             read(data)

@@ -11,11 +11,11 @@ import pytest
 
 from robotiq_async import Finger, MoveTimeoutError, RobotiqError
 from robotiq_async.fleet import AgentError, ControlLostError
-from robotiq_async.fleet.agent.jobs import KEPT
-from robotiq_async.fleet.network.bus import Kind, Urgency
+from robotiq_async.fleet.agent.jobs import JOBS_KEPT
+from robotiq_async.fleet.network.bus import MessageKind, Urgency
 from robotiq_async.fleet.network.mailbox import MOST_QUESTIONS, SHARE, Mailbox
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.fleet.wire.envelope import Answer, Call
+from robotiq_async.fleet.wire.envelope import AgentAnswer, AgentCall
 from robotiq_async.fleet.wire.status_message import SIZE
 from robotiq_async.values.request import Request
 from tests.fleet.lab import LEFT, Lab, lab
@@ -25,7 +25,7 @@ from tests.virtual import inside, until, virtual
 A, B = Finger.A, Finger.B
 
 
-def call_of(hand: RemoteHand, **arguments: object) -> Call:
+def call_of(hand: RemoteHand, **arguments: object) -> AgentCall:
     assert hand._session is not None
     return hand._session.dialog.call(arguments)
 
@@ -34,7 +34,7 @@ def force_of_a(here: Lab) -> int:
     return Request.from_registers(here.gripper.request_registers).axes[0].force
 
 
-async def repeated(here: Lab, verb: str, call: Call) -> Answer:
+async def repeated(here: Lab, verb: str, call: AgentCall) -> AgentAnswer:
     return await here.answer(verb, call.pack())
 
 
@@ -58,7 +58,7 @@ async def test_what_was_not_begun_and_what_may_have_been(here: Lab, hand: Remote
     never = await repeated(here, "cmd/set_speed", old)
     assert never.begun is False
     await hand.acquire()
-    for _ in range(KEPT + 2):
+    for _ in range(JOBS_KEPT + 2):
         await repeated(here, "cmd/command", call_of(hand, axes={"8": {"speed": 5}}))
     unknown = await repeated(here, "cmd/set_speed", replace(old, number=old.number + 1))
     assert unknown.begun is None, "it may be one of those that were forgotten"
@@ -149,7 +149,7 @@ async def test_a_move_that_is_superseded_on_its_way_may_have_begun(here: Lab, ha
 @inside(lab)
 async def test_a_client_of_version_1_is_told_so(here: Lab) -> None:
     """It asks under the key that it knows, and reads that the answer is of another version."""
-    call = json.dumps(json.loads(Call(LEFT.base, "old").pack()) | {"version": 1})
+    call = json.dumps(json.loads(AgentCall(LEFT.base, "old").pack()) | {"version": 1})
     for verb in ("info", "halt", "lease", "cmd/move"):
         answer = await here.answer(verb, call.encode())
         assert answer.error is not None
@@ -174,7 +174,7 @@ async def test_an_agent_of_version_1_is_refused_with_a_sentence() -> None:
 def test_questions_come_last_and_get_a_share() -> None:
     """So do the requests of those who do not command, while somebody does."""
 
-    async def ask(last: Kind) -> tuple[list[str], float]:
+    async def ask(last: MessageKind) -> tuple[list[str], float]:
         mailbox, done = Mailbox(), []
 
         def work(what: str) -> None:
@@ -183,14 +183,14 @@ def test_questions_come_last_and_get_a_share() -> None:
 
         accepted = [mailbox.put(lambda: work("last"), last) for _ in range(MOST_QUESTIONS + 1)]
         assert accepted == [True] * MOST_QUESTIONS + [False]
-        mailbox.put(lambda: work("command"), Kind.REQUEST)
-        mailbox.put(lambda: work("halt"), Kind.HALT)
+        mailbox.put(lambda: work("command"), MessageKind.REQUEST)
+        mailbox.put(lambda: work("halt"), MessageKind.HALT)
         begun = time.perf_counter()
         while len(done) < 8:  # noqa: ASYNC110
             await asyncio.sleep(0.001)
         return done, 6 * 0.002 / (time.perf_counter() - begun)
 
-    for last in (Kind.QUESTION, Kind.OTHERS):
+    for last in (MessageKind.QUESTION, MessageKind.OTHERS):
         done, share = asyncio.run(ask(last))
         assert done[:3] == ["halt", "command", "last"]
         assert share < 1.5 * SHARE
@@ -200,13 +200,13 @@ def test_questions_come_last_and_get_a_share() -> None:
 async def test_whoever_commands_does_not_wait_for_the_requests_of_others(
     here: Lab, reader: RemoteHand
 ) -> None:
-    ask = Call(LEFT.base, "stranger").pack()
+    ask = AgentCall(LEFT.base, "stranger").pack()
     verbs = ("lease", "cmd/move")
     sort = here.agent._sort
-    assert {sort(LEFT.key(verb), ask) for verb in verbs} == {Kind.REQUEST}, "nobody does"
+    assert {sort(LEFT.key(verb), ask) for verb in verbs} == {MessageKind.REQUEST}, "nobody does"
     await reader.acquire()
-    assert {sort(LEFT.key(verb), ask) for verb in verbs} == {Kind.OTHERS}
-    assert {sort(LEFT.key(verb), call_of(reader).pack()) for verb in verbs} == {Kind.REQUEST}
+    assert {sort(LEFT.key(verb), ask) for verb in verbs} == {MessageKind.OTHERS}
+    assert {sort(LEFT.key(verb), call_of(reader).pack()) for verb in verbs} == {MessageKind.REQUEST}
 
 
 @inside(lab)

@@ -16,7 +16,7 @@ from robotiq_async import Finger, RobotiqHand
 from robotiq_async.fleet.fleet import Fleet
 from robotiq_async.fleet.keys.access import CLIENTS, AccessList, Role, access_control, rights
 from robotiq_async.fleet.keys.authority import Authority, Pair
-from robotiq_async.fleet.keys.certificates import HERE, issue, make_authority
+from robotiq_async.fleet.keys.certificates import LOOPBACK_NAMES, issue, make_authority
 from robotiq_async.fleet.keys.key_folder import ACCESS
 from robotiq_async.fleet.network import zenoh_bus
 from robotiq_async.fleet.network.bus import Urgency
@@ -194,7 +194,7 @@ async def test_a_client_does_not_pass_for_an_agent_nor_one_host_for_another(keys
         await one.server(keys / "operate-bob")
         await two.server(keys / "agent-cell")
         await three.server(keys / "agent-cell")
-        assert "127.0.0.2" not in HERE
+        assert "127.0.0.2" not in LOOPBACK_NAMES
         clients = [await each.client(keys / "read-alice") for each in (one, three, two)]
         await clients[-1].connected.wait()
         assert [client.connected.is_set() for client in clients] == [False, False, True]

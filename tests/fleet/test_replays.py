@@ -7,7 +7,7 @@ import asyncio
 import pytest
 
 from robotiq_async import ConnectionLostError, Finger, RobotiqError, State
-from robotiq_async.simulator.physics.gripper import Write
+from robotiq_async.simulator.physics.gripper import HeardWrite
 from robotiq_async.values.request import Request
 from tests.fleet.cell import ending, move_slowly
 from tests.fleet.lab import LEFT, Garbling, Lab, lab
@@ -162,7 +162,7 @@ async def test_answers_of_another_run_acknowledge_nothing(here: Lab) -> None:
 # -- late settings -----------------------------------------------------------------------------------------
 
 
-def has_it(write: Write) -> bool:
+def has_it(write: HeardWrite) -> bool:
     asked = Request.from_registers(write.registers).axes[0]
     return 201 in (asked.speed, asked.force)
 

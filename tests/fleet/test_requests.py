@@ -13,10 +13,10 @@ import pytest
 
 from robotiq_async import Finger, MoveSupersededError, RobotiqHand, State
 from robotiq_async.fleet.agent.agent import Agent
-from robotiq_async.fleet.network.bus import Bus, Reply
+from robotiq_async.fleet.network.bus import Bus, BusReply
 from robotiq_async.fleet.remote.dialog import UNDER_WAY
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.fleet.wire.envelope import Call
+from robotiq_async.fleet.wire.envelope import AgentCall
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.errors import ControlLostError
 from robotiq_async.values.request import Request
@@ -40,7 +40,7 @@ class CountingBus(Spoiling):
 
     under_way = most = 0
 
-    def ask(self, key: str, payload: bytes, **how: Any) -> asyncio.Future[Reply | None]:
+    def ask(self, key: str, payload: bytes, **how: Any) -> asyncio.Future[BusReply | None]:
         asking = super().ask(key, payload, **how)
         if key.endswith("cmd/command"):
             self.under_way += 1
@@ -226,11 +226,11 @@ async def test_a_move_that_is_cancelled_on_its_way_moves_until_the_agent_has_cal
 # -- repetitions -------------------------------------------------------------------------------------------
 
 
-def first_copy_of(*numbers: int) -> Callable[[Call], bool]:
+def first_copy_of(*numbers: int) -> Callable[[AgentCall], bool]:
     """Drop the first copy of some of the commands: the first command is 0."""
     seen: list[int] = []
 
-    def drops(call: Call) -> bool:
+    def drops(call: AgentCall) -> bool:
         if call.number in seen:
             return False
         seen.append(call.number)
@@ -305,8 +305,10 @@ async def test_a_request_waits_for_the_one_that_was_asked_before_it(here: World)
     assert session is not None
     made = session.dialog.call({"position": 50, "fingers": 1})
 
-    def call(number: int, after: int) -> Call:
-        return Call(LEFT.base, made.client, made.epoch, made.lease, number, made.seen, {"fingers": 1}, after)
+    def call(number: int, after: int) -> AgentCall:
+        return AgentCall(
+            LEFT.base, made.client, made.epoch, made.lease, number, made.seen, {"fingers": 1}, after
+        )
 
     early = await ask(client, "cmd/hold", call(1001, 1000))
     assert isinstance(early, ControlLostError)

@@ -15,7 +15,7 @@ import pytest
 from robotiq_async import ConnectionLostError, Finger, NotStartedError, RobotiqError, State
 from robotiq_async.fleet.agent.jobs import Job, Jobs
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.fleet.wire.envelope import Call, unpack_answer
+from robotiq_async.fleet.wire.envelope import AgentCall, unpack_answer
 from robotiq_async.runtime.log import Log
 from robotiq_async.values.errors import ControlLostError
 from robotiq_async.values.request import Request
@@ -262,7 +262,7 @@ async def test_a_release_that_is_lost_is_said_again(here: Lab, hand: RemoteHand)
 class Asked:
     """A request that arrives at the agent."""
 
-    def __init__(self, verb: str, call: Call) -> None:
+    def __init__(self, verb: str, call: AgentCall) -> None:
         self.key, self.payload = LEFT.key(verb), call.pack()
         self.answers: list[bytes] = []
 
@@ -310,7 +310,7 @@ async def test_requests_admitted_just_before_the_end_are_not_written_after_it(
         if "lease" not in each.key:
             here.agent._receive(each)
     here.serving.cancel()
-    here.agent._receive(Asked("info/stranger", Call(LEFT.base, "stranger")))
+    here.agent._receive(Asked("info/stranger", AgentCall(LEFT.base, "stranger")))
     await asyncio.wait({here.serving})
     assert not going(here, writes)
 
@@ -351,9 +351,9 @@ async def test_a_lease_that_comes_with_the_end_is_not_kept(here: Lab) -> None:
 
 @virtual
 async def test_a_request_that_outlasts_the_agent_is_cancelled_and_answered() -> None:
-    asked = Asked("cmd/move", Call(LEFT.base, "client", number=1))
+    asked = Asked("cmd/move", AgentCall(LEFT.base, "client", number=1))
     publisher = SimpleNamespace(status_message=lambda: b"")
     requests = Jobs(cast("Any", publisher), 1, Log("left"), lambda *_: None)
-    requests.start(Job("move", Call(LEFT.base, "client", number=1), asked), asyncio.sleep(60))
+    requests.start(Job("move", AgentCall(LEFT.base, "client", number=1), asked), asyncio.sleep(60))
     await requests.end()
     assert asked.answers

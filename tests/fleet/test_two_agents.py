@@ -15,7 +15,7 @@ from robotiq_async.fleet.fleet import Fleet
 from robotiq_async.fleet.network.bus import PendingQuery, Urgency
 from robotiq_async.fleet.remote.errand import Errand, of_its_run
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.fleet.wire.envelope import Answer, Call, failure
+from robotiq_async.fleet.wire.envelope import AgentAnswer, AgentCall, failure
 from robotiq_async.values.errors import AgentError, ControlLostError, NotAllStoppedError
 from tests.fleet.lab import LEFT, Answered, Lab, lab, serving
 from tests.fleet.world import ServingAgent, World, world
@@ -168,17 +168,17 @@ async def test_a_second_agent_of_a_host_is_refused_for_any_gripper(here: Lab) ->
         pass
 
 
-CALL = Call(LEFT.base, "stranger", epoch=7, number=3)
+CALL = AgentCall(LEFT.base, "stranger", epoch=7, number=3)
 
 
 @pytest.mark.parametrize(
     ("reply", "counts", "refuses"),
     [
-        (Answer(LEFT.base, 3, 7, {}).pack(), True, False),
+        (AgentAnswer(LEFT.base, 3, 7, {}).pack(), True, False),
         (failure(CALL, 7, AgentError("late"), begun=False).pack(), True, True),
         (failure(CALL, 8, AgentError("anew"), begun=False).pack(), False, True),
-        (Answer(LEFT.base, 4, 7, {}).pack(), False, False),
-        (Answer("robotiq/v1/lab/cell/right", 3, 7, {}).pack(), False, False),
+        (AgentAnswer(LEFT.base, 4, 7, {}).pack(), False, False),
+        (AgentAnswer("robotiq/v1/lab/cell/right", 3, 7, {}).pack(), False, False),
         (b"?", False, True),
     ],
 )

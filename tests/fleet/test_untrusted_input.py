@@ -12,7 +12,7 @@ from robotiq_async import Finger, State
 from robotiq_async.fleet.limited_log import EVERY_S
 from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.fleet.wire.envelope import Call
+from robotiq_async.fleet.wire.envelope import AgentCall
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.fleet.wire.status_message import StatusMessage
 from robotiq_async.fleet.wire.values import read_error
@@ -80,7 +80,7 @@ async def test_a_command_without_a_lease_or_for_another_run(
     here: Lab, later: int, refusal: type[RobotiqError]
 ) -> None:
     """The arguments are valid for no command, so the refusal comes before they are read."""
-    call = Call(LEFT.base, "stranger", here.agent.epoch + later, number=2, arguments={"fingers": 0})
+    call = AgentCall(LEFT.base, "stranger", here.agent.epoch + later, number=2, arguments={"fingers": 0})
     writes = len(here.gripper.writes)
     with pytest.raises(refusal):
         (await here.answer("cmd/hold", call.pack())).outcome(instantly)
@@ -122,7 +122,7 @@ async def test_arguments_that_do_not_fit_leave_nothing_behind(here: Lab, hand: R
 @inside(world)
 async def test_a_request_under_a_wildcard_is_refused(here: World, key: str) -> None:
     call = await move_slowly(here)
-    refused = await ask(here.other, "halt", Call(LEFT.base, "stranger", number=1), key)
+    refused = await ask(here.other, "halt", AgentCall(LEFT.base, "stranger", number=1), key)
     assert refused is not None
     assert here.gripper.is_moving
     await here.holder.do(here.holder.hand.halt())
@@ -132,7 +132,7 @@ async def test_a_request_under_a_wildcard_is_refused(here: World, key: str) -> N
 @inside(world)
 async def test_a_request_for_another_gripper_is_refused(here: World) -> None:
     """It came under the wrong key."""
-    right = Call(GripperName("lab", "cell", "right").base, "stranger", number=1)
+    right = AgentCall(GripperName("lab", "cell", "right").base, "stranger", number=1)
     refused = await ask(here.other, "lease", right)
     assert "right" in str(refused)
     assert here.holder.hand.is_in_control
@@ -148,7 +148,7 @@ async def test_labels_of_clients_are_made_printable(
     assert reader._session is not None
     seen = reader._session.mirror.stamp
     for verb, number in (("lease", 1), ("halt", 2), ("lease", 3)):
-        call = Call(LEFT.base, "eve", 0, 0, number, seen, {"what": "acquire", "label": NAME})
+        call = AgentCall(LEFT.base, "eve", 0, 0, number, seen, {"what": "acquire", "label": NAME})
         (await here.answer(verb, call.pack())).outcome(instantly)
     info = await reader._session.dialog.ask("info", timeout=1.0)
     assert info["holder"].isprintable(), "who shows it elsewhere may not look at it first"

@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import zenoh
 
-from robotiq_async.fleet.network.bus import Kind, Query, Urgency
+from robotiq_async.fleet.network.bus import MessageKind, Query, Urgency
 from robotiq_async.fleet.network.zenoh_bus import ZenohBus
 from tests.fleet.lab import LEFT
 
@@ -79,7 +79,11 @@ async def test_a_client_that_does_not_read_the_answers_to_its_questions_delays_n
         query.reply(b"!")
 
     async with opened() as (bus, session):
-        for verb, kind in {"info": Kind.QUESTION, "lease": Kind.REQUEST, "halt": Kind.HALT}.items():
+        for verb, kind in {
+            "info": MessageKind.QUESTION,
+            "lease": MessageKind.REQUEST,
+            "halt": MessageKind.HALT,
+        }.items():
             bus.serve(KEYS[verb], answer, lambda *_, kind=kind: kind)
         asked = {verb: Asked(key) for verb, key in KEYS.items()}
         try:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async.link.address import FORMS, Address, Line, Simulation, parse_address
+from robotiq_async.link.address import FORMS, Address, LineSettings, Simulation, parse_address
 from tests.strategies import ANY
 
 NAMES = st.text("abcdefghijklmnopqrstuvwxyz0123456789_-", min_size=1, max_size=63).filter(
@@ -185,15 +185,15 @@ PORTS_THAT_ARE_NONE = ["", "0", "65536", "-1", "+502", " 502", "502 ", "5_02", "
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        ("rtu:///dev/ttyUSB0", Line(115200, "N", 1)),
-        ("rtu:///dev/ttyUSB0?baud=500000", Line(500000, "N", 1)),
-        ("rtu://COM3?baud=9600&parity=E&stopbits=2", Line(9600, "E", 2)),
-        ("rtu://COM3?model=2f85&parity=o", Line(115200, "O", 1)),
-        (r"rtu://\\?\COM10?baud=9600", Line(9600)),
-        (r"rtu://\\?\COM10", Line()),
+        ("rtu:///dev/ttyUSB0", LineSettings(115200, "N", 1)),
+        ("rtu:///dev/ttyUSB0?baud=500000", LineSettings(500000, "N", 1)),
+        ("rtu://COM3?baud=9600&parity=E&stopbits=2", LineSettings(9600, "E", 2)),
+        ("rtu://COM3?model=2f85&parity=o", LineSettings(115200, "O", 1)),
+        (r"rtu://\\?\COM10?baud=9600", LineSettings(9600)),
+        (r"rtu://\\?\COM10", LineSettings()),
     ],
 )
-def test_how_a_serial_port_sends(text: str, line: Line) -> None:
+def test_how_a_serial_port_sends(text: str, line: LineSettings) -> None:
     parsed = parse_address(text)
     assert parsed.line == line
     assert parse_address(str(parsed)) == parsed
@@ -201,8 +201,8 @@ def test_how_a_serial_port_sends(text: str, line: Line) -> None:
 
 
 def test_a_character_has_ten_to_twelve_bits() -> None:
-    assert Line().character_s == pytest.approx(86.8e-6, abs=1e-7)
-    assert Line(9600, "E", 2).character_s == pytest.approx(12 / 9600)
+    assert LineSettings().character_s == pytest.approx(86.8e-6, abs=1e-7)
+    assert LineSettings(9600, "E", 2).character_s == pytest.approx(12 / 9600)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ pytest.importorskip("mujoco", reason="needs the extra physics")
 
 from robotiq_async import ObjectStatus
 from robotiq_async.simulator import Physics, SimulatedGripper
-from robotiq_async.simulator.mechanics.scene import Part, Scene, parse_scene
+from robotiq_async.simulator.mechanics.scene import Scene, ScenePart, parse_scene
 from robotiq_async.values.enums import JAW
 from robotiq_async.values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, Model
 from tests.simulator.test_mechanics import POLL_S, Bench, active
@@ -22,9 +22,9 @@ from tests.simulator.test_mechanics import POLL_S, Bench, active
     ("text", "scene"),
     [
         ("table", Scene()),
-        ("box:40x60x80,0.3", Scene(Part("box", (40, 60, 80), 0.3))),
-        ("rod:40x120,0.25@95", Scene(Part("rod", (40, 120), 0.25, 95))),
-        ("sphere:60,1", Scene(Part("sphere", (60,), 1))),
+        ("box:40x60x80,0.3", Scene(ScenePart("box", (40, 60, 80), 0.3))),
+        ("rod:40x120,0.25@95", Scene(ScenePart("rod", (40, 120), 0.25, 95))),
+        ("sphere:60,1", Scene(ScenePart("sphere", (60,), 1))),
         ("cell.xml", Scene(file="cell.xml")),
     ],
 )

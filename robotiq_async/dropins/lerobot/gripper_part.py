@@ -19,7 +19,7 @@ from ...values.conventions import Convention
 from ...values.enums import FORCE_MAX, Finger, State
 from ...values.errors import GripperFaultError, InvalidStateError, NotActivatedError, RobotiqError
 from ...values.status import RobotiqStatus
-from ..patience import Patience
+from ..patience import CallerPatience
 
 LOST_AFTER_S: Final = 1.0
 """Beyond the 0.4 s after which a hand gives up on an answer, and the 0.1 s until it connects again: one lost
@@ -60,7 +60,7 @@ class GripperPart:
         self._hand = hand
         self._convention = convention
         limit = check_number("lost_after", lost_after, 0.05, 60.0, "seconds")
-        self._patience = Patience(hand, limit)
+        self._patience = CallerPatience(hand, limit)
         self._is_connected = False
 
     @property

@@ -13,18 +13,18 @@ from ...hand.robotiq_hand import RobotiqHand
 from ...runtime.clock import now
 from ...runtime.log import Log
 from ...values.errors import AgentError
-from ..control.lease import WINDOW_S
+from ..control.lease import LEASE_WINDOW_S
 from ..limited_log import LimitedLog
-from ..network.bus import Bus, Kind, Query, Undo
-from ..wire.envelope import Call, failure
+from ..network.bus import Bus, MessageKind, Query, Undo
+from ..wire.envelope import AgentCall, failure
 from ..wire.names import ROOT, GripperName
-from .questions import Questions
+from .questions import AgentQuestions
 from .records import NoRecords, Records
 from .served_hand import ServedHand
 
 SUMMARY_S: Final = 1.0  # seconds from one summary to the next
 BEATS: Final = 5  # statuses per window that are sent even if nothing changes
-LOOK_S: Final = 0.3  # seconds to wait for the tokens of other agents: a router may forward them late
+AGENT_LOOK_S: Final = 0.3  # seconds to wait for the tokens of other agents: a router may forward them late
 EPOCH_BITS: Final = 53  # bits of an epoch: JSON readers that use doubles represent it exactly
 
 
@@ -43,7 +43,7 @@ class Agent:
         hands: Mapping[str, RobotiqHand],
         bus: Bus,
         *,
-        window: float = WINDOW_S,
+        window: float = LEASE_WINDOW_S,
         records: Records | None = None,
         asleep: Callable[[], float] | None = None,
     ) -> None:
@@ -104,9 +104,9 @@ class Agent:
             for each in self._all:
                 each.resume()
             undo.append(self._bus.watch(f"{self._prefix}/*/alive/*", self._report_conflict))
-            questions = Questions(loop.time)
-            sorts: dict[str, Callable[[str, bytes], Kind | None]] = {
-                "halt": lambda *_: Kind.HALT,
+            questions = AgentQuestions(loop.time)
+            sorts: dict[str, Callable[[str, bytes], MessageKind | None]] = {
+                "halt": lambda *_: MessageKind.HALT,
                 "lease": self._sort,
                 "cmd/*": self._sort,
                 "info/*": questions.sort,
@@ -133,14 +133,14 @@ class Agent:
         return list(self.hands.values())
 
     async def _refuse_if_served(self) -> None:
-        await asyncio.sleep(LOOK_S)
+        await asyncio.sleep(AGENT_LOOK_S)
         for _, name in await self._others():
             raise AgentError(f"{self._conflict_with(name)}: nothing was done")
 
     async def _refuse_if_another_began(self) -> None:
         # Of several agents that start at the same moment the one with the lowest epoch remains.
         for is_last in (False, True):
-            await asyncio.sleep(LOOK_S)
+            await asyncio.sleep(AGENT_LOOK_S)
             others = await self._others()
             for epoch, name in others:
                 # Still there at the second look: it started before this one, and its token came late.
@@ -158,7 +158,7 @@ class Agent:
 
     async def _others(self) -> list[tuple[int, GripperName]]:
         """The grippers that other agents of this site and host serve, each with the epoch of that agent."""
-        keys = await self._bus.announced(f"{self._prefix}/*/alive/*", timeout=LOOK_S)
+        keys = await self._bus.announced(f"{self._prefix}/*/alive/*", timeout=AGENT_LOOK_S)
         return [other for other in map(self._other, keys) if other is not None]
 
     def _other(self, key: str) -> tuple[int, GripperName] | None:
@@ -179,10 +179,12 @@ class Agent:
             if is_logged and name.gripper in self.hands:
                 self.hands[name.gripper].publisher.add({"kind": "conflict", "key": key})
 
-    def _sort(self, key: str, payload: bytes) -> Kind:
+    def _sort(self, key: str, payload: bytes) -> MessageKind:
         # In a thread of zenoh. Who commands does not wait for the requests of others, which say who they are.
         served = self.hands.get(key.split("/")[4])
-        return Kind.REQUEST if served is None or served.may_be_of_holder(payload) else Kind.OTHERS
+        return (
+            MessageKind.REQUEST if served is None or served.may_be_of_holder(payload) else MessageKind.OTHERS
+        )
 
     def _receive(self, query: Query) -> None:
         self._look_at_clocks()
@@ -194,7 +196,7 @@ class Agent:
             name = GripperName.of_key(query.key)
         except ValueError as no_name:
             refused = AgentError(f"not a request for one gripper: {no_name}")
-            query.reply(failure(Call("", ""), self.epoch, refused, begun=False).pack())
+            query.reply(failure(AgentCall("", ""), self.epoch, refused, begun=False).pack())
             return
         served = self.hands.get(name.gripper)
         if served is not None:  # else the key is wrong, or there is no such gripper

@@ -18,10 +18,10 @@ from ...link.address import is_remote, parse_address
 from ...session.options import HandOptions, Place, offered
 from ...values.checks import check_seconds
 from ...values.model import model_of
-from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
+from ..control.lease import LEASE_WINDOW_S, WINDOW_MAX_S, WINDOW_MIN_S
 from ..keys.access import AccessList
 from ..keys.key_folder import ACCESS, check_key_folder
-from ..network.configuration import LOOPBACK, LOOPBACK_TLS
+from ..network.configuration import LOOPBACK_ENDPOINT, LOOPBACK_TLS
 from ..network.endpoints import check_endpoints
 from ..wire.names import check_name
 
@@ -41,11 +41,11 @@ class AgentSettings:
     site: str
     grippers: Mapping[str, HandOptions]  # by the name of the hand
     host: str = field(default_factory=lambda: machine_name())
-    listen: tuple[str, ...] = (LOOPBACK,)  # endpoints of zenoh for clients; none with a router
+    listen: tuple[str, ...] = (LOOPBACK_ENDPOINT,)  # endpoints of zenoh for clients; none with a router
     connect: tuple[str, ...] = ()  # endpoints of a router, through which clients connect
     keys: Path | None = None  # folder with the agent's certificate and key; None for no encryption
     insecure: bool = False  # whether other machines may connect without encryption
-    window: float = WINDOW_S  # seconds for which a lease lasts without being renewed
+    window: float = LEASE_WINDOW_S  # seconds for which a lease lasts without being renewed
 
 
 _OF_GRIPPER: Final = tuple(offered(Place.FILE))
@@ -87,7 +87,7 @@ class _Reader:
         with self._blaming("host"):
             host = check_name("host", table.get("host", machine_name()))
         with self._blaming("window"):
-            window = check_seconds("window", table.get("window", WINDOW_S), WINDOW_MIN_S, WINDOW_MAX_S)
+            window = check_seconds("window", table.get("window", LEASE_WINDOW_S), WINDOW_MIN_S, WINDOW_MAX_S)
         with self._blaming("insecure"):
             insecure = _check_bool("insecure", table.get("insecure", False))
         with self._blaming("keys"):
@@ -95,7 +95,7 @@ class _Reader:
         with self._blaming("connect"):
             wanted = _check_list("connect", table.get("connect", []))
             connect = check_endpoints("connect", wanted, has_keys=keys is not None, insecure=insecure)
-        default = [] if connect else [LOOPBACK if keys is None else LOOPBACK_TLS]
+        default = [] if connect else [LOOPBACK_ENDPOINT if keys is None else LOOPBACK_TLS]
         with self._blaming("listen"):
             wanted = _check_list("listen", table.get("listen", default))
             listen = check_endpoints("listen", wanted, has_keys=keys is not None, insecure=insecure)

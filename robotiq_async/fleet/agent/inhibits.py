@@ -6,12 +6,12 @@ import time
 from typing import Final
 
 from ...values.inhibit import LONGEST_REASON, Inhibit
-from ..wire.envelope import Call
+from ..wire.envelope import AgentCall
 from ..wire.values import read_inhibit, words
 from .jobs import label_of
 
 
-def inhibit_asked(call: Call) -> Inhibit | None:
+def inhibit_asked(call: AgentCall) -> Inhibit | None:
     """The inhibit that a halt asks for; None for a halt alone. Nothing malformed keeps it from halting."""
     reason = call.arguments.get("inhibit")
     if reason is None:
@@ -30,7 +30,7 @@ def inhibit_kept(record: object) -> Inhibit:
 _UNREADABLE: Final = Inhibit("the record of an inhibit cannot be read", "", 0.0)
 
 
-def signed(call: Call) -> str:
+def signed(call: AgentCall) -> str:
     """Who asks: what the client says, and its label."""
     who = _short(call.arguments.get("who", ""))
     return _short(f"{who}, {label_of(call)}" if who else label_of(call))

@@ -14,14 +14,14 @@ from ...values.events import SentRequest
 from ...values.move_result import MoveResult
 from ...values.request import Request
 from ..network.bus import Query
-from ..wire.envelope import Answer, Call, failure
+from ..wire.envelope import AgentAnswer, AgentCall, failure
 from ..wire.settings import Setting, asked_of, is_in, moved_by
 from ..wire.values import Fields, result_fields
 from .publisher import HandPublisher
 
-KEPT: Final = 512
+JOBS_KEPT: Final = 512
 """Jobs that are kept for repetitions, also after the end of their lease: 2.5 s of a loop at 200 Hz."""
-END_S: Final = 0.5
+JOBS_END_S: Final = 0.5
 """Seconds for jobs to end after the hand has been stopped, before they are cancelled."""
 LABEL_MAX: Final = 200  # characters of a label that are shown
 T = TypeVar("T")
@@ -40,7 +40,7 @@ class Job:
         says: makes what its answer has besides the result.
     """
 
-    def __init__(self, name: str, call: Call, query: Query, says: Callable[[], Fields] = dict) -> None:
+    def __init__(self, name: str, call: AgentCall, query: Query, says: Callable[[], Fields] = dict) -> None:
         self.name = name
         self.call = call
         self.queries: list[Query] = [query]
@@ -111,11 +111,11 @@ class Jobs:
         self._followed: dict[Finger, Job] = {}  # by axis, the newest that sends it to a position
         self._tasks: set[asyncio.Task[Any]] = set()
 
-    def find(self, call: Call, number: object = None) -> Job | None:
+    def find(self, call: AgentCall, number: object = None) -> Job | None:
         """The job of a request, or of another one of its sender's lease."""
         return self._kept.get((call.client, call.lease, call.number if number is None else number))  # type: ignore[arg-type]
 
-    def may_have_been(self, call: Call) -> bool:
+    def may_have_been(self, call: AgentCall) -> bool:
         """Whether a request that is not found may have been a job. Repetitions keep their stamp."""
         return call.seen <= self._forgotten
 
@@ -124,7 +124,7 @@ class Jobs:
         self._kept[job.key] = self._open[job.key] = job
         self._followed.update(dict.fromkeys(moved_by(job.asked), job))
         self.start(job, work)
-        if len(self._kept) > KEPT:
+        if len(self._kept) > JOBS_KEPT:
             self._forget()
 
     def start(self, job: Job, work: Work) -> None:
@@ -168,7 +168,7 @@ class Jobs:
     async def end(self) -> None:
         """Wait until all jobs have been answered, END_S at most."""
         if self._tasks:
-            await asyncio.wait(self._tasks, timeout=END_S)
+            await asyncio.wait(self._tasks, timeout=JOBS_END_S)
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -189,7 +189,7 @@ class Jobs:
             answer = failure(call, self._epoch, error, begun)
         else:
             value = {**(result_fields(task.result()) or {}), **job.says()}
-            answer = Answer(call.to, call.number, self._epoch, value, begun=begun)
+            answer = AgentAnswer(call.to, call.number, self._epoch, value, begun=begun)
         if error is not None or is_done:
             self._ended(job, error is None)
         job.reply(answer.pack(), self._publisher.status_message())
@@ -203,6 +203,6 @@ class Jobs:
                 return
 
 
-def label_of(call: Call) -> str:
+def label_of(call: AgentCall) -> str:
     """The label a client gives itself, made printable."""
     return printable(str(call.arguments.get("label", "unknown client"))[:LABEL_MAX])

@@ -8,13 +8,13 @@ from typing import Final
 
 from ...runtime.log import log
 from ..limited_log import EVERY_S
-from ..network.bus import Kind
+from ..network.bus import MessageKind
 
 EACH: Final = 100.0  # questions a second of one client; fetching missed events takes 50
 _CLIENTS: Final = 1000  # Clients with a budget of their own. The least recent one is forgotten
 
 
-class Questions:
+class AgentQuestions:
     """Admits a question before anything else is done with it, in any thread and in a few microseconds.
 
     Each client has a budget, so that none uses up what the others need; what it does not use in a second is
@@ -28,13 +28,13 @@ class Questions:
         self._dropped = 0
         self._report_due = 0.0
 
-    def sort(self, key: str, _payload: bytes = b"") -> Kind | None:
+    def sort(self, key: str, _payload: bytes = b"") -> MessageKind | None:
         """Whether to read a question. Its key ends in the client's name: with keys, its certificate's."""
         # Of each gripper, unless the key names several.
         client, now = key.rpartition("/")[2] if "*" in key else key, self._clock()
         with self._lock:
             if self._is_within_budget(client, now):
-                return Kind.QUESTION
+                return MessageKind.QUESTION
             self._dropped += 1
             if now >= self._report_due:
                 dropped, self._dropped, self._report_due = self._dropped, 0, now + EVERY_S

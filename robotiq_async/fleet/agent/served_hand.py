@@ -39,7 +39,7 @@ from ...values.move_result import MoveResult
 from ..control.admission import Admission
 from ..control.lease import Lease
 from ..network.bus import Bus, Query
-from ..wire.envelope import Answer, Call, failure, unpack_call
+from ..wire.envelope import AgentAnswer, AgentCall, failure, unpack_call
 from ..wire.names import GripperName
 from ..wire.settings import check_changes, moved_by, read_settings, settings_of
 from ..wire.values import Fields, inhibit_fields
@@ -50,7 +50,7 @@ from .kept_settings import KeptSettings
 from .publisher import HandPublisher
 from .records import Records
 
-RETRY_S: Final = 1.0  # seconds between two attempts to reach the gripper
+START_RETRY_S: Final = 1.0  # seconds between two attempts to reach the gripper
 COMMANDS: Final = frozenset(
     {"set_position", "set_speed", "set_force", "move", "hold", "activate", "reset", "atr", "recover"}
 )
@@ -136,7 +136,7 @@ class ServedHand:
                 self._log.warning("%s", error.message)
             self.publisher.note_problem(error.message)
             await self._hand.stop(halt=False)
-            await asyncio.sleep(RETRY_S)
+            await asyncio.sleep(START_RETRY_S)
 
     # -- requests --------------------------------------------------------------------------------------
 
@@ -149,7 +149,7 @@ class ServedHand:
         try:
             call = unpack_call(query.payload)
         except RobotiqError as error:
-            query.reply(failure(Call(self.name.base, ""), self._epoch, error, begun=False).pack())
+            query.reply(failure(AgentCall(self.name.base, ""), self._epoch, error, begun=False).pack())
             return
         is_free = verb.partition("/")[0] in ("info", "halt")  # of the lease, and of the run of the agent
         try:
@@ -170,9 +170,9 @@ class ServedHand:
             self._reply(query, failure(replace(call, to=self.name.base), self._epoch, error, begun))
         else:
             if value is not None:
-                self._reply(query, Answer(call.to, call.number, self._epoch, value))
+                self._reply(query, AgentAnswer(call.to, call.number, self._epoch, value))
 
-    def _answer(self, verb: str, call: Call, query: Query) -> Fields | None:
+    def _answer(self, verb: str, call: AgentCall, query: Query) -> Fields | None:
         # None: the answer follows later.
         if self._is_ending and verb.partition("/")[0] not in ("info", "halt"):
             raise ControlLostError("the agent is ending", "closed")
@@ -189,11 +189,11 @@ class ServedHand:
                 raise AgentError(f"unknown request {verb!r}")
         return None
 
-    def _reply(self, query: Query, answer: Answer) -> None:
+    def _reply(self, query: Query, answer: AgentAnswer) -> None:
         # With the newest status, because answers overtake statuses.
         query.reply(answer.pack(), self.publisher.status_message())
 
-    def _info(self, call: Call) -> Fields:
+    def _info(self, call: AgentCall) -> Fields:
         since = call.arguments.get("since", -1)
         return {
             **self.publisher.summary(),
@@ -204,7 +204,7 @@ class ServedHand:
 
     # -- the lease -------------------------------------------------------------------------------------
 
-    def _change_lease(self, call: Call, query: Query) -> Fields | None:
+    def _change_lease(self, call: AgentCall, query: Query) -> Fields | None:
         what = call.arguments.get("what")
         if what == "renew":
             self._admission.renew(call, now())
@@ -229,7 +229,7 @@ class ServedHand:
             "settings": self._settings.are_kept(call.client),
         }
 
-    def _grant(self, call: Call, *, take: bool) -> None:
+    def _grant(self, call: AgentCall, *, take: bool) -> None:
         if self._admission.is_repeated(call):
             return
         holder = self._lease.holder
@@ -248,7 +248,7 @@ class ServedHand:
         self._settings.grant(call.client)
         self._keep_record()
 
-    def _release(self, call: Call, query: Query) -> None:
+    def _release(self, call: AgentCall, query: Query) -> None:
         # A client may repeat its release, or strengthen it, as long as no other client has acquired the
         # lease.
         self._admission.release(call, now())
@@ -309,7 +309,7 @@ class ServedHand:
 
     # -- commands --------------------------------------------------------------------------------------
 
-    def _halt(self, call: Call, query: Query) -> None:
+    def _halt(self, call: AgentCall, query: Query) -> None:
         # Accepted from any client, in any state, and never treated as a repetition.
         inhibit = inhibit_asked(call)
         if inhibit is not None:
@@ -329,7 +329,7 @@ class ServedHand:
         self._keep_record()
         self.publisher.add_inhibit()
 
-    def _begin_to_permit(self, call: Call, query: Query) -> None:
+    def _begin_to_permit(self, call: AgentCall, query: Query) -> None:
         who = signed(call)
 
         async def permit() -> None:
@@ -350,7 +350,7 @@ class ServedHand:
         if self._hand.status.go_echo:
             raise AgentError("the agent ended, and the fingers were not seen to stop")
 
-    def _command(self, name: str, call: Call, query: Query) -> None:
+    def _command(self, name: str, call: AgentCall, query: Query) -> None:
         if name == "cancel":
             self._cancel(call, query)
             return
@@ -396,7 +396,7 @@ class ServedHand:
             self._hand.command(fingers, **changes)
         self._fingers.are_commanded(moved_by(job.asked))
 
-    def _cancel(self, call: Call, query: Query) -> None:
+    def _cancel(self, call: AgentCall, query: Query) -> None:
         self._admission.renew(call, now())
         number = call.arguments.get("number", -1)
         job, left = self._jobs.find(call, number), self._jobs.left_of(number)
@@ -406,5 +406,5 @@ class ServedHand:
             job.cancel()
         else:
             # The cancellation may have overtaken the command: refuse it when it arrives.
-            self._admission.bar(Call(call.to, call.client, number=int(call.arguments.get("number", 0))))
-        self._reply(query, Answer(call.to, call.number, self._epoch, {}))
+            self._admission.bar(AgentCall(call.to, call.client, number=int(call.arguments.get("number", 0))))
+        self._reply(query, AgentAnswer(call.to, call.number, self._epoch, {}))

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Final
 
 from ...values.errors import AgentError, ControlLostError
-from ..wire.envelope import Call
+from ..wire.envelope import AgentCall
 from .lease import Holder, Lease
 
 _CLIENTS: Final = 1000
@@ -27,13 +27,13 @@ class Admission:
         self._newest = 0  # number of the newest request admitted under the present lease
         self._asked: dict[str, int] = {}  # number of the newest request for the lease, by client
 
-    def check_meant(self, call: Call, *, in_any_run: bool = False) -> None:
+    def check_meant(self, call: AgentCall, *, in_any_run: bool = False) -> None:
         if call.to != self._base:
             raise AgentError(f"a request for {call.to} was carried to {self._base}")
         if not in_any_run and call.epoch not in (0, self._epoch):
             raise AgentError("the agent was restarted since this request was made")
 
-    def admit(self, call: Call, now: float) -> None:
+    def admit(self, call: AgentCall, now: float) -> None:
         """Accept a command and count it, or raise. The caller has ended an expired lease first."""
         self._check_holder(call, now)
         if call.number <= self._newest:
@@ -43,7 +43,7 @@ class Admission:
         self._newest = call.number
         self.lease.renew(call.seen)
 
-    def is_repeated(self, call: Call) -> bool:
+    def is_repeated(self, call: AgentCall) -> bool:
         """Whether a request for the lease is a repetition of the one that gave its sender the present lease.
 
         Raises:
@@ -60,7 +60,7 @@ class Admission:
             raise AgentError("the request for the lease was repeated")
         return True
 
-    def acquire(self, call: Call, label: str) -> int:
+    def acquire(self, call: AgentCall, label: str) -> int:
         """Give the lease to a client; returns its number. The caller ends the previous lease first."""
         holder = self.lease.holder
         if holder is not None:
@@ -69,11 +69,11 @@ class Admission:
         self._newest = call.number
         return self.lease.grant(Holder(call.client, label), call.seen)
 
-    def renew(self, call: Call, now: float) -> None:
+    def renew(self, call: AgentCall, now: float) -> None:
         self._check_holder(call, now)
         self.lease.renew(call.seen)
 
-    def release(self, call: Call, now: float) -> None:
+    def release(self, call: AgentCall, now: float) -> None:
         # The holder may repeat its release, or strengthen it, as long as no other client has acquired the
         # lease.
         if self.lease.is_released_by(call.client, call.lease):
@@ -81,7 +81,7 @@ class Admission:
         else:
             self.renew(call, now)
 
-    def _check_again(self, call: Call) -> None:
+    def _check_again(self, call: AgentCall) -> None:
         # A client that reacquires the lease automatically ("again") must not undo a halt or a take that came
         # in the meantime. Only an explicit acquire() may.
         again = call.arguments.get("again")
@@ -98,15 +98,15 @@ class Admission:
                 "restarted",
             )
 
-    def is_of_holder(self, call: Call) -> bool:
+    def is_of_holder(self, call: AgentCall) -> bool:
         holder = self.lease.holder
         return holder is not None and holder.client == call.client and self.lease.number == call.lease
 
-    def bar(self, call: Call) -> None:
+    def bar(self, call: AgentCall) -> None:
         """Refuse, from now on, commands with a number up to this one."""
         self._newest = max(self._newest, call.number)
 
-    def check_fresh(self, call: Call, now: float) -> None:
+    def check_fresh(self, call: AgentCall, now: float) -> None:
         if not self.lease.is_fresh(call.seen, now):
             raise ControlLostError(
                 f"the request was on its way for {now - call.seen:.1f} s, longer than the window of "
@@ -114,7 +114,7 @@ class Admission:
                 "late",
             )
 
-    def _check_holder(self, call: Call, now: float) -> None:
+    def _check_holder(self, call: AgentCall, now: float) -> None:
         if not self.is_of_holder(call):
             holder, reason = self.lease.holder, self.lease.end_of(call.lease)
             who = holder.label if holder is not None and holder.client != call.client else "no client"

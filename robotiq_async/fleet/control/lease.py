@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-WINDOW_S: Final = 1.0
+LEASE_WINDOW_S: Final = 1.0
 """Seconds that a lease lasts beyond the newest stamp that its holder has proven to have received."""
 WINDOW_MIN_S: Final = 0.1
 WINDOW_MAX_S: Final = 10.0
@@ -40,7 +40,7 @@ class Lease:
     """
 
     def __init__(
-        self, window: float = WINDOW_S, run: int = 0, changed: Callable[[], object] = lambda: None
+        self, window: float = LEASE_WINDOW_S, run: int = 0, changed: Callable[[], object] = lambda: None
     ) -> None:
         self.window = window
         self.runs: tuple[int, ...] = (run,)

@@ -30,7 +30,7 @@ from .key_folder import ACCESS, AUTHORITY, CERTIFICATE, DAYS, KEY
 
 AUTHORITY_KEY: Final = "ca.key"
 AUTHORITY_DAYS: Final = 3650
-HERE: Final = ("localhost", "127.0.0.1", "::1")  # names of every agent on its own machine
+LOOPBACK_NAMES: Final = ("localhost", "127.0.0.1", "::1")  # names of every agent on its own machine
 
 
 def has_authority(folder: Path) -> bool:
@@ -78,7 +78,7 @@ def issue(folder: Path, name: str, role: Role, *, hosts: Sequence[str] = (), day
         raise FileExistsError(f"{own} already exists")
     authority = _load(folder)
     clients = AccessList.read_file(folder / ACCESS)
-    server_names = tuple(dict.fromkeys((*hosts, *HERE))) if role is Role.AGENT else ()
+    server_names = tuple(dict.fromkeys((*hosts, *LOOPBACK_NAMES))) if role is Role.AGENT else ()
     until = datetime.now(UTC) + timedelta(days=days)
     pair = authority.certify(role.common_name(name), until, server_names)
     own.mkdir(mode=0o700)

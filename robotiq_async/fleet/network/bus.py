@@ -37,7 +37,7 @@ class Query(Protocol):
         """Answer without waiting for the network. No effect once the client has stopped waiting."""
 
 
-class Reply(Protocol):
+class BusReply(Protocol):
     """An answer to a request."""
 
     @property
@@ -49,11 +49,11 @@ class Reply(Protocol):
         """Data sent with the answer; may be empty."""
 
 
-def is_any(_reply: Reply) -> bool:
+def is_any(_reply: BusReply) -> bool:
     return True
 
 
-class Kind(Enum):
+class MessageKind(Enum):
     """Kind of a message, by which it is handled first or last."""
 
     HALT = "halt"  # before all others
@@ -65,8 +65,8 @@ class Kind(Enum):
     QUESTION = "question"  # of anybody
 
 
-def is_request(_key: str, _payload: bytes) -> Kind:
-    return Kind.REQUEST
+def is_request(_key: str, _payload: bytes) -> MessageKind:
+    return MessageKind.REQUEST
 
 
 class Bus(Protocol):
@@ -86,7 +86,7 @@ class Bus(Protocol):
         self,
         expression: str,
         handler: Callable[[Query], None],
-        sort: Callable[[str, bytes], Kind | None] = is_request,
+        sort: Callable[[str, bytes], MessageKind | None] = is_request,
     ) -> Undo:
         """Call a handler with each request under matching keys. Returns what ends it.
 
@@ -104,8 +104,8 @@ class Bus(Protocol):
         *,
         timeout: float,
         urgency: Urgency,
-        decides: Callable[[Reply], bool] = is_any,
-    ) -> asyncio.Future[Reply | None]:
+        decides: Callable[[BusReply], bool] = is_any,
+    ) -> asyncio.Future[BusReply | None]:
         """Send a request, once, to every process that serves the key: after a partition there may be two.
 
         The request leaves within this call: requests of the same urgency arrive in the order of the calls.
@@ -144,12 +144,12 @@ class Bus(Protocol):
 class PendingQuery:
     """Waits for the reply that decides; without such a reply, the result is the last one, or None."""
 
-    def __init__(self, decides: Callable[[Reply], bool]) -> None:
-        self.answered: asyncio.Future[Reply | None] = asyncio.get_running_loop().create_future()
+    def __init__(self, decides: Callable[[BusReply], bool]) -> None:
+        self.answered: asyncio.Future[BusReply | None] = asyncio.get_running_loop().create_future()
         self._decides = decides
-        self._last: Reply | None = None
+        self._last: BusReply | None = None
 
-    def take(self, reply: Reply) -> None:
+    def take(self, reply: BusReply) -> None:
         if not self.answered.done():
             self._last = reply
             if self._decides(reply):

@@ -11,7 +11,7 @@ from ..keys.key_folder import ACCESS, AUTHORITY, CERTIFICATE, KEY, check_key_fol
 from .endpoints import check_endpoints
 
 PORT: Final = 7447
-LOOPBACK: Final = f"tcp/127.0.0.1:{PORT}"
+LOOPBACK_ENDPOINT: Final = f"tcp/127.0.0.1:{PORT}"
 LOOPBACK_TLS: Final = f"tls/127.0.0.1:{PORT}"
 QUEUED: Final = 16  # halts, and commands, that may wait in a link until its thread runs; zenoh's default is 2
 UNKNOWN: Final = 1000
@@ -24,7 +24,7 @@ LINK_LEASE_MS: Final = 1000
 def agent_configuration(
     site: str,
     host: str,
-    listen: Sequence[str] = (LOOPBACK,),
+    listen: Sequence[str] = (LOOPBACK_ENDPOINT,),
     connect: Sequence[str] = (),
     *,
     keys: Path | None = None,
@@ -62,7 +62,7 @@ def router_configuration(
 
 
 def client_configuration(
-    connect: Sequence[str] = (LOOPBACK,), *, keys: Path | None = None, insecure: bool = False
+    connect: Sequence[str] = (LOOPBACK_ENDPOINT,), *, keys: Path | None = None, insecure: bool = False
 ) -> dict[str, object]:
     """Configuration of a client's session, which does not listen; errors as of an agent's."""
     connect = check_endpoints("connect", connect, has_keys=keys is not None, insecure=insecure)

@@ -9,7 +9,7 @@ from typing import Final
 
 from ...runtime.sockets import is_loopback
 
-FORMS: Final = "tcp/HOST:PORT, tls/HOST:PORT or quic/HOST:PORT"
+ENDPOINT_FORMS: Final = "tcp/HOST:PORT, tls/HOST:PORT or quic/HOST:PORT"
 _ENDPOINT: Final = re.compile(r"(tcp|tls|quic)/(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9_.-]+):([0-9]{1,5})")
 """Options of zenoh after a ? or a # are refused: some of them would turn the protection off."""
 
@@ -35,10 +35,10 @@ class Endpoint:
 def parse_endpoint(what: str, text: object) -> Endpoint:
     """Parse an endpoint, named ``what`` in messages. TypeError, ValueError: it has not one of the FORMS."""
     if not isinstance(text, str):
-        raise TypeError(f"{what} must be {FORMS}, got {text!r}")
+        raise TypeError(f"{what} must be {ENDPOINT_FORMS}, got {text!r}")
     found = _ENDPOINT.fullmatch(text)
     if found is None or not 1 <= int(found[3]) <= 65535:
-        raise ValueError(f"{what} must be {FORMS}, and nothing more, got {text!r}")
+        raise ValueError(f"{what} must be {ENDPOINT_FORMS}, and nothing more, got {text!r}")
     return Endpoint(text, found[1], found[2].strip("[]"))
 
 

@@ -13,7 +13,7 @@ from typing import Final
 
 from ...runtime.log import log
 from ..limited_log import EVERY_S, LimitedLog
-from .bus import Kind
+from .bus import MessageKind
 
 GATHER_S: Final = 0.001
 """Seconds for which telemetry is collected under load, to wake the loop once for all of it."""
@@ -54,7 +54,7 @@ class Mailbox:
         self._loop = asyncio.get_running_loop()
         self._halts: deque[Callable[[], None]] = deque()
         self._deliveries: deque[Callable[[], None]] = deque()
-        self._last = {kind: _Last(self._loop) for kind in (Kind.OTHERS, Kind.QUESTION)}
+        self._last = {kind: _Last(self._loop) for kind in (MessageKind.OTHERS, MessageKind.QUESTION)}
         self._is_due = False
         self._gathering: asyncio.TimerHandle | None = None
         self._opened_at = 0.0
@@ -62,19 +62,19 @@ class Mailbox:
         self._report_due = 0.0
         self._failed = LimitedLog()
 
-    def put(self, delivery: Callable[[], None], kind: Kind) -> bool:
+    def put(self, delivery: Callable[[], None], kind: MessageKind) -> bool:
         """Call a function in the loop; thread-safe. False if the mailbox is full: the call is dropped."""
         last = self._last.get(kind)
         deliveries = (
-            self._halts if kind is Kind.HALT else self._deliveries if last is None else last.deliveries
+            self._halts if kind is MessageKind.HALT else self._deliveries if last is None else last.deliveries
         )
-        if kind is not Kind.ANSWER and len(deliveries) >= (MOST if last is None else MOST_QUESTIONS):
+        if kind is not MessageKind.ANSWER and len(deliveries) >= (MOST if last is None else MOST_QUESTIONS):
             self._dropped += last is None
             return False
         deliveries.append(delivery)
         # Telemetry, and what comes last, wait for a timer that is already set. Anything else wakes the loop
         # before that.
-        waits = kind is Kind.TELEMETRY or last is not None
+        waits = kind is MessageKind.TELEMETRY or last is not None
         if not self._is_due or (not waits and self._gathering is not None):
             self._is_due = True
             with contextlib.suppress(RuntimeError):  # the loop is closed

@@ -10,9 +10,9 @@ from urllib.parse import parse_qsl
 
 from ...link.address import malformed
 from ..wire.names import GripperName
-from .configuration import LOOPBACK, LOOPBACK_TLS, client_configuration
+from .configuration import LOOPBACK_ENDPOINT, LOOPBACK_TLS, client_configuration
 
-FORM: Final = "zenoh://SITE/HOST/GRIPPER[?connect=tls/HOST:7447][&keys=FOLDER]"
+ROUTE_FORM: Final = "zenoh://SITE/HOST/GRIPPER[?connect=tls/HOST:7447][&keys=FOLDER]"
 CONNECT_VARIABLE: Final = "ROBOTIQ_ASYNC_CONNECT"
 KEYS_VARIABLE: Final = "ROBOTIQ_ASYNC_KEYS"
 _OPTIONS: Final = frozenset({"connect", "keys", "insecure"})
@@ -35,7 +35,7 @@ class Route:
     @property
     def endpoints(self) -> tuple[str, ...]:
         """The endpoints to connect to; by default an agent on this machine."""
-        return self.connect or (LOOPBACK if self.keys is None else LOOPBACK_TLS,)
+        return self.connect or (LOOPBACK_ENDPOINT if self.keys is None else LOOPBACK_TLS,)
 
     def configuration(self) -> dict[str, object]:
         """The zenoh configuration of a client session on this route.
@@ -61,16 +61,16 @@ def parse_remote_address(address: object) -> tuple[GripperName, Route]:
         ValueError: malformed; the message has the form.
     """
     if not isinstance(address, str):
-        raise TypeError(f"address must be a string, got {address!r}; accepted: {FORM}")
+        raise TypeError(f"address must be a string, got {address!r}; accepted: {ROUTE_FORM}")
     plain, _, query = address.partition("?")
     try:
         name = GripperName.parse(plain)
         pairs = parse_qsl(query, strict_parsing=True) if query else []
     except ValueError as error:
-        raise malformed(address, "", f"{FORM}; {error}") from None
+        raise malformed(address, "", f"{ROUTE_FORM}; {error}") from None
     unknown = [option for option, _ in pairs if option not in _OPTIONS]
     if unknown:
-        raise malformed(address, "", f"{FORM}; no option {unknown[0]!r}")
+        raise malformed(address, "", f"{ROUTE_FORM}; no option {unknown[0]!r}")
     usual = default_route()
     connect = tuple(value for option, value in pairs if option == "connect")
     folders = [value for option, value in pairs if option == "keys"]

@@ -28,13 +28,13 @@ except ModuleNotFoundError as error:
 from ...runtime.concurrency import in_a_thread
 from ...values.errors import ConnectFailedError
 from ..keys.certificates import common_name
-from .bus import Kind, PendingQuery, Query, Reply, Undo, Urgency, is_any, is_request
+from .bus import BusReply, MessageKind, PendingQuery, Query, Undo, Urgency, is_any, is_request
 from .mailbox import Mailbox, ReplySender
 
 CLOSE_S: Final = 1.0  # seconds for closing a session
 LAST_ANSWERS_S: Final = 0.2  # seconds to send the answers to requests that are cancelled at the end
 DROP_EVERY_S: Final = 0.02  # seconds: what is dropped is reported to its clients so often
-LONGEST: Final = 4096  # bytes of a request; a longer one is dropped unread
+LONGEST_REQUEST: Final = 4096  # bytes of a request; a longer one is dropped unread
 _PRIORITY: Final = {
     Urgency.STOP: zenoh.Priority.REAL_TIME,
     Urgency.COMMAND: zenoh.Priority.INTERACTIVE_HIGH,
@@ -108,7 +108,8 @@ class ZenohBus:
         self._mailbox = Mailbox()
         # A sender for each kind: clients that do not read their answers delay only those of that kind.
         self._repliers = {
-            kind: ReplySender() for kind in (Kind.HALT, Kind.REQUEST, Kind.OTHERS, Kind.QUESTION)
+            kind: ReplySender()
+            for kind in (MessageKind.HALT, MessageKind.REQUEST, MessageKind.OTHERS, MessageKind.QUESTION)
         }
         self._dropping = ReplySender(pause=DROP_EVERY_S)
         self._closing: asyncio.Future[None] | None = None
@@ -135,7 +136,7 @@ class ZenohBus:
     def subscribe(self, expression: str, listener: Callable[[str, bytes], None]) -> Undo:
         def deliver(sample: zenoh.Sample) -> None:
             delivery = functools.partial(_deliver, listener, sample)
-            self._mailbox.put(delivery, Kind.TELEMETRY)
+            self._mailbox.put(delivery, MessageKind.TELEMETRY)
 
         return self._undo(self._session.declare_subscriber(expression, _direct(deliver)))
 
@@ -143,12 +144,12 @@ class ZenohBus:
         self,
         expression: str,
         handler: Callable[[Query], None],
-        sort: Callable[[str, bytes], Kind | None] = is_request,
+        sort: Callable[[str, bytes], MessageKind | None] = is_request,
     ) -> Undo:
         def deliver(query: zenoh.Query) -> None:
             payload = b"" if query.payload is None else query.payload.to_bytes()
             key = str(query.key_expr)
-            kind = sort(key, payload) if len(payload) <= LONGEST else None
+            kind = sort(key, payload) if len(payload) <= LONGEST_REQUEST else None
             if kind is not None and self._mailbox.put(
                 lambda: handler(_Query(query, key, payload, self._repliers[kind])), kind
             ):
@@ -166,17 +167,17 @@ class ZenohBus:
         *,
         timeout: float,
         urgency: Urgency,
-        decides: Callable[[Reply], bool] = is_any,
-    ) -> asyncio.Future[Reply | None]:
+        decides: Callable[[BusReply], bool] = is_any,
+    ) -> asyncio.Future[BusReply | None]:
         asking = PendingQuery(decides)
 
         def arrive(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
                 sample = reply.ok
-                self._mailbox.put(lambda: asking.take(_Reply(sample)), Kind.ANSWER)
+                self._mailbox.put(lambda: asking.take(_Reply(sample)), MessageKind.ANSWER)
 
         def end() -> None:
-            self._mailbox.put(asking.end, Kind.ANSWER)
+            self._mailbox.put(asking.end, MessageKind.ANSWER)
 
         try:
             self._session.get(
@@ -206,7 +207,7 @@ class ZenohBus:
                 found.append(str(reply.ok.key_expr))
 
         # Not a channel of zenoh: it holds 256, and get() fills it itself, so it would wait forever.
-        handler = Callback(arrive, lambda: self._mailbox.put(ended.set, Kind.ANSWER), indirect=False)
+        handler = Callback(arrive, lambda: self._mailbox.put(ended.set, MessageKind.ANSWER), indirect=False)
         with contextlib.suppress(TimeoutError, zenoh.ZError):
             self._session.liveliness().get(expression, handler, timeout=timeout)
             async with asyncio.timeout(2 * timeout):
@@ -216,7 +217,7 @@ class ZenohBus:
     def watch(self, expression: str, listener: Callable[[str, bool], None]) -> Undo:
         def deliver(sample: zenoh.Sample) -> None:
             key, is_there = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
-            self._mailbox.put(lambda: listener(key, is_there), Kind.ANSWER)
+            self._mailbox.put(lambda: listener(key, is_there), MessageKind.ANSWER)
 
         liveliness = self._session.liveliness()
         return self._undo(liveliness.declare_subscriber(expression, _direct(deliver), history=True))

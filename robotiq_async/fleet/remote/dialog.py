@@ -23,9 +23,9 @@ from ...values.errors import (
     NotStartedError,
     RobotiqError,
 )
-from ..control.lease import WINDOW_MAX_S, WINDOW_MIN_S, WINDOW_S
+from ..control.lease import LEASE_WINDOW_S, WINDOW_MAX_S, WINDOW_MIN_S
 from ..network.bus import Bus, Urgency
-from ..wire.envelope import Answer, Call
+from ..wire.envelope import AgentAnswer, AgentCall
 from ..wire.names import GripperName
 from ..wire.settings import moved_by
 from ..wire.values import Fields
@@ -83,7 +83,7 @@ class Dialog:
         self.number: int = 0
         if before is not None and before.process == self.process:
             self.client, self.number = before.client, before.number
-        self.window: float = WINDOW_S
+        self.window: float = LEASE_WINDOW_S
         self.settings: OwnSettings = OwnSettings()
         self.is_over: bool = False
         self.has_ended: bool = False
@@ -100,15 +100,17 @@ class Dialog:
         self._commands: dict[int, Errand] = {}  # commands without an answer, in their order
         self._resending: asyncio.TimerHandle | None = None
         self._waiting: dict[Finger, dict[str, int]] = {}  # commands of a loop that were not sent yet
-        self._asked: Call | None = None  # the lease, and the newest stamp, at the time of the oldest of these
+        self._asked: AgentCall | None = (
+            None  # the lease, and the newest stamp, at the time of the oldest of these
+        )
         self._under_way = 0
 
     # -- requests --------------------------------------------------------------------------------------
 
-    def call(self, arguments: Fields | None = None) -> Call:
+    def call(self, arguments: Fields | None = None) -> AgentCall:
         self.number += 1
         mirror, lease = self.mirror, self.lease.number
-        return Call(
+        return AgentCall(
             self.name.base, self.client, mirror.epoch, lease, self.number, mirror.stamp, arguments or {}
         )
 
@@ -120,11 +122,17 @@ class Dialog:
         with suppress(RobotiqError):
             await self.ask(verb, arguments, timeout=timeout)
 
-    async def send(self, call: Call, verb: str, **how: Any) -> Any:  # noqa: ANN401
+    async def send(self, call: AgentCall, verb: str, **how: Any) -> Any:  # noqa: ANN401
         return await self.answer(self.post(call, verb, **how))
 
     def post(
-        self, call: Call, verb: str, *, timeout: float, urgency: Urgency = Urgency.COMMAND, agents: int = 1
+        self,
+        call: AgentCall,
+        verb: str,
+        *,
+        timeout: float,
+        urgency: Urgency = Urgency.COMMAND,
+        agents: int = 1,
     ) -> Errand:
         """Send a request, before any that is posted later. Wait for its answer with :meth:`answer`.
 
@@ -191,14 +199,14 @@ class Dialog:
         """Wait until the present halts have ended, successfully or not."""
         await asyncio.gather(*self._halts, return_exceptions=True)
 
-    def cancel(self, name: str, call: Call) -> None:
+    def cancel(self, name: str, call: AgentCall) -> None:
         """The call of a command was cancelled: hold what it set in motion."""
         if self.lease.is_held and not self.is_over:
             cancelling = self.spawn(self._cancel(call))
             if name in MOTIONS:
                 self._noted(self._cancels, cancelling)
 
-    async def _cancel(self, call: Call) -> None:
+    async def _cancel(self, call: AgentCall) -> None:
         try:
             await self.ask("cmd/cancel", {"number": call.number}, timeout=self.window)
         except RobotiqError as error:
@@ -255,7 +263,7 @@ class Dialog:
             self._under_way += 1
             self.spawn(self._await(errand)).add_done_callback(lambda _: self._command_done())
 
-    def _is_under_this_lease(self, asked: Call) -> bool:
+    def _is_under_this_lease(self, asked: AgentCall) -> bool:
         return self.lease.is_held and (asked.epoch, asked.lease) == (self.mirror.epoch, self.lease.number)
 
     def _command_done(self) -> None:
@@ -384,7 +392,7 @@ class Dialog:
         self._pending.discard(errand)
         errand.end()
 
-    async def _reply(self, errand: Errand) -> Answer:
+    async def _reply(self, errand: Errand) -> AgentAnswer:
         ends = [self._closed] if errand.is_allowed_after_stop else [self._closed, self._silence]
         answer = await errand.wait(*ends)
         if answer is None and errand.was_empty and not errand.is_halt and await self._is_agent_present():

@@ -15,11 +15,13 @@ from typing import Any, Final
 from ...runtime.clock import now
 from ...runtime.limit import Limit
 from ...values.errors import AgentError, ConnectionLostError, RobotiqError
-from ..network.bus import Reply, Urgency
-from ..wire.envelope import Answer, Call, unpack_answer
+from ..network.bus import BusReply, Urgency
+from ..wire.envelope import AgentAnswer, AgentCall, unpack_answer
 from ..wire.settings import Setting, asked_of
 
-REPEAT_S: Final = 0.25  # seconds without an answer before a request is repeated: longer than a round trip
+ERRAND_REPEAT_S: Final = (
+    0.25  # seconds without an answer before a request is repeated: longer than a round trip
+)
 REPEAT_SLOWLY_S: Final = 1.0
 """After this many seconds, the interval of repetitions: by then the request was admitted or is too late, and
 only its answer may be lost."""
@@ -54,7 +56,7 @@ def no_answer_as_lost_connection() -> Iterator[None]:
         raise ConnectionLostError(str(error)) from error
 
 
-def of_its_run(call: Call) -> Callable[[Reply], bool]:
+def of_its_run(call: AgentCall) -> Callable[[BusReply], bool]:
     """A check that a reply comes from the addressed run of the agent, or any run if none is addressed.
 
     With two agents for one gripper, the refusal of the wrong one arrives first.
@@ -62,18 +64,18 @@ def of_its_run(call: Call) -> Callable[[Reply], bool]:
     return lambda reply: _is_of_its_run(call, _read(reply))
 
 
-def _is_of_its_run(call: Call, said: Answer | RobotiqError) -> bool:
-    return isinstance(said, Answer) and _is_about(call, said) and call.epoch in (0, said.epoch)
+def _is_of_its_run(call: AgentCall, said: AgentAnswer | RobotiqError) -> bool:
+    return isinstance(said, AgentAnswer) and _is_about(call, said) and call.epoch in (0, said.epoch)
 
 
-def _read(reply: Reply) -> Answer | RobotiqError:
+def _read(reply: BusReply) -> AgentAnswer | RobotiqError:
     try:
         return unpack_answer(reply.payload)
     except RobotiqError as error:
         return error
 
 
-def _is_about(call: Call, answer: Answer) -> bool:
+def _is_about(call: AgentCall, answer: AgentAnswer) -> bool:
     return (answer.to, answer.number) == (call.to, call.number)
 
 
@@ -93,7 +95,7 @@ class Errand:
     def __init__(
         self,
         name: object,
-        call: Call,
+        call: AgentCall,
         verb: str,
         timeout: float,
         urgency: Urgency,
@@ -115,21 +117,21 @@ class Errand:
         self._agents = agents
         self._resend, self._came_early = resend, came_early
         self._confirmed: set[int] = set()  # the runs of agents that have
-        self._newest: Reply | None = None
-        self._said: Answer | RobotiqError | None = None  # by that
-        self._in_doubt: Answer | RobotiqError | None = None
+        self._newest: BusReply | None = None
+        self._said: AgentAnswer | RobotiqError | None = None  # by that
+        self._in_doubt: AgentAnswer | RobotiqError | None = None
         """The outcome when the time is over."""
         self.asked: dict[Setting, int] = asked_of(verb.removeprefix("cmd/"), call.arguments)
         self._loop = asyncio.get_running_loop()
         self._limit = Limit(timeout)
         self._strays = 0
-        self._copies: set[asyncio.Future[Reply | None]] = set()
+        self._copies: set[asyncio.Future[BusReply | None]] = set()
         self._timer: asyncio.TimerHandle | None = None
         self.begin()
 
     def begin(self) -> None:
         self.asked_at: float = now()
-        self.answered: asyncio.Future[Answer | RobotiqError | None] = self._loop.create_future()
+        self.answered: asyncio.Future[AgentAnswer | RobotiqError | None] = self._loop.create_future()
 
     @property
     def is_halt(self) -> bool:
@@ -159,7 +161,7 @@ class Errand:
         """The request as bytes; ``after`` is the number of the unanswered command before it, or 0."""
         return (replace(self.call, after=after) if after else self.call).pack()
 
-    async def wait(self, *ends: asyncio.Future[None]) -> Answer | None:
+    async def wait(self, *ends: asyncio.Future[None]) -> AgentAnswer | None:
         """Wait for the answer; None if there is none. NoAnswerError: one of the others is done before."""
         with self._limit as limit:
             awaited: set[asyncio.Future[Any]] = {self.answered, *ends}
@@ -175,12 +177,12 @@ class Errand:
 
     # -- replies ---------------------------------------------------------------------------------------
 
-    def decides(self, reply: Reply) -> bool:
+    def decides(self, reply: BusReply) -> bool:
         """Whether a reply ends the wait for the others to its copy."""
         said = self._say(reply)
         if not self.is_halt:
             return _is_of_its_run(self.call, said)
-        if isinstance(said, Answer) and said.error is None:
+        if isinstance(said, AgentAnswer) and said.error is None:
             # Of two agents both must confirm it.
             if _is_about(self.call, said):
                 self._confirmed.add(said.epoch)
@@ -190,14 +192,14 @@ class Errand:
             return False
         return True
 
-    def add(self, copy: asyncio.Future[Reply | None]) -> None:
+    def add(self, copy: asyncio.Future[BusReply | None]) -> None:
         """Add a copy that was sent."""
         sent_at = now()
         self._copies.add(copy)
         copy.add_done_callback(lambda copy: self._end_copy(copy, sent_at))
         self._repeat_later()
 
-    def _end_copy(self, copy: asyncio.Future[Reply | None], sent_at: float) -> None:
+    def _end_copy(self, copy: asyncio.Future[BusReply | None], sent_at: float) -> None:
         self._copies.discard(copy)
         if self.answered.done() or copy.cancelled():
             return
@@ -214,9 +216,9 @@ class Errand:
         elif not self._copies and (at_once or not self.may_repeat or self.left <= RETRY_S):
             self.answered.set_result(None)
 
-    def _take(self, reply: Reply) -> None:
+    def _take(self, reply: BusReply) -> None:
         said = self._say(reply)
-        if isinstance(said, Answer) and self.may_repeat:
+        if isinstance(said, AgentAnswer) and self.may_repeat:
             is_stray = bool(said.number) and not _is_about(self.call, said)
             if is_stray and self._strays < STRAYS:
                 self._strays += 1
@@ -227,12 +229,12 @@ class Errand:
                 return
         self._settle(reply)
 
-    def _take_of_halt(self, reply: Reply | None) -> None:
+    def _take_of_halt(self, reply: BusReply | None) -> None:
         # Only an answer about the gripper ends it before its time: that all have stopped, or why not.
         if reply is None:
             return
         said = self._say(reply)
-        if not isinstance(said, Answer) or not _is_about(self.call, said):
+        if not isinstance(said, AgentAnswer) or not _is_about(self.call, said):
             self._in_doubt = self._checked(said)
         elif said.error is not None:
             self._in_doubt = said
@@ -241,18 +243,18 @@ class Errand:
         elif len(self._confirmed) >= self._agents:
             self._settle(reply)
 
-    def _settle(self, reply: Reply) -> None:
+    def _settle(self, reply: BusReply) -> None:
         self.status = reply.attachment
         self.answered.set_result(self._checked(self._say(reply)))
 
-    def _say(self, reply: Reply) -> Answer | RobotiqError:
+    def _say(self, reply: BusReply) -> AgentAnswer | RobotiqError:
         if reply is not self._newest or self._said is None:
             self._newest, self._said = reply, _read(reply)
         return self._said
 
-    def _checked(self, said: Answer | RobotiqError) -> Answer | RobotiqError:
+    def _checked(self, said: AgentAnswer | RobotiqError) -> AgentAnswer | RobotiqError:
         """An answer if it may be the one to this request, else the error."""
-        if not isinstance(said, Answer):
+        if not isinstance(said, AgentAnswer):
             return said
         if said.to != self.call.to or said.number not in (0, self.call.number):
             return AgentError(
@@ -268,7 +270,7 @@ class Errand:
     def _repeat_later(self, pause: float = 0.0) -> None:
         self._stop_repeating()
         if self.may_repeat:
-            usual = REPEAT_S if now() < self.asked_at + REPEAT_SLOWLY_S else REPEAT_SLOWLY_S
+            usual = ERRAND_REPEAT_S if now() < self.asked_at + REPEAT_SLOWLY_S else REPEAT_SLOWLY_S
             pause = pause or (ATTEMPT_S if self.is_halt else usual)
             self._timer = self._loop.call_later(pause, self._repeat)
 
@@ -285,7 +287,7 @@ class Errand:
         self._in_doubt = error
         self._limit.restart(min(seconds, self.left))
 
-    def fail(self, why: Answer | RobotiqError | None) -> None:
+    def fail(self, why: AgentAnswer | RobotiqError | None) -> None:
         if not self.answered.done():
             self.answered.set_result(why)
 

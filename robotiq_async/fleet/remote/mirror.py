@@ -15,7 +15,7 @@ from ...values.inhibit import Inhibit
 from ...values.model import Model
 from ...values.status import RobotiqStatus
 from ...values.stroke import Points, Stroke, check_points
-from ..control.lease import WINDOW_S
+from ..control.lease import LEASE_WINDOW_S
 from ..wire.status_message import StatusMessage
 from ..wire.values import Fields, read_inhibit, read_request, read_transition, reading
 
@@ -139,7 +139,9 @@ class Mirror:
         self.misrouted += 1
         return True
 
-    def is_of_another_run(self, message: StatusMessage, arrival: float, window: float = WINDOW_S) -> bool:
+    def is_of_another_run(
+        self, message: StatusMessage, arrival: float, window: float = LEASE_WINDOW_S
+    ) -> bool:
         """Whether a message is of another run of the agent than the present one, and to be dropped.
 
         Either it is late, or two agents serve the gripper. The second may serve another gripper under the
@@ -161,7 +163,7 @@ class Mirror:
         arrival: float,
         *,
         in_turn: bool,
-        window: float = WINDOW_S,
+        window: float = LEASE_WINDOW_S,
         asked: float | None = None,
     ) -> bool:
         """Take over a message; returns whether it is current, that is, at most ``window`` seconds old.

@@ -37,7 +37,7 @@ from .dialog import label
 from .errand import no_answer_as_lost_connection
 from .session import CONNECT_S, RemoteSession
 
-COMMAND_S: Final = 5.0  # seconds for commands that end with the acknowledgment of the gripper
+REMOTE_COMMAND_S: Final = 5.0  # seconds for commands that end with the acknowledgment of the gripper
 SEQUENCE_S: Final = 130.0
 """Seconds for an activation, a reset or a release; the agent's own limits are shorter."""
 MOVE_S: Final = 100.0  # seconds for a move without a timeout; the agent's own limit is shorter
@@ -222,7 +222,7 @@ class RemoteHand(Hand):
     # -- commands --------------------------------------------------------------------------------------
 
     async def _set(self, what: Literal["position", "speed", "force"], value: int, axes: Finger) -> None:
-        await self._ask(f"set_{what}", {"value": value, "fingers": int(axes)}, COMMAND_S)
+        await self._ask(f"set_{what}", {"value": value, "fingers": int(axes)}, REMOTE_COMMAND_S)
 
     def _command(self, axes: Finger, position: int | None, speed: int | None, force: int | None) -> None:
         session = self._running_session()
@@ -252,7 +252,7 @@ class RemoteHand(Hand):
             return replace(result, status=mirror.renumbered(result.status))
 
     async def _hold(self, axes: Finger) -> None:
-        await self._ask("hold", {"fingers": int(axes)}, COMMAND_S)
+        await self._ask("hold", {"fingers": int(axes)}, REMOTE_COMMAND_S)
 
     async def _inhibit(self, inhibit: Inhibit) -> None:
         arguments = {"inhibit": inhibit.reason, "who": inhibit.who}
@@ -262,7 +262,7 @@ class RemoteHand(Hand):
         session = self._running_session()
         arguments = {"what": "permit", "label": label(), "who": who}
         with no_answer_as_lost_connection():
-            self._take_over_inhibit(await session.dialog.ask("lease", arguments, timeout=COMMAND_S))
+            self._take_over_inhibit(await session.dialog.ask("lease", arguments, timeout=REMOTE_COMMAND_S))
 
     def _take_over_inhibit(self, answer: Fields) -> None:
         if "inhibited" not in answer:

@@ -16,7 +16,7 @@ _INTEGERS: Final = ("epoch", "lease", "number", "after")
 
 
 @dataclass(frozen=True, slots=True)
-class Call:
+class AgentCall:
     """One request.
 
     Attributes:
@@ -44,11 +44,13 @@ class Call:
         return _pack(self)
 
 
-def unpack_call(data: bytes) -> Call:
+def unpack_call(data: bytes) -> AgentCall:
     """Parse a request: ProtocolError if it is none, AgentError if it is of another version."""
     fields = _object("a request", data)
     try:
-        call = Call(**{name: fields[name] for name in Call.__slots__ if name in fields or name != "after"})
+        call = AgentCall(
+            **{name: fields[name] for name in AgentCall.__slots__ if name in fields or name != "after"}
+        )
     except KeyError as error:
         raise ProtocolError(f"not a request: {data[:200]!r}") from error
     if not _is_well_formed(call):
@@ -56,7 +58,7 @@ def unpack_call(data: bytes) -> Call:
     return call
 
 
-def _is_well_formed(call: Call) -> bool:
+def _is_well_formed(call: AgentCall) -> bool:
     # Any program on the network may have written the fields, so each type is checked.
     values = {name: getattr(call, name) for name in call.__slots__}
     return (
@@ -72,7 +74,7 @@ def _is_well_formed(call: Call) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class AgentAnswer:
     """The answer to a request.
 
     Attributes:
@@ -102,14 +104,16 @@ class Answer:
         return self.value
 
 
-def unpack_answer(data: bytes) -> Answer:
+def unpack_answer(data: bytes) -> AgentAnswer:
     """Parse an answer: ProtocolError if it is none, AgentError if it is of another version."""
     fields = _object("an answer", data)
     try:
         begun = fields.get("begun")
         if begun is not None and not isinstance(begun, bool):
             raise TypeError("begun")
-        return Answer(**{name: fields[name] for name in Answer.__slots__ if name != "begun"}, begun=begun)
+        return AgentAnswer(
+            **{name: fields[name] for name in AgentAnswer.__slots__ if name != "begun"}, begun=begun
+        )
     except (KeyError, TypeError) as error:
         raise ProtocolError(f"not an answer: {data[:200]!r}") from error
 
@@ -117,15 +121,15 @@ def unpack_answer(data: bytes) -> Answer:
 _WORDS: Final = {False: "; nothing was done", None: "; it may have been carried out", True: "; it had begun"}
 
 
-def failure(call: Call, epoch: int, error: Exception, begun: bool | None) -> Answer:
+def failure(call: AgentCall, epoch: int, error: Exception, begun: bool | None) -> AgentAnswer:
     """The answer with an error, which says what became of the request. No other place says that."""
     fields = error_fields(error)
     if isinstance(error, AgentError | ControlLostError):
         fields["message"] += _WORDS[begun]
-    return Answer(call.to, call.number, epoch, error=fields, begun=begun)
+    return AgentAnswer(call.to, call.number, epoch, error=fields, begun=begun)
 
 
-def _pack(message: Call | Answer) -> bytes:
+def _pack(message: AgentCall | AgentAnswer) -> bytes:
     fields = {name: getattr(message, name) for name in message.__slots__}
     if not fields.get("after", True):
         del fields["after"]

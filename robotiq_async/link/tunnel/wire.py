@@ -20,15 +20,15 @@ from ...runtime.log import Log, log
 from ...values.errors import ConnectionLostError, ProtocolError, ResponseTimeoutError
 from ..address import Address
 from ..outcome import Lost, Noise, Outcome, Silent
-from ..wires import OnData, OnEnd, Send, Table, failing_as
+from ..wires import ErrorTable, OnData, OnEnd, Send, failing_as
 from .protocol import Tunnel
-from .worker import Call, Worker
+from .worker import TunnelCall, Worker
 
-CLOSE_S: Final = 0.5
+TUNNEL_CLOSE_S: Final = 0.5
 """Time for a tunnel to close."""
-ENDED_S: Final = CLOSE_S + 0.1
+ENDED_S: Final = TUNNEL_CLOSE_S + 0.1
 """For how long its close is waited for: its last call, which is cancelled, comes before."""
-OPENING: Final[Table] = {
+TUNNEL_ERRORS: Final[ErrorTable] = {
     LateError: lambda error: f"no connection {error}",
     TimeoutError: lambda error: str(error) or "no connection in time",
     OSError: why_unreachable,
@@ -49,7 +49,7 @@ class TunnelWire:
         self._worker: Final = Worker("robotiq_async tunnel")
         self._loop: asyncio.AbstractEventLoop | None = None
         """The loop in which it was opened; None once it was closed."""
-        self._call: Call | None = None
+        self._call: TunnelCall | None = None
         """The exchange that was begun last, until it has ended."""
         self._on_data: OnData
         self._on_end: OnEnd
@@ -58,7 +58,7 @@ class TunnelWire:
         """Open the tunnel, after whatever it still does for an earlier connection."""
         self._on_data, self._on_end = on_data, on_end
         self._loop = asyncio.get_running_loop()
-        with failing_as(OPENING, self._address):
+        with failing_as(TUNNEL_ERRORS, self._address):
             await self._worker.call(self._tunnel.open, seconds)
         return self._send
 
@@ -67,7 +67,7 @@ class TunnelWire:
         self._call = call = self._worker.begin(lambda: self._tunnel.exchange(pdu))
         call.done.add_done_callback(lambda _: self._take(call))
 
-    def _take(self, call: Call) -> None:
+    def _take(self, call: TunnelCall) -> None:
         """Pass on what a call came to, if it is still waited for."""
         if call is not self._call:
             return
@@ -108,7 +108,7 @@ class TunnelWire:
 
     async def _close(self) -> None:
         try:
-            async with asyncio.timeout(CLOSE_S):
+            async with asyncio.timeout(TUNNEL_CLOSE_S):
                 await self._tunnel.close()
         except Exception as error:  # noqa: BLE001  # nothing is left to do
             self._log.warning("the tunnel did not close: %r", error)

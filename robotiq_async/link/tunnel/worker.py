@@ -56,7 +56,7 @@ class Worker:
             raise call.error
         raise RuntimeError(f"it ended with {call.error!r}") from call.error
 
-    def begin(self, what: Callable[[], Awaitable[Any]]) -> Call:
+    def begin(self, what: Callable[[], Awaitable[Any]]) -> TunnelCall:
         """Begin a call, after those before it; its ``done`` comes when it has ended."""
         return self._put(what)
 
@@ -70,9 +70,9 @@ class Worker:
             await asyncio.wait({self._task}, timeout=seconds)
         return self._task is None or self._task.done()
 
-    def _put(self, what: Callable[[], Awaitable[Any]], *, is_last: bool = False) -> Call:
+    def _put(self, what: Callable[[], Awaitable[Any]], *, is_last: bool = False) -> TunnelCall:
         loop = asyncio.get_running_loop()
-        call = Call(what, loop.create_future(), is_last)
+        call = TunnelCall(what, loop.create_future(), is_last)
         if self._task is None or self._task.done() or self._task.get_loop() is not loop:
             self._calls = _Calls()
             self._start(loop)
@@ -102,26 +102,26 @@ class _Calls:
     """The queue of calls. ``asyncio.Queue`` raises when its loop is closed while a task waits for an item."""
 
     def __init__(self) -> None:
-        self.waiting: deque[Call] = deque()
+        self.waiting: deque[TunnelCall] = deque()
         self.has_ended = False  # whether the call that was started last is the last one
         self._more = asyncio.Event()
 
-    def begin(self, call: Call) -> None:
+    def begin(self, call: TunnelCall) -> None:
         """It is started now."""
         self.has_ended = call.is_last
 
-    def put(self, call: Call) -> None:
+    def put(self, call: TunnelCall) -> None:
         self.waiting.append(call)
         self._more.set()
 
-    async def get(self) -> Call:
+    async def get(self) -> TunnelCall:
         while not self.waiting:
             self._more.clear()
             await self._more.wait()
         return self.waiting.popleft()
 
 
-class Call:
+class TunnelCall:
     """One call and its outcome.
 
     Attributes:

@@ -104,7 +104,7 @@ class Questions(Exchange):
         return _late(place, self._received, f"GET {self.unanswered}", seconds)
 
 
-class Setting(Exchange):
+class UrcapSetting(Exchange):
     """A line that sets variables."""
 
     def feed(self, data: bytes) -> Answer | None:
@@ -236,7 +236,7 @@ class UrcapTransport:
         if (yield from self._read("FLT" if self._unanswered == "STA" else "STA")) is None:
             return False
         if self._gripper is not None:
-            outcome = yield Setting(lines.choice(self._gripper), self._timing)
+            outcome = yield UrcapSetting(lines.choice(self._gripper), self._timing)
             if isinstance(outcome, Noise | Silent):
                 why = f"the URCap does not choose gripper {self._gripper}: {outcome.error}"
                 raise ConnectFailedError(str(self._address), why) from outcome.error
@@ -278,7 +278,7 @@ class UrcapTransport:
             self._written = self._sent[-1]
         shown = None if self._releases else self._values.get("ACT")
         self._releases = bool(reg.rATR.read(image))
-        _check((yield Setting(lines.command(image, shown), self._timing)))
+        _check((yield UrcapSetting(lines.command(image, shown), self._timing)))
         self._lost_by = min(self._lost_by, self._line.now() + LOST_S)
         return True
 

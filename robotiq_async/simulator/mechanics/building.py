@@ -15,7 +15,7 @@ from .scene import Scene
 if TYPE_CHECKING:
     from robotiq_async.values.model import Model
 
-    from .scene import Part
+    from .scene import ScenePart
 
 OURS: Final = "gripper/"
 """Before the names of all that belongs to the gripper."""
@@ -43,7 +43,7 @@ def packaged(model: Model) -> str:
     return (files("robotiq_async") / "data" / name).read_text(encoding="utf-8")
 
 
-def above_table(text: str, reach: float, part: Part | None) -> Any:
+def above_table(text: str, reach: float, part: ScenePart | None) -> Any:
     """The gripper upside down above a table, on a mount that moves up, with a part between its fingers."""
     spec = mujoco.MjSpec()
     spec.option.timestep = _TIMESTEP
@@ -130,7 +130,7 @@ def _in_one_line(error: ValueError) -> str:
     return " ".join(str(error).split())
 
 
-def _add_part(spec: Any, part: Part, height: float) -> None:
+def _add_part(spec: Any, part: ScenePart, height: float) -> None:
     size = [each / 1000 for each in part.size]
     middle = part.height / 2000 if part.at is None else height - part.at / 1000
     if middle <= 0:

@@ -15,7 +15,7 @@ _MOST_KG: Final = 100.0
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class ScenePart:
     """One rigid part.
 
     Attributes:
@@ -50,7 +50,7 @@ class Scene:
         file: an MJCF with a site named ``gripper`` where the gripper is mounted; None for the table.
     """
 
-    part: Part | None = None
+    part: ScenePart | None = None
     file: str | None = None
 
 
@@ -73,7 +73,7 @@ def parse_scene(text: str) -> Scene:
     if len(size) != _EDGES[kind]:
         raise ValueError(f"physics: a {kind} has {_EDGES[kind]} lengths, got {found['size']}")
     at = None if found["at"] is None else _number("place", found["at"], _MOST_MM)
-    return Scene(Part(kind, size, _number("mass", found["mass"], _MOST_KG), at))
+    return Scene(ScenePart(kind, size, _number("mass", found["mass"], _MOST_KG), at))
 
 
 def _number(name: str, text: str, most: float) -> float:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from robotiq_async.values.calibration.motion_profile import GOES_ON_S
 from robotiq_async.values.enums import SPEED_MAX, ObjectStatus
 
-from .course import Course, of_a_jaw, rest, straight
+from .course import AxisCourse, of_a_jaw, rest, straight
 
 if TYPE_CHECKING:
     from robotiq_async.values.calibration.motion_profile import MotionProfile
@@ -246,7 +246,7 @@ class Axis:
             self._follow(self._course_to(time, here, goal))
         self._closes = self._path.end > here
 
-    def _course_to(self, time: float, here: float, goal: Goal) -> Course:
+    def _course_to(self, time: float, here: float, goal: Goal) -> AxisCourse:
         motion, (end, outcome, _) = self._motion, self._path
         rate, closing = goal.rate_of(motion), end > here
         if motion.is_straight or goal.rate:
@@ -335,7 +335,7 @@ class Axis:
             return 1.0
         return 0.0 if end == surface else max(0.0, (self.position(time) - surface) / (end - surface))
 
-    def _follow(self, course: Course) -> None:
+    def _follow(self, course: AxisCourse) -> None:
         if self.is_moving and course.moves_at > self._course.moves_at:
             self._moved_at = course.moves_at
         self._travelled += abs(course.origin - self._course.origin)

@@ -94,7 +94,7 @@ class StatusTrail:
         return self._entries[0].statuses
 
 
-class Controller:
+class GripperController:
     """The axes and the logic that moves them.
 
     Attributes:

@@ -23,7 +23,7 @@ class Knot(NamedTuple):
     position: float
 
 
-class Course:
+class AxisCourse:
     """A way of straight lines, at rest before and after it. Times are seconds, positions counts. Immutable.
 
     Attributes:
@@ -59,16 +59,18 @@ class Course:
         return self.end
 
 
-def rest(time: float, position: float) -> Course:
+def rest(time: float, position: float) -> AxisCourse:
     """The course of an axis that stays where it is."""
-    return Course((Knot(time, position),))
+    return AxisCourse((Knot(time, position),))
 
 
-def straight(time: float, here: float, end: float, rate: float, pressing: float) -> Course:
+def straight(time: float, here: float, end: float, rate: float, pressing: float) -> AxisCourse:
     """One straight line, and pressing for some seconds before the end is reported."""
     arrives = time + abs(end - here) / rate
     presses_at = arrives if pressing else math.inf
-    return Course((Knot(time, here), Knot(arrives, end)), presses_at=presses_at, ends_at=arrives + pressing)
+    return AxisCourse(
+        (Knot(time, here), Knot(arrives, end)), presses_at=presses_at, ends_at=arrives + pressing
+    )
 
 
 def of_a_jaw(
@@ -81,7 +83,7 @@ def of_a_jaw(
     lands: bool,
     presses: bool,
     early: float,
-) -> Course:
+) -> AxisCourse:
     """The motion of a jaw from the time at which it begins to move.
 
     Args:
@@ -107,9 +109,9 @@ def of_a_jaw(
         time += way / rate
     knots.append(Knot(time, end - sign * short))
     if not presses:
-        return Course(tuple(knots), ends_at=time)
+        return AxisCourse(tuple(knots), ends_at=time)
     pressing = profile.pressing_time(rate)
     ends_at = time + pressing - min(early, _EARLIEST * pressing)
     last = time + pressing * (1.0 if early else _LAST_COUNT)
     knots += Knot(last, end - sign * short), Knot(last, end)
-    return Course(tuple(knots), presses_at=time, ends_at=ends_at)
+    return AxisCourse(tuple(knots), presses_at=time, ends_at=ends_at)

@@ -17,7 +17,7 @@ from robotiq_async.values.model import Model, model_of
 from robotiq_async.values.request import Request
 
 from .control_modes import SCISSOR_HIGH, SCISSOR_LOW, check_ends, check_scissor_limit
-from .controller import ZEROS, Controller
+from .controller import ZEROS, GripperController
 from .driven_axis import PhysicsError
 from .habits import Habits
 from .spread import SEED
@@ -120,7 +120,9 @@ class SimulatedGripper(Surroundings):
         if physics is not None:
             physics.attach(kind, clock, self._speedup)
         ends = None if ends is None else check_ends(ends)
-        super().__init__(Controller(kind, limit, seed_or_none, habits or Habits(), physics, motion, ends))
+        super().__init__(
+            GripperController(kind, limit, seed_or_none, habits or Habits(), physics, motion, ends)
+        )
         self._clock = clock
         self._began = clock()
         self._off_until = -math.inf if powered else math.inf
@@ -146,7 +148,9 @@ class SimulatedGripper(Surroundings):
         self._catch_up()
         if self._is_on:
             self._heard_at = self._time
-            self._inbox.keep(self._time, Write(self._clock(), image), self._cycle, self.habits.write_spacing)
+            self._inbox.keep(
+                self._time, HeardWrite(self._clock(), image), self._cycle, self.habits.write_spacing
+            )
             self._catch_up()
 
     def carry_out_writes(self) -> None:
@@ -329,7 +333,7 @@ class SimulatedGripper(Surroundings):
         return self._axis(finger).travel(self._time)
 
     @property
-    def writes(self) -> tuple[Write, ...]:
+    def writes(self) -> tuple[HeardWrite, ...]:
         """The last 10000 writes that were kept, oldest first."""
         return tuple(self._inbox.writes)
 
@@ -365,7 +369,7 @@ class SimulatedGripper(Surroundings):
                 return
 
 
-class Write(NamedTuple):
+class HeardWrite(NamedTuple):
     """One write that was kept.
 
     Attributes:
@@ -390,7 +394,7 @@ class Inbox:
         self._model = model
         self.image: reg.Registers = ZEROS
         self.pending: deque[tuple[float, Request]] = deque()
-        self.writes: deque[Write] = deque(maxlen=_HISTORY)
+        self.writes: deque[HeardWrite] = deque(maxlen=_HISTORY)
         self._kept_at: float | None = None
 
     def checked(self, address_offset: int, registers: Sequence[int]) -> reg.Registers:
@@ -403,7 +407,7 @@ class Inbox:
         image[offset : offset + len(registers)] = registers
         return reg.check_registers(image)
 
-    def keep(self, time: float, write: Write, cycle: float, spacing: float) -> None:
+    def keep(self, time: float, write: HeardWrite, cycle: float, spacing: float) -> None:
         """Keep a write, unless it follows the last one too closely: then it is forgotten."""
         if self._kept_at is not None and time - self._kept_at < spacing - _ROUNDING:
             return

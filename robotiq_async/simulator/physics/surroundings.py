@@ -11,7 +11,7 @@ from robotiq_async.values.enums import Fault, Finger
 from .axis import Axis, Obstacle
 
 if TYPE_CHECKING:
-    from .controller import Controller
+    from .controller import GripperController
 
 _LONGEST: Final = 1e9
 
@@ -19,7 +19,7 @@ _LONGEST: Final = 1e9
 class Surroundings(ABC):
     """The part of a gripper that the world acts on. It catches up with its clock before anything happens."""
 
-    def __init__(self, controller: Controller) -> None:
+    def __init__(self, controller: GripperController) -> None:
         self._controller = controller
         self._time = 0.0
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from types import TracebackType
 
     from ..physics.driven_axis import PhysicsError
-    from ..troubles.trouble import Link
+    from ..troubles.trouble import TroubleLink
     from .connection import Connection
     from .responder import Responder
 
@@ -34,7 +34,7 @@ class SimulatorEndpoint(ABC):
         fault_injector: makes troubles happen, and decides on requests and replies.
     """
 
-    link: ClassVar[Link]
+    link: ClassVar[TroubleLink]
     functions: ClassVar[Collection[int]]
     """The Modbus functions that are served without any trouble."""
     _responds: ClassVar[type[Responder]]

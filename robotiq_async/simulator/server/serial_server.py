@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from ..physics.gripper import SimulatedGripper
-    from ..troubles.trouble import Link
+    from ..troubles.trouble import TroubleLink
 
 
 BAUD: Final = 115200
@@ -54,7 +54,7 @@ the vendor names 4 ms, at best 250 exchanges a second, for a function 23 whose b
 that the standard recommends above 19200 baud would not fit into that."""
 FRAME_GAP_S: Final = 0.00175
 """A pause of this length may be the end of a frame: the longest that the standard knows at this rate."""
-TIMER_S: Final = 0.0015
+LATE_TIMER_S: Final = 0.0015
 """A timer of the loop comes up to a millisecond late, for epoll rounds its time-outs up."""
 
 LONGEST_PAUSE_S: Final = 0.02
@@ -199,7 +199,7 @@ class SerialSimulatorServer(_RtuEndpoint):
     has it; no source covers a real gripper's answer to a broadcast.
     """
 
-    link: ClassVar[Link] = "rtu"
+    link: ClassVar[TroubleLink] = "rtu"
 
     def __init__(
         self,
@@ -273,7 +273,7 @@ class RtuOverTcpSimulatorServer(_RtuEndpoint, SimulatorServer):
     line behind. Requests sent without waiting are lost if the line cannot take them.
     """
 
-    link: ClassVar[Link] = "rtu+tcp"
+    link: ClassVar[TroubleLink] = "rtu+tcp"
 
     def __init__(
         self,
@@ -343,7 +343,7 @@ class WireTime:
 
     def sends(self, now: float, size: int) -> float:
         """The time at which bytes that the gripper sends now arrive at the client."""
-        begins = self._answers_from if now - self._answers_from < TIMER_S else now
+        begins = self._answers_from if now - self._answers_from < LATE_TIMER_S else now
         self._sent_until = max(begins, self._sent_until) + size * BYTE_S
         return self._sent_until
 

@@ -16,7 +16,7 @@ from .responder import Responder, TcpResponder
 
 if TYPE_CHECKING:
     from ..physics.gripper import SimulatedGripper
-    from ..troubles.trouble import Link
+    from ..troubles.trouble import TroubleLink
 
 _LONGEST_OFF: Final = 3600.0
 
@@ -31,7 +31,7 @@ class SimulatorServer(SimulatorEndpoint):
     replies is not read from until it does.
     """
 
-    link: ClassVar[Link] = "tcp"
+    link: ClassVar[TroubleLink] = "tcp"
     functions: ClassVar[frozenset[int]] = TCP_FUNCTIONS
     _responds: ClassVar[type[Responder]] = TcpResponder
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from robotiq_async.values.registers import Field
 
     from ..troubles.fault_injector import FaultInjector
-    from ..troubles.trouble import Link
+    from ..troubles.trouble import TroubleLink
 
 UNREADABLE: Final = "?"
 """The value of a variable that the controller cannot read, as in an emergency stop (ur_rtde's client)."""
@@ -223,7 +223,7 @@ class UrcapSimulatorServer(SimulatorServer):
     it: no source says.
     """
 
-    link: ClassVar[Link] = "urcap"
+    link: ClassVar[TroubleLink] = "urcap"
     _responds: ClassVar[type[Responder]] = UrcapResponder
 
     def __init__(

@@ -32,7 +32,7 @@ from robotiq_async.values.request import AxisRequest, Request
 from ..functions import READ_INPUT, READ_WRITE
 from . import corruption
 from .corruption import ReplyPolicy, reply_on
-from .trouble import KINDS, Link, Trouble
+from .trouble import KINDS, Trouble, TroubleLink
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator
@@ -40,10 +40,10 @@ if TYPE_CHECKING:
     from ..physics.gripper import SimulatedGripper
 
 
-class Target(Protocol):
+class TroubledServer(Protocol):
     """A simulator that has troubles."""
 
-    link: ClassVar[Link]
+    link: ClassVar[TroubleLink]
     gripper: SimulatedGripper
     policy: ReplyPolicy
 
@@ -96,7 +96,7 @@ class FaultInjector:
         is_unreadable: whether what a GET asks of the gripper cannot be read.
     """
 
-    def __init__(self, target: Target) -> None:
+    def __init__(self, target: TroubledServer) -> None:
         self._target = target
         self._ongoing: list[Ongoing] = []
         self._device_cycle = target.gripper.device_cycle

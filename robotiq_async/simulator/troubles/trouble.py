@@ -21,15 +21,15 @@ from robotiq_async.values.checks import as_float, as_int, check_seconds
 from . import corruption
 from .corruption import Corruption, Parts, Reply
 
-LONGEST: Final = 86400.0
+LONGEST_TROUBLE_S: Final = 86400.0
 _EVENT: Final = 0.0
 _CONDITION: Final = math.inf
 
 On = Literal["read", "write", "any"]
-Link = Literal["tcp", "rtu", "rtu+tcp", "urcap"]
+TroubleLink = Literal["tcp", "rtu", "rtu+tcp", "urcap"]
 
 
-class Kind(NamedTuple):
+class TroubleKind(NamedTuple):
     """One kind of trouble.
 
     Attributes:
@@ -53,11 +53,11 @@ class Kind(NamedTuple):
     high: float = 0.0
     corruption: Corruption | None = None
     on: On = "any"
-    link: Link | None = None
+    link: TroubleLink | None = None
     habit: str | None = None
     is_modbus: bool = False
 
-    def fits(self, link: Link) -> bool:
+    def fits(self, link: TroubleLink) -> bool:
         """Whether it can happen on a kind of link.
 
         A serial server has the frames of a line, and connections. It keeps the silence between frames itself.
@@ -71,9 +71,9 @@ class Kind(NamedTuple):
         return self.link in (None, link)
 
     @property
-    def links(self) -> tuple[Link, ...]:
+    def links(self) -> tuple[TroubleLink, ...]:
         """The kinds of link that it can happen on."""
-        return tuple(link for link in get_args(Link) if self.fits(link))
+        return tuple(link for link in get_args(TroubleLink) if self.fits(link))
 
     @property
     def can_hit_once(self) -> bool:
@@ -82,163 +82,175 @@ class Kind(NamedTuple):
         return self.lasts == _EVENT or self.corruption is not None or is_about_one
 
 
-KINDS: Final[dict[str, Kind]] = {
+KINDS: Final[dict[str, TroubleKind]] = {
     # Replies.
-    "delay": Kind("replies come VALUE seconds later", _CONDITION, 0.05, 0, 10, corruption.delay),
-    "late": Kind(
+    "delay": TroubleKind("replies come VALUE seconds later", _CONDITION, 0.05, 0, 10, corruption.delay),
+    "late": TroubleKind(
         "a reply comes VALUE seconds later, after the client has given up",
         *(_EVENT, 0.7, 0, 10, corruption.delay),
     ),
-    "drop": Kind("a reply is lost; its request was carried out", corruption=corruption.drop),
-    "half": Kind("only the first half of a reply comes", corruption=corruption.half),
-    "pieces": Kind(
+    "drop": TroubleKind("a reply is lost; its request was carried out", corruption=corruption.drop),
+    "half": TroubleKind("only the first half of a reply comes", corruption=corruption.half),
+    "pieces": TroubleKind(
         "replies come in three pieces, VALUE seconds apart", _CONDITION, 0.002, 0, 1, corruption.pieces
     ),
-    "twice": Kind("a reply comes twice in one segment", corruption=corruption.twice),
-    "wrong-function": Kind(
+    "twice": TroubleKind("a reply comes twice in one segment", corruption=corruption.twice),
+    "wrong-function": TroubleKind(
         "a reply is one to another function", corruption=corruption.wrong_function, is_modbus=True
     ),
-    "wrong-length": Kind("a reply is one register short", corruption=corruption.wrong_length, is_modbus=True),
-    "wrong-count": Kind(
+    "wrong-length": TroubleKind(
+        "a reply is one register short", corruption=corruption.wrong_length, is_modbus=True
+    ),
+    "wrong-count": TroubleKind(
         "a reply lies about how much it holds", corruption=corruption.wrong_count, is_modbus=True
     ),
-    "wrong-transaction": Kind(
+    "wrong-transaction": TroubleKind(
         "a reply carries an old transaction number",
         corruption=corruption.wrong_transaction,
         link="tcp",
         is_modbus=True,
     ),
-    "wrong-unit": Kind("a reply comes from another unit", corruption=corruption.wrong_unit, is_modbus=True),
-    "wrong-protocol": Kind(
+    "wrong-unit": TroubleKind(
+        "a reply comes from another unit", corruption=corruption.wrong_unit, is_modbus=True
+    ),
+    "wrong-protocol": TroubleKind(
         "a reply is of another protocol than Modbus",
         corruption=corruption.wrong_protocol,
         link="tcp",
         is_modbus=True,
     ),
-    "wrong-echo": Kind(
+    "wrong-echo": TroubleKind(
         "a reply to a write names another register",
         corruption=corruption.wrong_echo,
         on="write",
         is_modbus=True,
     ),
-    "wrong-checksum": Kind("a reply has a wrong checksum", corruption=corruption.wrong_checksum, link="rtu"),
-    "byte-before": Kind(
+    "wrong-checksum": TroubleKind(
+        "a reply has a wrong checksum", corruption=corruption.wrong_checksum, link="rtu"
+    ),
+    "byte-before": TroubleKind(
         "a byte VALUE comes before a reply", _EVENT, 0, 0, 255, corruption.byte_before, link="rtu"
     ),
-    "byte-after": Kind(
+    "byte-after": TroubleKind(
         "a byte VALUE comes after a reply", _EVENT, 0, 0, 255, corruption.byte_after, link="rtu"
     ),
-    "seven-bits": Kind(
+    "seven-bits": TroubleKind(
         "replies lose the highest bit of each byte", _CONDITION, corruption=corruption.seven_bits, link="rtu"
     ),
-    "garbled": Kind(
+    "garbled": TroubleKind(
         "replies are bytes that mean nothing, as at another rate",
         _CONDITION,
         corruption=corruption.garbled,
         link="rtu",
     ),
-    "exception": Kind(
+    "exception": TroubleKind(
         "a request is answered by exception VALUE",
         *(_EVENT, 4, 1, 255, corruption.refusal),
         link="tcp",
         is_modbus=True,
     ),
-    "uneven-delay": Kind(
+    "uneven-delay": TroubleKind(
         "replies come 10 to 60 ms later as a rule, and one in a hundred up to VALUE seconds",
         *(_CONDITION, 0.26, 0.12, 10, corruption.delay),
     ),
-    "latency-timer": Kind(
+    "latency-timer": TroubleKind(
         "replies wait for the timer of a USB adapter, which ends every VALUE seconds",
         *(_CONDITION, 0.016, 0.001, 1, corruption.delay),
         link="rtu",
     ),
     # Requests and connections.
-    "silence": Kind("requests are not heard; connections stay open", _CONDITION),
-    "echo": Kind("the line brings back what is sent", _CONDITION, link="rtu"),
-    "strict-silence": Kind(
+    "silence": TroubleKind("requests are not heard; connections stay open", _CONDITION),
+    "echo": TroubleKind("the line brings back what is sent", _CONDITION, link="rtu"),
+    "strict-silence": TroubleKind(
         "a request that comes within VALUE seconds after a reply is not heard",
         *(_CONDITION, 0.00175, 0, 1),
         link="rtu",
     ),
-    "reset": Kind("all connections are reset", link="tcp"),
-    "close": Kind("all connections are closed in order", link="tcp"),
-    "accept-silence": Kind(
+    "reset": TroubleKind("all connections are reset", link="tcp"),
+    "close": TroubleKind("all connections are closed in order", link="tcp"),
+    "accept-silence": TroubleKind(
         "connections are reset; new ones are accepted, not answered", _CONDITION, link="tcp"
     ),
-    "refuse": Kind("connections are reset; new ones are refused", _CONDITION, link="tcp"),
-    "first-lost": Kind("the first request of a new connection is not heard", _CONDITION, link="tcp"),
-    "old-connection": Kind(
+    "refuse": TroubleKind("connections are reset; new ones are refused", _CONDITION, link="tcp"),
+    "first-lost": TroubleKind("the first request of a new connection is not heard", _CONDITION, link="tcp"),
+    "old-connection": TroubleKind(
         "a forwarder keeps a connection for VALUE seconds after its end, and answers no new one until then",
         *(_CONDITION, 30.0, 0, 3600),
         link="tcp",
     ),
-    "multiplexer": Kind(
+    "multiplexer": TroubleKind(
         "a gateway keeps its own connection: replies come VALUE seconds later, to the client connected then",
         *(_CONDITION, 0.7, 0, 10),
         link="tcp",
     ),
     # The gripper.
-    "power-cut": Kind("the gripper has no power, and comes back reset", _CONDITION),
-    "idle-reset": Kind(
+    "power-cut": TroubleKind("the gripper has no power, and comes back reset", _CONDITION),
+    "idle-reset": TroubleKind(
         "the gripper loses its activation when no request comes for VALUE seconds", _CONDITION, 5.0, 0, 3600
     ),
-    "foreign": Kind("another client sends all axes to VALUE", _EVENT, 128, 0, 255),
-    "slow-device": Kind("requests take effect VALUE seconds after they came", _CONDITION, 0.2, 0, 10),
-    "interference": Kind("the scissor is blocked: fault 0x0A, after 20 s 0x0E", _CONDITION),
-    "fault": Kind("the gripper reports fault VALUE", _CONDITION, 9, 1, 15),
-    "controller-fault": Kind(
+    "foreign": TroubleKind("another client sends all axes to VALUE", _EVENT, 128, 0, 255),
+    "slow-device": TroubleKind("requests take effect VALUE seconds after they came", _CONDITION, 0.2, 0, 10),
+    "interference": TroubleKind("the scissor is blocked: fault 0x0A, after 20 s 0x0E", _CONDITION),
+    "fault": TroubleKind("the gripper reports fault VALUE", _CONDITION, 9, 1, 15),
+    "controller-fault": TroubleKind(
         "the controller before a jaw reports fault VALUE (kFLT)", *(_CONDITION, 12, 1, 15), is_modbus=True
     ),
-    "release": Kind("the gripper releases automatically"),
-    "stranded": Kind("the gripper loses its activation and keeps rACT: nothing moves until a reset"),
-    "e-stop": Kind(
+    "release": TroubleKind("the gripper releases automatically"),
+    "stranded": TroubleKind("the gripper loses its activation and keeps rACT: nothing moves until a reset"),
+    "e-stop": TroubleKind(
         "the emergency stop is pressed: fault 0x05; after its end VALUE resets are needed",
         *(_CONDITION, 1, 1, 9),
     ),
     # Habits of grippers, by one source or more.
-    "status-lag": Kind(
+    "status-lag": TroubleKind(
         "gDT and gSTA lag the rest of the status by VALUE seconds",
         *(_CONDITION, 0.05, 0, 1),
         habit="status_lag",
     ),
-    "silence-fault": Kind(
+    "silence-fault": TroubleKind(
         "the first status after VALUE seconds without a message shows fault 0x09",
         *(_CONDITION, 1.0, 0, 3600),
         habit="silence_fault",
     ),
-    "slow-activation": Kind(
+    "slow-activation": TroubleKind(
         "an activation takes VALUE seconds", *(_CONDITION, 25.0, 0, 600), habit="activation_time"
     ),
-    "echoed-limits": Kind(
+    "echoed-limits": TroubleKind(
         "a request beyond a software limit is echoed as the limit", _CONDITION, habit="echoes_limits"
     ),
-    "write-spacing": Kind(
+    "write-spacing": TroubleKind(
         "a write within VALUE seconds of the one before is acknowledged and forgotten",
         *(_CONDITION, 0.01, 0, 1),
         habit="write_spacing",
     ),
-    "wake-needed": Kind(
+    "wake-needed": TroubleKind(
         "on a new connection the first image with rACT only wakes the gripper: its motion is forgotten",
         _CONDITION,
         link="tcp",
     ),
-    "registers": Kind(
+    "registers": TroubleKind(
         "more than VALUE registers of a block are refused: no answer on a serial line",
         *(_CONDITION, 3, 1, 8),
         is_modbus=True,
     ),
-    "function-3-only": Kind(
+    "function-3-only": TroubleKind(
         "function 4 is refused, and function 3 reads the status", _CONDITION, is_modbus=True
     ),
-    "no-function-23": Kind("function 23 is refused: no answer on a serial line", _CONDITION, link="rtu"),
-    "one-connection-only": Kind("while there is a connection, a new one is reset", _CONDITION, link="tcp"),
-    "one-by-one": Kind(
+    "no-function-23": TroubleKind(
+        "function 23 is refused: no answer on a serial line", _CONDITION, link="rtu"
+    ),
+    "one-connection-only": TroubleKind(
+        "while there is a connection, a new one is reset", _CONDITION, link="tcp"
+    ),
+    "one-by-one": TroubleKind(
         "the variables of a SET are taken one by one, VALUE seconds apart",
         *(_CONDITION, 0.01, 0, 1),
         link="urcap",
     ),
-    "lost-set": Kind("a SET is acknowledged, and does not reach the gripper", _CONDITION, link="urcap"),
-    "unreadable": Kind(
+    "lost-set": TroubleKind(
+        "a SET is acknowledged, and does not reach the gripper", _CONDITION, link="urcap"
+    ),
+    "unreadable": TroubleKind(
         "the answer to a GET is NAME ?, as while the arm is in an emergency stop", _CONDITION, link="urcap"
     ),
 }
@@ -282,13 +294,13 @@ class Trouble:
             raise ValueError(f"on must be read, write or any, got {self.on!r}")
         if self.on != "any" and (known.corruption is None or known.on not in ("any", self.on)):
             raise ValueError(f"'on {self.on}' means nothing for {self.kind}")
-        self._keep("at", check_seconds("at", self.at, 0, LONGEST))
+        self._keep("at", check_seconds("at", self.at, 0, LONGEST_TROUBLE_S))
         if self.lasts is not None and self.lasts != math.inf:
-            self._keep("lasts", check_seconds("for", self.lasts, 0, LONGEST))
+            self._keep("lasts", check_seconds("for", self.lasts, 0, LONGEST_TROUBLE_S))
         if self.duration == 0 and not known.can_hit_once:
             raise ValueError(f"{self.kind} is a condition: give a duration, or leave it out to last for ever")
         if self.every is not None:
-            self._keep("every", check_seconds("every", self.every, 0.001, LONGEST))
+            self._keep("every", check_seconds("every", self.every, 0.001, LONGEST_TROUBLE_S))
             if self.every <= self.duration:
                 raise ValueError(f"{self.kind} cannot come again after {self.every:g} s: it lasts as long")
 
@@ -336,7 +348,7 @@ def _digits(number: float) -> str:
     return repr(int(number) if number == int(number) else number)
 
 
-def _checked_value(name: str, kind: Kind, value: object) -> float:
+def _checked_value(name: str, kind: TroubleKind, value: object) -> float:
     if kind.value is None:
         raise ValueError(f"{name} takes no value, got {value!r}")
     whole = isinstance(kind.value, int)
@@ -374,7 +386,7 @@ def _parse_one(line: str) -> Trouble:
     while words:
         word = words.pop(0)
         if word not in _WORDS or word in options or (word != "once" and not words):
-            raise ValueError(f"cannot read {line.strip()!r} at {word!r}; the form is: {FORM}")
+            raise ValueError(f"cannot read {line.strip()!r} at {word!r}; the form is: {TROUBLE_FORM}")
         options[word] = "" if word == "once" else words.pop(0)
     if "once" in options and "for" in options:
         raise ValueError(f"cannot read {line.strip()!r}: 'once' and 'for' contradict each other")
@@ -392,7 +404,7 @@ def _parse_one(line: str) -> Trouble:
     )
 
 
-FORM: Final = "KIND [VALUE] [on read|write] [at S] [for S|for ever|once] [every S]"
+TROUBLE_FORM: Final = "KIND [VALUE] [on read|write] [at S] [for S|for ever|once] [every S]"
 _WORDS: Final = ("on", "at", "for", "once", "every")
 
 

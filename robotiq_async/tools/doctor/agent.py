@@ -9,7 +9,7 @@ from typing import Final
 
 from ...fleet.network.bus import Bus, Urgency
 from ...fleet.remote.errand import of_its_run
-from ...fleet.wire.envelope import Call, unpack_answer
+from ...fleet.wire.envelope import AgentCall, unpack_answer
 from ...fleet.wire.names import GripperName
 from ...fleet.wire.status_message import StatusMessage, unpack
 from ...fleet.wire.values import Fields
@@ -65,7 +65,7 @@ class _Asker:
     async def info(self) -> Fields:
         """The agent's description of the gripper."""
         self._number += 1
-        call = Call(self._name.base, self._client, number=self._number)
+        call = AgentCall(self._name.base, self._client, number=self._number)
         asked, key = now(), self._name.question(self._bus.who or self._client)
         reply = await self._bus.ask(
             key, call.pack(), timeout=AGENT_ANSWER_S, urgency=Urgency.QUESTION, decides=of_its_run(call)

@@ -37,7 +37,7 @@ RUN_PAUSE_S: Final = 0.3
 """Pause between runs, in the gripper's time: a finger that has just stopped may still swing."""
 ATTEMPTS: Final = 20  # attempts at a run: one in which the event loop was blocked is repeated
 TOLERATED: Final = 0.01  # share of a run for which the event loop may be blocked, apart from two polls
-SLACK: Final = 5  # counts by which the readings of a full closing may miss those that the manual gives
+STROKE_SLACK: Final = 5  # counts by which the readings of a full closing may miss those that the manual gives
 GRASP_S: Final = 1.0  # seconds of the gripper's time that are recorded after the fingers have stopped
 CURRENT_MA: Final = 2550  # the highest current that a status can report
 FINGERS: Final = (Finger.A, Finger.B, Finger.C)
@@ -77,7 +77,10 @@ async def time_closing(hand: Hand, speed: int, fingers: Finger, speedup: float =
     """
     if Finger.SCISSOR in fingers:
         raise ValueError("fingers must be A, B and C only, got the scissor: it has a different stroke")
-    open_below, closed_above = hand.model.open_reading_max + SLACK, hand.model.closed_reading_min - SLACK
+    open_below, closed_above = (
+        hand.model.open_reading_max + STROKE_SLACK,
+        hand.model.closed_reading_min - STROKE_SLACK,
+    )
     for _ in range(ATTEMPTS):
         opened = await hand.open(fingers, speed=255)
         await asyncio.sleep(RUN_PAUSE_S / speedup)
