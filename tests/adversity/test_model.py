@@ -27,6 +27,7 @@ from tests.virtual import VirtualLoop
 
 ALL = Finger.ALL
 CLOSED = 255
+MOST_FORCE = 255
 masks = st.integers(1, 15).map(Finger)
 values = st.integers(0, 255)
 LINK_TROUBLES = [
@@ -135,19 +136,26 @@ class LiveUse(RuleBasedStateMachine):
         self.give_a_reason(axes)
         self.call(self.hand.set_position(position, axes))
 
-    @rule(axes=masks, at=st.integers(40, 200), force=values)
+    @rule(axes=masks, at=st.integers(40, 200), force=values, holds_after=st.sampled_from([None, 0.0, 0.03]))
     @precondition(lambda self: self.running)
-    def grip(self, axes: Finger, at: int, force: int) -> None:
-        """Close on something and wait for it; what the user asks next may be more force, a hold, a halt."""
+    def grip(self, axes: Finger, at: int, force: int, holds_after: float | None) -> None:
+        """Close on something and wait for it; then more force may make it press again, and a hold comes."""
         axes = self.of_the_model(axes)
         self.give_a_reason(axes)
-        self.gripper.place_object(axes, at)
+        for axis in self.gripper.model.axes:
+            if axis in axes & ~self.gripper.grips:
+                self.gripper.place_object(axis, max(at, self.gripper.position(axis)))  # not behind it
 
         async def close() -> None:
             with suppress(RobotiqError):
                 self.gripping |= (await self.hand.close(axes, speed=255, force=force)).contacts
 
         self.run(close())
+        if holds_after is not None:
+            self.set_force(axes, MOST_FORCE)
+            self.wait(holds_after)
+            self.hold(axes)
+            self.wait(0.3)
 
     @rule(axes=masks, force=values, seconds=st.sampled_from([0.0, 0.03, 0.06]))
     @precondition(lambda self: self.running)
