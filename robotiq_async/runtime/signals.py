@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import threading
 from types import FrameType
 from typing import Final
 
@@ -11,6 +12,12 @@ INSIST_S: Final = 3.0
 ENDING: Final = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 """Ctrl-C, ``kill``, a closed terminal, and Ctrl-Break on Windows. There a closed console ends the process at
 once, whatever handles SIGBREAK, which it raises too."""
+
+
+def check_main_thread() -> None:
+    """Raise RuntimeError in any thread but the one that signals reach."""
+    if threading.current_thread() is not threading.main_thread():
+        raise RuntimeError("signals reach the main thread alone: enter stops_on_signals() there")
 
 
 def ending_signals() -> list[signal.Signals]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import signal
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -13,7 +12,7 @@ from typing import Any, Final
 
 from ..runtime.concurrency import LateError
 from ..runtime.log import log
-from ..runtime.signals import INSIST_S, ending_signals, pass_on
+from ..runtime.signals import INSIST_S, check_main_thread, ending_signals, pass_on
 from ..values.errors import NotStartedError
 from .loop_thread import LOOP_THREAD
 from .robotiq_hand import RobotiqHand, caller_of
@@ -45,8 +44,7 @@ def stops_on_signals(*hands: RobotiqHand) -> Iterator[None]:
     for each in hands:
         if not isinstance(each, RobotiqHand):
             raise TypeError(f"hands must be blocking hands, got {each!r}")
-    if threading.current_thread() is not threading.main_thread():
-        raise RuntimeError("signals reach the main thread alone: enter stops_on_signals() there")
+    check_main_thread()
     is_received, stopped_at = False, float("inf")
 
     def handle(number: int, frame: FrameType | None) -> None:

@@ -19,7 +19,6 @@ import asyncio
 import os
 import signal
 import socket
-import threading
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
@@ -33,7 +32,7 @@ from ..control.state_machine import RUNNING
 from ..hand import Hand
 from ..runtime.clock import now
 from ..runtime.log import log
-from ..runtime.signals import INSIST_S, ending_signals, pass_on
+from ..runtime.signals import INSIST_S, check_main_thread, ending_signals, pass_on
 from ..sync import RobotiqHand as BlockingHand
 from ..values.enums import Fault, Finger, State, names_of
 from ..values.errors import NotStartedError
@@ -172,8 +171,7 @@ async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator
     for each in hands:
         if not isinstance(each, Hand):
             raise TypeError(f"hands must be hands for asyncio, got {each!r}")
-    if threading.current_thread() is not threading.main_thread():
-        raise RuntimeError("signals reach the main thread alone: enter stops_on_signals() there")
+    check_main_thread()
     loop, signals, stopping = asyncio.get_running_loop(), Signals(), list[asyncio.Task[None]]()
     insist_at = 0.0  # from when on a further signal acts
     scope = anyio.CancelScope()
