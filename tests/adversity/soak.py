@@ -47,6 +47,7 @@ from tests.adversity.world import (
     World,
     tunnel_through_an_arm,
 )
+from tests.arms import Arm
 from tests.serial_line import SerialLine
 
 SPEEDUP = 5.0
@@ -97,6 +98,8 @@ class Soak:
     writes: WriteWatch
     write_s: float
     """Longest time that a write may take."""
+    arm: Arm | None = None
+    """The arm at whose tool the gripper is, if there is one."""
     figures: Counter[str] = field(default_factory=Counter)
     broken: list[str] = field(default_factory=list)
     longest_stall: float = 0.0
@@ -215,6 +218,10 @@ class Soak:
             if self.line is not None and self.rng.random() < 0.1:
                 await self.pull(self.line)
                 continue
+            if self.arm is not None and self.rng.random() < 0.1:
+                self.figures["trouble: arm dropped its clients"] += 1
+                self.arm.drop_clients()
+                continue
             trouble = self.rng.choice(kinds)
             self.figures["troubles"] += 1
             self.figures[f"trouble: {trouble.kind}"] += 1
@@ -286,9 +293,11 @@ async def soaks(
         write_s = WRITE_S + others * TURNS * TURN_S
         for number in range(hands):
             gripper = StampedGripper(speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP, model=model)
-            world = await stack.enter_async_context(started(gripper, link, line, number))
+            world, arm = await stack.enter_async_context(started(gripper, link, line, number))
             pulled = line if number == 0 else None
-            them.append(Soak(world, pulled, random.Random(seed + number), loop, WriteWatch(model), write_s))
+            them.append(
+                Soak(world, pulled, random.Random(seed + number), loop, WriteWatch(model), write_s, arm)
+            )
         for number in range(hands, hands + silent):
             assert line is not None, "others need a line"
             stack.enter_context(looking(f"rtu://{line.near}", RTU_REGISTERS.device_id + number))
@@ -306,8 +315,11 @@ def looking(address: str, unit: int) -> Iterator[None]:
 @contextlib.asynccontextmanager
 async def started(
     gripper: StampedGripper, link: str, line: SerialLine | None, number: int
-) -> AsyncIterator[World]:
-    """A gripper with its server, and a hand; of several on a line it is the one with this number."""
+) -> AsyncIterator[tuple[World, Arm | None]]:
+    """A gripper with its server, and a hand; of several on a line it is the one with this number.
+
+    With a tunnel it is at the tool of an arm.
+    """
     server: Server
     unit = None
     if line is not None:
@@ -318,12 +330,13 @@ async def started(
     async with contextlib.AsyncExitStack() as stack:
         await stack.enter_async_context(server)
         address: str | Tunnel = server.address if line is None else f"rtu://{line.near}"
+        arm: Arm | None = None
         if link == "tunnel":
-            address = await stack.enter_async_context(tunnel_through_an_arm(server))
+            arm, address = await stack.enter_async_context(tunnel_through_an_arm(server))
         async with RobotiqHand(address, model=gripper.model, device_id=unit) as hand:
             world = World(gripper, server, None, hand)
             watching = asyncio.create_task(world.watch())
-            yield world
+            yield world, arm
             watching.cancel()
             await asyncio.gather(watching, return_exceptions=True)
 

@@ -31,7 +31,7 @@ from robotiq_async.simulator.troubles.fault_injector import FaultInjector
 from robotiq_async.values.model import Model, model_of
 from robotiq_async.values.registers import Registers, gFLT, gIMC
 from robotiq_async.values.request import Request
-from tests.arms import DoosanController, ToolLine, tunnel_of
+from tests.arms import Arm, DoosanController, ToolLine, tunnel_of
 from tests.grippers import activate_beforehand
 from tests.virtual import VirtualLoop
 from tests.virtual_line import VirtualLine
@@ -305,10 +305,10 @@ class World:
 
 
 @asynccontextmanager
-async def tunnel_through_an_arm(server: Server) -> AsyncIterator[Tunnel]:
-    """The tunnel to a gripper at an arm's tool: that which carries the bytes as they are."""
+async def tunnel_through_an_arm(server: Server) -> AsyncIterator[tuple[Arm, Tunnel]]:
+    """An arm with a gripper at its tool, and the tunnel that carries the bytes as they are."""
     async with DoosanController(ToolLine(parse_address(server.address).port)) as arm:
-        yield tunnel_of("Doosan", "127.0.0.1", arm.port)
+        yield arm, tunnel_of("Doosan", "127.0.0.1", arm.port)
 
 
 @asynccontextmanager
@@ -345,7 +345,7 @@ async def world(
     async with AsyncExitStack() as stack:
         await stack.enter_async_context(server)
         if link == "tunnel":
-            address = await stack.enter_async_context(tunnel_through_an_arm(server))
+            _, address = await stack.enter_async_context(tunnel_through_an_arm(server))
         # Every phase and every trouble lasts for many polls; more of them reveal no more and take longer.
         options = {"poll_interval": 0.03, "model": model} | options
         if any(habit.kind == "function-3-only" for habit in HABITS):
