@@ -129,7 +129,7 @@ assert Winmm.periods == 0
 """
 A_SILENCE = """
 import time
-from robotiq_async.link.silence import Silence
+from robotiq_async.link.serial.silence import Silence
 
 async def keep_silent():
     looks, silence, clock = 0, Silence(0.0001), time.monotonic

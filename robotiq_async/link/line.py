@@ -20,7 +20,7 @@ A line may have several users, because grippers with different unit ids can hang
 it and the last one closes it. Users take turns, in the order in which they ask for them, so each waits for
 one turn of each other at most. What another one has left on its way must not meet a request: the turn begins
 with waiting for silence then. A gripper that does not answer takes a short turn, and only once in a while
-(patience.py). When the wire ends, it ends for all users.
+(serial/patience.py). When the wire ends, it ends for all users.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ from .canonical import canonical_address
 from .exchange import Answer, EchoFilter, Exchange
 from .frames import stray
 from .outcome import Lost, Noise, Outcome, Refused, Stray
-from .patience import Patience
-from .silence import Silence
+from .serial.patience import LinePatience
+from .serial.silence import Silence
 from .watchdog import Watchdog
 from .wires import Send, Wire, wire_to
 
@@ -129,7 +129,7 @@ class Line:
         self._log: Final = log
         self._holders: Final[WeakKeyDictionary[object, Log]] = WeakKeyDictionary()
         """Those whose line it is, and who open it again after a loss, whether they are users now or not."""
-        self._patience: Final = Patience()
+        self._patience: Final = LinePatience()
         self._speaker: object = None
         """Who had the last turn, and has not left since."""
         self._exchange: Exchange | None = None

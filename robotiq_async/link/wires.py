@@ -30,7 +30,7 @@ from ..runtime.limit import Limit
 from ..values.errors import ConnectFailedError, ConnectionLostError, RobotiqConnectionError
 from .address import Address
 from .outcome import Lost, Outcome
-from .serial_ports import GONE, hasten, why_no_port
+from .serial.ports import GONE, hasten, why_no_port
 
 ModbusClient = AsyncModbusTcpClient | AsyncModbusSerialClient
 AsyncioTransport = Any

@@ -18,7 +18,7 @@ from robotiq_async import (
     State,
 )
 from robotiq_async.link.line import HUSH_S
-from robotiq_async.link.patience import QUESTION_S
+from robotiq_async.link.serial.patience import QUESTION_S
 from robotiq_async.simulator import SimulatedGripper, Trouble
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
 from tests.grippers import activate_beforehand

@@ -11,7 +11,7 @@ from robotiq_async import ConnectionLostError, ProtocolError, ResponseTimeoutErr
 from robotiq_async.link.dialogue import Dialogues
 from robotiq_async.link.exchange import Answer, Exchange, Timing
 from robotiq_async.link.outcome import Lost, Noise, Refused, Silent, Stray
-from robotiq_async.link.silence import Silence
+from robotiq_async.link.serial.silence import Silence
 from robotiq_async.runtime.log import log
 from robotiq_async.values.model import TWO_FINGER_85
 

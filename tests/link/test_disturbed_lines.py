@@ -11,7 +11,7 @@ import pytest
 from robotiq_async import ProtocolError, ResponseTimeoutError, RobotiqConnectionError
 from robotiq_async.link.line import HUSH_S
 from robotiq_async.link.modbus import ModbusTransport
-from robotiq_async.link.silence import LONG_S
+from robotiq_async.link.serial.silence import LONG_S
 from tests.link.scripted_device import Device, unopened, wrong_checksum
 from tests.serial_line import with_crc
 from tests.virtual_line import VirtualLine

@@ -16,7 +16,7 @@ import serial
 
 from robotiq_async import ConnectFailedError, ProtocolError, ResponseTimeoutError, RobotiqConnectionError
 from robotiq_async.link.modbus import ModbusTransport
-from robotiq_async.link.serial_ports import (
+from robotiq_async.link.serial.ports import (
     FORBIDDEN,
     MISSING,
     NO_PORT,

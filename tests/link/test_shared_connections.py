@@ -12,7 +12,7 @@ import pytest
 
 from robotiq_async import RobotiqConnectionError
 from robotiq_async.link.modbus import ModbusTransport
-from robotiq_async.link.patience import SOON
+from robotiq_async.link.serial.patience import SOON
 from robotiq_async.values.registers import REGISTER_COUNT, RTU_REGISTERS
 from tests.link.scripted_device import Device, unopened
 from tests.serial_line import with_crc

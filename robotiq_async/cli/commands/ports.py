@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from ...link.serial_ports import MISSING, names_of_adapters
+from ...link.serial.ports import MISSING, names_of_adapters
 from ...runtime.log import printable
 from ...values.errors import RobotiqError
 from ..arguments import need

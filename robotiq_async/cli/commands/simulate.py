@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from cyclopts import Parameter
 
-from ...link.serial_ports import why_no_port
+from ...link.serial.ports import why_no_port
 from ...runtime.sockets import is_loopback
 from ...values.enums import Finger
 from ...values.errors import RobotiqError

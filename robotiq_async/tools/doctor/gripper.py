@@ -13,7 +13,7 @@ from typing import Final
 from ...link.address import Address
 from ...link.modbus import ModbusTransport
 from ...link.registers import registers_of
-from ...link.serial_ports import USB_SERIAL, latency_file, latency_timer
+from ...link.serial.ports import USB_SERIAL, latency_file, latency_timer
 from ...link.transport import Link
 from ...runtime.host_names import addresses_of
 from ...session.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Final
 
 from ....link.registers import registers_of
-from ....link.serial_ports import latency_file, latency_timer
+from ....link.serial.ports import latency_file, latency_timer
 from ....runtime.sockets import is_loopback
 from ....session.options import POLL_INTERVAL_S
 from ....values.enums import Fault

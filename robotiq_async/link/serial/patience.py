@@ -29,7 +29,7 @@ QUESTION_S: Final = 0.06
 SHORT_S: Final = 0.024
 """An adapter may keep a reply for 16 ms (the usual latency timer of FTDI chips)."""
 LONG_EVERY: Final = 8
-SLACK: Final = 4.0
+TIMES_SLOWEST: Final = 4.0
 """A question waits for so many times as long as the slowest answer of late."""
 FADES: Final = 0.98
 """The share of the slowest answer that is left after the next one."""
@@ -46,7 +46,7 @@ class _Silent(NamedTuple):
     """The time of the next question."""
 
 
-class Patience:
+class LinePatience:
     """The share of a line that each user may take. Users are told apart, and forgotten with their objects."""
 
     def __init__(self) -> None:
@@ -62,7 +62,9 @@ class Patience:
         """The longest time for the next answer; ``response_s`` is the response timeout."""
         misses = self._silent[user].misses if user in self._silent else 0
         usual = SHORT_S if misses % LONG_EVERY else QUESTION_S
-        return min(response_s, max(usual * max(1.0, response_s / USUAL_RESPONSE_S), SLACK * self._slowest))
+        return min(
+            response_s, max(usual * max(1.0, response_s / USUAL_RESPONSE_S), TIMES_SLOWEST * self._slowest)
+        )
 
     def missed(self, user: object, now: float) -> None:
         """There was no answer."""
