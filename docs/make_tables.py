@@ -82,21 +82,30 @@ FAMILIES: Final = {
 
 
 def diagram() -> str:
-    """The states for Mermaid. What a status shows, and what leads from any state, is drawn once."""
+    """The states for Mermaid, in two pictures: what calls lead to, and what a status shows.
+
+    One alone is 1,500 pixels wide, and its text too small to read on the site. What leads from any state is
+    drawn once.
+    """
     seen = [trigger for trigger in Trigger if trigger.is_seen]
     follows = {state for state, row in TABLE.items() if all(isinstance(row[each], State) for each in seen)}
     shown = {each: Counter(TABLE[state][each] for state in follows).most_common(1)[0][0] for each in seen}
-    lines = ["stateDiagram-v2", "state shown <<choice>>", 'state "any state with a link" as any']
+    lines = ['state "any state with a link" as any']
     lines += [f"any --> {FAMILIES[each].name}: {each.value}" for each in list(FAMILIES)[:-1]]
-    lines += [f"{state.name} --> shown" for state in TABLE if state in follows and is_on_the_way(state)]
-    lines += [f"shown --> {shown[each].name}: {each.value}" for each in seen]  # type: ignore[union-attr]
+    shows = ["direction LR", "state shown <<choice>>"]
+    shows += [f"{state.name} --> shown" for state in TABLE if state in follows and is_on_the_way(state)]
+    shows += [f"shown --> {shown[each].name}: {each.value}" for each in seen]  # type: ignore[union-attr]
     for source, row in TABLE.items():
         drawn = FAMILIES | (shown if source in follows else {})
         for target in TABLE:
             found = [each.value for each in Trigger if row[each] is target is not drawn.get(each)]
             if found and target is not source:
                 lines.append(f"{source.name} --> {target.name}: {', '.join(found)}")
-    return "```mermaid\n" + "\n    ".join(lines) + "\n```"
+    return f"{_drawn(lines)}\n\nWhat a status shows:\n\n{_drawn(shows)}"
+
+
+def _drawn(lines: Sequence[str]) -> str:
+    return "```mermaid\n" + "\n    ".join(("stateDiagram-v2", *lines)) + "\n```"
 
 
 def is_on_the_way(state: State) -> bool:

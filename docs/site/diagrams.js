@@ -2,5 +2,7 @@
 import { mermaid } from "./mermaid/index.js";
 
 const isDark = document.body.dataset.mdColorScheme === "slate";
-mermaid.initialize({ startOnLoad: false, theme: isDark ? "dark" : "default" });
+// Narrow: what is wider than the column is drawn smaller.
+const state = { nodeSpacing: 10, rankSpacing: 25 };
+mermaid.initialize({ startOnLoad: false, theme: isDark ? "dark" : "default", state });
 await mermaid.run({ querySelector: ".diagram" });

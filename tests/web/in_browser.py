@@ -5,10 +5,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import shutil
 import signal
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import dataclass
 from functools import partial
+from html import escape
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 from typing import Any, Literal
 
 import pytest
@@ -21,6 +25,7 @@ from selenium.common.exceptions import WebDriverException
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
+from docs.site.__main__ import MERMAID
 from robotiq_async import (
     OPEN,
     WIDTH_NORMAL,
@@ -43,7 +48,7 @@ from robotiq_async.tools.web.settings import PageSettings
 from robotiq_async.values.enums import DEFAULT_SPEED, JAW
 from robotiq_async.values.model import THREE_FINGER
 from tests.conftest import watched
-from tests.docs.pages import blocks, read
+from tests.docs.pages import DOCS, blocks, read
 from tests.fake_hand import FakeHand
 from tests.virtual import HoldWatch
 from tests.web.browser import BROWSER, COLORS, DRIVER, GEOMETRY, MISSING, SMALL, VISIBLE, Browser, Pace
@@ -631,3 +636,43 @@ async def test_the_hand_keeps_its_polls_with_two_pages_open(browser: Browser, st
     missed_by_us = max(missed - others / 0.005, 0)
     share = polls / (polls + missed_by_us)
     assert share >= 0.99, f"{share:.2%}: {missed} missed in {polls}, others took {others:.3f} s"
+
+
+# -- the pictures of the site ------------------------------------------------------------------------------
+
+DIAGRAMS: str = """<html><body style="width: 720px; margin: 0" data-md-color-scheme="default">{}
+<script type="module" src="diagrams.js"></script></body></html>"""
+SMALLEST: str = """
+const found = [...document.querySelectorAll('svg')].map((svg) => svg.getBoundingClientRect().width
+  / svg.viewBox.baseVal.width * 16);
+return document.querySelectorAll('.diagram:not(:has(svg))').length ? null : found;
+"""
+"""The size of the text in each picture, drawn at 16 pixels and then scaled to the column."""
+
+
+async def test_the_pictures_of_the_states_can_be_read_on_the_site(window: Browser, tmp_path: Path) -> None:
+    """In a column of 720 pixels it was 7 pixels high."""
+    pictures = [block.text for block in blocks(read("state-machine.md"), "mermaid")]
+    shutil.copytree(MERMAID, tmp_path / "mermaid")
+    shutil.copy(DOCS / "site" / "diagrams.js", tmp_path)
+    body = "".join(f'<pre class="diagram">{escape(each)}</pre>' for each in pictures)
+    (tmp_path / "index.html").write_text(DIAGRAMS.format(body))
+    handler = partial(QuietHandler, directory=str(tmp_path))
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        serving = asyncio.create_task(asyncio.to_thread(server.serve_forever))
+        try:
+            await window.do(lambda: window.resize(1280, 800))
+            await window.open(f"http://127.0.0.1:{server.server_port}/index.html")
+            sizes = await window.until(lambda: window.driver.execute_script(SMALLEST))
+        finally:
+            await asyncio.to_thread(server.shutdown)
+            await serving
+    assert len(sizes) == len(pictures) == 2
+    assert min(sizes) >= 12
+
+
+class QuietHandler(SimpleHTTPRequestHandler):
+    """Writes no log."""
+
+    def log_message(self, *_: object) -> None:
+        pass

@@ -10,6 +10,7 @@ from rich.text import Text
 from textual.widget import Widget
 from textual.widgets import Static
 
+from ...tools.description.palette import AXIS_COLORS
 from ...tools.recording.payloads import Properties
 from ...tools.wording import AXIS_WORDS, STATE_WORDS, TRIGGER_WORDS, axis_name
 from ...values.enums import Fault, Finger, ObjectStatus, Severity, State, Trigger
@@ -108,7 +109,7 @@ class Axes(Widget):
         status, currents = self._status, self._currents[axis]
         position, requested = status.position(axis), status.requested_position(axis)
         line = Text(f"{axis_name(axis, status.model):8} ", "bold")
-        line.append_text(position_bar(position, requested, bar))
+        line.append_text(position_bar(position, requested, bar, AXIS_COLORS[axis]))
         line.append(f" {position:3} → {requested:<3} ", "not bold")
         if self._is_jaw:
             line.append(f"{status.opening_mm(axis):5.1f} mm ", "bold")
@@ -130,12 +131,12 @@ class Axes(Widget):
         return Text(f"{words:15}", _STYLES[state])
 
 
-def position_bar(position: int, requested: int, width: int) -> Text:
+def position_bar(position: int, requested: int, width: int, color: str = "blue") -> Text:
     """The position of an axis (the bar) and its requested position (the mark), in counts."""
     filled, mark = round(position / FULL * width), round(requested / FULL * (width - 1))
     cells = ["█"] * filled + ["·"] * (width - filled)
     cells[mark] = "▼"
-    bar = Text("".join(cells), "blue not bold")
+    bar = Text("".join(cells), f"{color} not bold")
     bar.stylize("dim", filled)
     bar.stylize("bold magenta not dim", mark, mark + 1)
     return bar
