@@ -14,6 +14,7 @@ from robotiq_async import (
     ConnectionLostError,
     Finger,
     InvalidStateError,
+    MotionInhibitedError,
     MoveResult,
     NotStartedError,
     RobotiqStatus,
@@ -257,3 +258,20 @@ def test_the_async_hand_tells_a_stranger_of_it() -> None:
     """A program that uses the async one in its place gets an error about a loop."""
     with pytest.raises(RuntimeError, match="needs a running asyncio event loop"):
         robotiq_async.RobotiqHand().start().send(None)
+
+
+def test_a_halt_of_a_person_in_another_thread_stays() -> None:
+    with RobotiqHand("sim://?speedup=5") as hand:
+        moving, outcome = in_a_thread(lambda: hand.close(speed=0))
+        until(lambda: hand.is_moving)
+        hand.inhibit("HALT was pressed", who="a window")
+        moving.join(patience(PATIENCE))
+        assert isinstance(outcome[0], MotionInhibitedError)
+        for refused in (hand.open, hand.recover, hand.activate):
+            with pytest.raises(MotionInhibitedError):
+                refused()
+        assert hand.inhibited is not None
+        hand.set_speed(255)
+        hand.permit()
+        assert hand.inhibited is None
+        hand.open()
