@@ -28,8 +28,10 @@ from robotiq_async import (
     GripChange,
     GripEvent,
     GripperFaultError,
+    Inhibit,
     InvalidStateError,
     Mode,
+    MotionInhibitedError,
     MoveResult,
     MoveTimeoutError,
     ObjectStatus,
@@ -118,6 +120,7 @@ VALUES: list[object] = [
     ForceCalibration.nominal(),
     Units(),
     GraspResult(result(), 2),
+    Inhibit("someone is in the cell", "panel", 1.5),
     GripEvent(GripChange.SLIPPED, A, 5, A | B, status_of(0xB9, 0xEA, at=12.5, sequence=7)),
     Request(activate=True, mode=Mode.PINCH),
     parse_address("tcp://gripper"),
@@ -156,6 +159,7 @@ ERRORS: list[Exception] = [
     TableError("table.csv", 3, "no number"),
     TableError("table.csv", None, "the file is empty"),
     EndError("time", "too slow"),
+    MotionInhibitedError(Inhibit("someone is in the cell", "panel", 1.5)),
 ]
 
 
