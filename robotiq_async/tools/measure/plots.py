@@ -195,7 +195,7 @@ def plot_recording(
             panel.set_ylim(bottom=0)
         is_jaw = not drawn["B"]["position"]
         # Fingers that move together overlap: the first curve is the widest and shows at the sides.
-        for (name, width), colour in zip(LINE_WIDTHS.items(), (*COLOURS, "0.5"), strict=True):
+        for (name, width), colour in zip(LINE_WIDTHS.items(), COLOURS, strict=True):
             line: Any = {"color": colour, "lw": width}
             dotted: Any = {"color": colour, "lw": 0.8, "ls": ":", "drawstyle": "steps"}
             if not drawn[name]["position"]:
