@@ -20,8 +20,8 @@ from robotiq_async.values.calibration.csv_tables import (
     SPEED_LAYOUT,
     read_stroke,
     read_table,
-    thesis_table,
 )
+from robotiq_async.values.calibration.thesis import FOAM_GRAMS, RIGID_GRAMS
 from robotiq_async.values.request import Request
 from tests.cli.conftest import draw_nothing, served
 
@@ -71,7 +71,7 @@ def test_force_writes_readings_currents_and_pictures(
         outcome.assert_succeeded()
         readings = read_table(table, FORCE)
         assert sorted(readings) == [0, 125, 250]
-        thesis = thesis_table(f"force_{surface}_grams", FORCE)
+        thesis = {"foam": FOAM_GRAMS, "rigid": RIGID_GRAMS}[surface]
         for force, runs in readings.items():
             assert all(min(thesis[force]) <= reading <= max(thesis[force]) for reading in runs)
         currents = read_currents(tmp_path / f"force_{surface}_grams_currents.csv")

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 import math
-from pathlib import Path
 from statistics import mean
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-import robotiq_async
 from robotiq_async.values.calibration.scales import closing_time
+from robotiq_async.values.calibration.thesis import CLOSING_MS
 from robotiq_async.values.enums import Finger, ObjectStatus
 from robotiq_async.values.model import THREE_FINGER
 from tests.simulator.conftest import CYCLE
@@ -21,16 +19,10 @@ if TYPE_CHECKING:
 
     from tests.simulator.conftest import Bench
 
-_TABLE = Path(robotiq_async.__file__).parent / "data" / "closing_time_ms.csv"
-
 
 def _measured() -> dict[int, float]:
     """Seconds of a full closing by speed value: thesis, table A1.1, mean of three runs."""
-    with _TABLE.open(newline="") as table:
-        return {
-            int(row["speed_value"]): mean(int(row[f"run_{run}_ms"]) for run in (1, 2, 3)) / 1000
-            for row in csv.DictReader(table)
-        }
+    return {value: mean(runs) / 1000 for value, runs in CLOSING_MS.items()}
 
 
 MEASURED = _measured()

@@ -34,10 +34,10 @@ from robotiq_async.values.calibration.csv_tables import (
     SPEED_LAYOUT,
     TableError,
     read_table,
-    thesis_table,
 )
 from robotiq_async.values.calibration.motion_profile import PRESSING_S
 from robotiq_async.values.calibration.scales import closing_time
+from robotiq_async.values.calibration.thesis import CLOSING_MS, FOAM_GRAMS, RIGID_GRAMS
 from robotiq_async.values.errors import MeasuringError
 from tests.grippers import activate_beforehand
 from tests.virtual import VirtualLoop, virtual
@@ -59,10 +59,10 @@ async def active(
 
 
 def test_the_values_are_those_of_the_thesis_in_its_order() -> None:
-    assert speed_values() == sorted(thesis_table("closing_time_ms", SPEED_LAYOUT))
+    assert speed_values() == sorted(CLOSING_MS)
     assert speed_values(100) == [0, 100, 200, 255]
     assert force_values() == [0, 50, 100, 150, 200, 250, 225, 175, 125, 75, 25]
-    assert sorted(force_values()) == sorted(thesis_table("force_foam_grams", FORCE))
+    assert sorted(force_values()) == sorted(FOAM_GRAMS)
 
 
 # -- speed -------------------------------------------------------------------------------------------------
@@ -261,7 +261,7 @@ async def test_a_reading_beyond_the_table_is_refused_and_not_written(tmp_path: P
 @pytest.mark.parametrize("surface", ["foam", "rigid"])
 def test_the_simulated_scale_shows_what_the_thesis_s_showed(surface: str) -> None:
     scale = SimulatedScale(surface)  # type: ignore[arg-type]
-    for force, runs in thesis_table(f"force_{surface}_grams", FORCE).items():
+    for force, runs in {"foam": FOAM_GRAMS, "rigid": RIGID_GRAMS}[surface].items():
         readings = {scale.reading(force) for _ in range(200)}
         assert min(runs) <= min(readings)
         assert max(readings) <= max(runs)

@@ -17,10 +17,10 @@ from robotiq_async.values.calibration.csv_tables import (
     FORCE,
     SPEED_LAYOUT,
     TableError,
-    thesis_table,
     write_table,
 )
 from robotiq_async.values.calibration.scales import closing_time
+from robotiq_async.values.calibration.thesis import CLOSING_MS
 from robotiq_async.values.model import THREE_FINGER
 from tests.virtual import virtual
 
@@ -39,7 +39,7 @@ def test_opening() -> None:
 def test_the_thesis_is_the_default_of_the_time_outs() -> None:
     thesis = SpeedCalibration.thesis()
     assert [thesis.closing_time(speed) for speed in range(256)] == [*map(closing_time, range(256))]
-    for speed, runs in thesis_table("closing_time_ms", SPEED_LAYOUT).items():
+    for speed, runs in CLOSING_MS.items():
         assert thesis.closing_time(speed) == pytest.approx(mean(runs) / 1000)
 
 

@@ -11,14 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robotiq_async.values.calibration.csv_tables import (
-    FORCE,
     SPEED_LAYOUT,
     Layout,
     TableError,
     read_table,
-    thesis_table,
     write_table,
 )
+from robotiq_async.values.calibration.thesis import CLOSING_MS, FOAM_GRAMS, RIGID_GRAMS
 
 HEADER = "speed_value,run_1_ms,run_2_ms"
 
@@ -57,11 +56,9 @@ def test_a_table_is_read_as_it_was_written(
 
 
 def test_the_thesis_tables_are_there() -> None:
-    closing = thesis_table("closing_time_ms", SPEED_LAYOUT)
-    assert sorted(closing) == [*range(0, 256, 4), 255]
-    assert closing[0] == (10021, 10021, 10021)
-    for surface in ("foam", "rigid"):
-        table = thesis_table(f"force_{surface}_grams", FORCE)
+    assert sorted(CLOSING_MS) == [*range(0, 256, 4), 255]
+    assert CLOSING_MS[0] == (10021, 10021, 10021)
+    for table in (FOAM_GRAMS, RIGID_GRAMS):
         assert sorted(table) == list(range(0, 251, 25))
         assert {len(runs) for runs in table.values()} == {3}
 

@@ -20,7 +20,6 @@ import secrets
 import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Final, TextIO
 
@@ -161,12 +160,6 @@ def write_stroke(path: Path | str, points: Points, model: Model | None = None) -
         OSError: the file cannot be written; it stays as it was.
     """
     _write(path, model, [STROKE, *([position, f"{mm:g}"] for position, mm in points)])
-
-
-def thesis_table(name: str, layout: Layout) -> RunsTable:
-    """A table of the thesis: closing_time_ms (A1.1), force_foam_grams or force_rigid_grams."""
-    with as_file(files("robotiq_async") / "data" / f"{name}.csv") as path:  # the package may be in a zip
-        return read_table(path, layout)
 
 
 # -- the column of the model -------------------------------------------------------------------------------

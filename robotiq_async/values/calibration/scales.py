@@ -22,8 +22,9 @@ from typing import Final
 from ..checks import check_byte, check_number
 from ..model import THREE_FINGER, Model
 from ..stroke import Stroke
-from .csv_tables import FORCE, SPEED_LAYOUT, Layout, RunsTable, TableError, read_measured, thesis_table
+from .csv_tables import FORCE, SPEED_LAYOUT, Layout, RunsTable, TableError, read_measured
 from .motion_profile import MotionProfile, profile_of
+from .thesis import CLOSING_MS, FOAM_GRAMS, RIGID_GRAMS
 
 GRAVITY: Final = 9.81  # m/s2, the thesis's value
 
@@ -87,10 +88,8 @@ class SpeedCalibration:
     @classmethod
     @cache
     def thesis(cls) -> SpeedCalibration:
-        """The thesis's table A1.1: the mean of three runs for every fourth value. Read from its file once."""
-        return cls.from_table(
-            "thesis, table A1.1", thesis_table("closing_time_ms", SPEED_LAYOUT), THREE_FINGER
-        )
+        """The thesis's table A1.1: the mean of three runs for every fourth value."""
+        return cls.from_table("thesis, table A1.1", CLOSING_MS, THREE_FINGER)
 
     @classmethod
     def from_csv(cls, path: Path | str) -> SpeedCalibration:
@@ -213,7 +212,7 @@ class ForceCalibration:
         """
         if surface not in ("foam", "rigid"):
             raise ValueError(f"surface must be 'foam' or 'rigid', got {surface!r}")
-        table = thesis_table(f"force_{surface}_grams", FORCE)
+        table = FOAM_GRAMS if surface == "foam" else RIGID_GRAMS
         return cls.from_table(f"thesis, {surface}", table, THREE_FINGER)
 
     @classmethod
@@ -342,7 +341,6 @@ class Figures:
         return values[before] if nearer < 0 else values[after]
 
 
-# Read at import: a program may later run in an event loop, which must not wait for a disk.
 _THESIS: Final = SpeedCalibration.thesis()
 
 
