@@ -32,11 +32,11 @@ from .frames import read_request, registers_in, write_and_read_request, write_re
 from .in_force import image_in_force
 from .line import Dialogue, Line, Step
 from .outcome import Noise, Outcome, Refused, Silent
+from .serial.patience import USUAL_RESPONSE_S
 
 REPEAT_S: Final = 0.15
-"""Time for a repeated read, so that a write after it still fails within a second."""
-USUAL_RESPONSE_S: Final = 0.4
-"""A longer response timeout means a slow line: a repeated read then gets that timeout instead of REPEAT_S."""
+"""Time for a repeated read, so that a write after it still fails within a second. On a slow line, which has a
+longer response timeout than the usual one, it gets that timeout."""
 SHORT_READS: Final = 3
 """Reads after the short silence, at opening, before a line is trusted with it."""
 MOST_UNANSWERED: Final = 3
