@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import shutil
 import tempfile
@@ -11,7 +12,7 @@ from time import monotonic
 from typing import Any, Final, Literal, TypeVar
 
 from selenium import webdriver
-from selenium.common.exceptions import TimeoutException
+from selenium.common.exceptions import StaleElementReferenceException, TimeoutException
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
@@ -61,6 +62,44 @@ return scene.getObjectByName(arguments[0]).children.map((each) => each.material?
 """
 
 
+class Part:
+    """A part of the page, looked up at each use: the page may put another element in its place."""
+
+    def __init__(self, driver: webdriver.Chrome, name: str) -> None:
+        self._driver = driver
+        self._selector = f"[data-testid={name}]"
+
+    @property
+    def text(self) -> str:
+        return self._used(lambda element: element.text)
+
+    @property
+    def tag_name(self) -> str:
+        return self._used(lambda element: element.tag_name)
+
+    def get_attribute(self, name: str) -> str | None:
+        return self._used(lambda element: element.get_attribute(name))
+
+    def is_displayed(self) -> bool:
+        return self._used(WebElement.is_displayed)
+
+    def is_enabled(self) -> bool:
+        return self._used(WebElement.is_enabled)
+
+    def click(self) -> None:
+        self._used(WebElement.click)
+
+    def move_to_middle(self) -> None:
+        self._used(lambda element: self._driver.execute_script(MIDDLE, element))
+
+    def _used(self, use: Callable[[WebElement], T]) -> T:
+        end = monotonic() + PATIENCE
+        while monotonic() < end:
+            with contextlib.suppress(StaleElementReferenceException):
+                return use(self._driver.find_element(By.CSS_SELECTOR, self._selector))
+        raise AssertionError(f"{self._selector} is replaced all the time")
+
+
 class Browser:
     """One browser with its own profile; a window at a time is driven."""
 
@@ -100,8 +139,8 @@ class Browser:
         found: T = await self.do(lambda: waiting.until(lambda _: condition()))
         return found
 
-    def find(self, name: str) -> WebElement:
-        return self.driver.find_element(By.CSS_SELECTOR, f"[data-testid={name}]")
+    def find(self, name: str) -> Part:
+        return Part(self.driver, name)
 
     def has(self, name: str) -> bool:
         return bool(self.driver.find_elements(By.CSS_SELECTOR, f"[data-testid={name}]"))
@@ -111,14 +150,14 @@ class Browser:
         try:
             return await self.until(lambda: words in self.find(name).text and self.find(name).text)
         except TimeoutException:
-            said = [each.text for each in self.driver.find_elements(By.CSS_SELECTOR, f"[data-testid={name}]")]
-            raise AssertionError(f"{name} says {said}, and not {words!r}") from None
+            said = self.find(name).text if self.has(name) else None
+            raise AssertionError(f"{name} says {said!r}, and not {words!r}") from None
 
     async def click(self, name: str) -> None:
         await self.until(lambda: self.find(name).is_enabled())
         # In the middle of the window: at its foot the halt would be hit.
-        await self.do(lambda: self.driver.execute_script(MIDDLE, self.find(name)))
-        await self.do(lambda: self.find(name).click())
+        await self.do(self.find(name).move_to_middle)
+        await self.do(self.find(name).click)
 
     async def press_keys(self, keys: str) -> None:
         """Press keys in the element with the focus."""
