@@ -95,7 +95,7 @@ def statistics() -> Statistics:
 def real_result() -> MoveResult:
     waiter: Future[MoveResult] = Future()
     move = Move(255, A | B, 10.0, waiter)
-    move.note_currents(status_of(0x39, 0xC0, current=15))
+    move.see(status_of(0x39, 0xC0, current=15), Finger.ALL, {})
     move.end(status_of(0xB9, 0xEA, at=12.5))
     return waiter.result(timeout=0)
 

@@ -34,10 +34,6 @@ class Move(Call):
         # The times are those of one gripper without load [thesis, table A1.1]: twice leaves room.
         return 2 * max(stroke * closing_time(speeds[axis]) for axis, stroke in strokes.items()) + MARGIN_S
 
-    def note_currents(self, status: RobotiqStatus) -> None:
-        for axis, peak in self._peak.items():
-            self._peak[axis] = max(peak, status.current_ma(axis) or 0)
-
     def is_under(self, status: RobotiqStatus, limited: Mapping[Finger, int]) -> bool:
         """Whether a status echoes the target for every axis of the move, or the limit in place of it."""
         # rGTO = 0 echoes positions, too, and none of them is followed [manual 2014, pp. 50, 54].
@@ -45,8 +41,10 @@ class Move(Call):
             status.requested_position(axis) == limited.get(axis, self.position) for axis in self.axes
         )
 
-    def has_arrived(self, status: RobotiqStatus, resting: Finger, limited: Mapping[Finger, int]) -> bool:
-        """Whether a status shows the move ended; ``resting`` are the axes known to rest."""
+    def see(self, status: RobotiqStatus, resting: Finger, limited: Mapping[Finger, int]) -> bool:
+        """Take in a status; whether it shows the move ended. ``resting`` are the axes known to rest."""
+        for axis, peak in self._peak.items():
+            self._peak[axis] = max(peak, status.current_ma(axis) or 0)
         # An axis may be known to rest by its position, and move by its gDT, which is then from before.
         return self.axes in resting and not status.moving & self.axes and self.is_under(status, limited)
 

@@ -169,11 +169,10 @@ class OpenRequests:
 
     def end_arrived(self, status: RobotiqStatus, ledger: Ledger) -> None:
         """End the moves that a status shows to have arrived."""
-        limited = ledger.limits.limited
+        resting, limited = ledger.resting, ledger.limits.limited
         for move in self._written_moves:
-            move.note_currents(status)
             assert move.entry is not None
-            if ledger.acts(move.entry) and move.has_arrived(status, ledger.resting, limited):
+            if move.see(status, resting, limited) and ledger.acts(move.entry):
                 self.leave(move)
                 self._warn_of_unreached(move, move.end(status), limited)
 

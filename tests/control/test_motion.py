@@ -14,7 +14,7 @@ from robotiq_async.control.motion import Move
 from robotiq_async.control.pending import Command, OpenRequests, Pending
 from robotiq_async.control.waiters import fail
 from robotiq_async.values.calibration.scales import closing_time
-from robotiq_async.values.enums import Finger, ObjectStatus
+from robotiq_async.values.enums import NO_AXES, Finger, ObjectStatus
 from robotiq_async.values.errors import MoveSupersededError
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.move_result import MoveResult
@@ -67,7 +67,7 @@ def test_a_move_has_arrived_when_every_addressed_axis_rests_under_its_request(
     """Wherever it rests: open stops at 6-7 for a request of 0, closed at 240 or above."""
     (each, _), status = move(255, axes), status_of(byte_0, byte_1, echo=echo, position=241)
     assert each.is_under(status, {}) is is_under
-    assert each.has_arrived(status, Finger.ALL, {}) is has_arrived
+    assert each.see(status, Finger.ALL, {}) is has_arrived
 
 
 # -- the outcome is handed over once -----------------------------------------------------------------------
@@ -111,12 +111,12 @@ def test_it_is_known_which_axes_still_follow_a_move() -> None:
 def test_a_result_tells_of_each_addressed_axis_and_of_no_other() -> None:
     """A and B hold something, C is closed, the scissor touches something too."""
     each, outcome = move(255, ABC, now=10.0)
-    each.note_currents(status_of(0x39, 0xC0, echo=255, current=(15, 5, 0, 200)))
-    each.note_currents(status_of(0x39, 0xC0, echo=255, current=(3, 40, 1, 0)))
+    each.see(status_of(0x39, 0xC0, echo=255, current=(15, 5, 0, 200)), NO_AXES, {})
+    each.see(status_of(0x39, 0xC0, echo=255, current=(3, 40, 1, 0)), NO_AXES, {})
     last = status_of(
         0x79, 0b10_11_10_10, echo=255, position=(150, 151, 241, 99), current=(9, 9, 9, 9), at=12.5
     )
-    each.note_currents(last)
+    each.see(last, NO_AXES, {})
     result = ended((each, outcome), last)
     assert dict(result.outcomes) == {
         A: ObjectStatus.CONTACT_CLOSING,
@@ -155,7 +155,7 @@ def test_a_result_cannot_be_changed() -> None:
 def test_a_result_does_not_change_with_what_is_seen_later() -> None:
     each, outcome = move(255, A)
     result = ended((each, outcome), status_of(0xF9, 0xFF))
-    each.note_currents(status_of(0xF9, 0xFF, current=255))
+    each.see(status_of(0xF9, 0xFF, current=255), NO_AXES, {})
     assert dict(result.peak_current_ma) == {A: 0}
 
 
