@@ -17,9 +17,6 @@ SAME_ON_PURPOSE = {"RobotiqHand", "Stream", "RobotiqGripper"}
 """The blocking hand and its streams; the names that ur_rtde's users and those of LeRobot look for."""
 OF_EACH = {"SECONDS"}
 """The limit of time that each stage of verify has."""
-# Those that wait for a better name.
-CLASSES_LEFT = {"Answer", "Part"}
-CONSTANTS_LEFT = {"REST_S"}
 
 
 def public(name: str) -> bool:
@@ -45,7 +42,7 @@ def test_no_two_classes_have_one_name() -> None:
             is_type = not isinstance(each, ast.ClassDef)
             meanings[name].add(ast.unparse(each) if is_type else path)
     several = {name for name, where in meanings.items() if len(where) > 1}
-    assert several - SAME_ON_PURPOSE <= CLASSES_LEFT
+    assert several - SAME_ON_PURPOSE == set()
 
 
 def test_no_constant_has_two_values() -> None:
@@ -55,7 +52,7 @@ def test_no_constant_has_two_values() -> None:
             assert isinstance(each, ast.Assign | ast.AnnAssign)
             assert each.value is not None
             values[name].add(ast.unparse(each.value))
-    assert {name for name, found in values.items() if len(found) > 1} - OF_EACH <= CONSTANTS_LEFT
+    assert {name for name, found in values.items() if len(found) > 1} - OF_EACH == set()
 
 
 def test_the_page_of_words_is_short_and_names_places_that_exist() -> None:

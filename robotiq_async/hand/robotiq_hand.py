@@ -10,7 +10,7 @@
 #   move                                               moving(): a MoveResult; its end holds what still moves
 #   activate, reset, atr                               activated(), reach(): a state, in limited time
 #
-# _asked() is the gate of all of them: no request passes before start(), after stop(), or from another loop.
+# _admitted() is the gate of all of them: no request passes before start(), after stop(), or from elsewhere.
 # A failed or cancelled start stops the session, and writes only if it has begun to write.
 #
 # recover() is a loop of steps. RESET is activated, ATR_DONE and a known major fault are reset, and in any
@@ -231,17 +231,17 @@ class RobotiqHand(Hand):
     # -- commands --------------------------------------------------------------------------------------
 
     async def _set(self, what: Literal["position", "speed", "force"], value: int, axes: Finger) -> None:
-        session, command = self._asked(), Command(axes, **{what: value})
+        session, command = self._admitted(), Command(axes, **{what: value})
         await session.answered(lambda waiter: session.controller.command(command, waiter))
 
     def _command(self, axes: Finger, position: int | None, speed: int | None, force: int | None) -> None:
-        session = self._asked()
+        session = self._admitted()
         session.ask(session.controller.command, Command(axes, position, speed, force))
 
     async def _move(
         self, axes: Finger, target: int, speed: int | None, force: int | None, timeout: float | None
     ) -> MoveResult:
-        session = self._asked()
+        session = self._admitted()
         with session.moving(target, axes, speed, force) as (ended, usual), session.counters.move() as note:
             limit = usual if timeout is None else timeout
             with Limit(limit):
@@ -253,7 +253,7 @@ class RobotiqHand(Hand):
             )
 
     async def _hold(self, axes: Finger) -> None:
-        session = self._asked()
+        session = self._admitted()
         await session.answered(lambda waiter: session.controller.hold(axes, waiter))
 
     async def _inhibit(self, inhibit: Inhibit) -> None:
@@ -286,7 +286,7 @@ class RobotiqHand(Hand):
         self._machine.inhibit(inhibit)
 
     async def _halt(self) -> None:
-        session = self._asked()
+        session = self._admitted()
         if self.state in SEQUENCES:
             await self._reset_for(Trigger.ASK_HALT)  # rGTO = 0 does not end these
         elif session.controller.is_driven:
@@ -324,7 +324,7 @@ class RobotiqHand(Hand):
     # -- activation, faults ----------------------------------------------------------------------------
 
     async def _activate(self) -> None:
-        session = self._asked()
+        session = self._admitted()
         self._machine.check_permitted()
         if self.state in RUNNING:
             return
@@ -335,7 +335,7 @@ class RobotiqHand(Hand):
         await self._reset_for(Trigger.ASK_RESET)
 
     async def _reset_for(self, trigger: Trigger) -> None:
-        session = self._asked()
+        session = self._admitted()
         await session.reach(
             {State.RESET},
             RESET_TIMEOUT_S,
@@ -345,7 +345,7 @@ class RobotiqHand(Hand):
         )
 
     async def _atr(self) -> None:
-        session = self._asked()
+        session = self._admitted()
         # Only a reset ends a release; another client may then have activated the gripper.
         ended = (State.RESET, State.WF_ACTIVATION, State.RUNNING_IDLE, State.FAULT)
         await session.reach(
@@ -363,7 +363,7 @@ class RobotiqHand(Hand):
 
     async def _recover(self, timeout: float | None) -> None:
         limit = timeout or RECOVER_TIMEOUT_S
-        self._asked()
+        self._admitted()
         self._machine.check_permitted()
         watch, resets, began = StallWatch(self._channels.listeners, self._machine), 0, now()
         with Limit(limit), watch as stall:
@@ -415,7 +415,7 @@ class RobotiqHand(Hand):
                 self._options.log.warning("%s: it is reset again", error)
 
     async def _recover_step(self) -> None:
-        session, state = self._asked(), self.state
+        session, state = self._admitted(), self.state
         self._machine.check_permitted()
         if state is State.RESET:
             await self.activate()
@@ -506,7 +506,7 @@ class RobotiqHand(Hand):
         session = self._session
         return session is not None and (session.counters.has_begun_to_write or session.controller.has_request)
 
-    def _asked(self) -> Session:
+    def _admitted(self) -> Session:
         """The present run, for a request: refused before the start, after stop(), and from another loop."""
         self._check_running()
         session = self._session

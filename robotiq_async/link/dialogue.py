@@ -49,7 +49,7 @@ REPEAT_WARNING_S: Final = 60.0
 
 Decide = Callable[[], Sequence[int] | None]
 """Returns the image to write, or None; called in the turn of the loop in which a write leaves."""
-Part = Generator[Exchange | Step, Answer | None, Outcome | None]
+DialoguePart = Generator[Exchange | Step, Answer | None, Outcome | None]
 """A part of a dialogue; returns the outcome that ended it badly, or None."""
 
 
@@ -143,7 +143,7 @@ class Dialogues:
             raise bad.error
         return True
 
-    def write_and_read(self, decide: Decide) -> Dialogue[transport.Answer | None]:
+    def write_and_read(self, decide: Decide) -> Dialogue[transport.WriteAnswer | None]:
         """Write what ``decide`` returns, and read the status; None if nothing new was written.
 
         After a reply that is missing or damaged the write is in doubt, and the status that is read tells. A
@@ -164,17 +164,17 @@ class Dialogues:
         if self.serves_23:
             bad = yield from self._tried(image)
             if isinstance(bad, bytes):
-                return transport.Answer(self._status_in(bad), None)
+                return transport.WriteAnswer(self._status_in(bad), None)
             if isinstance(bad, Refused) and bad.is_unknown_function:
                 if not (yield from self.write(decide)):
                     return None
                 yield Step.TURN
-                return transport.Answer((yield from self.read()), None)
+                return transport.WriteAnswer((yield from self.read()), None)
         elif (bad := (yield from self._written(image))) is None:
-            return transport.Answer((yield from self.read()), None)
+            return transport.WriteAnswer((yield from self.read()), None)
         if not (isinstance(bad, Refused) or self._can_repeat(bad)):
             raise bad.error
-        return transport.Answer(self._status_in((yield from self._second(bad))), bad.error)
+        return transport.WriteAnswer(self._status_in((yield from self._second(bad))), bad.error)
 
     def stop_or_read(self, decide: Decide) -> Dialogue[Registers | None]:
         """Write what ``decide`` returns when the turn has come; read the status if that is nothing.
@@ -199,7 +199,7 @@ class Dialogues:
         if isinstance(obstacle, Outcome):
             raise obstacle.error
 
-    def _written(self, image: Sequence[int]) -> Part:
+    def _written(self, image: Sequence[int]) -> DialoguePart:
         """Write an image with function 16."""
         self._image = ()
         came_to = yield self._ask(write_request(self._map, image))
@@ -258,12 +258,12 @@ class Dialogues:
             if not is_asked_again or self.line.now() > until:
                 raise first.error from came_to.error
 
-    def _in_step(self, timing: Timing | None = None) -> Part:
+    def _in_step(self, timing: Timing | None = None) -> DialoguePart:
         """Wait for silence, and drop the rest of a damaged reply; then make sure that nothing can come."""
         noise = yield Step.HUSH
         return noise if isinstance(noise, Outcome) else (yield from self._probed(timing))
 
-    def _probed(self, timing: Timing | None = None) -> Part:
+    def _probed(self, timing: Timing | None = None) -> DialoguePart:
         """Make sure that no answer to an earlier request is still on its way.
 
         Serial replies carry no transaction id, and a gateway from TCP to a serial line gives a late reply the

@@ -188,7 +188,7 @@ class Line:
                 raise
 
     async def _connect(self, seconds: float) -> None:
-        _close_abandoned()
+        _close_left()
         self._watchdog = Watchdog(lambda: self._exchange is not None, self._on_timeout)
         self.echo.begin(may_be_on=self._wire.may_echo)
         self._become(OPENING)
@@ -234,7 +234,7 @@ class Line:
         if not self._users and self.state is not OPENING:
             self._close()
 
-    def _abandon(self, user: object) -> None:
+    def _break_off(self, user: object) -> None:
         """End the use of a line on which a reply may still come."""
         self._give_up()
         if user in self._users:
@@ -256,7 +256,7 @@ class Line:
         if self._exchange is not None:
             self._end(why or Lost(self._not_connected()))
 
-    def close_if_abandoned(self) -> None:
+    def close_if_loop_closed(self) -> None:
         """Close it if the loop was closed before."""
         if self.state is not CLOSED and self._watchdog.loop.is_closed():
             self._exchange = None  # its user has gone with the loop
@@ -289,7 +289,7 @@ class Line:
                 result: T = end.value
                 return result
             except BaseException:
-                self._abandon(user)
+                self._break_off(user)
                 raise
             finally:
                 if self._shares:
@@ -415,11 +415,11 @@ _opened: Final[WeakValueDictionary[int, Line]] = WeakValueDictionary()
 """The lines that have been opened, of all loops."""
 
 
-def _close_abandoned() -> None:
+def _close_left() -> None:
     """Close the lines of loops that were closed under their hands: a serial port has one owner."""
     for reference in _opened.valuerefs():  # a copy: threads make connections at any time
         if (line := reference()) is not None:
-            line.close_if_abandoned()
+            line.close_if_loop_closed()
 
 
 _shared: Final[WeakValueDictionary[tuple[asyncio.AbstractEventLoop, str], Line]] = WeakValueDictionary()

@@ -25,7 +25,7 @@ from .address import Address
 from .dialogue import Decide, Dialogues
 from .exchange import Exchange, PduExchange, SerialExchange, TcpExchange, Timing
 from .line import Line, shared_line
-from .transport import Answer
+from .transport import WriteAnswer
 from .tunnel.protocol import Tunnel, tunnel_to
 from .tunnel.wire import TunnelWire
 
@@ -137,7 +137,7 @@ class ModbusTransport:
         """
         return self._line.talk(self, self._dialogues.write(decide))
 
-    def send_and_read(self, decide: Decide) -> Coroutine[Any, Any, Answer | None]:
+    def send_and_read(self, decide: Decide) -> Coroutine[Any, Any, WriteAnswer | None]:
         """Write what ``decide`` returns, if anything, and read the status, with function 23.
 
         Raises:

@@ -9,7 +9,7 @@ from ..values.errors import RobotiqConnectionError
 from ..values.registers import Registers
 
 
-class Answer(NamedTuple):
+class WriteAnswer(NamedTuple):
     """The outcome of a write that also reads.
 
     Attributes:
@@ -79,7 +79,7 @@ class CyclicLink(Link, Protocol):
     def has_read_with_write(self) -> bool:
         """Whether it has, once."""
 
-    async def send_and_read(self, decide: Callable[[], Sequence[int] | None]) -> Answer | None:
+    async def send_and_read(self, decide: Callable[[], Sequence[int] | None]) -> WriteAnswer | None:
         """As :meth:`send`, and read the status in the same exchange; None if nothing new was written.
 
         ``decide`` is called again if the gripper refuses such an exchange, before another one is tried. It is

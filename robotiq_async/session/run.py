@@ -118,7 +118,7 @@ class Run:
 
     # -- what others ask -------------------------------------------------------------------------------
 
-    def asked(self) -> None:
+    def note_request(self) -> None:
         """A request was made: begin the next cycle at once if it may begin with its write.
 
         Who must not hear of it before the write waits for that, unless it is far.

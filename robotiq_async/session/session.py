@@ -200,7 +200,7 @@ class Session:
         try:
             return request(*args, **kwargs)
         finally:
-            self.run.asked()
+            self.run.note_request()
 
     async def answered(self, request: Callable[[Waiter[None]], None]) -> None:
         """Make a request and wait for its acknowledgement; raises RobotiqError if there is none."""

@@ -140,7 +140,7 @@ def test_a_thousand_clients_are_remembered_and_not_more() -> None:
     one = Admission(BASE, EPOCH, Lease(1.0))
     for client in range(3000):
         assert not one.is_repeated(AgentCall(BASE, str(client), EPOCH, 0, 1, NOW))
-    assert len(one._asked) <= 1000
+    assert len(one._by_client) <= 1000
 
 
 # -- any sequence, against a model -------------------------------------------------------------------------

@@ -67,8 +67,8 @@ async def test_a_halt_does_not_wait_for_the_tick_and_shifts_no_tick(here: Polled
     del here.wire.calls[:]
     before, asked = here.statuses[-1].timestamp, here.loop.time()
     here.controller.halt(asyncio.get_running_loop().create_future())
-    here.run.asked()
-    here.run.asked()
+    here.run.note_request()
+    here.run.note_request()
     await here.polls()
     assert here.wire.calls == ["write", "read"]
     assert here.statuses[-1].timestamp - asked < POLL_S / 2
@@ -85,7 +85,7 @@ async def test_a_request_that_is_no_stop_waits_for_the_tick(here: Polled) -> Non
     await here.polls(3)
     before = here.statuses[-1].timestamp
     here.controller.command(Command(Finger.A, 200))
-    here.run.asked()
+    here.run.note_request()
     await here.polls()
     assert here.statuses[-1].timestamp == pytest.approx(before + POLL_S)
 
@@ -145,7 +145,7 @@ async def test_when_the_loop_was_held_up_between_two_cycles_a_stop_reads_first(h
         here.wire.gripper.write(0, Request().registers)
         here.loop.hold_up(0.5)
         here.controller.halt(waiter)
-        here.run.asked()
+        here.run.note_request()
 
     here.loop.call_later(POLL_S / 2, hold_up)
     await here.polls(1)

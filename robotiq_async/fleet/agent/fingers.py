@@ -12,7 +12,7 @@ from ...runtime.log import Log
 from ...values.enums import Finger
 from ...values.errors import RobotiqConnectionError, RobotiqError
 
-REST_S: Final = 0.5
+FINGERS_REST_S: Final = 0.5
 """Seconds for a hand that keeps its grip to come to rest, as long as a stop that keeps one gives it."""
 
 
@@ -64,7 +64,7 @@ class Fingers:
     async def come_to_rest(self) -> bool:
         """Hold what moves; whether all of it rests within REST_S while the event loop runs."""
         await self._hand.hold(Finger.ALL)
-        with Limit(REST_S):
+        with Limit(FINGERS_REST_S):
             async for _ in self._hand.statuses():
                 if not self._hand.is_moving:
                     return True

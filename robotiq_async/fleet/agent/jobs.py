@@ -34,7 +34,7 @@ class Job:
 
     Attributes:
         reason: of its cancellation by the agent; empty if it was not cancelled, or by its client.
-        asked: the positions, speeds and forces that it asks for.
+        carries: its positions, speeds and forces.
         is_shown: whether the gripper has acknowledged an image with all of them.
         was_refused: whether the hand raised at once, before anything could be written.
         says: makes what its answer has besides the result.
@@ -47,7 +47,7 @@ class Job:
         self.answer: bytes | None = None
         self.task: asyncio.Task[MoveResult | None] | None = None
         self.reason: str = ""
-        self.asked: dict[Setting, int] = asked_of(name, call.arguments)
+        self.carries: dict[Setting, int] = asked_of(name, call.arguments)
         self.is_shown: bool = False
         self.was_refused: bool = False
         self.says: Callable[[], Fields] = says
@@ -73,7 +73,7 @@ class Job:
 
     def observe(self, request: Request) -> None:
         """An image was acknowledged."""
-        self.is_shown = self.is_shown or (bool(self.asked) and is_in(self.asked, request))
+        self.is_shown = self.is_shown or (bool(self.carries) and is_in(self.carries, request))
 
     def reply(self, answer: bytes, status: bytes) -> None:
         """Answer it, and each of its repetitions."""
@@ -122,7 +122,7 @@ class Jobs:
     def begin(self, job: Job, work: Work) -> None:
         """Carry out a request once, and keep it for repetitions."""
         self._kept[job.key] = self._open[job.key] = job
-        self._followed.update(dict.fromkeys(moved_by(job.asked), job))
+        self._followed.update(dict.fromkeys(moved_by(job.carries), job))
         self.start(job, work)
         if len(self._kept) > JOBS_KEPT:
             self._forget()

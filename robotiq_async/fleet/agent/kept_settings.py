@@ -49,12 +49,12 @@ class KeptSettings:
         self._gripper: dict[Setting, int] = {}  # as of the newest acknowledged image
         self._of: dict[str, dict[Setting, int]] = {}  # by client, in the order of the last acknowledgments
         self._holder = ""  # the last one
-        self._asked: dict[Setting, int] = {}  # by the holder, on the way to the gripper
+        self._ordered: dict[Setting, int] = {}  # by the holder, on the way to the gripper
         self._has: set[Setting] = set()  # settings in which the gripper has the holder's value
 
     def grant(self, client: str) -> None:
         """A client gets the lease."""
-        self._asked.clear()
+        self._ordered.clear()
         if client != self._holder:
             self._holder = client
             self._has.clear()
@@ -70,7 +70,7 @@ class KeptSettings:
 
     def ask(self, asked: Mapping[Setting, int]) -> None:
         """A command of this turn asks for these: give the axes that it moves the holder's other settings."""
-        self._asked |= settings_of(asked)
+        self._ordered |= settings_of(asked)
         for axis in moved_by(asked) & self._hand.model.all_axes:
             own = {what: self._own(axis, what) for what in SETTINGS if self._is_missing((axis, what))}
             if own:
@@ -79,19 +79,19 @@ class KeptSettings:
 
     def end(self, asked: Mapping[Setting, int], *, is_done: bool) -> None:
         """A command has ended: what it asked for is carried out, or is on its way no more."""
-        ended = {each: value for each, value in asked.items() if self._asked.get(each) == value}
+        ended = {each: value for each, value in asked.items() if self._ordered.get(each) == value}
         if is_done:
             self._keep(ended)
         else:
-            self._asked = {each: value for each, value in self._asked.items() if each not in ended}
+            self._ordered = {each: value for each, value in self._ordered.items() if each not in ended}
 
     def observe(self, what: object) -> None:
         if isinstance(what, Transition) and what.target not in RUNNING:
-            self._asked.clear()  # the hand drops what was not acknowledged
+            self._ordered.clear()  # the hand drops what was not acknowledged
         if not (isinstance(what, SentRequest) and what.acknowledged and what.request.activate):
             return
         before, self._gripper = self._gripper, settings_in(what.request)
-        self._keep({each: v for each, v in self._asked.items() if self._gripper.get(each) == v})
+        self._keep({each: v for each, v in self._ordered.items() if self._gripper.get(each) == v})
         self._has |= {each for each, value in self._gripper.items() if self._own(*each) == value}
         if before != self._gripper:
             self._changed()
@@ -99,7 +99,7 @@ class KeptSettings:
     def _keep(self, settings: Mapping[Setting, int]) -> None:
         # The gripper has these of the holder.
         if settings:
-            self._asked = {each: value for each, value in self._asked.items() if each not in settings}
+            self._ordered = {each: value for each, value in self._ordered.items() if each not in settings}
             self._of[self._holder] = {**self._of.pop(self._holder, {}), **settings}
             if len(self._of) > _CLIENTS:
                 del self._of[next(iter(self._of))]
@@ -107,7 +107,7 @@ class KeptSettings:
             self._changed()
 
     def _is_missing(self, setting: Setting) -> bool:
-        return setting not in self._has and setting not in self._asked
+        return setting not in self._has and setting not in self._ordered
 
     def _own(self, axis: Finger, what: str) -> int:
         kept = self._of.get(self._holder, {}).get((axis, what))

@@ -359,13 +359,13 @@ class ServedHand:
         self._admission.admit(call, now())
         job = Job(name, call, query)
         work = self._work(job)  # raises for invalid arguments, before anything changes
-        self._fingers.command(moved_by(job.asked))
+        self._fingers.command(moved_by(job.carries))
         self._jobs.begin(job, work)
 
     def _job_ended(self, job: Job, is_done: bool) -> None:
-        self._settings.end(settings_of(job.asked), is_done=is_done)
+        self._settings.end(settings_of(job.carries), is_done=is_done)
         if is_done:
-            self._fingers.are_commanded(moved_by(job.asked))
+            self._fingers.are_commanded(moved_by(job.carries))
 
     def _work(self, job: Job) -> Work:
         name, arguments = job.name, job.call.arguments
@@ -381,9 +381,9 @@ class ServedHand:
         return self._carry_out(job)
 
     async def _carry_out(self, job: Job) -> MoveResult | None:
-        self._settings.ask(job.asked)
+        self._settings.ask(job.carries)
         result: MoveResult | None = await getattr(self._hand, job.name)(**job.call.arguments)
-        if settings_of(job.asked):
+        if settings_of(job.carries):
             await self._records.kept()
         return result
 
@@ -391,10 +391,10 @@ class ServedHand:
         """Like :meth:`RobotiqHand.command`, for several axes at once."""
         mask = self._hand.model.mask  # all are checked before the first takes effect
         asked = {mask(int(each)): check_changes(changes) for each, changes in axes.items()}
-        self._settings.ask(job.asked)
+        self._settings.ask(job.carries)
         for fingers, changes in asked.items():
             self._hand.command(fingers, **changes)
-        self._fingers.are_commanded(moved_by(job.asked))
+        self._fingers.are_commanded(moved_by(job.carries))
 
     def _cancel(self, call: AgentCall, query: Query) -> None:
         self._admission.renew(call, now())

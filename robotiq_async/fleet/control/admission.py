@@ -25,7 +25,7 @@ class Admission:
         self._base = base
         self._epoch = epoch
         self._newest = 0  # number of the newest request admitted under the present lease
-        self._asked: dict[str, int] = {}  # number of the newest request for the lease, by client
+        self._by_client: dict[str, int] = {}  # number of the newest request for the lease, by client
 
     def check_meant(self, call: AgentCall, *, in_any_run: bool = False) -> None:
         if call.to != self._base:
@@ -49,10 +49,10 @@ class Admission:
         Raises:
             AgentError: a repetition, but its sender does not hold the lease now.
         """
-        before = self._asked.pop(call.client, -1)
-        self._asked[call.client] = max(before, call.number)
-        if len(self._asked) > _CLIENTS:
-            del self._asked[next(iter(self._asked))]
+        before = self._by_client.pop(call.client, -1)
+        self._by_client[call.client] = max(before, call.number)
+        if len(self._by_client) > _CLIENTS:
+            del self._by_client[next(iter(self._by_client))]
         if call.number > before:
             return False
         holder = self.lease.holder

@@ -100,7 +100,7 @@ class Dialog:
         self._commands: dict[int, Errand] = {}  # commands without an answer, in their order
         self._resending: asyncio.TimerHandle | None = None
         self._waiting: dict[Finger, dict[str, int]] = {}  # commands of a loop that were not sent yet
-        self._asked: AgentCall | None = (
+        self._oldest: AgentCall | None = (
             None  # the lease, and the newest stamp, at the time of the oldest of these
         )
         self._under_way = 0
@@ -169,7 +169,7 @@ class Dialog:
         finally:
             self._forget(errand)
             if errand.is_command:
-                self.settings.note(errand.call.number, errand.asked, begun)
+                self.settings.note(errand.call.number, errand.carries, begun)
         if errand.status:
             self._receive(errand.status, errand.asked_at)
         try:
@@ -233,13 +233,13 @@ class Dialog:
     def is_moving(self) -> bool:
         """Whether a motion was asked for that the agent has not answered yet."""
         waits = any("position" in changes for changes in self._waiting.values())
-        return waits or bool(self._cancels) or any(moved_by(each.asked) for each in self._commands.values())
+        return waits or bool(self._cancels) or any(moved_by(each.carries) for each in self._commands.values())
 
     def put(self, axes: Finger, changes: dict[str, int]) -> None:
         """Send changes of axes, together with those that wait, as soon as less than UNDER_WAY do."""
-        if self._asked is None or not self._is_under_this_lease(self._asked):
+        if self._oldest is None or not self._is_under_this_lease(self._oldest):
             self.clear()
-            self._asked = self.call()
+            self._oldest = self.call()
         for axis in axes:
             self._waiting.setdefault(axis, {}).update(changes)
         if self._under_way < UNDER_WAY:
@@ -249,11 +249,11 @@ class Dialog:
         if self._waiting and why:
             self.log.info("%s: commands that were not sent yet are dropped", why)
         self._waiting.clear()
-        self._asked = None
+        self._oldest = None
 
     def flush(self) -> None:
         """Send the waiting commands now, because another request follows."""
-        asked, self._asked = self._asked, None
+        asked, self._oldest = self._oldest, None
         waiting, self._waiting = self._waiting, {}
         if waiting and asked is not None and self._is_under_this_lease(asked):
             arguments = {"axes": {str(int(axis)): changes for axis, changes in waiting.items()}}

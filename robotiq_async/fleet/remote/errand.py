@@ -85,7 +85,7 @@ class Errand:
     Attributes:
         verb: the last part of its key.
         timeout: seconds for the answer, from the first copy, while the event loop runs.
-        asked: the positions, speeds and forces that it asks for.
+        carries: its positions, speeds and forces.
         asked_at: when the wait for an answer began.
         answered: the answer; None if there is none, or the error that ended the wait.
         status: that came with the newest answer.
@@ -121,7 +121,7 @@ class Errand:
         self._said: AgentAnswer | RobotiqError | None = None  # by that
         self._in_doubt: AgentAnswer | RobotiqError | None = None
         """The outcome when the time is over."""
-        self.asked: dict[Setting, int] = asked_of(verb.removeprefix("cmd/"), call.arguments)
+        self.carries: dict[Setting, int] = asked_of(verb.removeprefix("cmd/"), call.arguments)
         self._loop = asyncio.get_running_loop()
         self._limit = Limit(timeout)
         self._strays = 0

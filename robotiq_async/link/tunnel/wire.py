@@ -117,4 +117,4 @@ class TunnelWire:
         """Wait until the tunnel has closed, for a limited time."""
         with anyio.CancelScope(shield=True):
             if not await self._worker.ended(ENDED_S):
-                self._log.warning("the tunnel is abandoned: its last call did not return")
+                self._log.warning("the tunnel is given up: its last call did not return")
