@@ -509,3 +509,16 @@ async def test_a_lost_request_is_repeated_after_a_loop_that_was_held_up(
         loop.after_turns(2, lambda: loop.hold_up(held))
         await calling
         assert bus.left == 0
+
+
+@inside(world)
+async def test_copies_of_earlier_messages_are_no_sign_of_an_agent(here: World) -> None:
+    """They came after the agent was killed, and its silence was taken for a denied access."""
+    for stream in here.network.both("holder", here.agent.host.name):
+        stream.copies, stream.lateness = 2, 0.4
+    await asyncio.sleep(1)
+    calling = here.holder.host.create_task(ending(here.holder.hand.set_speed(9)))
+    await asyncio.sleep(0)
+    here.kill(here.agent.host)
+    await here.until(calling.done)
+    assert calling.result() == "ConnectionLost"

@@ -258,9 +258,12 @@ class RemoteSession:
             self.dialog.lose_lease("closed", "the agent was restarted")
             self.dialog.fall_silent()  # requests to the previous run will not be answered
         self._arrived_at = arrival
+        # A copy of an earlier one may arrive when the agent is gone.
+        is_new = message.epoch != self.mirror.epoch or message.stamp > self.mirror.stamp
         if not self.mirror.receive(message, arrival, in_turn=in_turn, window=self.dialog.window, asked=asked):
             return True  # about this gripper, but too old
-        self.dialog.heard()
+        if is_new:
+            self.dialog.heard()
         if in_turn:
             self.keeper.receive(message.lease)
         return True
