@@ -9,7 +9,7 @@ import sysconfig
 from pathlib import Path
 from typing import Final
 
-from .check import missing, problems, unlisted
+from .check import missing, named_defaults, problems, unlisted
 from .pages import ROOT, described, stage
 from .versions import collect
 
@@ -36,6 +36,9 @@ def main() -> int:
     names = [name for page in described().values() for name in page]
     listed = unlisted((BUILT / "objects.inv").read_bytes(), names)
     found = [*problems(BUILT), *missing(BUILT, described()), *listed]
+    known = {name.rpartition(".")[2] for name in names}
+    for page in sorted((BUILT / "api").glob("*.html")):
+        found += [f"{page.name}: {each}" for each in named_defaults(page.read_text(encoding="utf-8"), known)]
     for line in found:
         print(line, file=sys.stderr)
     if found:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import re
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Final
@@ -132,3 +133,10 @@ def unlisted(inventory: bytes, names: Iterable[str]) -> Iterator[str]:
     lines = zlib.decompress(inventory.split(b"\n", 4)[4]).decode().splitlines()
     known = {line.partition(" ")[0] for line in lines}
     yield from (f"objects.inv: nothing about {name}" for name in names if name not in known)
+
+
+def named_defaults(page: str, known: Collection[str]) -> Iterator[str]:
+    """Defaults in the signatures of a page that are names of constants, and not among those known."""
+    words = unescape(re.sub(r"<[^>]+>", "", page))
+    found = set(re.findall(r"^\s*\w+: [^=\n]+ = ([A-Z][A-Z_]+),?$", words, re.MULTILINE))
+    yield from (f"the default {name} is a name, and no value" for name in sorted(found - {*known}))

@@ -80,7 +80,9 @@ def _copy(kind: Class) -> None:
 
 def _shown(where: Object, default: object) -> object:
     """A default for the reader: the value of a constant, and anything else as the source has it."""
-    if not re.fullmatch(r"[A-Z_]+", words := str(default)):
+    if re.fullmatch(r"[A-Z]\w+\.[A-Z_]+", words := str(default)):
+        return words  # as an expression it would be shown without its class
+    if not re.fullmatch(r"[A-Z_]+", words):
         return default
     value = str(where.modules_collection[where.resolve(words)].value)
     inner = re.fullmatch(r"\w+\((.*)\)", value)  # a number or a text with a type of its own

@@ -225,6 +225,13 @@ def test_a_name_that_the_api_does_not_describe_is_found(site: Path) -> None:
     assert [*check.missing(site, wanted)] == ["index.html: nothing about c", "gone.html: nothing about d"]
 
 
+def test_a_default_that_is_a_name_is_found() -> None:
+    page = (
+        "<code>move(\n  <b>wait</b>: float = LONG_S,\n  model: Model | None = HAND_E,\n  n: int = 5\n)</code>"
+    )
+    assert [*check.named_defaults(page, ["HAND_E"])] == ["the default LONG_S is a name, and no value"]
+
+
 def test_a_name_that_sphinx_would_not_find_is_found() -> None:
     listed = b"# Sphinx inventory version 2\n# Project: a\n# Version: 1\n# zlib\n" + zlib.compress(
         b"a.B py:class 1 api.html#$ -\na.B.c py:method 1 api.html#$ -\n"
