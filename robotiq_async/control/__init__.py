@@ -17,7 +17,8 @@
 #
 # A cycle is see(), then decide(); the first write of a stop is decided before the read, which may never be
 # answered. An image is made from the base, the last image that the gripper has or is about to have. So an
-# axis that is not addressed keeps its request; where rGTO rises, it is asked for where it is unless it grips.
+# axis that is not addressed keeps its request. When an image sets rGTO again, each axis that holds nothing is
+# commanded to its present position.
 # Every image leaves through one gate (gate.py): only the procedure that was asked for raises rACT or rATR,
 # whatever an image carries along from another client or an older one. One race is left: if another client
 # resets the gripper while a status is a device cycle old, an image with rACT activates it [follows]. That

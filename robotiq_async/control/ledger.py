@@ -90,8 +90,8 @@ class Ledger:
         for each in self._doubtful:
             log.info("the last hand of this gripper has left a request on its way: %s", each.image)
             each.overtaken(each.number)
-        # The entry that showed as a status was adopted. It is an entry no more; but if it is ours, it may
-        # activate: after a reset our own image is taken for another client's.
+        # The entry that showed as a status was adopted. It has left the ledger, but if this client wrote it,
+        # it can still start an activation: after a reset our own image is taken for another client's.
         self._mistaken: Entry | None = None
         self._adoption: Adoption | None = None  # of another client's entry as long as that is the last
         # The axes that may still show a status from before their last request, with what they were asked: a

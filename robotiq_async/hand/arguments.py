@@ -66,7 +66,7 @@ def describes_arguments(**same: str) -> Callable[[F], F]:
 
 
 def with_arguments(text: str, names: Iterable[str], same: Mapping[str, str]) -> str:
-    """A docstring with the section, before that of what it raises."""
+    """A docstring with the section, before the section of errors."""
     lines = [
         textwrap.fill(
             f"{name}: {ARGUMENTS[same.get(name, name)]}",

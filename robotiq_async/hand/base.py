@@ -272,7 +272,7 @@ class Hand(HandKind):
         label_n: float | None = None,
         timeout: float | None = None,
     ) -> MoveResult:
-        """Open fingers: :meth:`move` to 0. Returns and raises what it does."""
+        """Open fingers: :meth:`move` to 0. Returns and raises the same."""
         return await self.move(
             OPEN, fingers, speed=speed, mm_per_s=mm_per_s, force=force, label_n=label_n, timeout=timeout
         )
@@ -346,7 +346,7 @@ class Hand(HandKind):
     async def halt(self) -> None:
         """Stop every axis now (rGTO = 0). The next command sets rGTO again, and moves only the axes it names.
 
-        But an axis that held something presses on with that command, and closes if the part was taken out.
+        An axis that held a part resumes pressing with that command, and closes if the part was taken out.
 
         Returns when the gripper reports that it has stopped, at most 1 s after the acknowledgement. Awaited
         moves end with MoveSupersededError. When cancelled, the halt is sent all the same. If the link goes
@@ -366,7 +366,7 @@ class Hand(HandKind):
 
     @describes_arguments(who="whose")
     async def inhibit(self, reason: str, *, who: str = "") -> None:
-        """Halt for a person, and refuse what may move or press until a person calls :meth:`permit`.
+        """Halt for a person, and refuse calls that may move or press until a person calls :meth:`permit`.
 
         After :meth:`halt` the next command goes on; after this every motion, force, activation, release and
         recovery raises MotionInhibitedError, and so do calls that wait for one. It outlasts lost links,

@@ -1,1 +1,1 @@
-"""One run of a hand, from start() to stop(): the task that polls, and what others wait for beside it."""
+"""One run of a hand, from start() to stop(): the task that polls, and the waits of callers beside it."""

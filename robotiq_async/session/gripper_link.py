@@ -29,7 +29,7 @@ _TUNNEL: Final = " (two grippers behind one arm: give each of the hands its devi
 _URCAP: Final = " (two grippers behind one URCap: give each of the hands its device_id)"
 
 MOST_LEFT: Final = 64
-"""The most grippers of which is kept what their last hands have left. Half a second after its end only the
+"""The most grippers whose last hands leave something for the next. Half a second after its end only the
 contacts of a hand matter: they keep a grip when rGTO rises again."""
 
 T = TypeVar("T")
@@ -179,7 +179,7 @@ class _Claim(Generic[T]):
 
 
 class Claims(Generic[T, L]):
-    """Grippers and their owners, and what the last owner of each has left for the next. Thread-safe.
+    """Grippers with their owners, and the legacy of the last owner of each for the next. Thread-safe.
 
     What is left is kept for the last :data:`MOST_LEFT` grippers.
     """
@@ -219,7 +219,7 @@ class Claims(Generic[T, L]):
                 self._left.popitem(last=False)
 
     def left(self, gripper: Gripper) -> L | None:
-        """The part that the last owner of a gripper has left."""
+        """The legacy of the last owner of a gripper."""
         newest_first = reversed([*self._left.items()])
         return next((left for each, left in newest_first if each.may_be(gripper)), None)
 

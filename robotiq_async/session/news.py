@@ -1,4 +1,4 @@
-"""FaultNews: what the log says of a gripper's faults, and of a reset, once each.
+"""FaultNews: the log of a gripper's faults, and of a reset, once each.
 
 A fault is logged when the hand counts it as one: a passing 0x09 is none. A reset is logged, whoever it was,
 once the gripper has been active in this run: what it held may have fallen.

@@ -63,7 +63,7 @@ def usual_write_spacing(model: Model) -> float:
 LATE_POLLS: Final = "polling was late"  # how the warning about late polls begins
 LONGEST_SPACING_S: Final = 0.1  # a command waits that long at most before it is written
 CONNECT_TIMEOUT_S: Final = 2.0
-"""A lost first packet is sent again after 1 s; what answers neither is not there."""
+"""A lost first packet is sent again after 1 s; a device that answers neither is not there."""
 RESPONSE_TIMEOUT_S: Final = 0.4
 """Two of these, a read in flight and a write, still end within the second that a write may take; on a serial
 line also with the time in which the read may be asked once more."""

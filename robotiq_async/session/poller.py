@@ -198,7 +198,7 @@ class Poller:
 
     @contextmanager
     def _noting_doubt(self) -> Iterator[None]:
-        """Publish what was sent if the exchange fails: the gripper may carry it out, or never get it."""
+        """Publish the sent request if the exchange fails: the gripper may carry it out, or never get it."""
         try:
             yield
         except RobotiqConnectionError:
@@ -229,7 +229,7 @@ class Poller:
         return request.registers
 
     def _decide_or_repeat(self) -> Registers | None:
-        """The same; after a refusal once more what was refused, unless something has been asked since."""
+        """The same; after a refusal the refused image again, unless a newer request has come."""
         entry = self._controller.in_flight
         if entry is None:
             return self._decide()

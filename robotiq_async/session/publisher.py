@@ -1,4 +1,4 @@
-"""Who hears what of a run, and when: readers, listeners, and the callers whom a request has ended.
+"""The order in which a run is heard of: by readers, listeners, and the callers whom a request has ended.
 
 What they do may hold up the loop. So a write that is due leaves first.
 """

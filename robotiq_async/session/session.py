@@ -136,7 +136,7 @@ class Session:
                 self._end_with(self._task)
 
     def _claim(self) -> Left | None:
-        """Claim the gripper; return what the last run of any hand of it has left to act."""
+        """Claim the gripper; return the writes of its last run that may still act."""
         gripper = self.options.link.gripper
         owner = self._claims.claim(gripper, self, lambda each: each.is_over)
         if owner is not None:

@@ -179,8 +179,8 @@ class Intake(Generic[T]):
 class LimitedIntake(Intake[T]):
     """The inside of a stream whose reader gets an error if no item comes for some time, and may then read on.
 
-    The time counts from the last item, or from the last error; before the first item from the opening, if the
-    hand runs then. A reader that waits for the start waits for the first item without a limit.
+    The timer starts at the last item or error, or at the opening if the hand runs then. A reader that waits
+    for the start waits for the first item without a limit.
 
     Args:
         buffer: as that of a stream.

@@ -1,4 +1,4 @@
-"""Waits of callers: futures for a state, and what ends the wait for an activation that makes no progress."""
+"""Waits of callers: futures for a state, and the end of a wait for an activation without progress."""
 
 from __future__ import annotations
 

@@ -131,7 +131,7 @@ class Operator:
             return describe(await self.hand.move(position, fingers, speed=speed, force=force))
 
     async def leave(self) -> str:
-        """Stop the hand, and the fingers if this person has moved them; returns what became of the fingers.
+        """Stop the hand, and the fingers if this person has moved them; returns how the fingers ended.
 
         It takes no longer than :meth:`Hand.stop`.
         """

@@ -234,7 +234,7 @@ class ViewerError(RobotiqError):
 
 
 class MeasuringError(RobotiqError):
-    """A measurement failed, or did not measure what it was meant to."""
+    """A measurement failed, or measured something else."""
 
 
 class NotAllStoppedError(RobotiqError):

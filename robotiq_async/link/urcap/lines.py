@@ -39,8 +39,8 @@ def command(image: Sequence[int], activation: int | None) -> bytes:
     """The one line that sets the variables as an image of a jaw has them.
 
     No source says whether the URCap takes the variables of a line at once or one by one. So they stand in the
-    order that is right for both. What stops the fingers comes first; what starts them comes last, when
-    position, speed and force are set.
+    order that is right for both: a variable that stops the fingers comes first, and one that starts them
+    comes last, after position, speed and force.
 
     A motion is the line that clients send: position, speed, force, go. Activation and release are left out
     of it: a motion must not activate a gripper that another client has just reset. ACT 0 is in the line even

@@ -1,4 +1,4 @@
-"""Writes what MoveIt wants beside a URDF: an SRDF, with a group, its states and the collisions to ignore.
+"""Writes the SRDF that MoveIt reads beside a URDF, with a group, its states and the collisions to ignore.
 
 The group ``gripper`` is the whole gripper, for what is held touches all of it. Joints that no motor drives
 are passive: MoveIt wants a controller for the others alone. The gripper's collisions with itself are ignored,

@@ -168,7 +168,7 @@ MODEL: Final = "model"
 
 
 def _without_model(path: Path | str, rows: Sequence[CsvRow]) -> tuple[Sequence[CsvRow], Model | None]:
-    """The rows without their last column, and what it says, if it is that of the model."""
+    """The rows without their last column, and the model in it, if it is that of the model."""
     if not rows or rows[0][1][-1] != MODEL:
         return rows, None
     found = None
