@@ -12,7 +12,7 @@ import pytest
 
 from robotiq_async import RobotiqConnectionError
 from robotiq_async.link.modbus import ModbusTransport
-from robotiq_async.link.serial.patience import SOON
+from robotiq_async.link.serial.patience import SOON, LinePatience
 from robotiq_async.values.registers import REGISTER_COUNT, RTU_REGISTERS
 from tests.link.scripted_device import Device, unopened
 from tests.serial_line import with_crc
@@ -93,6 +93,22 @@ async def test_a_silent_gripper_is_asked_now_and_then(pair: Pair, device: Device
     assert len(tries) > 12
     assert all(later - earlier > 10 for earlier, later in pairwise(tries[1:])), "for some polls of the other"
     assert all(later - earlier > 150 for earlier, later in pairwise(tries[SOON:])), "for a second"
+
+
+def test_a_question_waits_longer_where_answers_have_just_taken_long() -> None:
+    patience, left, right = LinePatience(), Device, ModbusTransport
+    assert patience.seconds(left, 0.4) == 0.06
+    assert patience.seconds(left, 2.0) == pytest.approx(0.3), "by the response timeout"
+    patience.missed(left, 0.0)
+    assert patience.seconds(left, 0.4) == 0.024
+    patience.asked(1.0)
+    patience.answered(right, 1.04)
+    assert patience.seconds(left, 0.4) == patience.seconds(right, 0.4) == pytest.approx(0.16)
+    assert patience.seconds(left, 0.1) == 0.1, "never beyond the response timeout"
+    for _ in range(100):
+        patience.asked(2.0)
+        patience.answered(right, 2.003)
+    assert (patience.seconds(left, 0.4), patience.seconds(right, 0.4)) == (0.024, 0.06)
 
 
 async def test_an_answer_that_is_too_late_costs_the_other_no_write(pair: Pair, device: Device) -> None:
