@@ -41,6 +41,7 @@ STYLE: Final = """
 .body--dark .rq-contact .rq-does { color: #ff8a5c; }
 .rq-banner { background: #b00020; color: #fff; padding: .5rem .75rem; border-radius: 4px; }
 .rq-helps { background: #fff !important; color: #8c0019 !important; font-weight: 700; }
+.rq-chart text { fill: currentColor; opacity: .75; }
 .rq-stale { opacity: .66; filter: grayscale(1); }
 .rq-stale .rq-does { opacity: 1; }
 @media (min-width: 1200px) {

@@ -125,8 +125,8 @@ class Curves:
 
     def __init__(self) -> None:
         self._drawn_at = 0.0
-        self._positions = ui.echart(_options("position / counts", 255, 51)).classes("w-full h-40")
-        self._currents = ui.echart(_options("current / mA", CURRENT_MAX, 200)).classes("w-full h-40")
+        self._positions = _chart(_options("position / counts", 255, 51))
+        self._currents = _chart(_options("current / mA", CURRENT_MAX, 200))
 
     def show(self, hand: HandMirror) -> None:
         now = monotonic()
@@ -150,6 +150,11 @@ class Curves:
         self._currents.options["yAxis"]["max"] = max(CURRENT_MAX, -(-highest // 200) * 200)
         self._positions.update()
         self._currents.update()
+
+
+def _chart(options: dict[str, Any]) -> ui.echart:
+    # Not on a canvas: its text has the colour of the page's, which no grey can be read on in light and dark.
+    return ui.echart(options, renderer="svg").classes("w-full h-40 rq-chart")
 
 
 def _options(title: str, highest: int, step: int) -> dict[str, Any]:
