@@ -1,7 +1,7 @@
 """Operators press HALT at random beside a loop that grasps for ever: nothing moves until one permits it.
 
 The true motion of the simulated gripper is the judge. An hour of virtual
-time: ``python -m tests.hand.test_operators 3600 2``.
+time: ``python -m tests.tools.test_operators 3600 2``.
 """
 
 from __future__ import annotations
