@@ -208,8 +208,7 @@ class Poller:
 
     def _note_acknowledged(self, began: float) -> None:
         entry, answered = self._controller.in_flight, self.tick.time()
-        if entry is None:
-            return
+        assert entry is not None, "an image has left"
         self._counters.note_write(answered - began, entry.sent - self._asked)
         self._controller.acknowledged(answered)
         self._note_sent(entry, acknowledged=True)
