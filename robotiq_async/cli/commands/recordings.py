@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ...tools.recording.recordings import RecordedMessage
 
 Overwrite = Annotated[Flag, Parameter(help="Replace an existing file.")]
-COUNTS_COLUMNS: Final = "COUNTS_COLUMNS"  # the numbers that a table has anyway
+COUNTS_COLUMNS: Final = "COUNTS"  # the numbers that a table has anyway
 TOPIC_KINDS: Final = {"statuses": "status", "commands": "command", "events": "event"}
 
 
