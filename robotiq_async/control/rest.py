@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from enum import Enum
+from functools import cache
 from typing import Final, NamedTuple
 
 from ..values.enums import NO_AXES, Finger, ObjectStatus
@@ -28,6 +29,10 @@ move_gripper.cpp); 0.05 s are added for a poll and a slow host. Nothing was meas
 LAG_READS: Final = 10
 """The reads that the lag lasts at least: the same source counts exchanges, and a slow poll makes few of
 them."""
+
+PAD_MM: Final = 1.6
+"""The most by which pads and part yield as the force rises [conceivable]: 7 counts of a Hand-E, for 10 ms in
+simulation, 4 of a 2F-85, 2 of the others."""
 
 
 def agrees(model: Model, request: int, what: ObjectStatus, position: int, direction: int) -> bool:
@@ -137,6 +142,12 @@ def _is_true_since(
     return fits
 
 
+@cache
+def yields(model: Model) -> int:
+    """The counts that an axis in contact may go on without having moved off."""
+    return max(TOLERANCE, int(PAD_MM * model.stroke.counts / model.stroke.mm))
+
+
 class Contacts:
     """Where each axis was last seen in contact, until it has moved off: what may press. False while empty.
 
@@ -159,7 +170,7 @@ class Contacts:
         self._shown = dict.fromkeys(contacts, status)
         for axis in before.keys() - self._shown.keys():  # usually none
             at = before[axis].position(axis)
-            if axis in status.moving and abs(status.position(axis) - at) <= TOLERANCE:
+            if axis in status.moving and abs(status.position(axis) - at) <= yields(status.model):
                 self._shown[axis] = before[axis]
                 self.open |= axis
 
@@ -177,7 +188,7 @@ class Contacts:
         pressing = NO_AXES
         for axis, shown in self._shown.items():
             what, at = shown.finger_status(axis), shown.position(axis)
-            is_there = abs(status.position(axis) - at) <= TOLERANCE
+            is_there = abs(status.position(axis) - at) <= yields(status.model)
             if is_there and agrees(status.model, base.position(axis), what, at, direction=0):
                 pressing |= axis
         return pressing

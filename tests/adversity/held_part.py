@@ -20,13 +20,12 @@ from robotiq_async import Finger, RobotiqError, RobotiqHand, State
 from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.simulator import Habits, Physics, SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.simulator.troubles.corruption import unchanged
-from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model, model_of
+from robotiq_async.values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model, model_of
 from robotiq_async.values.request import Request
 from tests.virtual import run
 
-MODELS: Final = (TWO_FINGER_85, TWO_FINGER_140)
-"""The grippers that take turns. The pads of a simulated Hand-E dent a part by up to five counts for 10 ms
-when the force rises, and fingers B and C of a 3-Finger push it to A: by more than a contact yields."""
+MODELS: Final = (TWO_FINGER_85, TWO_FINGER_140, HAND_E)
+"""The grippers that take turns. Fingers B and C of a 3-Finger push a part to A: by more than pads yield."""
 IN_A_JAW: Final = "box:30x40x60,0.3"
 IN_A_HAND: Final = "box:60x60x60,0.3"
 LIFTED_MM: Final = 60
@@ -181,7 +180,7 @@ def main() -> None:
     parser.add_argument("--lives", type=int, default=60)
     parser.add_argument("--first", type=int, default=0, help="number of the first")
     parser.add_argument("--steps", type=int, default=8, help="things that happen in a life")
-    parser.add_argument("--model", type=model_of, help="of the gripper; by default 2f85 and 2f140 in turn")
+    parser.add_argument("--model", type=model_of, help="of the gripper; by default the jaws in turn")
     asked = parser.parse_args()
     logging.disable(logging.CRITICAL)
     bad = loose = 0

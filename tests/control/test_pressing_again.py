@@ -224,3 +224,20 @@ def test_an_axis_that_has_moved_off_and_comes_past_is_held_at_once() -> None:
     scan.step()
     assert asked.is_answered
     assert scan.last_image.position(A) < PART + 5, "it is held, and does not press on"
+
+
+@pytest.mark.parametrize(("model", "counts"), [(TWO_FINGER_85, 4), (HAND_E, 7), (THREE_FINGER, 2)], ids=str)
+def test_an_axis_whose_pad_yields_to_more_force_is_not_held_where_it_is(model: Model, counts: int) -> None:
+    """A body of a simulated Hand-E lost its part: 7 counts counted as moved off, and the hold let go."""
+    scan = Scan(model=model)
+    scan.start()
+    scan.gripper.place_object(A, PART, soft=counts)
+    scan.moved(255, A, speed=255, force=0)
+    at = scan.latest.position(A)
+    scan.run(0.6)
+    scan.move(255, A, force=255)
+    scan.until(lambda: A in scan.latest.moving and scan.latest.position(A) > at)
+    held(scan, Move(0, A, scan.now, Outcome()))
+    scan.run(1.0)
+    assert scan.gripper.grips == A
+    assert scan.latest.requested_position(A) == 255
