@@ -135,6 +135,8 @@ class Poller:
                     return
 
     def _plan(self, write: NextWrite, reads: int) -> CycleStep | None:
+        if not reads and not begins_at_once(write, is_slow=self._is_slow):
+            return READ  # as next_step() says after more work: a stream of commands comes here at each poll
         age = self.tick.time() - self._asked
         return next_step(write, reads, age, is_stale=self._is_stale(), is_slow=self._is_slow)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async.control.controller import NextWrite
-from robotiq_async.session.cycle import FRESH_S, READS, SOON_S, CycleStep, next_step
+from robotiq_async.session.cycle import FRESH_S, READS, SOON_S, CycleStep, begins_at_once, next_step
 from robotiq_async.session.options import LONGEST_SPACING_S
 
 STOP = NextWrite(wait=0.0, is_urgent=True, is_command=False, is_stop=True)
@@ -55,3 +55,16 @@ def test_a_step_after_a_read(
 ) -> None:
     now = write._replace(wait=wait)
     assert next_step(now, reads, 0.0, is_stale=is_stale, is_slow=False) is expected
+
+
+@pytest.mark.parametrize("is_slow", [False, True])
+@pytest.mark.parametrize("is_stale", [False, True])
+@pytest.mark.parametrize("wait", [0.0, SOON_S, 1.0])
+@pytest.mark.parametrize("write", [STOP, COMMAND, PROCEDURE])
+def test_a_cycle_that_does_not_begin_with_its_write_begins_with_a_read(
+    write: NextWrite, wait: float, is_stale: bool, is_slow: bool
+) -> None:
+    """The poller plans no further then."""
+    write = write._replace(wait=wait)
+    if not begins_at_once(write, is_slow=is_slow):
+        assert next_step(write, 0, 0.0, is_stale=is_stale, is_slow=is_slow) is CycleStep.READ
