@@ -159,7 +159,7 @@ async def stills(
     await asyncio.sleep(1.5)
     await keep(browser, "web_lost")
     await server.accept()
-    await browser.says("state", "ready")
+    await browser.says("state", "holding")
 
 
 async def film(browser: Browser, play: Callable[[], Awaitable[None]]) -> tuple[list[Image.Image], list[int]]:
