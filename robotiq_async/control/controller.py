@@ -165,8 +165,7 @@ class Controller:
         """Begin a reset, unless one is about to be sent; ASK_HALT or HALT_RESETS if a halt asks for it."""
         if self.machine.ask(trigger, self.status):
             who = "reset" if trigger is Trigger.ASK_RESET else "halt"
-            ended = MoveSupersededError(f"a {who} took over")
-            self._begin_reset(trigger, self.machine.taken_over(ended))
+            self._begin_reset(trigger, MoveSupersededError(f"a {who} took over"))
 
     def hold_when_back(self) -> None:
         """The link is down: once it is back, what this hand moves is held."""

@@ -73,6 +73,13 @@ async def test_a_fault_of_the_controller(caplog: pytest.LogCaptureFixture) -> No
             (line,) = lines(caplog)
             assert "its controller reports: " in line
             assert "0x0A" in line
+            gripper.inject_fault(Fault.OVER_CURRENT)
+            await asyncio.sleep(0.1)
+            gripper.controller_fault = 0x0C
+            await asyncio.sleep(0.1)
+            fault, controller = lines(caplog)
+            assert "0x0E OVER_CURRENT" in fault
+            assert "0x0C" in controller
 
 
 @pytest.mark.parametrize("who", ["this program", "another client or for lack of power"])
