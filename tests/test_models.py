@@ -490,6 +490,7 @@ def test_a_page_shows_the_axis_that_there_is() -> None:
     mirror = HandMirror(0, "sim://", State.RUNNING_IDLE)
     message = {
         "state": "RUNNING_IDLE",
+        "inhibited": None,
         "problem": "",
         "events": [],
         "peaks": [150],
