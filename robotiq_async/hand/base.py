@@ -372,9 +372,12 @@ class Hand(HandKind):
         recovery raises MotionInhibitedError, and so do calls that wait for one. It outlasts lost links,
         :meth:`stop` and :meth:`start`; again, it halts again, and the first reason stays. Whatever it raises,
         motion is inhibited; what moves while the link is down is held once it is back. No emergency stop.
+        A :meth:`stop` under way that leaves the fingers moving becomes one that stops them; then it raises.
 
         Raises:
             TypeError, ValueError: of the arguments; nothing is inhibited.
+            NotStartedError: the hand was stopped: the fingers MAY STILL MOVE. A hand that was never started
+                raises nothing: it is inhibited from its start on.
             RobotiqError: what :meth:`halt` raises: the fingers MAY STILL MOVE.
         """
         with self._naming:

@@ -258,14 +258,17 @@ class RobotiqHand(Hand):
 
     async def _inhibit(self, inhibit: Inhibit) -> None:
         session = self._session
-        if session is None or session.is_over:
-            self._machine.inhibit(inhibit)  # it counts from the next start on
+        if session is None:
+            self._machine.inhibit(inhibit)  # it counts from the first start on; nothing was moved
             return
-        session.check_loop("the hand")
+        if not session.is_over:
+            session.check_loop("the hand")
         self._machine.inhibit(inhibit)
         if self.state is State.DISCONNECTED:
             session.controller.hold_when_back()
-        await self._halt()
+        elif self.state is State.DO_SHUTDOWN:
+            await session.stop(halt=True)  # it may be one that leaves the fingers moving
+        await self._halt()  # raises if the hand runs no more: the fingers may still move
 
     async def _permit(self, who: str) -> None:
         if self._session is not None and not self._session.is_over:

@@ -7,10 +7,18 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
-from robotiq_async import Fault, MotionInhibitedError, RobotiqError, State
+from robotiq_async import (
+    ConnectionLostError,
+    Fault,
+    MotionInhibitedError,
+    NotStartedError,
+    RobotiqError,
+    RobotiqHand,
+    State,
+)
 from robotiq_async.hand import Hand
-from tests.contract.bench import A, Bench, at_rest, contract, ended
-from tests.virtual import until
+from tests.contract.bench import LOCAL, A, Bench, at_rest, bench, contract, ended
+from tests.virtual import inside, until
 
 REASON, WHO = "HALT was pressed", "the page"
 MOVES: dict[str, Callable[[Hand], Awaitable[object]]] = {
@@ -155,6 +163,48 @@ async def test_while_the_link_is_down_what_moves_is_held_once_it_is_back(here: B
     await until(lambda: not here.gripper.is_moving)
     await at_rest(hand)
     assert here.gripper.position(A) < 240
+
+
+@pytest.mark.parametrize("where", [LOCAL])
+@inside(bench, "where")
+async def test_a_hand_that_runs_no_more_says_that_the_fingers_may_still_move(here: Bench) -> None:
+    """It is inhibited all the same, from its next start on."""
+    hand = RobotiqHand(here.server.address, reconnect=False)
+    await hand.inhibit(REASON)  # never started: it has moved nothing
+    await hand.permit()
+    await hand.start()
+    hand.command(position=255, speed=0)
+    await here.moves()
+    await here.unplug(hand)
+    await until(lambda: hand.state is State.SHUTDOWN)
+    with pytest.raises(ConnectionLostError):  # the link was given up
+        await hand.inhibit(REASON)
+    await here.server.accept()
+    await hand.start()
+    await refused(hand.move(200))
+    await hand.permit()
+    hand.command(position=255, speed=0)
+    await hand.stop(halt=False)
+    with pytest.raises(NotStartedError):
+        await hand.inhibit(REASON)
+    assert hand.inhibited is not None
+
+
+@pytest.mark.parametrize("where", [LOCAL])
+@inside(bench, "where")
+async def test_it_strengthens_a_stop_that_would_leave_the_fingers_moving(here: Bench) -> None:
+    hand = RobotiqHand(here.server.address)
+    await hand.start()
+    hand.command(position=255, speed=0)
+    await here.moves()
+    stopping = asyncio.create_task(hand.stop(halt=False))
+    await asyncio.sleep(0)
+    with pytest.raises(NotStartedError):
+        await hand.inhibit(REASON)
+    assert hand.inhibited is not None
+    assert not here.gripper.is_moving
+    await stopping
+    await stays(here)
 
 
 @contract

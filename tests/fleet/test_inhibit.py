@@ -8,16 +8,18 @@ from pathlib import Path
 
 import pytest
 
-from robotiq_async import Finger, Inhibit, MotionInhibitedError, RobotiqError
+from robotiq_async import Finger, Inhibit, MotionInhibitedError, RobotiqError, RobotiqHand
 from robotiq_async.fleet.agent import records
+from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.agent.records import FileRecords
-from robotiq_async.fleet.fleet import Fleet
+from robotiq_async.fleet.fleet import Fleet, halt
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.values.errors import AgentError, ControlLostError, NotAllStoppedError
 from tests.fleet.cell import move_slowly
-from tests.fleet.lab import LEFT, Between, Lab, lab
+from tests.fleet.lab import LEFT, Between, Lab, lab, serving
+from tests.fleet.network import Network
 from tests.fleet.world import World, world
-from tests.virtual import inside, until
+from tests.virtual import inside, until, virtual
 
 
 @inside(lab)
@@ -80,6 +82,19 @@ async def test_nothing_malformed_keeps_it_from_halting(here: Lab) -> None:
         inhibit = here.local.inhibited
         assert inhibit is not None
         assert inhibit.reason.isprintable()
+
+
+@virtual
+async def test_a_halt_that_cannot_reach_the_gripper_is_no_success() -> None:
+    """The agent tries to reach its gripper again and again, so that its hand runs only now and then."""
+    network = Network()
+    hand = RobotiqHand("tcp://127.0.0.1:65001")  # nobody listens there
+    async with serving(Agent("lab", "cell", {"left": hand}, network.bus("agent"))):
+        for number in range(8):
+            await asyncio.sleep(0.13)
+            outcome = await halt(network.bus(f"console {number}"), LEFT, 1, "HALT")
+            assert outcome.startswith("refused"), number
+    assert hand.inhibited is not None
 
 
 class Older(Between):
