@@ -83,7 +83,7 @@ EXAMPLES: Final = [
     event(39, request_fields(SentRequest(IMAGE, 811.53125, acknowledged=True))),
     event(40, {"kind": "lease", "number": 3, "holder": LABEL, "reason": "granted"}),
     event(41, {"kind": "conflict", "key": NAME.key("alive", "77")}),
-    event(42, {"kind": "inhibit", "stamp": 812.4375, "inhibited": INHIBIT.as_dict()}),
+    event(42, {"kind": "inhibit", "stamp": 812.4375, "inhibited": INHIBIT.as_dict(), "inhibit_number": 2}),
     json.loads(MOVE.pack()),
     json.loads(AgentAnswer(NAME.base, 7, EPOCH, result_fields(RESULT)).pack()),
     json.loads(

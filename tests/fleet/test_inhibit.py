@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -14,11 +15,12 @@ from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.agent.records import FileRecords
 from robotiq_async.fleet.fleet import Fleet, halt
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
+from robotiq_async.fleet.wire.envelope import unpack_call
 from robotiq_async.values.errors import AgentError, ControlLostError, NotAllStoppedError
 from tests.fleet.cell import move_slowly
 from tests.fleet.lab import LEFT, Between, Lab, lab, serving
 from tests.fleet.network import Network
-from tests.fleet.world import World, world
+from tests.fleet.world import MemoryRecords, World, world
 from tests.virtual import inside, until, virtual
 
 
@@ -95,6 +97,57 @@ async def test_a_halt_that_cannot_reach_the_gripper_is_no_success() -> None:
             outcome = await halt(network.bus(f"console {number}"), LEFT, 1, "HALT")
             assert outcome.startswith("refused"), number
     assert hand.inhibited is not None
+
+
+class LatePermit(Between):
+    """A network on which a permit is 0.6 s on its way."""
+
+    def ask(self, key: str, payload: bytes, **how: Any) -> asyncio.Future[Any]:
+        if unpack_call(payload).arguments.get("what") == "permit":
+            return asyncio.ensure_future(self._late(key, payload, how))
+        return self._bus.ask(key, payload, **how)
+
+    async def _late(self, key: str, payload: bytes, how: Any) -> Any:
+        await asyncio.sleep(0.6)
+        return await self._bus.ask(key, payload, **how)
+
+
+@inside(lab)
+async def test_a_permit_lifts_the_inhibit_that_its_person_saw_and_no_later_one(here: Lab) -> None:
+    late = here.client_over(LatePermit(here.network.bus("late")), control=False)
+    async with late as one, here.client("other", control=False) as other:
+        await one.inhibit("the guard is open")
+        permitting = asyncio.create_task(one.permit(who="one"))
+        await asyncio.sleep(0.1)
+        await other.inhibit("a hand is in the gripper")
+        with pytest.raises(AgentError, match="look at the gripper"):
+            await permitting
+        assert here.local.inhibited is not None
+        await other.permit()
+        assert here.local.inhibited is None
+        with pytest.raises(AgentError, match="look at the gripper"):  # it names none
+            await other._session.dialog.ask("lease", {"what": "permit"}, timeout=1)
+
+
+@pytest.mark.parametrize("is_halt_first", [True, False])
+@virtual
+async def test_a_halt_and_a_permit_in_one_turn_leave_an_inhibit_that_the_next_agent_has(
+    is_halt_first: bool,
+) -> None:
+    kept = MemoryRecords()
+    async with (
+        lab(records=kept) as here,
+        here.client("one", control=False) as one,
+        here.client("other", control=False) as other,
+    ):
+        await one.inhibit("first")
+        asked = [other.inhibit("second"), one.permit()]
+        await asyncio.gather(*(asked if is_halt_first else reversed(asked)), return_exceptions=True)
+        assert other.inhibited is not None
+        assert here.local.inhibited is not None
+    async with lab(records=kept) as here, here.client("program") as program:
+        with pytest.raises(MotionInhibitedError):
+            await program.move(100)
 
 
 class Older(Between):

@@ -33,10 +33,12 @@ class HandPublisher:
 
     Attributes:
         problem: why the gripper cannot be reached; empty if it can.
+        inhibit_number: of the newest halt that has inhibited motion, in this run of the agent.
     """
 
     def __init__(self, name: GripperName, hand: RobotiqHand, bus: Bus, epoch: int, lease: Lease) -> None:
         self.problem: str = ""
+        self.inhibit_number: int = 0
         self._name = name
         self._mark = name.mark
         self._hand = hand
@@ -69,13 +71,18 @@ class HandPublisher:
         self._sent_at = now()
         self._send(json.dumps({**self._head(), "events": [event], "status": status}).encode())
 
+    def count_inhibit(self) -> None:
+        """A halt inhibits motion, perhaps once more: a permit of an earlier one does not lift it."""
+        self.inhibit_number += 1
+
     def add_inhibit(self) -> None:
         """Tell whether motion is inhibited now."""
         self.add({"kind": "inhibit", **self.inhibited()})
 
     def inhibited(self) -> Fields:
-        """Whether motion is inhibited, and when that was so."""
-        return {"stamp": now(), "inhibited": inhibit_fields(self._hand.inhibited)}
+        """Whether motion is inhibited, the number that a permit of it names, and when that was so."""
+        inhibited = inhibit_fields(self._hand.inhibited)
+        return {"stamp": now(), "inhibited": inhibited, "inhibit_number": self.inhibit_number}
 
     def events_since(self, index: int) -> list[Fields]:
         """The next events after a number, as many as are kept and fit into an answer."""

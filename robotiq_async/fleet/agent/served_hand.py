@@ -314,6 +314,7 @@ class ServedHand:
         inhibit = inhibit_asked(call)
         if inhibit is not None:
             self._hand.resume_inhibit(inhibit)  # in this turn: what is admitted from here on is refused
+            self.publisher.count_inhibit()
         self._lease.intervene(call.client, "halted")
         if self._admission.is_of_holder(call):
             self._admission.bar(call)
@@ -330,10 +331,15 @@ class ServedHand:
         self.publisher.add_inhibit()
 
     def _begin_to_permit(self, call: AgentCall, query: Query) -> None:
-        who = signed(call)
+        who, number = signed(call), call.arguments.get("inhibit_number")
 
         async def permit() -> None:
-            await self._hand.permit(who=who)
+            if type(number) is not int or number != self.publisher.inhibit_number:
+                raise AgentError(
+                    "a halt has inhibited motion that this permit does not name: look at the gripper, then "
+                    "permit it again"
+                )
+            await self._hand.permit(who=who)  # in the turn of the check: no halt comes between
             self._inhibit_changed()
             await self._records.kept()
 
@@ -342,9 +348,13 @@ class ServedHand:
     async def _stop_now(self, inhibit: Inhibit | None) -> None:
         # While the agent ends, the hand is being stopped anyway: wait for that stop and check its outcome.
         if not self._is_ending:
-            # Of several reasons the first one stays.
-            await (self._hand.halt() if inhibit is None else self._hand.inhibit(inhibit.reason))
-            await self._records.kept()
+            try:
+                # Of several reasons the first one stays.
+                await (self._hand.halt() if inhibit is None else self._hand.inhibit(inhibit.reason))
+            finally:
+                if inhibit is not None:
+                    self._keep_record()
+                await self._records.kept()
             return
         await self._hand.stop(keep_grip=False)
         if self._hand.status.go_echo:

@@ -78,6 +78,7 @@ class Mirror:
         received_at: arrival of the last current message.
         points: of the agent's stroke, measured on the gripper; empty for nominal openings.
         inhibited: why the agent refuses motion; None while it does not.
+        inhibit_number: the newest inhibit of that run of the agent; a permit names it. None if not known.
     """
 
     def __init__(
@@ -100,6 +101,7 @@ class Mirror:
         self.received_at: float = 0.0
         self.points: Points = ()
         self.inhibited: Inhibit | None = None
+        self.inhibit_number: int | None = None
         self._inhibit_stamp = -math.inf
         """The agent's time of the newest word about it: a summary may be older than an answer."""
         self._strokes: dict[Model, Stroke] = {}  # made of the points
@@ -228,6 +230,7 @@ class Mirror:
         """Take over whether motion is inhibited; an older agent does not say."""
         if "inhibited" in told and (stamp := float(told["stamp"])) >= self._inhibit_stamp:
             self.inhibited, self._inhibit_stamp = read_inhibit(told["inhibited"]), stamp
+            self.inhibit_number = told.get("inhibit_number")
 
     def _stroke(self, model: Model) -> Stroke | None:
         if self.points and model not in self._strokes:
@@ -258,7 +261,7 @@ class Mirror:
         while len(self._clocks) > _RUNS:
             del self._clocks[next(iter(self._clocks))]
         self.newest = None
-        self._inhibit_stamp = -math.inf
+        self._inhibit_stamp, self.inhibit_number = -math.inf, None
         self.events = message.events
         self._events_state = as_seen_from_here(message.state)
         self._base = self.next_sequence if message.sequence < self.next_sequence else 0

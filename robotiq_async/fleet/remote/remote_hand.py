@@ -62,7 +62,8 @@ class RemoteHand(Hand):
     * :meth:`halt` needs no lease and is repeated until it is answered. If another client commands the
       gripper, it loses the lease. ConnectionLostError means no answer within 2 s: the fingers MAY STILL MOVE.
     * :meth:`inhibit` and :meth:`permit` are the agent's, for all its clients: they need a started hand and no
-      lease. The inhibit outlasts leases, and restarts of the agent.
+      lease. The inhibit outlasts leases, and restarts of the agent. A permit lifts what this hand has heard
+      of; a later halt stays, and AgentError is raised.
     * Millimetres and fractions follow the ``stroke`` of the agent's hand. What is sent are counts.
     * :attr:`state` is DISCONNECTED also while the agent is silent; that is a transition, too. Some statuses
       may be missing, and :meth:`grip_events` follows those that arrived.
@@ -260,7 +261,8 @@ class RemoteHand(Hand):
 
     async def _permit(self, who: str) -> None:
         session = self._running_session()
-        arguments = {"what": "permit", "label": label(), "who": who}
+        seen = session.mirror.inhibit_number  # a later halt, which this permit may overtake, stays
+        arguments = {"what": "permit", "label": label(), "who": who, "inhibit_number": seen}
         with no_answer_as_lost_connection():
             self._take_over_inhibit(await session.dialog.ask("lease", arguments, timeout=REMOTE_COMMAND_S))
 
