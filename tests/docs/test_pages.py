@@ -191,6 +191,12 @@ def test_the_readme_is_read_in_one_go() -> None:
     assert len(read(ROOT / "README.md").split()) <= 900
 
 
+def test_the_code_of_the_first_page_is_seen_whole_on_the_site() -> None:
+    """A window of 1280 pixels shows 84 characters; the warning that the jaw moves was cut off."""
+    lines = [line for block in blocks(read(ROOT / "README.md")) for line in block.text.splitlines()]
+    assert [line for line in lines if len(line) > 84] == []
+
+
 def test_the_code_for_typed_projects_passes_mypy_strict(tmp_path: Path) -> None:
     files: list[str] = []
     for block in blocks(read(FIXTURES), "python"):
