@@ -21,15 +21,17 @@ pytest.importorskip("nicegui", reason="the page needs the extra web")
 from robotiq_async import Finger
 from robotiq_async.runtime.sockets import listen
 from robotiq_async.simulator import SimulatorServer
+from tests.docs.agents import agent_of_the_pages
 from tests.docs.pages import DOCS, blocks, read
 from tests.grippers import active_gripper
 from tests.patience import patience
 
 PAGE = DOCS / "how-to" / "cell.md"
 (PROGRAM,) = (each.text for each in blocks(read(PAGE), "python"))
+(CHANGE,) = (each.text for each in blocks(read(PAGE), "diff"))
 (UNIT,) = (each.text for each in blocks(read(PAGE), "ini"))
 (SCRAPES,) = (each.text for each in blocks(read(PAGE), "yaml"))
-(ORDERS,) = (each.text for each in blocks(read(PAGE), "sh"))
+ORDERS, FLEET = (each.text for each in blocks(read(PAGE), "sh"))
 PASSWORD = "correct horse"
 
 
@@ -66,13 +68,13 @@ class Cell:
 
 
 @asynccontextmanager
-async def running(address: str, folder: Path) -> AsyncIterator[Cell]:
+async def running(folder: Path, code: str = PROGRAM, **variables: str) -> AsyncIterator[Cell]:
     program, port = folder / "cell.py", free_ports()
-    program.write_text(PROGRAM, encoding="utf-8")
+    program.write_text(code, encoding="utf-8")
     process = await asyncio.create_subprocess_exec(
         sys.executable,
         str(program),
-        env={"GRIPPER": address, "PORT": str(port), "PASSWORD": PASSWORD, "PATH": "/usr/bin:/bin"},
+        env={"PORT": str(port), "PASSWORD": PASSWORD, "PATH": "/usr/bin:/bin", **variables},
         cwd=folder,
         stdin=DEVNULL,
         stdout=PIPE,
@@ -108,7 +110,7 @@ async def test_a_cell(tmp_path: Path) -> None:
     gripper.place_object(Finger.ABC, position=120)
     async with SimulatorServer(gripper) as server:
         still = gripper.travel(Finger.A)
-        async with running(server.address, tmp_path) as cell:
+        async with running(tmp_path, GRIPPER=server.address) as cell:
             answer = ""
             while answer != "empty":  # until the hand is connected
                 (answer,) = await cell.order("status")
@@ -121,7 +123,7 @@ async def test_a_cell(tmp_path: Path) -> None:
             assert 'robotiq_holds{hand="cell"} 3.0' in figures
             await cell.end()
         held = gripper.travel(Finger.A)
-        async with running(server.address, tmp_path) as cell:
+        async with running(tmp_path, GRIPPER=server.address) as cell:
             answer = ""
             while answer != "holding":
                 (answer,) = await cell.order("status")
@@ -132,6 +134,43 @@ async def test_a_cell(tmp_path: Path) -> None:
             assert asked == halted
             assert gripper.travel(Finger.A) == held
             await cell.end()
+
+
+async def test_a_cell_whose_gripper_is_at_another_host(tmp_path: Path) -> None:
+    pytest.importorskip("zenoh", reason="an agent needs the extra fleet")
+    lines = CHANGE.splitlines(keepends=True)
+    before, after = ("".join(each[1:] for each in lines if each[0] != sign) for sign in "+-")
+    assert PROGRAM.count(before) == 1
+    halt, permit = (line.partition("#")[0].split()[1:] for line in FLEET.splitlines())
+    async with (
+        agent_of_the_pages() as route,
+        running(tmp_path, PROGRAM.replace(before, after), **route) as cell,
+    ):
+        answer = ""
+        while answer != "empty":  # until the hand is connected, and has the lease
+            (answer,) = await cell.order("activate")
+        assert await cell.order("open") == ["empty"]
+        await command(*halt, **route)
+        assert (await cell.order("open"))[0].startswith("error: lost control")
+        acquired, refused = await cell.order("acquire", "grasp")
+        assert acquired.startswith("motion is inhibited")
+        assert refused.startswith("error: motion is inhibited")
+        await command(*permit, "--yes", **route)
+        assert await cell.order("open") == ["empty"]
+        await cell.end()
+
+
+async def command(*words: str, **variables: str) -> None:
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "robotiq_async", *words),
+        env={"PATH": "/usr/bin:/bin", **variables},
+        stdin=DEVNULL,
+        stdout=PIPE,
+        stderr=STDOUT,
+    )
+    async with asyncio.timeout(patience(60)):
+        printed, _ = await process.communicate()
+    assert process.returncode == 0, printed.decode()
 
 
 def scraped(port: int) -> str:
