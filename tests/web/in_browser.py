@@ -403,12 +403,44 @@ async def test_nothing_covers_anything_and_all_text_can_be_read(
     assert first == "recover...", "what helps stands first"
     assert await browser.run(WIDE) == 0
     assert await browser.run(COVERED) == []
+    await can_be_read(browser)
+    await stage.hand.recover()
+
+
+async def test_all_text_can_be_read_in_every_state(browser: Browser, stage: Stage) -> None:
+    hand = stage.hand
+    await browser.do(lambda: browser.resize(1280, 800))
+    await browser.says("state", "ready")
+    await can_be_read(browser)
+    stage.gripper.place_object(Finger.ABC, position=85)
+    await hand.close()
+    await browser.says("state", "holding")
+    await can_be_read(browser)
+    await hand.open()
+    await stage.slow()
+    closing = asyncio.create_task(hand.close())
+    await browser.says("state", "moving")
+    await can_be_read(browser)
+    await hand.inhibit("HALT was pressed")
+    with pytest.raises(MotionInhibitedError):
+        await closing
+    await browser.says("state", "inhibited")
+    await can_be_read(browser)
+    await hand.permit()
+    stage.server.refuse()
+    stage.server.cut()
+    await browser.says("state", "lost")
+    await can_be_read(browser)
+    await stage.server.accept()
+
+
+async def can_be_read(browser: Browser) -> None:
+    """Measure the contrast of all text, light and dark."""
     for mode in ("light_mode", "dark_mode"):
         await browser.do(browser.find(mode).click)
         await browser.until(partial(shows_mode, browser, mode))
         assert [each for each in await browser.run(CONTRAST) if each[1] < 4.5] == []
     await browser.do(browser.find("light_mode").click)
-    await stage.hand.recover()
 
 
 def shows_mode(browser: Browser, mode: str) -> bool:

@@ -18,7 +18,7 @@ while (walker.nextNode()) {
   const box = element.getBoundingClientRect();
   const seen = {opacityProperty: true, visibilityProperty: true};
   if (!words || !element.checkVisibility(seen) || !box.width) continue;
-  if (element.closest('[disabled], .disabled, .rq-stage, script, style, canvas, .q-icon')) continue;
+  if (element.closest('[disabled], .disabled, script, style, canvas, .q-icon')) continue;
   const layers = []; let opacity = 1;
   for (let each = element; each; each = each.parentElement) {
     const style = getComputedStyle(each);

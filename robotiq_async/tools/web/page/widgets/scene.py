@@ -32,10 +32,10 @@ GLOW: Final = "#ff5a1f"
 GHOST: Final = "#0ea5e9"
 STAGE_COLOR: Final = "#b9c3cf"
 """Background of the hand, which is grey and black, on a light and on a dark page."""
-HALO: Final = "text-shadow:0 0 2px #fff,0 0 2px #fff,0 0 4px #fff"
-"""Style around a letter, for any background."""
+NAME_PLATE: Final = "color:#16202c;background:#ffffffe0;padding:0 .2em;border-bottom:.15em solid "
+"""Style of a finger's names: dark on white on any background, above a line of its colour."""
 LETTER_FONT: Final = "font:bold 17px sans-serif"
-NAME_FONT: Final = "font:11px sans-serif;font-size:clamp(0px,(100vw - 640px) * 9,11px);padding-top:2.2em"
+NAME_FONT: Final = "font:11px sans-serif;font-size:clamp(0px,(100vw - 640px) * 9,11px);margin-top:1.7em"
 """Style of the name below the letter, at the same point; a phone has no room for it."""
 HELD: Final = "#f2c230"
 STALE: Final = 0.25
@@ -197,7 +197,7 @@ class Drawing:
             if axis in FINGER_NAMES:
                 with self.figure.group(f"{FINGER_NAMES[axis]}_link_3"):
                     for words, font in ((str(axis.name), LETTER_FONT), (FINGER_NAMES[axis], NAME_FONT)):
-                        ui.scene.text(words, f"color:{color};{font};{HALO}").move(0.052, 0.032, 0.0)
+                        ui.scene.text(words, f"{font};{NAME_PLATE}{color}").move(0.052, 0.032, 0.0)
 
 
 class HandScene:
