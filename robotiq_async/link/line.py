@@ -271,9 +271,17 @@ class Line:
         Raises:
             RobotiqConnectionError: the dialogue has raised it; the user has left the line.
         """
+        has_begun = False
         while True:
-            # Cancelled while it waits for its turn, the user stays: it has nothing on its way.
-            must_hush = self._shares and await self._take_turn(user)
+            try:
+                must_hush = self._shares and await self._take_turn(user)
+            except BaseException:
+                # Before the first turn the user has nothing on its way, and stays. Between two turns it may
+                # have, and another one has the line: that exchange goes on.
+                if has_begun:
+                    self.leave(user)
+                raise
+            has_begun = True
             try:
                 if must_hush and (noise := await self._hush()) is not None:
                     raise noise.error

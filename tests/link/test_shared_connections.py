@@ -74,6 +74,25 @@ async def test_the_rest_of_a_cancelled_exchange_does_not_meet_a_write_of_the_oth
     assert right.is_open
 
 
+async def test_who_is_cancelled_between_two_turns_takes_no_late_reply_for_a_later_one(
+    pair: Pair, device: Device
+) -> None:
+    """A late acknowledgement was taken for that of a stop which the gripper had not heard."""
+    left, right = pair
+    device.late = {LEFT: 0.13, RIGHT: 0.03}
+    moving = asyncio.create_task(left.send_and_read(lambda: IMAGE))
+    await asyncio.sleep(0.001)
+    reading = asyncio.create_task(right.read())
+    await until(lambda: device.requests[-1][0] == RIGHT)
+    moving.cancel()
+    await asyncio.wait([moving, reading])
+    assert moving.cancelled()
+    assert right.is_open, "the exchange of the other goes on"
+    device.late, device.loses = {}, 1
+    with pytest.raises(RobotiqConnectionError):
+        await left.write(IMAGE)
+
+
 async def test_a_silent_gripper_is_asked_now_and_then(pair: Pair, device: Device) -> None:
     left, right = pair
     device.late[LEFT] = SILENT_S
