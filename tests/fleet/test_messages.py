@@ -64,7 +64,7 @@ PLAIN = trees(st.integers(-(2**53), 2**53) | st.floats(allow_nan=False))
 CALLS = st.builds(
     AgentCall,
     to=st.text(ANY, max_size=30),
-    client=st.text(ANY, min_size=1, max_size=64),
+    client=st.text(st.characters(min_codepoint=32, max_codepoint=126), min_size=1, max_size=64),
     epoch=st.integers(0, 2**53),
     lease=st.integers(0, 2**32),
     number=st.integers(0, 2**53),

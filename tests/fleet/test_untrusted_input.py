@@ -138,6 +138,22 @@ async def test_a_request_for_another_gripper_is_refused(here: World) -> None:
     assert here.holder.hand.is_in_control
 
 
+@pytest.mark.parametrize("name", ["\ud800", "\u00fc", "a\nb"])
+@inside(lab)
+async def test_a_client_whose_name_is_no_plain_text_gets_no_lease(
+    here: Lab, reader: RemoteHand, name: str
+) -> None:
+    """With half a character as its name, requests of all others went unanswered until its lease ended."""
+    assert reader._session is not None
+    seen = reader._session.mirror.stamp
+    acquire = {"what": "acquire", "label": "eve"}
+    call = AgentCall(LEFT.base, name, number=1, seen=seen, arguments=acquire)
+    with pytest.raises(ProtocolError, match="not a request"):
+        (await here.answer("lease", call.pack())).outcome(instantly)
+    await asyncio.wait_for(reader.take(), 1.0)
+    assert reader.is_in_control
+
+
 # -- untrusted input ---------------------------------------------------------------------------------------
 
 

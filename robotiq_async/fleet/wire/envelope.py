@@ -21,7 +21,8 @@ class AgentCall:
 
     Attributes:
         to: base key of the addressed gripper. The receiver compares it: zenoh may deliver under a wrong key.
-        client: identifies the client; see :class:`~robotiq_async.fleet.control.lease.Holder`.
+        client: identifies the client: 1..64 printable characters of ASCII; see
+            :class:`~robotiq_async.fleet.control.lease.Holder`.
         epoch: the run of the agent that is addressed; 0 for any.
         lease: number of the lease that the request is made under.
         number: rises with each request of a client; identifies repetitions and requests that were overtaken.
@@ -65,6 +66,9 @@ def _is_well_formed(call: AgentCall) -> bool:
         isinstance(values["to"], str)
         and isinstance(values["client"], str)
         and 0 < len(values["client"]) <= 64
+        # Plain text: it is compared as bytes, and half a character (a lone surrogate) has none.
+        and values["client"].isascii()
+        and values["client"].isprintable()
         and all(type(values[name]) is int and values[name] >= 0 for name in _INTEGERS)
         and type(values["seen"]) in (int, float)
         # Not isfinite(): an int may be too long for it.
