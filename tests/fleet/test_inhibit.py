@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ import pytest
 from robotiq_async import Finger, Inhibit, MotionInhibitedError, RobotiqError, RobotiqHand
 from robotiq_async.fleet.agent import records
 from robotiq_async.fleet.agent.agent import Agent
+from robotiq_async.fleet.agent.inhibits import inhibit_kept
 from robotiq_async.fleet.agent.records import FileRecords
 from robotiq_async.fleet.fleet import Fleet, halt
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
@@ -185,6 +188,59 @@ async def test_its_record_counts_after_a_restart_of_the_machine(
     later = FileRecords(tmp_path)
     assert later.read(LEFT) is None
     assert later.read_inhibit(LEFT) == inhibit.as_dict()
+
+
+async def test_a_record_that_is_lost_in_part_counts_as_an_inhibit(tmp_path: Path) -> None:
+    """A power cut may leave an empty file; a gripper without a file was never inhibited."""
+    one, file = FileRecords(tmp_path), tmp_path / "lab+cell+left.json"
+    assert one.read_inhibit(LEFT) is None
+    one.keep(LEFT, {"number": 3, "inhibited": None})
+    await one.kept()
+    assert one.read_inhibit(LEFT) is None
+    whole = file.read_bytes()
+    for left in (b"", whole[:20], b"[]", b"null", b"\xff"):
+        file.write_bytes(left)
+        found = one.read_inhibit(LEFT)
+        assert found is not None
+        assert inhibit_kept(found).reason == "the record of an inhibit cannot be read"
+
+
+async def test_a_full_disk_loses_no_inhibit(tmp_path: Path) -> None:
+    """Nor does it leave a record of the lease that is outdated."""
+    one, inhibit = FileRecords(tmp_path), Inhibit("the guard is open", "", 1.0)
+    one.keep(LEFT, {"number": 3, "inhibited": inhibit.as_dict()})
+    await one.kept()
+    (tmp_path / "lab+cell+left.new").mkdir()  # as little room as on a full disk
+    one.keep(LEFT, {"number": 4, "inhibited": inhibit.as_dict()})
+    await one.kept()
+    assert one.read(LEFT) is None
+    assert one.read_inhibit(LEFT) is not None
+    one.keep(LEFT, {"number": 5, "inhibited": None})  # a person has lifted it
+    await one.kept()
+    assert one.read_inhibit(LEFT) is None
+
+
+async def test_an_inhibit_is_on_the_disk_before_it_replaces_the_record_of_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = FileRecords(tmp_path)
+    steps: list[str] = []
+
+    def noted(name: str, work: Callable[..., Any]) -> Callable[..., Any]:
+        def step(*arguments: Any) -> Any:
+            steps.append(name)
+            return work(*arguments)
+
+        return step
+
+    monkeypatch.setattr(os, "fsync", noted("sync", os.fsync))
+    monkeypatch.setattr(Path, "replace", noted("replace", Path.replace))
+    one.keep(LEFT, {"inhibited": None})
+    await one.kept()
+    assert steps == ["replace"]  # settings change often, and are not worth a wait for the disk
+    one.keep(LEFT, {"inhibited": Inhibit("HALT", "", 1.0).as_dict()})
+    await one.kept()
+    assert steps == ["replace", "sync", "replace", "sync"]
 
 
 @pytest.mark.parametrize("record", ["?", {"reason": 3}, {"reason": "", "who": "", "since": "x"}])

@@ -5,7 +5,8 @@ not receive that halt, reacquires the lease automatically; the new run of the ag
 the record for that. Without a record no client may reacquire automatically.
 
 An inhibit that a person has set counts until a person lifts it, so its record counts after a restart of the
-machine, too: an outdated one can only refuse motion.
+machine, too: an outdated one can only refuse motion. It is on the disk before the file of before is replaced.
+If it cannot be written, an empty file takes its place: one that cannot be read counts as an inhibit.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from ..wire.names import GripperName
 from ..wire.values import Fields
 
 KEPT_S: Final = 0.1  # seconds that the answer to a halt waits for its record at most; a disk may stall
+_UNREADABLE: Final = "cannot be read"  # no inhibit, and not None
 _BOOT: Final = Path("/proc/sys/kernel/random/boot_id")
 
 
@@ -33,7 +35,10 @@ class Records(Protocol):
         """The record of a gripper; None if it is not known for certain."""
 
     def read_inhibit(self, name: GripperName) -> object:
-        """The inhibit in the record of a gripper, whenever it was written; None for none."""
+        """The inhibit in the record of a gripper, whenever it was written; None for none.
+
+        Of a record that cannot be read, something that is no inhibit.
+        """
 
     def keep(self, name: GripperName, record: Fields) -> None:
         """Replace the record of a gripper; never blocks."""
@@ -58,13 +63,15 @@ class NoRecords:
 class FileRecords:
     """Files in a folder, one for each gripper. The folder is created when it is needed.
 
-    They are valid until the machine restarts: the last write may not have reached the disk then.
+    They are valid until the machine restarts: the last write may not have reached the disk then, unless it
+    has an inhibit.
     """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._boot = _boot()
-        self._newest: dict[GripperName, bytes] = {}
+        self._newest: dict[GripperName, tuple[bytes, bool]] = {}
+        """What waits for the write before it, and whether it has an inhibit."""
         self._writing: dict[GripperName, asyncio.Future[None]] = {}
         self._has_failed = False
 
@@ -72,20 +79,25 @@ class FileRecords:
         if not os.access(self._folder, os.W_OK):
             return None  # may be outdated: the run before this one could not replace it
         record = self._stored(name)
-        return record if self._boot and record.get("boot") == self._boot else None
+        return record if record and self._boot and record.get("boot") == self._boot else None
 
     def read_inhibit(self, name: GripperName) -> object:
-        return self._stored(name).get("inhibited")
+        record = self._stored(name)
+        return _UNREADABLE if record is None else record.get("inhibited")
 
-    def _stored(self, name: GripperName) -> Fields:
+    def _stored(self, name: GripperName) -> Fields | None:
+        # Empty if there is none, None if it cannot be read.
         try:
             record = json.loads(self._path(name).read_bytes())
-        except (OSError, ValueError, RecursionError):
+        except (FileNotFoundError, NotADirectoryError):
             return {}
-        return record if isinstance(record, dict) else {}
+        except (OSError, ValueError, RecursionError):
+            return None
+        return record if isinstance(record, dict) else None
 
     def keep(self, name: GripperName, record: Fields) -> None:
-        self._newest[name] = json.dumps({"boot": self._boot, **record}).encode()
+        data = json.dumps({"boot": self._boot, **record}).encode()
+        self._newest[name] = data, record.get("inhibited") is not None
         if name not in self._writing:
             self._begin(name)
 
@@ -96,27 +108,35 @@ class FileRecords:
             await asyncio.wait(list(self._writing.values()), timeout=left)
 
     def _begin(self, name: GripperName) -> None:
-        data = self._newest.pop(name)
-        self._writing[name] = writing = in_a_thread(lambda: self._write(self._path(name), data))
-        writing.add_done_callback(lambda done: self._end(name, done))
+        data, inhibits = self._newest.pop(name)
+        self._writing[name] = writing = in_a_thread(
+            lambda: self._write(self._path(name), data, sync=inhibits)
+        )
+        writing.add_done_callback(lambda done: self._end(name, done, inhibits))
 
-    def _end(self, name: GripperName, done: asyncio.Future[None]) -> None:
+    def _end(self, name: GripperName, done: asyncio.Future[None], inhibits: bool) -> None:
         del self._writing[name]
         error = None if done.cancelled() else done.exception()
         if error is not None:  # an outdated record could admit a barred client
             with suppress(OSError):
-                self._path(name).unlink(missing_ok=True)
+                self._drop(self._path(name), inhibits)
         if error is not None and not self._has_failed:
             self._has_failed = True
             log.warning(
                 "%s: after a restart no client reacquires the lease automatically, FLEET.toml's speeds and "
-                "forces count, and motion is not inhibited",
+                "forces count, and an inhibit has lost its reason, or is lost",
                 error,
             )
         if name in self._newest:
             self._begin(name)
 
-    def _write(self, path: Path, data: bytes) -> None:
+    def _drop(self, path: Path, inhibits: bool) -> None:
+        if inhibits:
+            path.write_bytes(b"")  # needs no space if there was a record
+        else:
+            path.unlink(missing_ok=True)
+
+    def _write(self, path: Path, data: bytes, *, sync: bool) -> None:
         self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         new = path.with_suffix(".new")
         with suppress(FileNotFoundError):
@@ -124,7 +144,12 @@ class FileRecords:
         file = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
         with os.fdopen(file, "wb") as opened:
             opened.write(data)
+            if sync:
+                opened.flush()
+                os.fsync(opened.fileno())
         new.replace(path)
+        if sync:
+            _sync_folder(self._folder)
 
     def _path(self, name: GripperName) -> Path:
         # Names cannot contain a plus.
@@ -142,6 +167,15 @@ def file_records() -> Records:
     except RuntimeError:  # a user without a home
         log.warning("no folder for records: after a restart no client reacquires the lease automatically")
         return NoRecords()
+
+
+def _sync_folder(folder: Path) -> None:
+    with suppress(OSError):  # no system but POSIX opens folders; the file itself is on the disk
+        opened = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(opened)
+        finally:
+            os.close(opened)
 
 
 def _boot() -> Any:  # noqa: ANN401  # only compared
