@@ -6,6 +6,7 @@ import asyncio
 import json
 import logging
 from collections.abc import AsyncIterator, Awaitable
+from dataclasses import replace
 
 import pytest
 
@@ -26,6 +27,7 @@ from robotiq_async.ros2.gripper.connection import (
     GripperConnection,
     PendingStop,
     RefusedError,
+    make_hand,
 )
 from robotiq_async.ros2.gripper.goals import GoalEnding, GoalOutcome
 from robotiq_async.ros2.translation.diagnosis import DiagnosticLevel, diagnose, status_text
@@ -116,6 +118,24 @@ async def test_an_inhibit_stays_until_a_person_permits(
     assert await settled(gripper) == at
     assert await connection.command("permit")
     assert (await begin(connection)).ending is GoalEnding.SUCCEEDED
+
+
+async def test_an_inhibit_stays_over_a_cleanup_and_the_next_configure(
+    connection: GripperConnection, server: SimulatorServer, gripper: SimulatedGripper
+) -> None:
+    await connection.command("inhibit")
+    await connection.close("the node was cleaned up")
+    settings = replace(SETTINGS, address=server.address)
+    hand = make_hand(settings, connection.hand)
+    anew = GripperConnection(hand, settings)
+    await anew.open()
+    await anew.permit()
+    at = await settled(gripper)
+    await refuses("HALT was pressed.*call ~/permit", begin(anew))
+    assert await settled(gripper) == at
+    assert await anew.command("permit")
+    await anew.close("the node was cleaned up")
+    assert make_hand(settings, hand).inhibited is None
 
 
 async def test_opening_permitting_and_closing_activate_nothing(

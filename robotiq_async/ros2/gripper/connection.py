@@ -270,10 +270,13 @@ class PendingStop:
                 return
 
 
-def make_hand(settings: NodeSettings) -> Hand:
+def make_hand(settings: NodeSettings, before: Hand | None = None) -> Hand:
     """A hand that is not started. In the ROS node only this function knows which kind of hand it is.
 
     A hand on another host acquires its lease with the first command: connecting only reads.
+
+    A person's inhibit stays over a cleanup and the next configure: at an agent by itself, else it is the one
+    of the hand ``before``.
 
     Raises:
         ValueError: an option that the hand refuses.
@@ -283,4 +286,7 @@ def make_hand(settings: NodeSettings) -> Hand:
         if find_spec("zenoh") is None:
             raise RobotiqError(f"a gripper on another host needs zenoh: {install('fleet')}")
         return RemoteHand(settings.address, control=None)
-    return RobotiqHand(settings.address, speed=settings.speed, force=settings.force, **settings.options)
+    hand = RobotiqHand(settings.address, speed=settings.speed, force=settings.force, **settings.options)
+    if before is not None and before.inhibited is not None:
+        hand.resume_inhibit(before.inhibited)
+    return hand
