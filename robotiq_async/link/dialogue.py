@@ -238,7 +238,8 @@ class Dialogues:
     def _second(self, first: Outcome) -> Dialogue[bytes]:
         """Read once more on a line that lost or damaged a byte, as USB adapters occasionally do.
 
-        Where others use the line a question is short, so a silent gripper is asked until its time is over.
+        Where others use the line a question is short. A gripper is asked there until its time is over: the
+        answer may come when it is no longer waited for, and meet the next question as noise.
 
         Raises:
             RobotiqConnectionError: that of the first request, if there is again no clean answer.
@@ -254,7 +255,7 @@ class Dialogues:
                 self._note_repeat(first.error)
                 return came_to
             assert came_to is not None, "an exchange comes to something"
-            is_asked_again = isinstance(came_to, Silent) and self.line.is_shared
+            is_asked_again = isinstance(came_to, Silent | Noise) and self.line.is_shared
             if not is_asked_again or self.line.now() > until:
                 raise first.error from came_to.error
 

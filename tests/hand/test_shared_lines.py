@@ -105,6 +105,17 @@ async def test_a_silent_gripper_costs_the_other_a_twentieth_of_its_polls(bus: Bu
         await left.move(70)
 
 
+async def test_a_late_answer_now_and_then_costs_no_link(bus: Bus) -> None:
+    """It met the next question, and each second one ended the link: moves failed that a sole user makes."""
+    async with bus.hand(LEFT) as left, bus.hand(RIGHT):
+        late = Trouble("late", 0.1, every=0.7)
+        async with bus.servers[LEFT].fault_injector.making(late):
+            for position in (255, 0, 255):
+                await left.move(position, speed=255)
+                await asyncio.sleep(1.0)
+        assert left.statistics.reconnects == 0
+
+
 @pytest.mark.parametrize("count", [1, 2])
 async def test_what_silent_grippers_delay_a_write_and_a_stop_by(
     count: int, monkeypatch: pytest.MonkeyPatch
