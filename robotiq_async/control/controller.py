@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
-from ..values.enums import NO_AXES, Fault, Finger, State, StopLevel, Trigger
+from ..values.enums import NO_AXES, Fault, Finger, Initialization, State, StopLevel, Trigger
 from ..values.errors import (
     ConnectionLostError,
     GripperFaultError,
@@ -28,7 +28,7 @@ from ..values.model import THREE_FINGER, Model
 from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .entry import Entry
-from .evidence import FOLLOWS, Evidence, classify, is_activating
+from .evidence import FOLLOWS, Evidence, classify, is_activating, is_interrupted
 from .gate import gate, merged
 from .ledger import NEVER, Ledger
 from .motion import Move
@@ -168,7 +168,7 @@ class Controller:
             self._begin_reset(trigger, MoveSupersededError(f"a {who} took over"))
 
     def hold_when_back(self) -> None:
-        """The link is down: once it is back, what this hand moves is held."""
+        """The link is down: once it is back, what this hand moves is held; a sequence is reset by see()."""
         self._requests.merge_hold(Finger.ALL, "motion was inhibited while the link was down")
 
     def release(self) -> None:
@@ -277,7 +277,7 @@ class Controller:
             return status is not None
         condition = self._evidence.condition
         shows = condition is Trigger.SEEN_BUSY or status.fault is Fault.AUTOMATIC_RELEASE
-        return shows or self._ledger.may_drive(status)
+        return shows or is_interrupted(status) or self._ledger.may_drive(status)
 
     @property
     def is_busy(self) -> bool:
@@ -360,12 +360,21 @@ class Controller:
                 return
             if condition is not before:
                 self._update_state(condition)
+            if before is None and self._must_reset(status):
+                self._take_back("motion is inhibited: an activation or a release that goes on is reset")
+                return
         if condition is Trigger.SEEN_READY:
             ledger.update_rest(status)
             if self._requests.calls:
                 self._requests.end_arrived(status, ledger)
         elif condition is Trigger.SEEN_BUSY:
             self._follow_activation(status)
+
+    def _must_reset(self, status: RobotiqStatus) -> bool:
+        """Whether a sequence goes on as the link is back, and motion is inhibited: a hold does not end it."""
+        # A reset in a change of mode would drop a part.
+        changes_mode = status.initialization is Initialization.CHANGING_MODE
+        return self.machine.inhibited is not None and self.is_driven and not changes_mode
 
     def _note_news(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
         """A new condition, or an image that no entry explains: whose image acts, what ends, what is held."""
@@ -422,7 +431,7 @@ class Controller:
             self._take_back("the gripper was reset as it was commanded: its activation is taken back")
 
     def _take_back(self, why: str) -> None:
-        """End an activation that was not asked for."""
+        """End an activation or a release that must not go on."""
         self.machine.log.warning("%s", why)
         self._begin_reset(Trigger.ASK_RESET, NotActivatedError(why))
 

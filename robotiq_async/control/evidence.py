@@ -39,6 +39,7 @@ STRANDED_READS: Final = 10
 FOLLOWS: Final = frozenset({Trigger.SEEN_READY, Trigger.SEEN_FAULT})
 """The conditions in which the gripper follows requests, ours or another client's."""
 
+_NOT_ACTIVE: Final = frozenset({Initialization.RESET, Initialization.ACTIVATING})
 _CODE: Final = int(Fault.COMMUNICATION_NOT_READY)
 
 
@@ -53,6 +54,13 @@ def classify(status: RobotiqStatus) -> Trigger:
 def is_activating(status: RobotiqStatus) -> bool:
     """Whether the gripper activates. A change of mode is busy as well, and keeps what the hand holds."""
     return classify(status) is Trigger.SEEN_BUSY and status.initialization is Initialization.ACTIVATING
+
+
+def is_interrupted(status: RobotiqStatus) -> bool:
+    """Whether a fault shows in an activation: the fingers may go on as it clears [conceivable]."""
+    # gIMC = 2 is a change of mode, which only an active gripper makes.
+    is_begun = status.activation_echo and status.initialization in _NOT_ACTIVE
+    return is_begun and classify(status) is Trigger.SEEN_FAULT
 
 
 @cache

@@ -4,7 +4,8 @@ A procedure is sent a status and yields the image to write now, or None. After a
 sent is one that can show the effect. The first status decides whether the procedure begins at all: another
 client may have changed the gripper since the call. A procedure does no I/O and has no clock; its caller
 limits its time. It never yields its image again, even if a gripper may have forgotten it: the image moves the
-fingers.
+fingers. An activation may outlast its procedure: one that a fault has stopped may go on as that clears, and
+one whose link was lost goes on. Begun is about that of the gripper.
 """
 
 from __future__ import annotations
@@ -64,8 +65,9 @@ class Begun(NamedTuple):
 
     def is_over(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether a status shows its end. What shows may be from before it."""
-        has_ended = classify(status) in (Trigger.SEEN_READY, Trigger.SEEN_RESET)
-        return (has_ended or status.fault.severity is Severity.MAJOR) and ledger.acts(self.entry)
+        # A fault does not end it: the fingers may go on as that clears [conceivable].
+        has_ended = status.is_activated or classify(status) is Trigger.SEEN_RESET
+        return has_ended and ledger.acts(self.entry)
 
     def is_stray(self, status: RobotiqStatus) -> bool:
         """Whether it was not asked for, and moves an axis."""

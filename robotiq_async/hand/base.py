@@ -371,7 +371,8 @@ class Hand(HandKind):
         After :meth:`halt` the next command goes on; after this every motion, force, activation, release and
         recovery raises MotionInhibitedError, and so do calls that wait for one. It outlasts lost links,
         :meth:`stop` and :meth:`start`; again, it halts again, and the first reason stays. Whatever it raises,
-        motion is inhibited; what moves while the link is down is held once it is back. No emergency stop.
+        motion is inhibited; what moves while the link is down is held once it is back, and an activation or
+        a release reset. No emergency stop.
         A :meth:`stop` under way that leaves the fingers moving becomes one that stops them; then it raises.
 
         Raises:

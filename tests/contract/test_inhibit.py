@@ -10,6 +10,7 @@ import pytest
 from robotiq_async import (
     ConnectionLostError,
     Fault,
+    GripperFaultError,
     MotionInhibitedError,
     NotStartedError,
     RobotiqError,
@@ -204,6 +205,35 @@ async def test_it_strengthens_a_stop_that_would_leave_the_fingers_moving(here: B
     assert hand.inhibited is not None
     assert not here.gripper.is_moving
     await stopping
+    await stays(here)
+
+
+@contract(active=False)
+async def test_while_the_link_is_down_an_activation_is_reset_once_it_is_back(here: Bench, hand: Hand) -> None:
+    """Only what moves was held, and that ends no activation."""
+    activating = await here.moving(hand.activate())
+    await here.unplug(hand)
+    with pytest.raises(RobotiqError):
+        await hand.inhibit(REASON)
+    assert isinstance(await ended(activating), RobotiqError)
+    await until(lambda: hand.inhibited is not None)
+    await here.server.accept()
+    await hand.wait_for_state(State.RESET)
+    await stays(here)
+    await refused(hand.activate())
+
+
+@contract(active=False)
+async def test_an_activation_that_has_failed_does_not_go_on_as_its_fault_clears(
+    here: Bench, hand: Hand
+) -> None:
+    """A halt only cleared rGTO then, and 442 counts followed."""
+    activating = await here.moving(hand.activate())
+    here.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    assert isinstance(await ended(activating), GripperFaultError)
+    await hand.inhibit(REASON)
+    assert hand.state is State.RESET
+    here.gripper.clear_faults()
     await stays(here)
 
 

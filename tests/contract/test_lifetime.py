@@ -108,8 +108,16 @@ async def test_an_activation_that_ends_in_a_fault_fails_the_start(here: Bench) -
         await hand.start()
     assert caught.value.fault is Fault.ACTIVATION_FAULT
     assert hand.state is State.SHUTDOWN
+    await until(lambda: not here.gripper.request_registers[0] & 0x0100)
+    await hand.start(activate=False)
+    assert hand.state is State.RESET, "its activation is taken back, or it might go on as the fault clears"
+    here.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    await hand.wait_for_state(State.FAULT)
+    await hand.stop()
     await hand.start()
     assert hand.state is State.FAULT, "one that is there already is not start()'s business"
+    here.gripper.clear_faults()
+    await hand.wait_for_state(State.RESET)
     await hand.recover()
     assert hand.state is State.RUNNING_IDLE
     await hand.stop()
