@@ -71,7 +71,7 @@ class FileRecords:
         self._folder = folder
         self._boot = _boot()
         self._newest: dict[GripperName, tuple[bytes, bool]] = {}
-        """What waits for the write before it, and whether it has an inhibit."""
+        """The record that waits for the write before it, and whether it has an inhibit."""
         self._writing: dict[GripperName, asyncio.Future[None]] = {}
         self._has_failed = False
 
