@@ -21,6 +21,8 @@ from tests.cli.conftest import PATIENCE, Beside, Call, Shell
 pytest.importorskip("zenoh")
 import zenoh
 
+from robotiq_async.fleet.keys.access import Role
+from robotiq_async.fleet.keys.certificates import issue, make_authority
 from robotiq_async.fleet.network.configuration import session_configuration
 from tests.fleet.sessions import free_port
 from tests.grippers import until
@@ -230,6 +232,20 @@ def test_an_agent_that_waits_for_its_router_says_so_and_can_be_ended(
     agent = beside("agent", str(file))
     assert agent.read_error() == f"robotiq-async: {router} is not there yet: waiting"
     assert agent.finish(signal.SIGTERM).code == 0
+
+
+def test_an_agent_that_does_not_trust_its_router_says_that_nobody_comes_through(
+    beside: Callable[..., Beside], tmp_path: Path
+) -> None:
+    file = tmp_path / "FLEET.toml"
+    make_authority(tmp_path)
+    keys, router = issue(tmp_path, "cell", Role.AGENT), free_endpoint().replace("tcp/", "tls/")
+    text = f'site = "lab"\nkeys = "{keys.name}"\nconnect = ["{router}"]\n[grippers]\nleft = {{address = "sim://"}}\n'
+    for trust, words in (("", "no trusts_router"), ("trusts_router = true\n", "not there yet: waiting")):
+        file.write_text(trust + text)
+        agent = beside("agent", str(file))
+        assert words in agent.read_error()
+        assert agent.finish(signal.SIGTERM).code == 0
 
 
 def test_a_file_is_checked(call: Call, tmp_path: Path) -> None:

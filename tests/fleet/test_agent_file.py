@@ -93,6 +93,19 @@ def test_behind_a_router_it_does_not_listen(tmp_path: Path) -> None:
         read(tmp_path, both + GOOD)
 
 
+def test_a_router_is_trusted_only_where_the_file_says_so(tmp_path: Path) -> None:
+    put_keys(tmp_path)
+    router = f'keys = "cell-1"\nconnect = ["tls/gate:7447"]\n{GOOD}'
+    assert not read(tmp_path, router).trusts_router
+    assert read(tmp_path, f"trusts_router = true\n{router}").trusts_router
+    for text, words in (
+        (f'trusts_router = "yes"\n{router}', "line 1: trusts_router must be true or false, got 'yes'"),
+        (f"trusts_router = true\n{GOOD}", "line 1: trusts_router is for agents with keys"),
+    ):
+        with pytest.raises(AgentFileError, match=words):
+            read(tmp_path, text)
+
+
 def test_two_grippers_behind_one_gateway_and_any_number_of_simulated_ones(tmp_path: Path) -> None:
     right = '[grippers.right]\naddress = "192.168.1.11:502"\ndevice_id = 4\n'
     simulated = "".join(f'[grippers.s{n}]\naddress = "sim://"\n' for n in range(3))

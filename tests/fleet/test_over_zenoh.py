@@ -24,18 +24,20 @@ from robotiq_async.fleet.network.configuration import (
     agent_configuration,
     client_configuration,
     router_configuration,
+    session_configuration,
 )
 from robotiq_async.fleet.network.route import Route
-from robotiq_async.fleet.network.zenoh_bus import open_bus
+from robotiq_async.fleet.network.zenoh_bus import ZenohBus, open_bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.simulator import SimulatorServer
 from robotiq_async.values.errors import ConnectFailedError, NotAllowedError
 from tests.fleet.lab import LEFT
-from tests.fleet.sessions import PATIENCE, line
+from tests.fleet.sessions import PATIENCE, Client, Line, free_port, line
 from tests.grippers import active_gripper
 
 ONE = f"{LEFT.base}/*"
 FLEET = "robotiq/v1/lab/*/*/summary"
+OTHER = "robotiq/v1/lab/other/left"
 MANY = 600
 """More than a channel of zenoh's holds: halting so many never began."""
 each_role = pytest.mark.parametrize(
@@ -49,14 +51,16 @@ each_role = pytest.mark.parametrize(
 
 @pytest.fixture(scope="module")
 def keys(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A site with an agent and a client in each role, and one that is shut out."""
+    """A site with agents, a router (gate), a client in each role, and one that is shut out."""
     folder = tmp_path_factory.mktemp("keys")
     make_authority(folder)
-    issue(folder, "cell", Role.AGENT)
+    for host in ("cell", "other", "gate"):
+        issue(folder, host, Role.AGENT)
     for name, role in zip(("alice", "panel", "bob", "eve"), (*CLIENTS, Role.OPERATE), strict=True):
         issue(folder, name, role)
     clients = AccessList(("alice",), ("panel",), ("bob",))
-    (folder / "agent-cell" / ACCESS).write_text(clients.text(), encoding="utf-8")
+    for host in ("cell", "other", "gate"):
+        (folder / f"agent-{host}" / ACCESS).write_text(clients.text(), encoding="utf-8")
     return folder
 
 
@@ -280,18 +284,32 @@ async def test_a_fleet_is_halted_in_the_role_for_it(keys: Path) -> None:
         assert list((await fleet.halt_all()).values()) == ["stopped"]
 
 
-async def test_behind_a_router_the_rules_are_the_routers(keys: Path) -> None:
+async def behind_a_router(here: Line, keys: Path, rules: dict[str, object], *, trusts_router: bool) -> None:
+    """An agent that is reached through a router alone."""
+    await here.open(rules)
+    cell, router = keys / "agent-cell", [here.endpoint]
+    bus = await here.open(
+        agent_configuration("lab", "cell", [], router, keys=cell, trusts_router=trusts_router)
+    )
+    await here.serve_over(bus, RobotiqHand("sim://"))
+
+
+async def trusting(here: Line, keys: Path, host: str, *answers_for: str) -> ZenohBus:
+    """The agent of a host, with no rules of its own, that answers to the keys of some hosts."""
+    own, router = keys / f"agent-{host}", [here.endpoint]
+    bus = await here.open(agent_configuration("lab", host, [], router, keys=own, trusts_router=True))
+    for each in answers_for:
+        for verb in ("info/*", "lease", "halt", "cmd/*"):
+            here.stack.callback(bus.serve(f"robotiq/v1/lab/{each}/*/{verb}", lambda query: query.reply(b"!")))
+        here.stack.callback(bus.announce(f"robotiq/v1/lab/{each}/left/alive/77"))
+    return bus
+
+
+async def test_behind_a_router_that_is_trusted_the_rules_are_the_routers(keys: Path) -> None:
     """The agent sees the router's certificate alone: each client has its role all the same."""
-    router = keys / "agent-gate"
-    if not router.exists():
-        issue(keys, "gate", Role.AGENT)
-        (router / ACCESS).write_bytes((keys / "agent-cell" / ACCESS).read_bytes())
     async with line(patience=3 * PATIENCE) as here:
-        await here.open(router_configuration("lab", ["cell"], [here.endpoint], router))
-        bus = await here.open(
-            agent_configuration("lab", "cell", [], [here.endpoint], keys=keys / "agent-cell")
-        )
-        await here.serve_over(bus, RobotiqHand("sim://"))
+        rules = router_configuration("lab", ["cell"], [here.endpoint], keys / "agent-gate")
+        await behind_a_router(here, keys, rules, trusts_router=True)
         async with hand(here.endpoint, keys / "operate-bob") as bob:
             await bob.acquire()
             await bob.hold()
@@ -309,6 +327,33 @@ async def test_behind_a_router_the_rules_are_the_routers(keys: Path) -> None:
             question = LEFT.question("operate:bob")
             reply = await client.bus.ask(question, b"?", timeout=1.0, urgency=Urgency.COMMAND)
             assert (reply is not None) is is_its_own
+
+
+async def test_an_agent_keeps_its_rules_behind_a_router_that_it_does_not_trust(keys: Path) -> None:
+    """A reader, a client that is not in the list, and one without keys took control."""
+    async with line(patience=3 * PATIENCE) as here:
+        unencrypted = f"tcp/127.0.0.1:{free_port()}"
+        router = session_configuration([here.endpoint, unencrypted], (), keys / "agent-gate")
+        await behind_a_router(here, keys, router | {"mode": "router"}, trusts_router=False)
+        await trusting(here, keys, "other", "other")
+        clients = [await here.client(keys / who) for who in ("read-alice", "operate-eve", "operate-bob")]
+        clients.append(Client(await here.open(session_configuration([], [unencrypted]))))
+        for client in clients:
+            await client.watch("robotiq/v1/lab/other/*/alive/*").wait()
+            assert await client.bus.ask(f"{OTHER}/halt", b"?", timeout=PATIENCE, urgency=Urgency.COMMAND)
+            assert not any([await client.may(verb) for verb in ("info", "halt", "lease", "cmd/hold")])
+
+
+def test_a_router_is_trusted_where_it_is_the_only_way_to_an_agent_with_keys(keys: Path) -> None:
+    cell, router = keys / "agent-cell", ["tls/127.0.0.1:7447"]
+    for listen, connect, folder in (
+        (router, router, cell),
+        (router, [], cell),
+        ([], ["tcp/127.0.0.1:1"], None),
+    ):
+        with pytest.raises(ValueError, match="trusts_router"):
+            agent_configuration("lab", "cell", listen, connect, keys=folder, trusts_router=True)
+    assert "access_control" in agent_configuration("lab", "cell", router, router, keys=cell)
 
 
 # -- without keys ------------------------------------------------------------------------------------------

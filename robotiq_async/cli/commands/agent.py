@@ -83,10 +83,18 @@ async def _serve(settings: AgentSettings) -> None:
 
     site, host = settings.site, settings.host
     configuration = agent_configuration(
-        site, host, settings.listen, settings.connect, keys=settings.keys, insecure=settings.insecure
+        site,
+        host,
+        settings.listen,
+        settings.connect,
+        keys=settings.keys,
+        insecure=settings.insecure,
+        trusts_router=settings.trusts_router,
     )
     if settings.insecure:
         tell("anyone who reaches this host can command its grippers: there are no keys")
+    if settings.keys is not None and settings.connect and not settings.trusts_router:
+        tell("clients that come through a router are refused: FLEET.toml has no trusts_router = true")
     hands = {name: make_hand(options) for name, options in settings.grippers.items()}
     try:
         bus = await _open(configuration, ", ".join(settings.listen or settings.connect))

@@ -21,7 +21,7 @@ from ...values.model import model_of
 from ..control.lease import LEASE_WINDOW_S, WINDOW_MAX_S, WINDOW_MIN_S
 from ..keys.access import AccessList
 from ..keys.key_folder import ACCESS, check_key_folder
-from ..network.configuration import LOOPBACK_ENDPOINT, LOOPBACK_TLS
+from ..network.configuration import LOOPBACK_ENDPOINT, LOOPBACK_TLS, check_trust
 from ..network.endpoints import check_endpoints
 from ..wire.names import check_name
 
@@ -45,6 +45,7 @@ class AgentSettings:
     connect: tuple[str, ...] = ()  # endpoints of a router, through which clients connect
     keys: Path | None = None  # folder with the agent's certificate and key; None for no encryption
     insecure: bool = False  # whether other machines may connect without encryption
+    trusts_router: bool = False  # whether the rules of the router in connect stand in for the access list
     window: float = LEASE_WINDOW_S  # seconds for which a lease lasts without being renewed
 
 
@@ -102,8 +103,12 @@ class _Reader:
             if listen and connect:
                 why = "clients connect there, or through a router"
                 raise ValueError(f"listen and connect cannot be combined: {why}, got {wanted!r}")
+        with self._blaming("trusts_router"):
+            trusts = check_trust(
+                table.get("trusts_router", False), listen, connect, has_keys=keys is not None
+            )
         return AgentSettings(
-            site, self._grippers(table[_GRIPPERS]), host, listen, connect, keys, insecure, window
+            site, self._grippers(table[_GRIPPERS]), host, listen, connect, keys, insecure, trusts, window
         )
 
     def _table(self) -> dict[str, Any]:

@@ -29,23 +29,38 @@ def agent_configuration(
     *,
     keys: Path | None = None,
     insecure: bool = False,
+    trusts_router: bool = False,
 ) -> dict[str, object]:
     """Configuration of an agent's session. With keys, clients may do only what its access list permits.
 
-    Without an endpoint to listen on, the agent is reached through the routers in ``connect`` alone, and the
-    access list is theirs.
+    Without an endpoint to listen on, the agent is reached through the routers in ``connect`` alone. It sees
+    the certificate of the router, not those of the clients: its own list then refuses them all, unless it
+    ``trusts_router``. In that case it has no rules, and everyone whom the router lets through commands.
 
     Raises:
-        TypeError, ValueError: a malformed or unprotected endpoint; a folder that lacks a file.
+        TypeError, ValueError: a malformed or unprotected endpoint; a folder that lacks a file; a router to
+            trust, but no keys, no router, or an endpoint to listen on.
     """
+    check_trust(trusts_router, listen, connect, has_keys=keys is not None)
     listen = check_endpoints("listen", listen, has_keys=keys is not None, insecure=insecure)
     connect = check_endpoints("connect", connect, has_keys=keys is not None, insecure=insecure)
     # A router forwards nothing between peers. Our clients are peers, so the agent is a client of the router.
     mode = "client" if connect and not listen else "peer"
     session = session_configuration(listen, connect, keys) | {"mode": mode}
-    if keys is None or mode == "client":
+    if keys is None or trusts_router:
         return session
     return session | {"access_control": access_control(site, (host,), AccessList.read_file(keys / ACCESS))}
+
+
+def check_trust(
+    trusts_router: object, listen: Sequence[str], connect: Sequence[str], *, has_keys: bool
+) -> bool:
+    """Check that there is a router to trust, and no way past it: TypeError or ValueError if not."""
+    if not isinstance(trusts_router, bool):
+        raise TypeError(f"trusts_router must be true or false, got {trusts_router!r}")
+    if trusts_router and not (has_keys and connect and not listen):
+        raise ValueError("trusts_router is for agents with keys that are reached by connect alone, got true")
+    return trusts_router
 
 
 def router_configuration(
