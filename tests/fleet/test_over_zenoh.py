@@ -356,6 +356,25 @@ def test_a_router_is_trusted_where_it_is_the_only_way_to_an_agent_with_keys(keys
     assert "access_control" in agent_configuration("lab", "cell", router, router, keys=cell)
 
 
+async def test_behind_a_router_an_agent_speaks_for_its_own_host_alone(keys: Path) -> None:
+    """One answered the halts, leases and commands of another host, and published its statuses."""
+    async with line(patience=3 * PATIENCE) as here:
+        hosts = ["cell", "other"]
+        await here.open(router_configuration("lab", hosts, [here.endpoint], keys / "agent-gate"))
+        agent = await trusting(here, keys, "other", *hosts)
+        bob = await here.client(keys / "operate-bob")
+        heard, own = bob.subscribe(ONE), bob.subscribe(f"{OTHER}/*")
+        seen = bob.watch(LEFT.key("alive", "*"))
+        await bob.watch(f"{OTHER}/alive/*").wait()
+        assert await bob.bus.ask(f"{OTHER}/halt", b"?", timeout=PATIENCE, urgency=Urgency.COMMAND)
+        assert not any([await bob.may(verb) for verb in ("info", "halt", "lease", "cmd/hold")])
+        for base in (LEFT.base, OTHER):
+            agent.publisher(f"{base}/feed", Urgency.COMMAND)(b"news")
+        await own.wait()
+        assert not heard.is_set()
+        assert not seen.is_set()
+
+
 # -- without keys ------------------------------------------------------------------------------------------
 
 

@@ -121,23 +121,19 @@ def access_control(
 ) -> dict[str, object]:
     """The part of a zenoh configuration that denies everything but the rights of the clients of some agents.
 
-    It is an agent's, or that of a router: there the links of the agents have the other side of each right.
+    It is an agent's, or that of a router: there the link of each agent has the other side of each right, for
+    the keys of its own host alone.
     """
-    own = tuple(f"{ROOT}/{check_name('site', site)}/{check_name('host', host)}/*" for host in hosts)
     names = [role.common_name(each) for role in CLIENTS for each in clients.of(role)]
-    rules = [
-        *_reading(own),
-        *(_rule(f"ask info {name}", ("query",), _IN, _below(own, f"info/{name}")) for name in names),
-        *_asking("halt", own, "halt"),
-        *_asking("lease", own, "lease"),
-        *_asking("cmd", own, "cmd/*"),
-    ]
-    agents = [Role.AGENT.common_name(host) for host in hosts] if is_router else []
-    other_side = [_other_side(rule) for rule in rules] if is_router else []
+    rules = _rules([_base(site, host) for host in hosts], names)
+    agents = {
+        Role.AGENT.common_name(host): [_other_side(rule, host) for rule in _rules([_base(site, host)], names)]
+        for host in (hosts if is_router else ())
+    }
     return {
         "enabled": True,
         "default_permission": "deny",
-        "rules": [*rules, *other_side],
+        "rules": [*rules, *(rule for own in agents.values() for rule in own)],
         # Each client asks under its own name alone: that is what its budget of questions is counted by.
         "subjects": [{"id": name, "cert_common_names": [name]} for name in (*names, *agents)],
         "policies": [
@@ -151,14 +147,28 @@ def access_control(
                 if clients.of(role)
             ),
             *({"rules": [f"ask info {name}"], "subjects": [name]} for name in names),
-            *({"rules": [rule["id"] for rule in other_side], "subjects": [name]} for name in agents),
+            *({"rules": [rule["id"] for rule in own], "subjects": [name]} for name, own in agents.items()),
         ],
     }
+
+
+def _base(site: str, host: str) -> str:
+    return f"{ROOT}/{check_name('site', site)}/{check_name('host', host)}/*"
 
 
 def rights(role: Role) -> tuple[str, ...]:
     roles = CLIENTS[: CLIENTS.index(role) + 1]
     return tuple(rule for each in roles for rule in _RIGHTS[each])
+
+
+def _rules(own: Sequence[str], names: Sequence[str]) -> list[Rule]:
+    return [
+        *_reading(own),
+        *(_rule(f"ask info {name}", ("query",), _IN, _below(own, f"info/{name}")) for name in names),
+        *_asking("halt", own, "halt"),
+        *_asking("lease", own, "lease"),
+        *_asking("cmd", own, "cmd/*"),
+    ]
 
 
 def _reading(own: Sequence[str]) -> list[Rule]:
@@ -192,9 +202,10 @@ def _below(own: Sequence[str], *keys: str) -> list[str]:
     return [f"{base}/{key}" for base in own for key in keys]
 
 
-def _other_side(rule: Rule) -> Rule:
+def _other_side(rule: Rule, host: str) -> Rule:
     # What comes from the clients goes to the agent, and what comes from there goes to them.
-    return {**rule, "id": f"agent: {rule['id']}", "flows": list(_OUT if rule["flows"] == list(_IN) else _IN)}
+    flows = list(_OUT if rule["flows"] == list(_IN) else _IN)
+    return {**rule, "id": f"agent {host}: {rule['id']}", "flows": flows}
 
 
 def _rule(name: str, messages: Sequence[str], flows: Sequence[str], keys: Sequence[str]) -> Rule:
