@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import re
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
@@ -48,7 +49,7 @@ from robotiq_async.values.request import AxisRequest, Request
 from tests.contract.bench import MODEL, OTHERWISE, SERVER
 from tests.fleet.lab import SPEEDUP, lab
 from tests.verify.test_contract import ASKING, FILES, OF_OTHERS, scenes
-from tests.virtual import virtual
+from tests.virtual import until, virtual
 
 SIBLINGS = [TWO_FINGER_85, TWO_FINGER_140, HAND_E]
 siblings = pytest.mark.parametrize("model", SIBLINGS, ids=lambda model: model.name)
@@ -270,35 +271,92 @@ async def test_a_gripper_of_another_model_is_refused_and_not_written_to(
     assert not gripper.writes
 
 
-def of_no_gripper(reply: bytes) -> list[tuple[float, bytes]]:
-    """A reply over TCP: one with registers shows several axes, and a controller as siblings have it."""
-    strange = reply[:10] + b"\xff\xf0" + reply[12:]
+def changed(reply: bytes, start: int, data: bytes) -> list[tuple[float, bytes]]:
+    """A reply over TCP; one with registers has these bytes from byte ``start`` of the status on."""
+    at = 9 + start
+    strange = (reply[:at] + data + reply[at + len(data) :])[: len(reply)]
     return [(0.0, strange if reply[7] in (3, 4) and len(reply) > 13 else reply)]
 
 
-@pytest.mark.parametrize("model", [THREE_FINGER, TWO_FINGER_85], ids=lambda model: model.name)
+def of_no_gripper(reply: bytes) -> list[tuple[float, bytes]]:
+    """It shows several axes, and a controller as siblings have it."""
+    return changed(reply, 1, b"\xff\xf0")
+
+
+def of_one_axis(reply: bytes) -> list[tuple[float, bytes]]:
+    return changed(changed(reply, 1, b"\x00")[0][1], 4, bytes((100, *bytes(10))))
+
+
+def with_a_reserved_bit(reply: bytes) -> list[tuple[float, bytes]]:
+    return changed(reply, 2, b"\x10")
+
+
+@pytest.mark.parametrize(
+    ("model", "replies", "words"),
+    [
+        (THREE_FINGER, of_one_axis, "this is no 3-Finger"),
+        (TWO_FINGER_85, of_no_gripper, "another device answers: its registers"),
+    ],
+    ids=["3f", "2f85"],
+)
 @virtual
-async def test_another_device_is_refused_and_not_written_to(model: Model) -> None:
+async def test_another_device_is_refused_and_not_written_to(
+    model: Model, replies: Callable[[bytes], list[tuple[float, bytes]]], words: str
+) -> None:
     """At a start, at a reconnection, and at the stop in the end."""
     gripper = SimulatedGripper(asyncio.get_running_loop().time, model=model)
     async with SimulatorServer(gripper) as server:
         hand = RobotiqHand(f"127.0.0.1:{server.port}", model=model)
-        server.policy = of_no_gripper
-        with pytest.raises(ProtocolError, match="another device answers: its registers"):
-            await hand.start()
+        for stranger, why in ((replies, words), (of_no_gripper, "another device answers: its registers")):
+            server.policy = stranger
+            with pytest.raises(ProtocolError, match=why):
+                await hand.start()
         assert not gripper.writes
         server.policy = lambda reply: [(0.0, reply)]
         await hand.start()
         await hand.set_position(200)
-        server.policy = of_no_gripper
+        server.policy = replies
         written = len(gripper.writes)
         server.cut()
         await hand.wait_for_state(State.DISCONNECTED)
         await asyncio.sleep(3)
-        with pytest.raises(ConnectionLostError, match="another device answers"):
+        with pytest.raises(ConnectionLostError, match=words):
             hand.command(position=0)
         await hand.stop()
         assert len(gripper.writes) == written
+
+
+@virtual
+async def test_a_gripper_with_a_reserved_bit_is_refused_at_first_and_stopped_later(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """It was refused after a reconnection, and its fingers moved on: halt() raised, stop() wrote nothing."""
+    caplog.set_level(logging.WARNING, "robotiq_async")
+    gripper = SimulatedGripper(asyncio.get_running_loop().time)
+    async with SimulatorServer(gripper) as server:
+        hand = RobotiqHand(server.address)
+        server.policy = with_a_reserved_bit
+        with pytest.raises(ProtocolError, match="another device answers: its registers"):
+            await hand.start()
+        server.policy = lambda reply: [(0.0, reply)]
+        await hand.start()
+        hand.command(position=255, speed=0)
+        await until(lambda: gripper.is_moving)
+        server.policy = with_a_reserved_bit
+        for _ in range(2):
+            server.cut()
+            await hand.wait_for_state(State.DISCONNECTED)
+            await hand.wait_for_state(State.RUNNING_IDLE, timeout=5)
+        assert gripper.is_moving
+        await hand.halt()
+        assert not gripper.is_moving
+        hand.command(position=255, speed=0)
+        await until(lambda: gripper.is_moving)
+        server.cut()
+        await hand.stop()
+        assert not gripper.is_moving
+    told = [each for each in caplog.messages if "the gripper shows bits that are always 0 in it" in each]
+    assert len(told) == 1
 
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=lambda model: model.name)

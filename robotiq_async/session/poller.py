@@ -55,6 +55,9 @@ class Poller:
         self._is_slow: Final = options.link.is_slow
         self._stroke: Final = options.units.stroke
         self.tick: Final = Tick(options.poll_interval)
+        self._log: Final = options.log
+        self._accepted: str | None = None
+        """The contradiction that the gripper showed when its link was opened last; None before the first."""
         self._late_polls: Final = LatePolls(self.tick.time, options.log)
         self._last_poll: float | None = None  # when the poll before was asked for; None: no period is counted
         self._asked = -math.inf  # when the newest status was asked for
@@ -261,10 +264,23 @@ class Poller:
         asked = self.tick.time()
         registers = await self._link.read()
         answered = self.tick.time()
-        if is_first and (shown := self._model.contradiction(registers)):
-            await self._link.close()  # a stop would be written to a link that is open
-            raise self._not_this_gripper(registers, shown)
+        if is_first:
+            await self._check_who_answers(registers)
         self._take(self._status(registers, answered), asked)
+
+    async def _check_who_answers(self, registers: Registers) -> None:
+        """Refuse another gripper, and what is none.
+
+        Reserved bits alone do not tell that a gripper is another one than before. It may be in motion, so it
+        must get its stop.
+        """
+        if shown := self._model.contradiction(registers):
+            if self._accepted is None or self._model.wrong_axes(registers):
+                await self._link.close()  # a stop would be written to a link that is open
+                raise self._not_this_gripper(registers, shown)
+            if shown != self._accepted:
+                self._log.warning("the gripper shows %s; it showed none before", shown)
+        self._accepted = shown
 
     def _not_this_gripper(self, registers: Registers, shown: str) -> ProtocolError:
         if why := why_stranger(registers):

@@ -152,19 +152,28 @@ class Model:
         return request > position >= self.closed_reading_min - TOLERANCE
 
     def contradiction(self, registers: Registers) -> str:
-        """The status registers that only another model can have, as a text; empty if there are none.
+        """The status registers that this model cannot have, as a text; empty if there are none.
+
+        They are those of :meth:`wrong_axes`, or reserved bits, which are 0.
+        """
+        if wrong := self.wrong_axes(registers):
+            return wrong
+        if any(field.read(registers) for field in reg.status_reserved(self.has_modes)):
+            return "bits that are always 0 in it"
+        return ""
+
+    def wrong_axes(self, registers: Registers) -> str:
+        """The status registers that only a model with other axes has, as a text; empty if there are none.
 
         A sibling leaves byte 1 and bytes 6 to 14 at 0. On a 3-Finger the positions of B, C and the scissor
-        lie there, which are never 0 together. Reserved bits are 0. All zeros prove nothing: a gateway may
-        send them before its gripper answers.
+        lie there, which are never 0 together. All zeros prove nothing: a gateway may send them before its
+        gripper answers.
         """
         has_one = not registers[0] & 0xFF and not any(registers[3:7]) and not registers[7] >> 8
         if has_one and len(self.axes) > 1 and registers[2] >> 8:
             return "one axis alone, as a 2F or a Hand-E: bytes 1 and 6 to 14 are 0"
         if not has_one and len(self.axes) == 1:
             return "more than one axis, as a 3-Finger: bytes 1 and 6 to 14 are not all 0"
-        if any(field.read(registers) for field in reg.status_reserved(self.has_modes)):
-            return "bits that are always 0 in it"
         return ""
 
     @property
