@@ -96,7 +96,7 @@ def adopting(wire: Wire) -> RobotiqHand:
     wire.command(255)
     hand = RobotiqHand(wire)
     hand.start(activate=False)
-    until(wire.is_moving)
+    until(lambda: wire.is_moving() and hand.is_moving)  # a hold decides on the status that there is
     return hand
 
 
