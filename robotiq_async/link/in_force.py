@@ -1,8 +1,11 @@
 """The image in force of a jaw that stands still: written again, it moves nothing. Pure.
 
 A link tries function 23 with it (dialogue.py). It is the last image that this link wrote, if the jaw shows
-it. Before the first one it is made of what the jaw shows. Then the jaw must be stopped, or within 2 counts of
-its target without a contact: it holds nothing, so speed and force do not matter until a command.
+it, and is stopped or has come to its target. A contact does not do: gOBJ may come some reads behind the echo,
+so it may still be that from before the motion. The position tells whether gOBJ 3 is.
+
+Before the first image it is made of what the jaw shows. Then the jaw must be within 2 counts of its target
+without a contact: it holds nothing, so speed and force do not matter until a command.
 """
 
 from __future__ import annotations
@@ -11,7 +14,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from ..values import registers as reg
-from ..values.model import TOLERANCE
+from ..values.model import TOLERANCE, TWO_FINGER_85
 from ..values.registers import Registers
 
 AT_TARGET: Final = 3
@@ -34,7 +37,9 @@ def image_in_force(shown: Registers, written: Sequence[int] | None) -> Sequence[
         return ()
     if written is None:
         return _image_of(shown)
-    if not written or reg.rATR.read(written) or (reg.gGTO.read(shown) and not reg.gOBJ.read(shown)):
+    target, position = reg.gPR[0].read(shown), reg.gPO[0].read(shown)
+    has_come = reg.gOBJ.read(shown) == AT_TARGET and TWO_FINGER_85.has_reached(target, position)
+    if not written or reg.rATR.read(written) or (reg.gGTO.read(shown) and not has_come):
         return ()
     return written if all(echo.read(shown) == field.read(written) for echo, field in _ECHOES) else ()
 
@@ -43,7 +48,6 @@ def _image_of(shown: Registers) -> Sequence[int]:
     """The request that an adopted jaw shows, or empty."""
     target = reg.gPR[0].read(shown)
     is_there = reg.gOBJ.read(shown) == AT_TARGET and abs(target - reg.gPO[0].read(shown)) <= TOLERANCE
-    stands = is_there or not reg.gGTO.read(shown)
-    if not (stands and reg.gACT.read(shown) and reg.gIMC.read(shown) == ACTIVE):
+    if not (is_there and reg.gACT.read(shown) and reg.gIMC.read(shown) == ACTIVE):
         return ()
     return (shown[0] & ECHOED, target, 0, 0, 0, 0, 0, 0)

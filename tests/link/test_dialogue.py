@@ -193,7 +193,9 @@ def test_a_jaw_that_refuses_function_23_costs_nothing_more() -> None:
     ("status", "image"),
     [
         ((0xF900, 0x0064, 0x6600), "0900 0064 0000"),  # at its target
-        ((0x3100, 0x0064, 0x3000), "0100 0064 0000"),  # stopped on the way
+        ((0xF100, 0x0064, 0x6600), "0100 0064 0000"),  # stopped there
+        ((0x3100, 0x0064, 0x3000), ""),  # stopped on the way: it may hold something
+        ((0xB100, 0x00FF, 0x6000), ""),  # stopped with something in it: the force would change
         ((0xF900, 0x0064, 0x6700), ""),  # not where it was to go: it might move
         ((0xB900, 0x0064, 0x6000), ""),  # it presses: the force would change
         ((0xD900, 0x0064, 0x6400), ""),  # it activates
@@ -220,8 +222,15 @@ def test_noise_decides_nothing() -> None:
 
 @pytest.mark.parametrize(
     "status",
-    [(0x3900, 0x00FF, 0x7000), (0xF100, 0x00FF, 0xE300), (0xF900, 0x0080, 0x8000), (0xF900, 0x0BFF, 0xE300)],
-    ids=["moving", "stopped by another", "another's position", "a fault"],
+    [
+        (0x3900, 0x00FF, 0x7000),
+        (0xF900, 0x00FF, 0x7000),  # gOBJ comes behind the echo: it is that from before the motion
+        (0xB900, 0x00FF, 0x7000),
+        (0xF100, 0x00FF, 0xE300),
+        (0xF900, 0x0080, 0x8000),
+        (0xF900, 0x0BFF, 0xE300),
+    ],
+    ids=["moving", "still there", "still holding", "stopped by another", "another's position", "a fault"],
 )
 def test_it_is_not_tried_unless_the_jaw_rests_as_it_was_told(status: tuple[int, ...]) -> None:
     dialogues = speaker(is_sure=False)
