@@ -548,7 +548,7 @@ class Controller:
         if pending.hold:
             held = ledger.held(pending.hold, status, now - ledger.now.time)
             # What may press on its part is not held before that is known.
-            left = Pending(hold=pending.hold & ~pending.moved & ledger.may_press(status))
+            left = pending.held_later(ledger.may_press(status, pending.note_hold(now)))
         image = merged(base, pending, status, gripping=gripping, held=held)
         if not pending.has_changes and gate(image, status, may_reset=ledger.may_reset) == base:
             # No axis moves, so there is nothing to write, and what the gripper has answers the callers. If an

@@ -199,10 +199,12 @@ class Ledger:
         """The axes that are known to press on a part, or did when rGTO was cleared."""
         return self.contacts.pressing(status, self.base) & ~self.contacts.open
 
-    def may_press(self, status: RobotiqStatus) -> Finger:
+    def may_press(self, status: RobotiqStatus, since: float) -> Finger:
         """The axes that show a motion where they were in contact: not known yet whether they press again."""
-        # An axis that moves has moved off before long. One that still shows a motion after that presses.
-        is_recent = self.now.time - self.last.time < WINDOW_S
+        # An axis that moves has moved off before long. One that still shows a motion after that presses. That
+        # it moves may be due to a force of another client, which no echo shows: so what counts is ``since``,
+        # when that was first asked, and not our last write alone.
+        is_recent = self.now.time - max(self.last.time, since) < WINDOW_S
         return self._pressing_again(status) if is_recent else NO_AXES
 
     def held(self, axes: Finger, status: RobotiqStatus, age: float = 0.0) -> dict[Finger, int]:

@@ -7,6 +7,7 @@ a lost link, because it can only stop one. One without a caller goes if another 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
@@ -42,6 +43,8 @@ class Pending:
     # Axes to hold if they move. A position of the same axis goes before it, but does not end it: if the link
     # goes down before the write, the hold remains and the position does not.
     hold: Finger = NO_AXES
+    # When the hold was first about to be written: what may press on a part is held later, or not at all.
+    hold_began: float = math.inf
 
     @property
     def is_empty(self) -> bool:
@@ -56,6 +59,15 @@ class Pending:
     @property
     def moved(self) -> Finger:
         return Finger(sum(self.positions))
+
+    def note_hold(self, now: float) -> float:
+        """The hold is about to be written; return when it first was."""
+        self.hold_began = min(self.hold_began, now)
+        return self.hold_began
+
+    def held_later(self, axes: Finger) -> Pending:
+        """The hold of those of these axes that are not moved, for a later write."""
+        return Pending(hold=self.hold & ~self.moved & axes, hold_began=self.hold_began)
 
     def merge(self, new: Command) -> None:
         # The last value wins, per axis and field; an axis keeps what a command does not name.
@@ -114,7 +126,9 @@ class OpenRequests:
         """Hold those axes that move; ``why`` is for the log, if no caller has asked for it."""
         if axes and why:
             self._log.info("%s: what moves of %s is held", why, axes)
-        self.pending = replace(self.pending, hold=self.pending.hold | axes)
+        pending = self.pending
+        began = math.inf if axes & ~pending.hold else pending.hold_began  # an axis more has its own time
+        self.pending = replace(pending, hold=pending.hold | axes, hold_began=began)
 
     def hold_only(self, axes: Finger) -> None:
         """Drop all holds but those of these axes, and those that callers of hold() wait for."""

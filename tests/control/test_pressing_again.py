@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -12,6 +13,7 @@ from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values import registers as reg
 from robotiq_async.values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, Model
 from robotiq_async.values.registers import Registers
+from robotiq_async.values.request import Request
 from tests.control.scan import Outcome, Scan
 
 A, B, C = Finger.A, Finger.B, Finger.C
@@ -140,6 +142,44 @@ def test_a_hold_stops_an_axis_whose_part_has_gone(device_cycle: float) -> None:
     scan.until(lambda: asked.is_answered, 1.0)
     scan.run(3.0)
     assert scan.positions()[A] <= PART + 4
+
+
+@pytest.mark.parametrize("model", [THREE_FINGER, TWO_FINGER_85, HAND_E], ids=str)
+def test_a_hold_long_after_our_last_write_stops_an_axis_whose_part_has_gone(model: Model) -> None:
+    """Another client raised the force, which no echo shows: the hold was acknowledged, and dropped."""
+    scan = Scan(model=model)
+    scan.start()
+    scan.gripper.place_object(A, PART)
+    assert scan.moved(255, A, speed=0).contacts == A
+    scan.run(0.6)
+    scan.gripper.remove_object(A)
+    image = Request.from_registers(scan.written[-1], model)
+    theirs = replace(image, axes=tuple(replace(axis, force=255) for axis in image.axes))
+    scan.gripper.write(0, theirs.registers)
+    scan.until(lambda: A in scan.latest.moving)
+    asked = scan.hold(A)
+    scan.until(lambda: asked.is_answered, 1.0)
+    scan.run(3.0)
+    assert scan.positions()[A] <= PART + 12
+
+
+def test_holds_that_wait_are_timed_one_by_one() -> None:
+    """One that has been dropped does not shorten the time of the next."""
+    scan = Scan()
+    scan.gripper = gripper = Silent(lambda: scan.now, spread=False)
+    scan.start()
+    gripper.place_object(A, PART)
+    scan.moved(255, A)
+    scan.run(0.6)
+    gripper.reports_contacts = False
+    scan.run(0.1)
+    for axes in (A, A, A | B):
+        outcome = scan.hold(axes)
+        scan.run(0.4)
+        assert not outcome.is_answered
+        scan.run(0.2)
+        assert outcome.is_answered
+        assert scan.last_image.position(A) == 255
 
 
 def test_a_hold_does_not_wait_for_ever_for_an_axis_that_presses_and_reports_no_contact() -> None:
