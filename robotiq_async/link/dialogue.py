@@ -79,6 +79,9 @@ class Dialogues:
         self._map: Final = registers
         self._make: Final = make
         self._usual: Final = Timing(response_timeout)
+        self._whole: Final = self._usual._replace(is_whole=True)
+        """For a write that no status follows: a late acknowledgement would cost the link, and a stop that has
+        arrived would count as lost."""
         self._repeat_s: Final = response_timeout if response_timeout > USUAL_RESPONSE_S else REPEAT_S
         self._log: Final = log
         self._poll: Final = read_request(registers, registers.count)
@@ -139,7 +142,7 @@ class Dialogues:
         yield from self._ready()
         if (image := decide()) is None:
             return False
-        if (bad := (yield from self._written(image))) is not None:
+        if (bad := (yield from self._written(image, self._whole))) is not None:
             raise bad.error
         return True
 
@@ -182,7 +185,7 @@ class Dialogues:
         After a disturbance it reads, which brings the line in step before a write.
         """
         if (yield Step.READY) is None and (image := decide()) is not None:
-            if (bad := (yield from self._written(image))) is not None:
+            if (bad := (yield from self._written(image, self._whole))) is not None:
                 raise bad.error
             return None
         return (yield from self.read())
@@ -199,10 +202,10 @@ class Dialogues:
         if isinstance(obstacle, Outcome):
             raise obstacle.error
 
-    def _written(self, image: Sequence[int]) -> DialoguePart:
+    def _written(self, image: Sequence[int], timing: Timing | None = None) -> DialoguePart:
         """Write an image with function 16."""
         self._image = ()
-        came_to = yield self._ask(write_request(self._map, image))
+        came_to = yield self._ask(write_request(self._map, image), timing)
         if isinstance(came_to, Outcome):
             self._note_unheard(came_to)
             return came_to

@@ -30,11 +30,13 @@ class Timing(NamedTuple):
         seconds: the longest time from the request to the end of the reply.
         by: when it must be over even so, in the loop's time.
         is_long: whether the longer silence is kept before it.
+        is_whole: whether it may take that longest time where others use the line, too.
     """
 
     seconds: float
     by: float = math.inf
     is_long: bool = False
+    is_whole: bool = False
 
 
 class Exchange(ABC):

@@ -337,8 +337,10 @@ class Line:
 
     def _allowed(self, exchange: Exchange) -> float:
         """The longest time for the answer to a request of this turn, in seconds."""
-        seconds = exchange.timing.seconds
-        return self._patience.seconds(self._speaker, seconds) if self._shares and self.is_shared else seconds
+        timing = exchange.timing
+        if timing.is_whole or not (self._shares and self.is_shared):
+            return timing.seconds
+        return self._patience.seconds(self._speaker, timing.seconds)
 
     def _obstacle(self, user: object) -> Outcome | None:
         """The obstacle to a request of this user."""

@@ -14,6 +14,7 @@ from robotiq_async import (
     Finger,
     InvalidStateError,
     NotStartedError,
+    RobotiqConnectionError,
     RobotiqHand,
     State,
 )
@@ -114,6 +115,35 @@ async def test_a_late_answer_now_and_then_costs_no_link(bus: Bus) -> None:
                 await left.move(position, speed=255)
                 await asyncio.sleep(1.0)
         assert left.statistics.reconnects == 0
+
+
+async def test_a_stop_that_is_acknowledged_late_is_acknowledged(bus: Bus) -> None:
+    """halt() raised after 63 ms, and the link was lost, although the gripper had stopped."""
+    async with bus.hand(LEFT) as left, bus.hand(RIGHT):
+        left.command(position=255, speed=0)
+        await until(lambda: bus.gripper(LEFT).is_moving)
+        await bus.servers[LEFT].fault_injector.begin(Trouble("late", 0.2, on="write"))
+        await left.halt()
+        assert left.statistics.reconnects == 0
+
+
+async def test_a_gripper_that_falls_silent_on_its_own_stop_keeps_the_line_once(bus: Bus) -> None:
+    loop = asyncio.get_running_loop()
+    async with bus.hand(LEFT) as left, bus.hand(RIGHT) as right:
+        for hand in (left, right):
+            hand.command(position=255, speed=0)
+        await until(lambda: bus.gripper(RIGHT).is_moving)
+        async with bus.servers[LEFT].fault_injector.making(Trouble("silence")):
+            began, stopping = loop.time(), asyncio.create_task(left.halt())
+            await right.halt()
+            assert 0.25 < loop.time() - began < 0.25 + 0.15, "for its response timeout"
+            with pytest.raises(RobotiqConnectionError):
+                await stopping
+            right.command(position=0, speed=0)
+            await until(lambda: bus.gripper(RIGHT).is_moving)
+            began = loop.time()
+            await right.halt()
+            assert loop.time() - began < 0.15
 
 
 @pytest.mark.parametrize("count", [1, 2])
