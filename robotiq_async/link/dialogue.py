@@ -29,7 +29,7 @@ from ..values.registers import REGISTER_COUNT, RegisterMap, Registers
 from . import transport
 from .exchange import Answer, Exchange, Timing
 from .frames import read_request, registers_in, write_and_read_request, write_request
-from .in_force import image_in_force
+from .in_force import image_in_force, shows
 from .line import Dialogue, Line, Step
 from .outcome import Noise, Outcome, Refused, Silent
 from .serial.patience import USUAL_RESPONSE_S
@@ -80,8 +80,8 @@ class Dialogues:
         self._make: Final = make
         self._usual: Final = Timing(response_timeout)
         self._whole: Final = self._usual._replace(is_whole=True)
-        """For a write that no status follows: a late acknowledgement would cost the link, and a stop that has
-        arrived would count as lost."""
+        """For a write of which no status tells what became: a late acknowledgement would cost the link, and a
+        stop that has arrived would count as lost."""
         self._repeat_s: Final = response_timeout if response_timeout > USUAL_RESPONSE_S else REPEAT_S
         self._log: Final = log
         self._poll: Final = read_request(registers, registers.count)
@@ -164,8 +164,9 @@ class Dialogues:
         if (image := decide()) is None:
             return None
         bad: bytes | Outcome | None
+        timing = self._timing_of(image)
         if self.serves_23:
-            bad = yield from self._tried(image)
+            bad = yield from self._tried(image, timing)
             if isinstance(bad, bytes):
                 return transport.WriteAnswer(self._status_in(bad), None)
             if isinstance(bad, Refused) and bad.is_unknown_function:
@@ -173,7 +174,7 @@ class Dialogues:
                     return None
                 yield Step.TURN
                 return transport.WriteAnswer((yield from self.read()), None)
-        elif (bad := (yield from self._written(image))) is None:
+        elif (bad := (yield from self._written(image, timing))) is None:
             return transport.WriteAnswer((yield from self.read()), None)
         if not (isinstance(bad, Refused) or self._can_repeat(bad)):
             raise bad.error
@@ -213,10 +214,10 @@ class Dialogues:
         self._image = image
         return None
 
-    def _tried(self, image: Sequence[int]) -> Dialogue[bytes | Outcome]:
+    def _tried(self, image: Sequence[int], timing: Timing | None = None) -> Dialogue[bytes | Outcome]:
         """Write an image with function 23, and learn whether that is served."""
         self._image = ()
-        came_to = yield self._ask(write_and_read_request(self._map, image))
+        came_to = yield self._ask(write_and_read_request(self._map, image), timing)
         assert came_to is not None, "an exchange comes to something"
         if isinstance(came_to, bytes):
             self.serves_23, self.has_served_23, self._image = True, True, image
@@ -227,6 +228,11 @@ class Dialogues:
         else:
             self._note_unheard(came_to)
         return came_to
+
+    def _timing_of(self, image: Sequence[int]) -> Timing:
+        """The limits of a write that a status follows, which tells nothing if it had that echo before."""
+        is_shown = self.line.is_shared and self._status and shows(self._status, image)
+        return self._whole if is_shown else self._usual
 
     def _to_try(self) -> Sequence[int]:
         """The image with which function 23 may be tried, or empty."""

@@ -41,7 +41,12 @@ def image_in_force(shown: Registers, written: Sequence[int] | None) -> Sequence[
     has_come = reg.gOBJ.read(shown) == AT_TARGET and TWO_FINGER_85.has_reached(target, position)
     if not written or reg.rATR.read(written) or (reg.gGTO.read(shown) and not has_come):
         return ()
-    return written if all(echo.read(shown) == field.read(written) for echo, field in _ECHOES) else ()
+    return written if shows(shown, written) else ()
+
+
+def shows(shown: Registers, image: Sequence[int]) -> bool:
+    """Whether a status has the echo of an image, which it may have of an earlier one, too."""
+    return all(echo.read(shown) == field.read(image) for echo, field in _ECHOES)
 
 
 def _image_of(shown: Registers) -> Sequence[int]:

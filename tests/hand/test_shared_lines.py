@@ -127,6 +127,16 @@ async def test_a_stop_that_is_acknowledged_late_is_acknowledged(bus: Bus) -> Non
         assert left.statistics.reconnects == 0
 
 
+async def test_a_late_answer_to_what_no_status_shows_costs_no_link(bus: Bus) -> None:
+    """Speed has no echo: the status that was read after 60 ms could not tell that the command had arrived."""
+    async with bus.hand(LEFT) as left, bus.hand(RIGHT):
+        left.command(position=255, speed=0)
+        await until(lambda: bus.gripper(LEFT).is_moving)
+        await bus.servers[LEFT].fault_injector.begin(Trouble("late", 0.1, on="write"))
+        await left.move(255, speed=255)
+        assert left.statistics.reconnects == 0
+
+
 async def test_a_gripper_that_falls_silent_on_its_own_stop_keeps_the_line_once(bus: Bus) -> None:
     loop = asyncio.get_running_loop()
     async with bus.hand(LEFT) as left, bus.hand(RIGHT) as right:

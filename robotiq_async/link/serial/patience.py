@@ -6,9 +6,9 @@ for 60 ms again, for a gripper that answers slowly. The silence after it takes a
 misses a user rests for a second between two questions, so a silent gripper costs the others 5 % of their
 rate, and 80 ms at a time.
 
-A write that no status follows has the whole response timeout, because a late acknowledgement would cost the
-link. So a gripper that falls silent on it, on its own stop for example, keeps the others waiting for that
-time, once: a link that is lost is opened again with questions.
+A write of which no status tells what became has the whole response timeout, because a late acknowledgement
+would cost the link. So a gripper that falls silent on it, on its own stop for example, keeps the others
+waiting for that time, once: a link that is lost is opened again with questions.
 
 A response timeout that is longer than the usual one means a slow line, and lengthens the questions alike. So
 do answers that have just taken long, of whichever gripper: the adapter, a server or a busy machine is slow.
