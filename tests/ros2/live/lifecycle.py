@@ -52,7 +52,12 @@ def test_a_life(simulator: Simulator) -> None:
         assert client.change("cleanup")
         assert client.state() == "unconfigured"
         shown = json.loads(client.status().wait(new=False).data)  # what is kept for new subscribers
-        assert shown == {"state": "SHUTDOWN", "connected": False, "takes_commands": False}
+        assert shown == {
+            "state": "SHUTDOWN",
+            "connected": False,
+            "takes_commands": False,
+            "inhibited": None,
+        }
         assert client.change("configure")
         process.prints("connected to", times=2)
         assert client.change("shutdown")
