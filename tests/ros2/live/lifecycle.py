@@ -66,6 +66,33 @@ def test_a_life(simulator: Simulator) -> None:
         assert process.ends() == 0
 
 
+def test_a_person_halts_and_the_halt_stays(simulator: Simulator) -> None:
+    with node(address=simulator.address) as process, Client() as client:
+        assert client.change("configure")
+        assert client.change("activate")
+        assert client.call("activate").success
+        goal = begun(client.move(2.8))
+        assert client.call("inhibit").success
+        assert goal.ends()[0] == ABORTED
+        there = position(simulator)
+        assert there < 230
+        again = client.send(["fingers"], [0.0])
+        assert again is None or again.ends()[0] == ABORTED
+        assert not client.call("activate").success
+        assert client.change("deactivate")
+        assert client.change("cleanup")
+        assert client.change("configure")
+        assert client.change("activate")
+        again = client.send(["fingers"], [0.0])
+        assert again is None or again.ends()[0] == ABORTED, "it stays over a cleanup"
+        assert position(simulator) == there
+        assert client.call("permit").success
+        assert position(simulator) == there, "a permit moves nothing"
+        assert client.move(0.0).ends()[0] == SUCCEEDED
+        process.send(signal.SIGTERM)
+        assert process.ends() == 0
+
+
 def test_a_node_that_only_watches_leaves_the_fingers_alone(simulator: Simulator) -> None:
     with node(address=simulator.address) as process, Client() as client:
         assert client.change("configure")
