@@ -24,6 +24,8 @@ import pytest
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.docs.agents import ROOM, agent_of_the_pages
 from tests.docs.pages import DOCS, PAGES, ROOT, TUTORIAL, Block, blocks, named, read, requirements
+from tests.docs.test_cell import PAGE as CELL
+from tests.docs.test_cell import running
 from tests.docs.test_service import PAGE as SERVICE
 from tests.docs.test_tutorial import PROGRAM, TYPED, agree
 from tests.docs.test_web_service import PAGE as WEB_SERVICE
@@ -35,7 +37,7 @@ README = ROOT / "README.md"
 
 
 LEROBOT = DOCS / "how-to" / "lerobot.md"
-ELSEWHERE = (TUTORIAL, WEB_SERVICE, SERVICE, LEROBOT)
+ELSEWHERE = (TUTORIAL, WEB_SERVICE, SERVICE, CELL, LEROBOT)
 """Pages whose code is no matter of the prompt: each has tests of its own. For LeRobot, of 5.7 GB, they are
 ``make test-lerobot``."""
 CODE = {page: code for page in PAGES if page not in ELSEWHERE and (code := blocks(read(page), "python"))}
@@ -142,6 +144,19 @@ async def test_the_web_service(tmp_path: Path) -> None:
     python = environment(requirements(read(WEB_SERVICE)))
     async with service(active_gripper(1.0), tmp_path, python) as here:
         await stops(here, signal.SIGINT)
+
+
+async def test_the_cell(tmp_path: Path) -> None:
+    """It runs in an environment with the packages that the page installs."""
+    python = environment(requirements(read(CELL)))
+    async with (
+        SimulatorServer(active_gripper(20.0)) as server,
+        running(tmp_path, python=python, GRIPPER=server.address) as cell,
+    ):
+        answer = ""
+        while answer != "empty":  # until the hand is connected
+            (answer,) = await cell.order("status")
+        await cell.end()
 
 
 # -- the tutorial ------------------------------------------------------------------------------------------

@@ -68,11 +68,13 @@ class Cell:
 
 
 @asynccontextmanager
-async def running(folder: Path, code: str = PROGRAM, **variables: str) -> AsyncIterator[Cell]:
+async def running(
+    folder: Path, code: str = PROGRAM, *, python: str = sys.executable, **variables: str
+) -> AsyncIterator[Cell]:
     program, port = folder / "cell.py", free_ports()
     program.write_text(code, encoding="utf-8")
     process = await asyncio.create_subprocess_exec(
-        sys.executable,
+        python,
         str(program),
         env={"PORT": str(port), "PASSWORD": PASSWORD, "PATH": "/usr/bin:/bin", **variables},
         cwd=folder,

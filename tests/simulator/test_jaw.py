@@ -175,6 +175,8 @@ def test_requests_that_follow_one_another_do_not_begin_the_motion_again() -> Non
 @pytest.mark.parametrize("physics", [None, "table"])
 def test_a_stream_of_small_steps_lags_at_its_beginning_only(physics: str | None, hz: int) -> None:
     """It reached each step before the next came, began each anew, and lagged up to ten counts for ever."""
+    if physics is not None:
+        pytest.importorskip("mujoco", reason="needs the extra physics")
     jaw = Jaw(physics=physics and Physics(physics))
     jaw.move(50, 255)
     jaw.now += 1
