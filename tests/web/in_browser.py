@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import functools
 import os
 import shutil
 import signal
@@ -625,7 +624,6 @@ async def test_a_page_whose_process_stands_still_holds_its_motion_and_takes_no_p
     await stage.slow()
     await press(browser, stage.hand, "close")
     process = stage.page._process.pid
-    await browser.run("window.losses = 0; window.socket.on('disconnect', () => { window.losses += 1; })")
     os.kill(process, signal.SIGSTOP)
     try:
         status = await seen(stage.hand, moving=False)
@@ -635,10 +633,7 @@ async def test_a_page_whose_process_stands_still_holds_its_motion_and_takes_no_p
         await browser.do(lambda: browser.find("open").click())
     finally:
         os.kill(process, signal.SIGCONT)
-    # The browser may give the connection up, also as the process goes on, and what was pressed goes with it.
-    # It may load the page anew then, which does not know of the losses.
-    is_lost = functools.partial(browser.driver.execute_script, "return window.losses !== 0")
-    await browser.until(lambda: is_lost() or "too late" in browser.find("outcome").text)
+    # The press may arrive now, too late, or is gone with its connection, or its button was disabled.
     await browser.until(lambda: not browser.find("cut").is_displayed())
     assert requests.take_nowait() is None
     await press(browser, stage.hand, "close")  # it comes after what was pressed before
