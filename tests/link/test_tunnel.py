@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
@@ -238,9 +238,8 @@ async def test_a_command_without_an_answer_is_in_doubt_and_not_sent_again(
         assert carries(tunnel, 200) == is_carried
 
 
-async def test_a_request_that_the_tunnel_keeps_has_left_it_before_the_next() -> None:
-    """A thread that carries a command on, although it is no longer waited for."""
-    tunnel = await arm()
+def keeper(tunnel: Arm) -> tuple[Callable[[bytes], Awaitable[bytes]], asyncio.Event]:
+    """An exchange that survives its cancellation and answers once it is released, and the event for that."""
     released = asyncio.Event()
 
     async def keep(pdu: bytes) -> bytes:
@@ -249,6 +248,13 @@ async def test_a_request_that_the_tunnel_keeps_has_left_it_before_the_next() -> 
                 await released.wait()
         return tunnel.answer(pdu)
 
+    return keep, released
+
+
+async def test_a_request_that_the_tunnel_keeps_has_left_it_before_the_next() -> None:
+    """A thread that carries a command on, although it is no longer waited for."""
+    tunnel = await arm()
+    keep, released = keeper(tunnel)
     async with RobotiqHand(tunnel, model="2f85", write_function=16) as hand:
         await hand.move(30)
         tunnel.trouble[WRITE] = keep
@@ -267,14 +273,7 @@ async def test_a_request_that_the_tunnel_keeps_has_left_it_before_the_next() -> 
 
 async def test_a_command_that_waited_behind_a_stuck_read_is_not_sent_later() -> None:
     tunnel = await arm()
-    released = asyncio.Event()
-
-    async def keep(pdu: bytes) -> bytes:
-        while not released.is_set():
-            with contextlib.suppress(asyncio.CancelledError):
-                await released.wait()
-        return tunnel.answer(pdu)
-
+    keep, released = keeper(tunnel)
     async with RobotiqHand(tunnel, model="2f85", write_function=16) as hand:
         tunnel.trouble[READ] = keep
         await until(lambda: not tunnel.trouble)
