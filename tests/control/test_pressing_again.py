@@ -163,13 +163,19 @@ def test_a_hold_long_after_our_last_write_stops_an_axis_whose_part_has_gone(mode
     assert scan.positions()[A] <= PART + 12
 
 
-def test_holds_that_wait_are_timed_one_by_one() -> None:
-    """One that has been dropped does not shorten the time of the next."""
+def holding_silently() -> tuple[Scan, Silent]:
+    """A finger that presses on a part, of a gripper that can be told to report no contact."""
     scan = Scan()
     scan.gripper = gripper = Silent(lambda: scan.now, spread=False)
     scan.start()
     gripper.place_object(A, PART)
     scan.moved(255, A)
+    return scan, gripper
+
+
+def test_holds_that_wait_are_timed_one_by_one() -> None:
+    """One that has been dropped does not shorten the time of the next."""
+    scan, gripper = holding_silently()
     scan.run(0.6)
     gripper.reports_contacts = False
     scan.run(0.1)
@@ -183,11 +189,7 @@ def test_holds_that_wait_are_timed_one_by_one() -> None:
 
 
 def test_a_hold_does_not_wait_for_ever_for_an_axis_that_presses_and_reports_no_contact() -> None:
-    scan = Scan()
-    scan.gripper = gripper = Silent(lambda: scan.now, spread=False)
-    scan.start()
-    gripper.place_object(A, PART)
-    scan.moved(255, A)
+    scan, gripper = holding_silently()
     scan.halted()
     gripper.reports_contacts = False
     scan.move(255, A)
