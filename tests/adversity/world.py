@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 from bisect import bisect_left, bisect_right
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any
@@ -28,8 +28,9 @@ from robotiq_async.simulator.server.responder import Responder, TcpResponder
 from robotiq_async.simulator.server.serial_server import RtuResponder
 from robotiq_async.simulator.server.urcap_server import UNREADABLE, UrcapResponder
 from robotiq_async.simulator.troubles.fault_injector import FaultInjector
+from robotiq_async.values import registers as reg
 from robotiq_async.values.model import Model, model_of
-from robotiq_async.values.registers import Registers, gFLT, gIMC
+from robotiq_async.values.registers import Field, Registers, gFLT, gIMC
 from robotiq_async.values.request import Request
 from tests.arms import Arm, DoosanController, ToolLine, tunnel_of
 from tests.grippers import activate_beforehand
@@ -61,7 +62,8 @@ class StampedGripper(SimulatedGripper):
 
     Attributes:
         stamps: when each status was given out, and its number.
-        images: every image that was written, with where the axes were.
+        images: every image that was written, with where the axes were; of a SET that is taken one by one
+            that of its GTO alone.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
@@ -168,6 +170,13 @@ class UrcapServer(Heard, UrcapSimulatorServer):
             elif frame.pdu.endswith(b" GTO 1"):
                 self.motions.append(frame.pdu)
             return said
+
+        def _take(self, asked: Iterable[tuple[Field, int]]) -> None:
+            """Half a SET asks for nothing: GTO is the last variable of a motion, and the first of a stop."""
+            pairs = [*asked]
+            super()._take(pairs)
+            if isinstance(self.gripper, StampedGripper) and reg.rGTO not in dict(pairs):
+                self.gripper.images.pop()
 
     @property
     def given(self) -> list[tuple[float, str, int]]:
