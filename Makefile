@@ -42,7 +42,7 @@ show: $(STAMP)  ## Run the demo with the hand in three dimensions on a page in y
 smoke: $(STAMP)  ## Try a bit of everything; the first thing to run after a change (20 s)
 	@$(BIN)/python -m pytest --numprocesses auto --dist worksteal @tests/smoke.txt
 
-test-core: $(STAMP)  ## Run the tests of the core: values, control, link, session, hand, simulator, sync (1 minute)
+test-core: $(STAMP)  ## Run the tests of the core: values, control, link, hands, simulator, sync (1 minute)
 	@$(BIN)/python -m pytest -rs --numprocesses auto --dist worksteal @tests/core.txt
 
 test: $(STAMP)  ## Run the tests (5 minutes); those that need a browser, ROS or other environments are test-web, test-ros2, test-lerobot, test-urcap, test-urdf and pages

@@ -38,7 +38,7 @@ from robotiq_async.cli.consent import consent
 from robotiq_async.cli.failures import CommandError, UsageError
 from robotiq_async.cli.output.messages import forget
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from robotiq_async.link.address import is_remote, parse_address
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.model import model_of

@@ -2,9 +2,10 @@
 
 Programs import from here. The packages below it::
 
-    values      inputs and outputs: status, request, results, errors, units
-    hand        RobotiqHand; the base of every hand
-    session     the task that polls, from start() to stop()
+    values      words of the wire: status, request, results, errors
+    calibration  units, scales: between counts and millimetres, newtons, seconds
+    hands       the parts of any hand: its calls, options, streams
+    local       RobotiqHand, and the task that polls, from start() to stop()
     control     the next write: state machine, moves, adoption
     link        addresses, transports, Modbus: the bytes
     sync        blocking hands, for scripts and notebooks
@@ -19,13 +20,14 @@ Programs import from here. The packages below it::
 Nothing of this has run on real hardware yet.
 """
 
-from .hand.robotiq_hand import RobotiqHand
+from .calibration import Units
+from .calibration.conventions import Convention
+from .hands.options import ReconnectPolicy
+from .hands.statistics import Statistics
+from .hands.streams import Stream
 from .link.tunnel.protocol import Tunnel, TunnelPlace
+from .local.robotiq_hand import RobotiqHand
 from .runtime.version import __version__ as __version__
-from .session.options import ReconnectPolicy
-from .session.streams import Stream
-from .values.calibration import Units
-from .values.conventions import Convention
 from .values.enums import (
     CLOSED,
     FORCE_MAX,
@@ -70,7 +72,6 @@ from .values.grip import GraspResult, GripChange, GripEvent
 from .values.inhibit import Inhibit
 from .values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
 from .values.move_result import MoveResult
-from .values.statistics import Statistics
 from .values.status import Part, RobotiqStatus
 
 __all__ = [

@@ -26,9 +26,9 @@ from robotiq_async import (
     Transition,
     Trigger,
 )
-from robotiq_async.hand import Hand
+from robotiq_async.calibration import Units
+from robotiq_async.hands import Hand
 from robotiq_async.values import registers as reg
-from robotiq_async.values.calibration import Units
 from robotiq_async.values.enums import ObjectStatus
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import AxisRequest, Request

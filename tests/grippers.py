@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from robotiq_async import RobotiqHand, RobotiqStatus, State
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
 from robotiq_async.values import registers as reg
 from robotiq_async.values.enums import ObjectStatus

@@ -30,9 +30,8 @@ from typing import Any, NamedTuple
 
 import pytest
 
-PARTS = ("control", "session", "link", "values", "hand", "simulator", "fleet", "runtime")
-FOLDERS = (*PARTS[:-1], "contract", "adversity")
-NEAR = {"runtime": "session"}
+PARTS = ("control", "local", "link", "values", "calibration", "hands", "simulator", "fleet", "runtime")
+FOLDERS = (*PARTS, "contract", "adversity")
 SLOW_S = 4.0
 """Slower tests are left out."""
 AT_MOST = 40
@@ -202,7 +201,7 @@ def fitting(seconds: dict[str, float], part: str) -> list[str]:
     for test in sorted(seconds, key=lambda test: (seconds[test], test)):
         function = test.split("[")[0]
         seen[function] += 1
-        is_far = test.split("/")[1] not in (part, NEAR.get(part))
+        is_far = test.split("/")[1] != part
         order.append((seen[function] > 3, is_far, seconds[test], test))
     return [test for *_, test in sorted(order)][:AT_MOST]
 

@@ -13,8 +13,8 @@ from types import FunctionType
 
 import robotiq_async
 from robotiq_async import fleet, simulator, sync
+from robotiq_async.calibration.amounts import UNITS
 from robotiq_async.values import enums, model
-from robotiq_async.values.amounts import UNITS
 
 CONTRACT = {
     *("RobotiqHand", "RobotiqStatus", "MoveResult", "Transition", "Finger", "ObjectStatus", "Fault", "State"),

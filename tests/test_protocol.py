@@ -21,7 +21,7 @@ from robotiq_async import (
 from robotiq_async.cli.output.tables import print_status
 from robotiq_async.cli.tui.screen import Monitor
 from robotiq_async.fleet import RemoteHand
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from robotiq_async.tools.actions import ACTIONS, Operator
 from robotiq_async.tools.measure.campaigns import grasp, time_closing
 from robotiq_async.tools.metrics import serve_metrics

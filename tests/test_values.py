@@ -46,6 +46,9 @@ from robotiq_async import (
     TunnelPlace,
     Units,
 )
+from robotiq_async.calibration import ForceCalibration, SpeedCalibration
+from robotiq_async.calibration.conventions import Convention
+from robotiq_async.calibration.csv_tables import SPEED_LAYOUT, TableError
 from robotiq_async.control.motion import Move
 from robotiq_async.fleet import ControlLostError, GripperName, Member, NotAllStoppedError, Route
 from robotiq_async.fleet.control.lease import Holder
@@ -53,19 +56,16 @@ from robotiq_async.fleet.keys.access import AccessList
 from robotiq_async.fleet.keys.certificates import Credentials
 from robotiq_async.fleet.network.endpoints import Endpoint
 from robotiq_async.fleet.remote.errand import NoAnswerError
+from robotiq_async.hands.statistics import Counters
 from robotiq_async.link.address import Simulation, parse_address
 from robotiq_async.simulator import Habits, Likeness, Trouble
 from robotiq_async.tools.doctor import Finding, Level
 from robotiq_async.tools.verify.catalogue import EndError
 from robotiq_async.tools.web.settings import PageSettings
-from robotiq_async.values.calibration import ForceCalibration, SpeedCalibration
-from robotiq_async.values.calibration.csv_tables import SPEED_LAYOUT, TableError
-from robotiq_async.values.conventions import Convention
 from robotiq_async.values.frozen_mapping import FrozenMapping
 from robotiq_async.values.model import HAND_E
 from robotiq_async.values.registers import TCP_REGISTERS, gDT
 from robotiq_async.values.request import AxisRequest, Request
-from robotiq_async.values.statistics import Counters
 from robotiq_async.values.status import Part
 from tests.register_words import status_of
 

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from docs.site.docstrings import in_markdown
 
 ROOT: Final = Path(__file__).parents[2]
-ARGUMENTS: Final = runpy.run_path(str(ROOT / "robotiq_async" / "hand" / "arguments.py"))
+ARGUMENTS: Final = runpy.run_path(str(ROOT / "robotiq_async" / "hands" / "arguments.py"))
 DESCRIBES: Final = "describes_arguments("
 COPIES: Final = re.compile(r"_documented_as\((\w+)\)")
 

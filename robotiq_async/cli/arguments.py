@@ -10,8 +10,8 @@ from typing import Annotated, Any, Final, Literal, NamedTuple
 
 from cyclopts import Parameter, Token
 
+from ..hands.options import Option, Place, offered
 from ..runtime.extras import install
-from ..session.options import Option, Place, offered
 from ..values.checks import parse_fingers
 from ..values.enums import Finger
 from .failures import CommandError, UsageError, usage

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from ..hand import Hand
-from ..hand.robotiq_hand import RobotiqHand
+from ..hands import Hand
+from ..hands.options import POLL_INTERVAL_S
 from ..link.address import is_remote
-from ..session.options import POLL_INTERVAL_S
+from ..local.robotiq_hand import RobotiqHand
 from ..tools.actions import Operator
 from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from .arguments import USUAL_LINK, LinkOptions, need

@@ -19,8 +19,8 @@ from typing import Self
 
 from cyclopts import CycloptsError
 
+from ..hands.options import LATE_POLLS
 from ..runtime.signals import ending_signals
-from ..session.options import LATE_POLLS
 from ..values.errors import RobotiqError
 from .app import build
 from .arguments import AMOUNT_UNITS

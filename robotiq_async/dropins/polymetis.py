@@ -29,11 +29,11 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final, NoReturn
 
+from ..calibration.conventions import Convention
 from ..runtime.extras import install
 from ..runtime.log import log
 from ..runtime.version import __version__
 from ..sync import RobotiqHand
-from ..values.conventions import Convention
 from ..values.enums import Finger, State
 from ..values.errors import GripperFaultError, RobotiqConnectionError, RobotiqError
 from ..values.status import RobotiqStatus

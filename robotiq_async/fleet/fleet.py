@@ -10,9 +10,9 @@ from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import Any, Final, Self
 
+from ..hands.streams import Channel, Listeners, Stream
 from ..runtime.clock import now
 from ..runtime.concurrency import running_loop
-from ..session.streams import Channel, Listeners, Stream
 from ..values.enums import Fault, State
 from ..values.errors import NotAllStoppedError, ProtocolError, RobotiqError
 from ..values.model import model_of

@@ -49,7 +49,7 @@ def named(gripper: SimulatedGripper, address: Address) -> str:
 
 
 def simulated(address: str) -> SimulatedGripper | None:
-    """The gripper in this program behind the :attr:`~robotiq_async.hand.Hand.address` of a hand.
+    """The gripper in this program behind the :attr:`~robotiq_async.hands.Hand.address` of a hand.
 
     For those who draw it. None for every other address: a real gripper, and a simulated one elsewhere.
     """

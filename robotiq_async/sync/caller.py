@@ -25,7 +25,7 @@ import sys
 from collections.abc import Callable
 from typing import Final, TypeVar
 
-from ..hand.robotiq_hand import RobotiqHand as AsyncRobotiqHand
+from ..local.robotiq_hand import RobotiqHand as AsyncRobotiqHand
 from ..runtime.concurrency import LateError
 from ..runtime.log import Log, log
 from ..values.enums import State

@@ -6,12 +6,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Generic, Self, TypeVar
 
-from ..hand.arguments import with_arguments_of
-from ..hand.grip_watch import SLIP_COUNTS
-from ..hand.robotiq_hand import RobotiqHand as AsyncRobotiqHand
-from ..hand.run import refuse_copy
-from ..link.tunnel.protocol import Tunnel
-from ..session.options import (
+from ..calibration import ForceCalibration, SpeedCalibration, Units
+from ..hands.arguments import with_arguments_of
+from ..hands.grip_watch import SLIP_COUNTS
+from ..hands.options import (
     ACTIVATION_TIMEOUT_S,
     CONNECT_TIMEOUT_S,
     NO_ADDRESS,
@@ -21,15 +19,17 @@ from ..session.options import (
     HandOptions,
     ReconnectPolicy,
 )
-from ..session.streams import Stream as AsyncStream
-from ..values.calibration import ForceCalibration, SpeedCalibration, Units
+from ..hands.present_run import refuse_copy
+from ..hands.statistics import Statistics
+from ..hands.streams import Stream as AsyncStream
+from ..link.tunnel.protocol import Tunnel
+from ..local.robotiq_hand import RobotiqHand as AsyncRobotiqHand
 from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED, Finger, State
 from ..values.events import SentRequest, Transition
 from ..values.grip import GraspResult, GripEvent
 from ..values.inhibit import Inhibit
 from ..values.model import Model
 from ..values.move_result import MoveResult
-from ..values.statistics import Statistics
 from ..values.status import Part, RobotiqStatus
 from .caller import Caller
 

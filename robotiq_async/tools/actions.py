@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from ..hand import Hand
+from ..hands import Hand
 from ..runtime.clock import now
 from ..values.checks import check_byte
 from ..values.enums import (

@@ -27,14 +27,14 @@ except ModuleNotFoundError as error:
 
     raise ImportError(f"metrics need prometheus-client: {install('metrics')}") from error
 
-from ..hand import Hand
+from ..hands import Hand
+from ..hands.statistics import Statistics
 from ..runtime.concurrency import in_a_thread, wait_shielded
 from ..runtime.log import log
 from ..runtime.sockets import listen
 from ..values.checks import check_int
 from ..values.enums import Fault, State
 from ..values.errors import NotStartedError
-from ..values.statistics import Statistics
 from .service import health
 
 LOOPBACK: Final = "127.0.0.1"

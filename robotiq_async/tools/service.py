@@ -29,7 +29,7 @@ from typing import Any, Final
 import anyio
 
 from ..control.state_machine import RUNNING
-from ..hand import Hand
+from ..hands import Hand
 from ..runtime.clock import now
 from ..runtime.log import log
 from ..runtime.signals import INSIST_S, check_main_thread, ending_signals, pass_on

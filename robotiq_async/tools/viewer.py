@@ -29,7 +29,7 @@ except ModuleNotFoundError as error:
 
     raise ImportError(f"viewers need foxglove-sdk: {install('view')}") from error
 
-from ..hand import Hand
+from ..hands import Hand
 from ..runtime.clock import now
 from ..runtime.concurrency import in_a_thread, wait_shielded
 from ..values.checks import check_int

@@ -1,1 +1,1 @@
-"""Inputs and outputs of a hand: names, requests, status, results, errors, units. Pure."""
+"""Words of the wire: names, models, requests, status, results, errors. Pure: no file, no clock."""

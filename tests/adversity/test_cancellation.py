@@ -239,7 +239,7 @@ async def check_nothing_is_left(world: World) -> None:
     """Nothing is pending, the link is in step, and the next command moves only its axis.
 
     That no caller is left waiting is tested below the hand: tests/control/test_moves.py and
-    tests/session/test_session_waits.py.
+    tests/local/test_session_waits.py.
     """
     hand = world.hand
     assert hand.statistics.reconnects == 0

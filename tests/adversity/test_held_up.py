@@ -9,7 +9,7 @@ from itertools import pairwise
 import pytest
 
 from robotiq_async import Fault, Finger, NotActivatedError, RobotiqHand, State
-from robotiq_async.session.options import LATE_POLLS
+from robotiq_async.hands.options import LATE_POLLS
 from robotiq_async.simulator import Trouble
 from robotiq_async.values.request import Request
 from tests.adversity.world import World, started, world

@@ -1,6 +1,6 @@
 """Random use over a live link that fails at random: what was written, what moved and what was reported.
 
-What an example has found becomes a test of its own, among those of its subject (tests/control, tests/hand,
+What an example has found becomes a test of its own, among those of its subject (tests/control, tests/local,
 tests/adversity). More examples: ``HYPOTHESIS_PROFILE=explore``.
 """
 

@@ -17,7 +17,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from statistics import median
 
-from robotiq_async.values.statistics import percentile
+from robotiq_async.hands.statistics import percentile
 from tests.benchmarks import program
 from tests.benchmarks.contenders import INTERVAL_S, periods
 from tests.benchmarks.program import (

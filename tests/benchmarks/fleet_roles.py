@@ -26,8 +26,8 @@ from robotiq_async.fleet.network.configuration import agent_configuration, clien
 from robotiq_async.fleet.network.zenoh_bus import ZenohBus, open_bus
 from robotiq_async.fleet.wire.envelope import AgentAnswer, unpack_call
 from robotiq_async.fleet.wire.status_message import StatusMessage
-from robotiq_async.hand import Hand
-from robotiq_async.values.statistics import Counters, percentile
+from robotiq_async.hands import Hand
+from robotiq_async.hands.statistics import Counters, percentile
 from tests.benchmarks.program import Figures
 
 INTERVAL_S = 0.005

@@ -28,8 +28,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from robotiq_async import Finger, RobotiqHand, RobotiqStatus
+from robotiq_async.hands.statistics import percentile
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper
-from robotiq_async.values.statistics import percentile
 from tests.benchmarks import program
 from tests.benchmarks.program import ROOT, Row, figures_of, median_of
 from tests.serial_line import SerialLine

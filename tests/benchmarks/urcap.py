@@ -19,9 +19,9 @@ from contextlib import contextmanager
 from functools import partial
 
 from robotiq_async import JAW, TWO_FINGER_85, RobotiqHand
+from robotiq_async.hands.statistics import percentile
 from robotiq_async.link.urcap.transport import SLOW
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble, UrcapSimulatorServer
-from robotiq_async.values.statistics import percentile
 from tests.benchmarks import program
 from tests.benchmarks.program import ROOT, Row, figures_of, median_of
 

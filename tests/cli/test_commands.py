@@ -19,10 +19,10 @@ import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
 from robotiq_async import JAW, TWO_FINGER_85, Fault, Finger, RobotiqStatus
+from robotiq_async.calibration.csv_tables import write_stroke
 from robotiq_async.cli.commands.demo import _program
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values import registers as reg
-from robotiq_async.values.calibration.csv_tables import write_stroke
 from robotiq_async.values.request import Request
 from tests.cli.conftest import CLOSED, Outcome, served
 from tests.patience import patience

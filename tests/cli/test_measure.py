@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING
 import pytest
 
 from robotiq_async import JAW, TWO_FINGER_85
-from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.tools.measure.campaigns import read_currents
-from robotiq_async.values.calibration.csv_tables import (
+from robotiq_async.calibration.csv_tables import (
     FORCE,
     SPEED_LAYOUT,
     read_stroke,
     read_table,
 )
-from robotiq_async.values.calibration.thesis import FOAM_GRAMS, RIGID_GRAMS
+from robotiq_async.calibration.thesis import FOAM_GRAMS, RIGID_GRAMS
+from robotiq_async.simulator import SimulatedGripper, SimulatorServer
+from robotiq_async.tools.measure.campaigns import read_currents
 from robotiq_async.values.request import Request
 from tests.cli.conftest import draw_nothing, served
 

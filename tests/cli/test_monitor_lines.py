@@ -15,7 +15,7 @@ import pytest
 
 from robotiq_async import Fault, Finger, RobotiqHand
 from robotiq_async.cli.output.lines import print_objects
-from robotiq_async.session.options import LATE_POLLS
+from robotiq_async.hands.options import LATE_POLLS
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.forked import ROOT, forking
 from tests.grippers import shows, until

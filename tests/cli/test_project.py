@@ -23,7 +23,7 @@ def test_one_version() -> None:
     assert found is not None
     assert found["version"] == version
     assert "version" not in PROJECT
-    assert f"<version>{version}</version>" in (ROOT / "ros2" / "package.xml").read_text()
+    assert f"<version>{version}</version>" in (ROOT / "packaging" / "ros2" / "package.xml").read_text()
     changes = (ROOT / "CHANGELOG.md").read_text()
     assert f"## [{version}]" in changes
     # As long as nothing is released there is none to cite.

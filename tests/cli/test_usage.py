@@ -19,7 +19,7 @@ from robotiq_async.cli.commands.fleet import fleet, halt, keys
 from robotiq_async.cli.commands.measure import speed
 from robotiq_async.cli.commands.measure_force import force
 from robotiq_async.cli.commands.measure_stroke import stroke
-from robotiq_async.session.options import LATE_POLLS
+from robotiq_async.hands.options import LATE_POLLS
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.conftest import FORGETTING, WITHOUT
 

@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 import pytest
 
 from robotiq_async import RobotiqHand, State
-from robotiq_async.hand import Hand
-from robotiq_async.session.options import POLL_INTERVAL_S
+from robotiq_async.hands import Hand
+from robotiq_async.hands.options import POLL_INTERVAL_S
 from robotiq_async.simulator import Physics, SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.values.model import THREE_FINGER, Model
 from robotiq_async.values.request import Request

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from robotiq_async import HAND_E, JAW, TWO_FINGER_85, TWO_FINGER_140, Finger
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from robotiq_async.values.status import Part
 from tests.contract.bench import Bench, at_rest, contract, on_model
 

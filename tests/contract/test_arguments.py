@@ -12,7 +12,7 @@ import pytest
 
 from robotiq_async import Finger
 from robotiq_async.fleet import RemoteHand
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from tests.calls import CALLS, called
 from tests.contract.bench import Bench, at_rest, contract
 

@@ -7,7 +7,7 @@ import asyncio
 import pytest
 
 from robotiq_async import Finger, MoveSupersededError, NotActivatedError, State
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from tests.contract.bench import A, B, Bench, C, S, at_rest, contract, ended
 
 

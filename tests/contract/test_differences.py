@@ -10,7 +10,7 @@ import pytest
 
 from robotiq_async import RobotiqError, RobotiqHand, State
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from tests.contract.bench import A, Bench, contract, ended
 from tests.docs.pages import table
 from tests.virtual import until

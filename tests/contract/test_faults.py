@@ -13,7 +13,7 @@ from robotiq_async import (
     State,
     StateTimeoutError,
 )
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from tests.contract.bench import A, Bench, at_rest, contract, ended
 
 

@@ -22,7 +22,7 @@ from robotiq_async import (
     State,
     Stream,
 )
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from tests.contract.bench import A, B, Bench, C, at_rest, contract, ended
 
 GAINED, SLIPPED, LOST, RELEASED = GripChange

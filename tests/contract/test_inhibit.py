@@ -17,7 +17,7 @@ from robotiq_async import (
     RobotiqHand,
     State,
 )
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from tests.contract.bench import LOCAL, A, Bench, at_rest, bench, contract, ended
 from tests.virtual import inside, until
 

@@ -19,7 +19,7 @@ from robotiq_async import (
 )
 from robotiq_async.fleet.network.bus import Bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from tests.calls import COMMANDS, called
 from tests.contract.bench import LOCAL, REMOTE, A, B, Bench, C, contract, ended, statuses
 from tests.virtual import until

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from robotiq_async import NotStartedError, RobotiqStatus, State, Stream
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from tests.calls import CALLS, called
 from tests.contract.bench import LOCAL, REMOTE, A, Bench, bench, contract
 from tests.virtual import VirtualLoop

@@ -18,7 +18,7 @@ from robotiq_async import (
     ObjectStatus,
     RobotiqStatus,
 )
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from robotiq_async.values.request import AxisRequest, Request
 from tests.contract.bench import A, B, Bench, C, at_rest, contract, ended
 

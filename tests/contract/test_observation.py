@@ -9,7 +9,7 @@ import logging
 import pytest
 
 from robotiq_async import ConnectionLostError, NotStartedError, RobotiqError, RobotiqStatus, State
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from tests.calls import COMMANDS, called
 from tests.contract.bench import A, Bench, at_rest, contract, ended, statuses
 

@@ -20,7 +20,7 @@ import pytest
 pytest.importorskip("mujoco", reason="needs the extra physics")
 
 from robotiq_async import Finger, GripChange, GripEvent, Stream
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from robotiq_async.simulator import Habits
 from robotiq_async.values.model import HAND_E, MODELS, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
 from tests.contract.bench import LOCAL, MODEL, PHYSICS, Bench, bench

@@ -11,7 +11,7 @@ from typing import TypeVar
 import pytest
 
 from robotiq_async import ConnectionLostError, Fault, State, Stream
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from tests.contract.bench import A, Bench, at_rest, contract
 
 T = TypeVar("T")

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from robotiq_async import HAND_E, THREE_FINGER, TWO_FINGER_85, RobotiqHand, Units
+from robotiq_async.calibration import ForceCalibration, SpeedCalibration
+from robotiq_async.calibration.csv_tables import FORCE, SPEED_LAYOUT, write_table
 from robotiq_async.fleet import RemoteHand
-from robotiq_async.hand import Hand
-from robotiq_async.values.calibration import ForceCalibration, SpeedCalibration
-from robotiq_async.values.calibration.csv_tables import FORCE, SPEED_LAYOUT, write_table
+from robotiq_async.hands import Hand
 
 THESIS = Units()
 HANDS: list[Callable[..., Hand]] = [RobotiqHand, partial(RemoteHand, "zenoh://lab/cell/left")]

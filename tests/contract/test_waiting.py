@@ -7,7 +7,7 @@ import asyncio
 import pytest
 
 from robotiq_async import Fault, NotStartedError, State, StateTimeoutError
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from tests.contract.bench import Bench, contract, ended
 
 

@@ -11,7 +11,7 @@ from robotiq_async.control.controller import Controller
 from robotiq_async.control.motion import Move
 from robotiq_async.control.pending import Command
 from robotiq_async.control.state_machine import TABLE, StateMachine
-from robotiq_async.session.options import units_of
+from robotiq_async.hands.options import units_of
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.enums import StopLevel, Trigger
 from robotiq_async.values.errors import RobotiqError

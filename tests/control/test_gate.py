@@ -15,7 +15,7 @@ from robotiq_async.control.gate import gate
 from robotiq_async.control.motion import Move
 from robotiq_async.control.pending import Command
 from robotiq_async.control.state_machine import StateMachine
-from robotiq_async.session.options import units_of
+from robotiq_async.hands.options import units_of
 from robotiq_async.values.enums import StopLevel
 from robotiq_async.values.model import MODELS, Model
 from robotiq_async.values.request import Request

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robotiq_async.calibration.scales import closing_time
 from robotiq_async.control.entry import Entry
 from robotiq_async.control.ledger import Ledger
 from robotiq_async.control.motion import Move
 from robotiq_async.control.pending import Command, OpenRequests, Pending
 from robotiq_async.control.waiters import fail
-from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.enums import NO_AXES, Finger, ObjectStatus
 from robotiq_async.values.errors import MoveSupersededError
 from robotiq_async.values.model import THREE_FINGER

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import Finger, MoveSupersededError, ObjectStatus, State
+from robotiq_async.calibration.scales import closing_time
 from robotiq_async.control.motion import Move
-from robotiq_async.values.calibration.scales import closing_time
 from robotiq_async.values.request import Request
 from tests.control.scan import POLL_S, Outcome, Scan, started
 

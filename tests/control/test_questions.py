@@ -11,7 +11,7 @@ from robotiq_async.control.controller import Controller
 from robotiq_async.control.ledger import Ledger
 from robotiq_async.control.rest import LAG_READS, LAG_S
 from robotiq_async.control.state_machine import StateMachine
-from robotiq_async.session.options import units_of
+from robotiq_async.hands.options import units_of
 from robotiq_async.values.enums import NO_AXES, Finger
 from robotiq_async.values.errors import RobotiqError
 from robotiq_async.values.model import THREE_FINGER

@@ -75,7 +75,7 @@ KNOWN = {
         ("README.md", "[a](docs/how-to/fleet.md)", "[a](how-to/fleet.md)"),
         ("README.md", "[a](docs/decisions/)", "[a](decisions/README.md)"),
         ("README.md", "![a](docs/measured/web.webp)", "![a](measured/web.webp)"),
-        ("docs/tutorial.md", "[`hand`](../robotiq_async/hand/robotiq_hand.py)", "`hand`"),
+        ("docs/tutorial.md", "[`hand`](../robotiq_async/local/robotiq_hand.py)", "`hand`"),
         ("docs/tutorial.md", "[a](gone.md)", "[a](gone.md)"),
         (
             "docs/tutorial.md",
@@ -128,7 +128,7 @@ def test_every_documented_name_exists_and_is_listed_once() -> None:
         ("See :class:`~robotiq_async.RobotiqHand`.", "See `RobotiqHand`."),
         ("as :attr:`Hand.statistics` does", "as `Hand.statistics` does"),
         ("(:mod:`.feed`)", "(`feed`)"),
-        ("in :mod:`robotiq_async.values.calibration.scales`", "in `scales`"),
+        ("in :mod:`robotiq_async.calibration.scales`", "in `scales`"),
         ("Like this::\n\n    code", "Like this:\n\n    code"),
         ("``a::b`` and [::1]", "``a::b`` and [::1]"),
     ],

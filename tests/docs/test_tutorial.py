@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 
-from robotiq_async.session.options import LATE_POLLS
+from robotiq_async.hands.options import LATE_POLLS
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.docs.pages import ROOT, TUTORIAL, Block, blocks, compiled_prompt, read, run_prompt
 from tests.patience import patience

@@ -24,7 +24,7 @@ from robotiq_async.fleet.network.configuration import (
 )
 from robotiq_async.fleet.network.zenoh_bus import open_bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
-from robotiq_async.session.options import POLL_INTERVAL_S
+from robotiq_async.hands.options import POLL_INTERVAL_S
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.request import AxisRequest, Request
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from robotiq_async import TWO_FINGER_85
+from robotiq_async.calibration.csv_tables import write_stroke
 from robotiq_async.fleet.agent.agent_file import (
     AgentFileError,
     AgentSettings,
@@ -16,7 +17,6 @@ from robotiq_async.fleet.agent.agent_file import (
 )
 from robotiq_async.fleet.network.configuration import LOOPBACK_ENDPOINT, LOOPBACK_TLS, agent_configuration
 from robotiq_async.fleet.wire.names import check_name
-from robotiq_async.values.calibration.csv_tables import write_stroke
 
 LEFT = '[grippers.left]\naddress = "tcp://192.168.1.11"\n'
 GOOD = f'site = "lab"\nhost = "cell-1"\n{LEFT}'

@@ -7,12 +7,12 @@ from typing import Any
 import pytest
 
 from robotiq_async import JAW, TWO_FINGER_85
+from robotiq_async.calibration.amounts import UNITS
 from robotiq_async.fleet.remote.mirror import Mirror
 from robotiq_async.fleet.wire.values import reading
+from robotiq_async.hands.streams import Channels
 from robotiq_async.runtime.limit import Limit
 from robotiq_async.runtime.log import log
-from robotiq_async.session.streams import Channels
-from robotiq_async.values.amounts import UNITS
 from robotiq_async.values.errors import ProtocolError
 from tests.fleet.lab import lab
 from tests.virtual import virtual

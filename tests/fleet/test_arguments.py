@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from robotiq_async.fleet import RemoteHand
-from tests.hand.test_arguments import assert_calls_describe, assert_constructor_describes
+from tests.hands.test_arguments import assert_calls_describe, assert_constructor_describes
 
 
 def test_its_calls_describe_what_they_take() -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import pytest
 
 from robotiq_async import Finger, MoveTimeoutError, RobotiqError, RobotiqHand, State
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from robotiq_async.values.request import Request
 from tests.fleet.lab import POLL_S, Lab, lab
 from tests.virtual import inside, until

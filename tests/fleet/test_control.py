@@ -13,13 +13,13 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger, State
+from robotiq_async.calibration.scales import SpeedCalibration
 from robotiq_async.fleet.agent import records
 from robotiq_async.fleet.agent.records import FileRecords, NoRecords, file_records
 from robotiq_async.fleet.control.lease import Holder, Lease
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import AgentCall
 from robotiq_async.fleet.wire.names import GripperName
-from robotiq_async.values.calibration.scales import SpeedCalibration
 from robotiq_async.values.errors import AgentError, ControlLostError
 from robotiq_async.values.model import TWO_FINGER_85
 from robotiq_async.values.request import Request as Image

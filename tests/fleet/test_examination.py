@@ -19,7 +19,7 @@ from robotiq_async.fleet.network.bus import Query, Urgency
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import AgentAnswer
 from robotiq_async.fleet.wire.names import GripperName
-from robotiq_async.hand.robotiq_hand import RobotiqHand
+from robotiq_async.local.robotiq_hand import RobotiqHand
 from robotiq_async.simulator import SimulatorServer
 from robotiq_async.tools.doctor import Finding, Level, examine_remote
 from robotiq_async.tools.doctor.findings import GiveUpError

@@ -29,6 +29,7 @@ from robotiq_async import (
 from robotiq_async.fleet.wire import values
 from robotiq_async.fleet.wire.envelope import AgentAnswer, AgentCall, failure, unpack_answer, unpack_call
 from robotiq_async.fleet.wire.status_message import SIZE, StatusMessage, unpack
+from robotiq_async.hands.statistics import Statistics
 from robotiq_async.values import errors
 from robotiq_async.values.enums import Trigger
 from robotiq_async.values.errors import (
@@ -44,7 +45,6 @@ from robotiq_async.values.errors import (
 )
 from robotiq_async.values.model import MODELS
 from robotiq_async.values.request import AxisRequest, Request
-from robotiq_async.values.statistics import Statistics
 from tests.fleet.lab import instantly
 from tests.strategies import ANY
 

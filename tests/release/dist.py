@@ -38,7 +38,7 @@ IN_THE_SDIST: Final = (
         "demo/demo.py",
         "docs/tutorial.md",
         "hatch_build.py",
-        "ros2/package.xml",
+        "packaging/ros2/package.xml",
     ),
     *("robotiq_async/__init__.py", "tests/conftest.py"),
 )

@@ -16,7 +16,7 @@ PROGRAM: Final = """
 import asyncio, sys
 from robotiq_async import RobotiqHand
 from robotiq_async.cli import main
-from robotiq_async.values.calibration import SpeedCalibration
+from robotiq_async.calibration import SpeedCalibration
 
 async def grip():
     async with RobotiqHand("sim://?model=2f85&object=120&speedup=20") as hand:

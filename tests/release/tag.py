@@ -21,12 +21,12 @@ from tests.release.environments import ROOT, FailedError, exit_code
 def repositories() -> dict[str, str]:
     """The repository named in the project's files, by file."""
     urls = tomllib.loads(_read("pyproject.toml"))["project"]["urls"]
-    package = ET.fromstring(_read("ros2/package.xml"))
+    package = ET.fromstring(_read("packaging/ros2/package.xml"))
     citation = re.search(r"^repository-code: (\S+)$", _read("CITATION.cff"), re.MULTILINE)
     return {
         "pyproject.toml": urls["Repository"],
         "CITATION.cff": citation[1] if citation else "",
-        "ros2/package.xml": package.findtext("url[@type='repository']", ""),
+        "packaging/ros2/package.xml": package.findtext("url[@type='repository']", ""),
     }
 
 

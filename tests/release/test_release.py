@@ -55,7 +55,7 @@ def test_every_file_names_the_same_repository() -> None:
 
 
 def test_no_address_is_an_example() -> None:
-    for name in ("pyproject.toml", "CITATION.cff", "ros2/package.xml", "README.md", "SECURITY.md"):
+    for name in ("pyproject.toml", "CITATION.cff", "packaging/ros2/package.xml", "README.md", "SECURITY.md"):
         assert not re.search(r"example\.(org|com)", (ROOT / name).read_text(encoding="utf-8")), name
 
 

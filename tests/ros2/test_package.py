@@ -18,6 +18,7 @@ from robotiq_async.ros2.translation.settings import PARAMETERS
 from robotiq_async.tools.description import urdf
 
 ROOT = Path(__file__).parents[2]
+FILES = ROOT / "packaging" / "ros2"
 BUILD = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["hatch"]["build"]
 SHARED: dict[str, str] = BUILD["targets"]["wheel"]["shared-data"]
 PAGE = (ROOT / "docs" / "how-to" / "ros2.md").read_text(encoding="utf-8")
@@ -31,8 +32,8 @@ def test_everything_that_ros_looks_for_is_there() -> None:
         "lib/robotiq_async/gripper",
     }
     assert all((ROOT / source).is_file() for source in SHARED)
-    assert os.access(ROOT / "ros2" / "gripper", os.X_OK)
-    assert ET.parse(ROOT / "ros2" / "package.xml").findtext("name") == "robotiq_async"
+    assert os.access(FILES / "gripper", os.X_OK)
+    assert ET.parse(FILES / "package.xml").findtext("name") == "robotiq_async"
 
 
 def test_every_package_of_ros_that_is_imported_is_a_dependency() -> None:
@@ -41,13 +42,13 @@ def test_every_package_of_ros_that_is_imported_is_a_dependency() -> None:
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
                 imported.add(node.module.partition(".")[0])
-    wanted = {each.text for each in ET.parse(ROOT / "ros2" / "package.xml").findall("exec_depend")}
+    wanted = {each.text for each in ET.parse(FILES / "package.xml").findall("exec_depend")}
     of_ros = {each for each in imported if each.endswith(("_msgs", "_srvs", "_interfaces"))} | {"rclpy"}
     assert of_ros <= wanted
 
 
 def test_arguments_of_the_launch_file_are_parameters() -> None:
-    text = (ROOT / "ros2" / "gripper.launch.py").read_text(encoding="utf-8")
+    text = (FILES / "gripper.launch.py").read_text(encoding="utf-8")
     (arguments,) = re.findall(r"^ARGUMENTS = ({.*?^})", text, re.MULTILINE | re.DOTALL)
     assert set(ast.literal_eval(arguments)) <= set(PARAMETERS)
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from robotiq_async.calibration.motion_profile import PRESSING_S
 from robotiq_async.simulator import Habits
-from robotiq_async.values.calibration.motion_profile import PRESSING_S
 from robotiq_async.values.enums import NO_AXES, Fault, Finger, Initialization, Mode, ObjectStatus
 from robotiq_async.values.model import THREE_FINGER
 from tests.simulator.conftest import CYCLE

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async.values.calibration.scales import closing_time
+from robotiq_async.calibration.scales import closing_time
 from robotiq_async.values.enums import Fault, Finger, Initialization, ObjectStatus, Severity
 from robotiq_async.values.model import THREE_FINGER
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robotiq_async.calibration import MotionProfile, SpeedCalibration
 from robotiq_async.simulator import Physics, SimulatedGripper
-from robotiq_async.values.calibration import MotionProfile, SpeedCalibration
 from robotiq_async.values.enums import JAW, ObjectStatus
 from robotiq_async.values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
 from robotiq_async.values.status import RobotiqStatus

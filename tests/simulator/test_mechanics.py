@@ -18,10 +18,10 @@ pytest.importorskip("mujoco", reason="needs the extra physics")
 
 from demo import grasp_loop
 from robotiq_async import Finger, ObjectStatus, RobotiqHand, RobotiqStatus
+from robotiq_async.calibration.scales import SpeedCalibration
 from robotiq_async.simulator import Habits, Physics, SimulatedGripper
 from robotiq_async.simulator.mechanics.stepper import OrderedDrive
 from robotiq_async.simulator.physics.driven_axis import Way
-from robotiq_async.values.calibration.scales import SpeedCalibration
 from robotiq_async.values.enums import JAW
 from robotiq_async.values.model import HAND_E, MODELS, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
 from tests.patience import patience

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from robotiq_async.values.calibration.scales import closing_time
-from robotiq_async.values.calibration.thesis import CLOSING_MS
+from robotiq_async.calibration.scales import closing_time
+from robotiq_async.calibration.thesis import CLOSING_MS
 from robotiq_async.values.enums import Finger, ObjectStatus
 from robotiq_async.values.model import THREE_FINGER
 from tests.simulator.conftest import CYCLE

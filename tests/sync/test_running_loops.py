@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from robotiq_async.session.options import LATE_POLLS
+from robotiq_async.hands.options import LATE_POLLS
 from robotiq_async.sync import RobotiqHand
 
 WORDS = "an event loop runs in this thread"

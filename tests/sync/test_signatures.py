@@ -9,7 +9,7 @@ import pytest
 
 import robotiq_async
 from robotiq_async import sync
-from robotiq_async.session.streams import Stream as AsyncStream
+from robotiq_async.hands.streams import Stream as AsyncStream
 
 ASYNC, BLOCKING = robotiq_async.RobotiqHand, sync.RobotiqHand
 NAMES = [name for name in dir(ASYNC) if not name.startswith("_")]

@@ -10,6 +10,16 @@ from pathlib import Path
 import pytest
 
 from robotiq_async import HAND_E, THREE_FINGER, TWO_FINGER_85, Finger, RobotiqHand
+from robotiq_async.calibration import SpeedCalibration
+from robotiq_async.calibration.csv_tables import (
+    FORCE,
+    SPEED_LAYOUT,
+    TableError,
+    read_table,
+)
+from robotiq_async.calibration.motion_profile import PRESSING_S
+from robotiq_async.calibration.scales import closing_time
+from robotiq_async.calibration.thesis import CLOSING_MS, FOAM_GRAMS, RIGID_GRAMS
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.simulator.physics.axis import peak
 from robotiq_async.simulator.physics.scale import SimulatedScale
@@ -28,16 +38,6 @@ from robotiq_async.tools.measure.campaigns import (
     time_closing,
     write_currents,
 )
-from robotiq_async.values.calibration import SpeedCalibration
-from robotiq_async.values.calibration.csv_tables import (
-    FORCE,
-    SPEED_LAYOUT,
-    TableError,
-    read_table,
-)
-from robotiq_async.values.calibration.motion_profile import PRESSING_S
-from robotiq_async.values.calibration.scales import closing_time
-from robotiq_async.values.calibration.thesis import CLOSING_MS, FOAM_GRAMS, RIGID_GRAMS
 from robotiq_async.values.errors import MeasuringError
 from tests.grippers import activate_beforehand
 from tests.virtual import VirtualLoop, virtual

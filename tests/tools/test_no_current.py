@@ -21,7 +21,7 @@ from robotiq_async.tools.recording.table import COLUMNS, Table
 from robotiq_async.tools.web.page.mirror import HandMirror
 from robotiq_async.tools.web.server import HandUpdates
 from tests.fleet.lab import lab
-from tests.hand.test_urcap import OldUrcapServer, at_a_ur
+from tests.local.test_urcap import OldUrcapServer, at_a_ur
 
 pytestmark = pytest.mark.virtual_time
 

@@ -25,10 +25,10 @@ from robotiq_async import (
     RobotiqStatus,
     Units,
 )
+from robotiq_async.calibration import SpeedCalibration
+from robotiq_async.calibration.csv_tables import TableError, read_stroke, write_stroke
 from robotiq_async.control.evidence import without_fault
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.values.calibration import SpeedCalibration
-from robotiq_async.values.calibration.csv_tables import TableError, read_stroke, write_stroke
 from robotiq_async.values.model import MODELS
 from robotiq_async.values.status import Part
 from robotiq_async.values.stroke import LEAST_FALL_MM, Stroke, check_points

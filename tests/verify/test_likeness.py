@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from robotiq_async.calibration import MotionProfile
 from robotiq_async.simulator import (
     Habits,
     Likeness,
@@ -23,7 +24,6 @@ from robotiq_async.simulator.physics.controller import usual_motion
 from robotiq_async.simulator.troubles.likeness import SCHEMA
 from robotiq_async.simulator.troubles.trouble import Trouble
 from robotiq_async.tools.verify import Report
-from robotiq_async.values.calibration import MotionProfile
 from robotiq_async.values.model import MODELS, TWO_FINGER_85, Model
 from tests.verify.people import SHORT, Helper, verified
 from tests.virtual import run

@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("mujoco", reason="needs the extra physics")
 
-from robotiq_async.session.options import units_of
+from robotiq_async.hands.options import units_of
 from robotiq_async.simulator import Habits, Physics, SimulatedGripper
 from robotiq_async.tools.verify import CheckVerdict
 from robotiq_async.tools.verify.stages import soft_part

@@ -36,7 +36,7 @@ from robotiq_async import (
     RobotiqStatus,
     State,
 )
-from robotiq_async.hand import Hand
+from robotiq_async.hands import Hand
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import Operator
 from robotiq_async.tools.description import hand_model

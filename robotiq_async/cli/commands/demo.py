@@ -11,7 +11,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Final
 
-from ...hand import Hand
+from ...hands import Hand
 from ..arguments import AddressArgument, Flag, Yes, need
 from ..browser import opened
 from ..consent import consent

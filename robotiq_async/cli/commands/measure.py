@@ -19,7 +19,7 @@ from ..consent import consent
 from ..failures import CommandError, UsageError
 
 if TYPE_CHECKING:
-    from ...hand import Hand
+    from ...hands import Hand
     from ...simulator import SimulatedGripper
     from ...tools.measure.campaigns import Campaign
     from ...values.model import Model
@@ -113,7 +113,7 @@ async def _carry_out(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    from ...values.calibration.csv_tables import TableError
+    from ...calibration.csv_tables import TableError
 
     if done := len(campaign.table):
         print(f"Continuing {campaign.path}: {done} rows are there, {len(campaign.left)} remain.", flush=True)
@@ -158,7 +158,7 @@ async def _carry_out(
 @contextmanager
 def table_errors() -> Iterator[None]:
     """Turn TableError and OSError of tables and pictures into CommandError."""
-    from ...values.calibration.csv_tables import TableError
+    from ...calibration.csv_tables import TableError
 
     try:
         yield

@@ -20,10 +20,10 @@ from ..failures import CommandError, UsageError
 from .measure import NoPlot, Speedup, check, measure_left, print_files, table_errors
 
 if TYPE_CHECKING:
-    from ...hand import Hand
+    from ...calibration.csv_tables import RunsTable
+    from ...hands import Hand
     from ...simulator import SimulatedGripper
     from ...tools.measure.campaigns import Campaign, Currents
-    from ...values.calibration.csv_tables import RunsTable
 
 FORCE_WARNING = """the fingers MOVE: they open and close on what lies between them, {count} times.
 If it is not active yet it is activated first, and what it holds drops."""
@@ -75,8 +75,8 @@ def force(
     if (model := named_model(address)) is not THREE_FINGER:
         raise UsageError(f"forces are measured with three fingers; {address} names a {model}")
     factor = check(address, path, speedup, plot=not no_plot)
+    from ...calibration.csv_tables import FORCE, read_table
     from ...tools.measure.campaigns import force_campaign
-    from ...values.calibration.csv_tables import FORCE, read_table
 
     with table_errors():
         readings = None if scale is None else read_table(scale, FORCE)
@@ -104,8 +104,8 @@ async def _measure(
     bar: bool,
     plot: bool,
 ) -> None:
+    from ...calibration.scales import closing_time
     from ...tools.measure.campaigns import GRASP_S, grasp, write_currents
-    from ...values.calibration.scales import closing_time
 
     output = campaign.path
     currents_file = currents_beside(output)

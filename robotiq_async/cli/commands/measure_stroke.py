@@ -20,7 +20,7 @@ from .measure import check, gripper_to_measure
 from .measure_force import prompt
 
 if TYPE_CHECKING:
-    from ...hand import Hand
+    from ...hands import Hand
     from ...values.stroke import Point, Points
 
 STROKE_WARNING: Final = """the jaw MOVES to {count} positions, from open to closed, at its least force, and
@@ -84,7 +84,7 @@ def stroke(
 
 
 async def _measure(address: str, output: Path, count: int) -> None:
-    from ...values.calibration.csv_tables import write_stroke
+    from ...calibration.csv_tables import write_stroke
 
     print(gripper_words(address), flush=True)
     async with gripper_to_measure(address, 1.0) as hand:

@@ -12,7 +12,7 @@ from typing import Annotated, Final
 
 from cyclopts import Parameter
 
-from ...hand import Hand
+from ...hands import Hand
 from ...tools.recording.payloads import reading_fields
 from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from ..addresses import gripper_words

@@ -7,10 +7,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from ...calibration import Units
+from ...calibration.amounts import force_of, position_of, speed_of
 from ...link.address import is_remote
 from ...tools.wording import axis_name
-from ...values.amounts import force_of, position_of, speed_of
-from ...values.calibration import Units
 from ...values.checks import check_timeout
 from ...values.enums import Finger
 from ..addresses import gripper_words, is_simulated

@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from cyclopts import Parameter
 
+from ...calibration.conventions import CONVENTIONS, Convention
 from ...runtime.log import printable
-from ...values.conventions import CONVENTIONS, Convention
 from ..addresses import gripper_words
 from ..arguments import USUAL_LINK, AddressArgument, Flag, LinkOptions, need
 from ..failures import CommandError, UsageError, file_errors, normal_end
 from ..output.lines import FORMATTERS, brief_line, clock
 
 if TYPE_CHECKING:
-    from ...hand import Hand
+    from ...hands import Hand
     from ...tools.recording.recorder import Recorder
     from ...tools.recording.recordings import RecordedMessage
 

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
+from ...hands.options import HandOptions
 from ...link.address import is_remote, parse_address
 from ...runtime.concurrency import wait_shielded
-from ...session.options import HandOptions
 from ...values.model import model_of
 from ..addresses import gripper_words
 from ..arguments import AddressArgument, StageNumber, need

@@ -19,7 +19,7 @@ from ...values.status import NO_REQUEST, RobotiqStatus
 from .messages import forwarded_warnings
 
 if TYPE_CHECKING:
-    from ...hand import Hand
+    from ...hands import Hand
 
 NO_VALUE: Final = "-"
 """The text for a state without a meaning."""

@@ -15,7 +15,7 @@ from .lines import axis_words
 
 if TYPE_CHECKING:
     from ... import MoveResult, RobotiqStatus
-    from ...hand import Hand
+    from ...hands import Hand
 
 TABLE_WIDTH: Final = 80
 """Columns that a table may have in any window, as in a pipe."""

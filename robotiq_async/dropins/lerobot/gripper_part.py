@@ -12,10 +12,10 @@ import time
 from contextlib import suppress
 from typing import Final
 
+from ...calibration.conventions import Convention
 from ...runtime.log import Log
 from ...sync import RobotiqHand
 from ...values.checks import as_float, check_flag, check_number, repr_of, single
-from ...values.conventions import Convention
 from ...values.enums import FORCE_MAX, Finger, State
 from ...values.errors import GripperFaultError, InvalidStateError, NotActivatedError, RobotiqError
 from ...values.status import RobotiqStatus

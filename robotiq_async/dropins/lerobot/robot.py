@@ -23,8 +23,8 @@ except ImportError as error:
         "(the part, robotiq_async.dropins.lerobot.GripperPart, needs neither)"
     ) from error
 
+from ...calibration.conventions import Convention
 from ...sync import RobotiqHand
-from ...values.conventions import Convention
 from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
 from .gripper_part import LOST_AFTER_S, GripperPart
 

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from ...hand.robotiq_hand import RobotiqHand
+from ...local.robotiq_hand import RobotiqHand
 from ...runtime.clock import now
 from ...runtime.log import Log
 from ...values.errors import AgentError

@@ -13,9 +13,9 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any, Final
 
-from ...hand.robotiq_hand import RobotiqHand
+from ...hands.options import HandOptions, Place, offered
 from ...link.address import is_remote, parse_address
-from ...session.options import HandOptions, Place, offered
+from ...local.robotiq_hand import RobotiqHand
 from ...values.checks import check_seconds
 from ...values.model import model_of
 from ..control.lease import LEASE_WINDOW_S, WINDOW_MAX_S, WINDOW_MIN_S

@@ -6,7 +6,7 @@ from contextlib import suppress
 from typing import Final
 
 from ...control.state_machine import RUNNING
-from ...hand.robotiq_hand import RobotiqHand
+from ...local.robotiq_hand import RobotiqHand
 from ...runtime.limit import Limit
 from ...runtime.log import Log
 from ...values.enums import Finger

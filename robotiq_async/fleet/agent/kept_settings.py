@@ -21,7 +21,7 @@ from contextlib import suppress
 from typing import Any, Final
 
 from ...control.state_machine import RUNNING
-from ...hand.robotiq_hand import RobotiqHand
+from ...local.robotiq_hand import RobotiqHand
 from ...values.enums import Finger
 from ...values.errors import RobotiqError
 from ...values.events import SentRequest, Transition

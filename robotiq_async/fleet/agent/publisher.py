@@ -12,7 +12,7 @@ from collections import deque
 from itertools import islice
 from typing import Any, Final
 
-from ...hand.robotiq_hand import RobotiqHand
+from ...local.robotiq_hand import RobotiqHand
 from ...runtime.clock import now
 from ...values.errors import RobotiqError
 from ...values.events import SentRequest, Transition

@@ -27,12 +27,12 @@ from dataclasses import replace
 from inspect import signature
 from typing import Final
 
+from ...calibration.amounts import UNITS
 from ...control.state_machine import RUNNING
-from ...hand.robotiq_hand import RobotiqHand
+from ...local.robotiq_hand import RobotiqHand
 from ...runtime.clock import now
 from ...runtime.log import Log
 from ...runtime.version import __version__
-from ...values.amounts import UNITS
 from ...values.errors import AgentError, ControlLostError, RobotiqError
 from ...values.inhibit import Inhibit
 from ...values.move_result import MoveResult

@@ -8,11 +8,12 @@ from dataclasses import replace
 from functools import cache, partial
 from typing import Final, Literal
 
+from ...calibration import ForceCalibration, SpeedCalibration
 from ...control.state_machine import RUNNING, refusal
-from ...hand import Hand
+from ...hands import Hand
+from ...hands.options import units_of
+from ...hands.statistics import Counters, Statistics
 from ...runtime.limit import Limit
-from ...session.options import units_of
-from ...values.calibration import ForceCalibration, SpeedCalibration
 from ...values.checks import check_flag, check_seconds
 from ...values.enums import Finger, State, StopLevel, Trigger
 from ...values.errors import (
@@ -27,7 +28,6 @@ from ...values.errors import (
 from ...values.inhibit import Inhibit
 from ...values.model import THREE_FINGER
 from ...values.move_result import MoveResult
-from ...values.statistics import Counters, Statistics
 from ...values.status import RobotiqStatus
 from ...values.stroke import Points
 from ..network.bus import Bus
@@ -47,7 +47,7 @@ SLACK_S: Final = 5.0  # seconds beyond a timeout that the agent applies
 class RemoteHand(Hand):
     """A Robotiq gripper on another host, served by ``robotiq-async agent`` there.
 
-    What all hands promise is in :class:`~robotiq_async.hand.Hand`. Commanding takes a lease, which this
+    What all hands promise is in :class:`~robotiq_async.hands.Hand`. Commanding takes a lease, which this
     hand acquires when it starts and renews from its own event loop. A program that hangs loses the lease, and
     what it had set in motion is then held. Differences from a hand of this process:
 

@@ -27,12 +27,13 @@ import json
 from collections.abc import Mapping
 from typing import Any, Final
 
+from ...hands.statistics import Counters, Statistics
+from ...hands.streams import Channels
+from ...hands.waiting import StateWaiters
 from ...runtime.clock import now
 from ...runtime.concurrency import check_loop, wait_shielded
 from ...runtime.limit import Limit
 from ...runtime.log import Log
-from ...session.streams import Channels
-from ...session.waiting import StateWaiters
 from ...values.enums import State, StopLevel, Trigger
 from ...values.errors import (
     AgentError,
@@ -42,7 +43,6 @@ from ...values.errors import (
     NotStartedError,
     RobotiqError,
 )
-from ...values.statistics import Counters, Statistics
 from ..limited_log import LimitedLog
 from ..network.bus import Bus, Undo
 from ..wire.names import GripperName

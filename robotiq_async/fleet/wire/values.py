@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Final
 
+from ...hands.statistics import Statistics
 from ...runtime.log import printable
 from ...values import errors
 from ...values.enums import Fault, Finger, ObjectStatus, State, Trigger
@@ -30,7 +31,6 @@ from ...values.inhibit import Inhibit
 from ...values.model import model_of
 from ...values.move_result import MoveResult
 from ...values.request import Request
-from ...values.statistics import Statistics
 from ...values.status import RobotiqStatus
 
 Fields = dict[str, Any]

@@ -20,9 +20,9 @@ from importlib.util import find_spec
 from typing import Final
 
 from ...fleet.remote.remote_hand import RemoteHand
-from ...hand import Hand
-from ...hand.robotiq_hand import RobotiqHand
+from ...hands import Hand
 from ...link.address import is_remote
+from ...local.robotiq_hand import RobotiqHand
 from ...runtime.clock import now
 from ...runtime.extras import install
 from ...runtime.log import Log

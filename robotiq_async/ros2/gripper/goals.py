@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
-from ...hand import Hand
+from ...hands import Hand
 from ...runtime.concurrency import wait_shielded
 from ...runtime.log import Log
 from ...values.enums import Finger

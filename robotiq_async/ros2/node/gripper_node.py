@@ -17,7 +17,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
-from ...hand import Hand
+from ...hands import Hand
 from ...values.errors import RobotiqError
 from ..gripper.connection import NODE_COMMANDS, GripperConnection, RefusedError, make_hand
 from ..translation.description import robot_description

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 from ...control.state_machine import RUNNING
-from ...hand import Hand
+from ...hands import Hand
 from ...values.enums import Severity, State
 from ...values.errors import NotStartedError
 from ...values.status import RobotiqStatus

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Final
 
+from ...calibration.csv_tables import read_stroke
 from ...fleet.network.route import parse_remote_address
+from ...hands.options import Option, Place, offered
 from ...link.address import is_remote, parse_address
-from ...session.options import Option, Place, offered
-from ...values.calibration.csv_tables import read_stroke
 from ...values.checks import check_int, check_number
 from ...values.model import model_of
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from robotiq_async.values.calibration.motion_profile import GOES_ON_S
+from robotiq_async.calibration.motion_profile import GOES_ON_S
 from robotiq_async.values.enums import SPEED_MAX, ObjectStatus
 
 from .course import AxisCourse, of_a_jaw, rest, straight
 
 if TYPE_CHECKING:
-    from robotiq_async.values.calibration.motion_profile import MotionProfile
+    from robotiq_async.calibration.motion_profile import MotionProfile
 
     from .spread import Spread
 

@@ -31,9 +31,9 @@ from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from robotiq_async.calibration.motion_profile import SHORT_OF_CLOSED, MotionProfile
+from robotiq_async.calibration.scales import SpeedCalibration
 from robotiq_async.values import registers as reg
-from robotiq_async.values.calibration.motion_profile import SHORT_OF_CLOSED, MotionProfile
-from robotiq_async.values.calibration.scales import SpeedCalibration
 from robotiq_async.values.enums import (
     SPEED_MAX,
     Fault,

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 if TYPE_CHECKING:
-    from robotiq_async.values.calibration.motion_profile import MotionProfile
+    from robotiq_async.calibration.motion_profile import MotionProfile
 
 _SHORT: Final = 0.51
 """Counts that are left when an axis begins to press: the last count of its reading is yet to come."""

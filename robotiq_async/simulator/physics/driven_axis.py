@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
-from robotiq_async.values.calibration.motion_profile import PRESSING_S
+from robotiq_async.calibration.motion_profile import PRESSING_S
 from robotiq_async.values.enums import ObjectStatus
 from robotiq_async.values.model import TOLERANCE
 
@@ -20,7 +20,7 @@ from .spread import Spread
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from robotiq_async.values.calibration.motion_profile import MotionProfile
+    from robotiq_async.calibration.motion_profile import MotionProfile
     from robotiq_async.values.enums import Finger
     from robotiq_async.values.model import Model
 

@@ -26,7 +26,7 @@ from .surroundings import Surroundings
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from robotiq_async.values.calibration.motion_profile import MotionProfile
+    from robotiq_async.calibration.motion_profile import MotionProfile
 
     from .axis import Axis
     from .bodies import Bodies
@@ -47,7 +47,7 @@ class SimulatedGripper(Surroundings):
     depend on how often it is read. Use one from one thread only.
 
     A write takes effect one device cycle later, as on the device. Motions take the time of
-    :mod:`robotiq_async.values.calibration.motion_profile`: measured closings of a 3-Finger, whose scissor
+    :mod:`robotiq_async.calibration.motion_profile`: measured closings of a 3-Finger, whose scissor
     moves the same counts a second, as none are published; recorded motions of a 2F-85; and for the other
     siblings an estimate. Motor currents are in :mod:`.axis`; how far axes miss their requests, in
     :mod:`.spread`: as with a real gripper, a program that waits for gPO = rPR may wait for ever.

@@ -17,7 +17,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
-from robotiq_async.values.calibration.motion_profile import MotionProfile
+from robotiq_async.calibration.motion_profile import MotionProfile
 from robotiq_async.values.enums import Fault, Finger
 from robotiq_async.values.model import Model, model_of
 

@@ -19,7 +19,7 @@ from .model import Shape
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ...hand import Hand
+    from ...hands import Hand
     from ...simulator import Bodies
 
 PART: Final = "part"

@@ -13,12 +13,12 @@ from ...fleet.wire.envelope import AgentCall, unpack_answer
 from ...fleet.wire.names import GripperName
 from ...fleet.wire.status_message import StatusMessage, unpack
 from ...fleet.wire.values import Fields
+from ...hands.statistics import percentile
 from ...runtime.clock import now
 from ...runtime.shell import quoted
 from ...runtime.version import __version__
 from ...values.enums import State
 from ...values.errors import AgentError, ConnectionLostError, NotAllowedError, ProtocolError, RobotiqError
-from ...values.statistics import percentile
 from ...values.status import RobotiqStatus
 from .findings import Finding, GiveUpError, Level, ReportFinding
 from .gripper import report_state

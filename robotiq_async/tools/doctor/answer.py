@@ -8,12 +8,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final, NamedTuple
 
+from ...hands.options import LONGEST_RESPONSE_S
 from ...link.address import Address
 from ...link.modbus import ModbusTransport
 from ...link.registers import registers_of
 from ...link.sim_transport import SimulatedTransport, new_gripper
 from ...link.transport import Link
-from ...session.options import LONGEST_RESPONSE_S
 from ...values.errors import (
     ConnectFailedError,
     ConnectionLostError,

@@ -10,18 +10,18 @@ import math
 from pathlib import Path
 from typing import Final
 
+from ...hands.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S
+from ...hands.statistics import percentile
 from ...link.address import Address
 from ...link.modbus import ModbusTransport
 from ...link.registers import registers_of
 from ...link.serial.ports import USB_SERIAL, latency_file, latency_timer
 from ...link.transport import Link
 from ...runtime.host_names import addresses_of
-from ...session.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S
 from ...values.enums import Severity
 from ...values.errors import ConnectionLostError, RobotiqConnectionError
 from ...values.model import MODELS, Model, model_of, names_that_fit
 from ...values.registers import Registers
-from ...values.statistics import percentile
 from ...values.status import RobotiqStatus
 from .answer import DAMAGED, LOST_PORT, REACH_S, find_gripper, long_enough
 from .findings import Finding, GiveUpError, Level, ReportFinding

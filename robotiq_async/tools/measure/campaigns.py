@@ -14,9 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from ...hand import Hand
-from ...runtime.clock import now
-from ...values.calibration.csv_tables import (
+from ...calibration.csv_tables import (
     FORCE,
     SPEED_LAYOUT,
     Layout,
@@ -28,7 +26,9 @@ from ...values.calibration.csv_tables import (
     write_rows,
     write_table,
 )
-from ...values.calibration.scales import SpeedCalibration
+from ...calibration.scales import SpeedCalibration
+from ...hands import Hand
+from ...runtime.clock import now
 from ...values.enums import SPEED_MAX, Finger
 from ...values.errors import MeasuringError
 from ...values.model import THREE_FINGER, Model

@@ -18,9 +18,9 @@ except ModuleNotFoundError as error:
 
     raise ImportError(f"pictures need matplotlib: {install('plot')}") from error
 
+from ...calibration.csv_tables import RunsTable
+from ...calibration.scales import ForceCalibration, SpeedCalibration, mean, newton
 from ...runtime.log import printable
-from ...values.calibration.csv_tables import RunsTable
-from ...values.calibration.scales import ForceCalibration, SpeedCalibration, mean, newton
 from ..description.palette import AXIS_COLORS
 from ..recording.payloads import is_command
 from ..recording.table import CURRENT_COLUMN

@@ -13,10 +13,10 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from ...hand import Hand
+from ...hands import Hand
+from ...hands.streams import Stream
 from ...runtime.clock import now
 from ...runtime.log import Log
-from ...session.streams import Stream
 from ...values.errors import RobotiqConnectionError
 from ...values.events import SentRequest, Transition
 from ...values.model import THREE_FINGER

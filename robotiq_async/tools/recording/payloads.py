@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
-from ...hand import Hand
+from ...hands import Hand
 from ...values.checks import repr_of
 from ...values.enums import JAW, Fault, Finger, State
 from ...values.errors import NotStartedError

@@ -25,7 +25,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final, Protocol, Self
 
-from ...hand import Hand
+from ...hands import Hand
 from ...runtime.concurrency import NoThreadError, in_a_thread, wait_shielded, write_all
 from ...runtime.log import Log
 from ...sync.robotiq_hand import RobotiqHand as BlockingHand

@@ -16,8 +16,8 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from ...values.calibration.csv_tables import write_rows
-from ...values.conventions import Convention
+from ...calibration.conventions import Convention
+from ...calibration.csv_tables import write_rows
 from .feed import EVENT, STATUS, Message
 from .payloads import SCHEMAS, Properties
 

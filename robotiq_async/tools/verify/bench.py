@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Final
 
+from ...hands.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S
 from ...link.address import Address
 from ...link.modbus import ModbusTransport
 from ...link.transport import Link
 from ...link.urcap.transport import UrcapTransport
-from ...session.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S
 from ...values.enums import Finger
 from ...values.model import Model, model_of
 from ...values.registers import RegisterMap

@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 from typing import Final
 
+from ...hands.options import POLL_INTERVAL_S
 from ...link.registers import registers_of
-from ...session.options import POLL_INTERVAL_S
 from ...values.enums import Fault
 from ...values.model import names_that_fit, why_stranger
 from ...values.status import RobotiqStatus

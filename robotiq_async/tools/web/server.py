@@ -21,7 +21,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Final, Self
 
-from ...hand import Hand
+from ...hands import Hand
 from ...runtime.clock import now
 from ...runtime.concurrency import wait_shielded
 from ...runtime.extras import is_frozen

@@ -6,7 +6,7 @@ import asyncio
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from ....session.options import ACTIVATION_TIMEOUT_S, POLL_INTERVAL_S
+from ....hands.options import ACTIVATION_TIMEOUT_S, POLL_INTERVAL_S
 from ....values.enums import Finger, ObjectStatus
 from ....values.request import Request
 from ....values.status import RobotiqStatus

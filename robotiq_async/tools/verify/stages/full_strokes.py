@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from ....session.options import units_of
-from ....values.calibration.motion_profile import profile_of
+from ....calibration.motion_profile import profile_of
+from ....hands.options import units_of
 from ....values.enums import CLOSED, FORCE_MAX, OPEN, Finger, ObjectStatus
 from ....values.request import Request
 from ....values.status import RobotiqStatus

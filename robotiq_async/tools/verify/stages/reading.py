@@ -8,14 +8,14 @@ from collections import Counter
 from dataclasses import replace
 from typing import Final
 
+from ....hands.options import POLL_INTERVAL_S
+from ....hands.statistics import percentile
 from ....link.registers import registers_of
 from ....link.serial.ports import latency_file, latency_timer
 from ....runtime.sockets import is_loopback
-from ....session.options import POLL_INTERVAL_S
 from ....values.enums import Fault
 from ....values.errors import RobotiqConnectionError
 from ....values.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap, Registers
-from ....values.statistics import percentile
 from ..bench import Bench
 from ..catalogue import CheckVerdict, EndError, Figure
 from ..recorded_link import RecordedExchange, RecordedLink

@@ -6,12 +6,12 @@ import asyncio
 from dataclasses import replace
 from typing import Final
 
+from ....hands.options import POLL_INTERVAL_S
+from ....hands.statistics import percentile
 from ....link.modbus import ModbusTransport
-from ....session.options import POLL_INTERVAL_S
 from ....values.enums import Finger
 from ....values.errors import RobotiqConnectionError
 from ....values.request import Request
-from ....values.statistics import percentile
 from ..bench import Bench
 from ..catalogue import EndError, Figure
 from ..motions import MARGIN, are_near, go, in_place, resting_envelope

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from ....values.calibration.scales import SpeedCalibration
+from ....calibration.scales import SpeedCalibration
 from ....values.enums import Finger
 from ....values.request import Request
 from ....values.status import RobotiqStatus

@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 from typing import Final
 
+from ....hands.options import LONGEST_SPACING_S, usual_write_spacing
+from ....hands.statistics import percentile
 from ....link.registers import registers_of
-from ....session.options import LONGEST_SPACING_S, usual_write_spacing
 from ....values.enums import Finger
 from ....values.errors import RobotiqConnectionError
 from ....values.request import Request
-from ....values.statistics import percentile
 from ....values.status import RobotiqStatus
 from ..bench import Bench
 from ..catalogue import NO_OPTIONS, Figure, Options

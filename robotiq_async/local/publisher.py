@@ -1,0 +1,97 @@
+"""The order in which a run is heard of: by readers, listeners, and the callers whom a request has ended.
+
+What they do may hold up the loop. So a write that is due leaves first.
+"""
+
+# Theory of operation
+#
+# A listener may command the hand. If it got a change of state in the middle of a call, the rest of the call
+# would overwrite its request: changes are noted, and published after the call.
+#
+# A request may end what others wait for, and one that stops the fingers leaves soon. Until its image has left
+#
+# * the callers whom it has ended wait, whatever it is;
+# * the publication waits, too, if it is a stop, a halt, a reset or a hold: see hold_back(). State waiters are
+#   woken by the publication, and so they wait with it.
+#
+# They hear in the turn of the loop after that in which the image leaves; sooner if none leaves, because the
+# cycle had nothing to write, the link failed or is closed: see tell(). A write that is not expected soon, as
+# behind a slow gateway, is not waited for: Run decides that.
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Final
+
+from ..control.controller import Controller
+from ..hands.streams import Channel, Channels
+from ..values.events import SentRequest, Transition
+from ..values.status import RobotiqStatus
+from .news import BITS, FaultNews
+
+
+class Publisher:
+    """Publishes what happens in a run.
+
+    Attributes:
+        numbers: the sequence numbers of the statuses.
+        has_to_tell: whether somebody waits for the next write.
+    """
+
+    def __init__(self, channels: Channels, controller: Controller) -> None:
+        self._news: Final = FaultNews(controller.machine)
+        self.numbers: Final = channels.numbers
+        self.has_to_tell: bool = False
+        self._channels: Final = channels
+        self._controller: Final = controller
+        self._loop: Final = asyncio.get_running_loop()
+        self._queue: Final[deque[tuple[Channel[Any], Any, Callable[[], None] | None]]] = deque()
+        self._is_held_back = False
+
+    def note(self, change: Transition, wake: Callable[[], None] | None) -> None:
+        """Note a change of state, to be published after the present call; ``wake`` is called before that."""
+        self._news.reached(change)
+        self._queue.append((self._channels.transitions, change, wake))
+
+    def publish_changes(self) -> None:
+        """Publish what was noted."""
+        while self._queue and not self._is_held_back:
+            channel, item, wake = self._queue.popleft()
+            if wake is not None:
+                wake()
+            channel.push(item)
+
+    def publish_status(self, status: RobotiqStatus) -> None:
+        """Publish a status after the changes that it has led to."""
+        if status.registers[1] & BITS != self._news.shown:
+            self._news.see(status)
+        if self._queue or self._is_held_back:
+            self._queue.append((self._channels.statuses, status, None))
+            self.publish_changes()
+        else:  # the common case, at every poll
+            self._channels.statuses.push(status)
+
+    def publish_request(self, sent: SentRequest) -> None:
+        """Publish a request after the changes that it has led to."""
+        self._queue.append((self._channels.requests, sent, None))
+        self.publish_changes()
+
+    # -- the order of a write and of those who hear of it ---------------------------------------------
+
+    def hold_back(self, *, publication: bool) -> None:
+        """Let the callers whom a request has ended wait for its write; for a stop the publication, too."""
+        self.has_to_tell = True
+        self._is_held_back |= publication
+
+    def image_leaves(self) -> None:
+        """An image leaves in this turn of the loop."""
+        if self.has_to_tell or self._controller.has_ended_callers:
+            self._loop.call_soon(self.tell)
+
+    def tell(self) -> None:
+        """Let everybody hear who waits for a write: it has left, or there is none."""
+        self.has_to_tell = self._is_held_back = False
+        self.publish_changes()
+        self._controller.answer_ended()
