@@ -20,7 +20,6 @@ from ...values.errors import (
     AgentError,
     InvalidStateError,
     MotionInhibitedError,
-    NotAllowedError,
     NotStartedError,
     RobotiqConnectionError,
     StateTimeoutError,
@@ -323,7 +322,7 @@ class RemoteHand(Hand):
         try:
             with no_answer_as_lost_connection():
                 value: Fields = await dialog.send(call, f"cmd/{name}", timeout=timeout)
-        except (asyncio.CancelledError, RobotiqConnectionError, NotAllowedError):
+        except (asyncio.CancelledError, RobotiqConnectionError):
             # Also after an error that leaves open whether the request was carried out.
             dialog.cancel(name, call)
             raise
