@@ -15,6 +15,7 @@ from ..runtime.clock import now
 from ..runtime.concurrency import running_loop
 from ..values.enums import Fault, State
 from ..values.errors import NotAllStoppedError, ProtocolError, RobotiqError
+from ..values.inhibit import Inhibit
 from ..values.model import model_of
 from .limited_log import LimitedLog
 from .network.bus import Bus, Undo
@@ -24,7 +25,7 @@ from .remote.errand import NoAnswerError
 from .remote.mirror import AgentClock, Mirror
 from .remote.remote_hand import RemoteHand
 from .wire.names import ROOT, GripperName, check_name
-from .wire.values import read_inhibit, reading, words
+from .wire.values import reading, words
 
 LOOK_S: Final = 0.5  # seconds to wait for the tokens of agents
 LOOK_AGAIN_S: Final = 0.1  # seconds until the next look for agents, during a halt
@@ -272,8 +273,8 @@ async def halt(bus: Bus, name: GripperName, agents: int, inhibit: str = "") -> s
 
 
 def _inhibited(fields: Mapping[str, Any]) -> str:
-    inhibit = read_inhibit(fields.get("inhibited"))
-    return "" if inhibit is None else str(inhibit)
+    inhibit = fields.get("inhibited")
+    return "" if inhibit is None else str(Inhibit.from_dict(inhibit))
 
 
 @dataclass(slots=True)

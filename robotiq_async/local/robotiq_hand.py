@@ -58,6 +58,7 @@ from ..values.events import SentRequest, Transition
 from ..values.inhibit import Inhibit
 from ..values.model import Model
 from ..values.move_result import MoveResult
+from ..values.statistics import Statistics
 from ..values.status import RobotiqStatus
 from .session import Session
 
@@ -447,7 +448,7 @@ class RobotiqHand(Hand):
     def statistics(self) -> Statistics:
         """Figures of the polling since the last start."""
         if self._session is None:
-            return Counters().snapshot(0)
+            return Statistics.none()
         controller = self._session.controller
         return self._session.counters.snapshot(controller.foreign_commands, controller.passing_faults)
 

@@ -20,8 +20,7 @@ from robotiq_async.fleet.wire import status_message
 from robotiq_async.fleet.wire.envelope import AgentAnswer, AgentCall, failure
 from robotiq_async.fleet.wire.names import ROOT
 from robotiq_async.fleet.wire.status_message import StatusMessage
-from robotiq_async.fleet.wire.values import request_fields, result_fields, transition_fields
-from robotiq_async.hands.options import Place, offered
+from robotiq_async.session.options import Place, offered
 from robotiq_async.values.errors import ControlLostError
 from robotiq_async.values.events import SentRequest
 from robotiq_async.values.request import AxisRequest, Request
@@ -47,9 +46,7 @@ MESSAGE: Final = StatusMessage(
     is_held=True,
     events=41,
     is_moving=False,
-    sequence=20114,
-    age=0.0009765625,
-    registers=REGISTERS,
+    status=RobotiqStatus(REGISTERS, 812.4375 - 0.0009765625, 20114),
 )
 RESULT: Final = MoveResult(
     outcomes={Finger.A: ObjectStatus.AT_POSITION},
@@ -79,13 +76,13 @@ INHIBIT: Final = Inhibit("the guard is open", "PLC, bob@desk:4711", 1790000000.5
 BEGUN: Final = Transition(State.RUNNING_IDLE, State.RUNNING_CC, Trigger.ASK_COMMAND, 811.5)
 MOVE: Final = call(7, position=100, fingers=1, speed=None, force=None, timeout=None)
 EXAMPLES: Final = [
-    parsed(event(38, transition_fields(BEGUN))),
-    event(39, request_fields(SentRequest(IMAGE, 811.53125, acknowledged=True))),
+    parsed(event(38, {"kind": "transition", **BEGUN.as_dict()})),
+    event(39, {"kind": "request", **SentRequest(IMAGE, 811.53125, acknowledged=True).as_raw()}),
     event(40, {"kind": "lease", "number": 3, "holder": LABEL, "reason": "granted"}),
     event(41, {"kind": "conflict", "key": NAME.key("alive", "77")}),
     event(42, {"kind": "inhibit", "stamp": 812.4375, "inhibited": INHIBIT.as_dict(), "inhibit_number": 2}),
     json.loads(MOVE.pack()),
-    json.loads(AgentAnswer(NAME.base, 7, EPOCH, result_fields(RESULT)).pack()),
+    json.loads(AgentAnswer(NAME.base, 7, EPOCH, RESULT.as_dict() | {"status": STATUS.as_raw()}).pack()),
     json.loads(
         failure(
             MOVE, EPOCH, ControlLostError("the lease has ended (taken), ...", "taken"), begun=True

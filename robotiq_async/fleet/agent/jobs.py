@@ -16,7 +16,7 @@ from ...values.request import Request
 from ..network.bus import Query
 from ..wire.envelope import AgentAnswer, AgentCall, failure
 from ..wire.settings import Setting, asked_of, is_in, moved_by
-from ..wire.values import Fields, result_fields
+from ..wire.values import Fields
 from .publisher import HandPublisher
 
 JOBS_KEPT: Final = 512
@@ -188,7 +188,9 @@ class Jobs:
         if isinstance(error, Exception):
             answer = failure(call, self._epoch, error, begun)
         else:
-            value = {**(result_fields(task.result()) or {}), **job.says()}
+            result = task.result()
+            fields = {} if result is None else result.as_dict() | {"status": result.status.as_raw()}
+            value = {**fields, **job.says()}
             answer = AgentAnswer(call.to, call.number, self._epoch, value, begun=begun)
         if error is not None or is_done:
             self._ended(job, error is None)

@@ -42,7 +42,7 @@ from ..network.bus import Bus, Query
 from ..wire.envelope import AgentAnswer, AgentCall, failure, unpack_call
 from ..wire.names import GripperName
 from ..wire.settings import check_changes, moved_by, read_settings, settings_of
-from ..wire.values import Fields, inhibit_fields
+from ..wire.values import Fields
 from .fingers import Fingers
 from .inhibits import inhibit_asked, inhibit_kept, signed
 from .jobs import Job, Jobs, Work, label_of
@@ -91,7 +91,8 @@ class ServedHand:
         self._keep_record()
 
     def _keep_record(self) -> None:
-        inhibited = inhibit_fields(self._hand.inhibited)
+        inhibit = self._hand.inhibited
+        inhibited = None if inhibit is None else inhibit.as_dict()
         record = {**self._lease.record, "settings": self._settings.record, "inhibited": inhibited}
         self._records.keep(self.name, record)
 

@@ -18,7 +18,6 @@ from ...values.enums import Finger, StopLevel
 from ...values.errors import (
     AgentError,
     ControlLostError,
-    MoveTimeoutError,
     NotAllowedError,
     NotStartedError,
     RobotiqError,
@@ -173,13 +172,11 @@ class Dialog:
         if errand.status:
             self._receive(errand.status, errand.asked_at)
         try:
-            return answer.outcome(self.mirror.clock)
+            return answer.outcome(self.mirror.read_status)
         except (TypeError, ValueError) as error:
             if errand.verb not in OWN:
                 raise
             raise AgentError(f"{self.name}: its agent does not understand {errand.verb}: {error}") from error
-        except MoveTimeoutError as error:
-            raise MoveTimeoutError(error.message, self.mirror.renumbered(error.status)) from None
         except ControlLostError as error:
             if errand.verb != "lease":
                 self.check_running()  # the lease was given back at the end of the run

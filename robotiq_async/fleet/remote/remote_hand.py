@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Collection
-from dataclasses import replace
 from functools import cache, partial
 from typing import Final, Literal
 
@@ -27,11 +26,12 @@ from ...values.errors import (
 from ...values.inhibit import Inhibit
 from ...values.model import THREE_FINGER
 from ...values.move_result import MoveResult
+from ...values.statistics import Statistics
 from ...values.status import RobotiqStatus
 from ...values.stroke import Points
 from ..network.bus import Bus
 from ..network.route import parse_remote_address
-from ..wire.values import Fields, read_result, reading
+from ..wire.values import Fields, reading
 from .dialog import label
 from .errand import no_answer_as_lost_connection
 from .session import CONNECT_S, RemoteSession
@@ -248,8 +248,7 @@ class RemoteHand(Hand):
         assert self._session is not None, "it has answered"
         mirror = self._session.mirror
         with reading("a result"):
-            result = read_result(value, mirror.clock)
-            return replace(result, status=mirror.renumbered(result.status))
+            return MoveResult.from_dict(value, mirror.read_status(value["status"]))
 
     async def _hold(self, axes: Finger) -> None:
         await self._ask("hold", {"fingers": int(axes)}, REMOTE_COMMAND_S)
@@ -338,7 +337,7 @@ class RemoteHand(Hand):
     @property
     def statistics(self) -> Statistics:
         """Figures of the agent's polling, at most 1 s old."""
-        return Counters().snapshot(0) if self._session is None else self._session.statistics
+        return Statistics.none() if self._session is None else self._session.statistics
 
     @property
     def _points(self) -> Points | None:
