@@ -12,7 +12,7 @@ from typing import Any, Final, Self
 
 from ..hands.streams import Channel, Listeners, Stream
 from ..runtime.clock import now
-from ..runtime.concurrency import running_loop
+from ..session.streams import Channel, Stream
 from ..values.enums import Fault, State
 from ..values.errors import NotAllStoppedError, ProtocolError, RobotiqError
 from ..values.inhibit import Inhibit
@@ -98,7 +98,7 @@ class Fleet:
         self._tokens: dict[GripperName, set[str]] = {}
         self._summaries = Summaries()
         self._unreadable = LimitedLog()
-        self._changes: Channel[Member] = Channel(Listeners())
+        self._changes: Channel[Member] = Channel()
 
     async def __aenter__(self) -> Self:
         """Subscribe, and find the agents that are there already.
@@ -107,7 +107,7 @@ class Fleet:
             RuntimeError: not in a running asyncio event loop.
             RobotiqError: no session could be opened.
         """
-        loop = running_loop()
+        loop = asyncio.get_running_loop()
         self._changes.check_loop(loop)
         self._bus = bus = self._shared or await self._open()
         self._changes.reopen(loop)

@@ -13,12 +13,13 @@ from robotiq_async import Finger, Inhibit, MoveResult, ObjectStatus, RobotiqHand
 from robotiq_async.fleet import GripperName
 from robotiq_async.fleet.agent.agent_file import AgentSettings, read_agent_file
 from robotiq_async.fleet.agent.publisher import AT_ONCE, KEPT, HandPublisher
-from robotiq_async.fleet.agent.records import NoRecords
-from robotiq_async.fleet.agent.served_hand import COMMANDS, ServedHand
+from robotiq_async.fleet.agent.records import Records
+from robotiq_async.fleet.agent.served_hand import ServedHand
 from robotiq_async.fleet.control.lease import Lease
 from robotiq_async.fleet.wire import status_message
 from robotiq_async.fleet.wire.envelope import AgentAnswer, AgentCall, failure
 from robotiq_async.fleet.wire.names import ROOT
+from robotiq_async.fleet.wire.settings import COMMANDS
 from robotiq_async.fleet.wire.status_message import StatusMessage
 from robotiq_async.session.options import Place, offered
 from robotiq_async.values.errors import ControlLostError
@@ -148,14 +149,14 @@ async def test_an_event_is_published_as_documented() -> None:
 async def test_a_summary_and_an_info() -> None:
     hand, bus = RobotiqHand("sim://"), Network().bus("agent")
     summary = HandPublisher(NAME, hand, bus, EPOCH, Lease()).summary()
-    served = ServedHand(NAME, hand, bus, NoRecords(), epoch=EPOCH, window=1.0)
+    served = ServedHand(NAME, hand, bus, Records(), epoch=EPOCH, window=1.0)
     info = served._info(call(1))
     for name in {*summary, *info}:
         assert re.search(rf"^\| .*`{name}`", PROTOCOL, re.MULTILINE), name
 
 
 def test_every_command_and_key_is_there() -> None:
-    for name in (*COMMANDS, "command", "cancel"):
+    for name in (*COMMANDS, "cancel"):
         assert f"`{name}`" in PROTOCOL, name
     for key in ("feed", "summary", "info/WHO", "lease", "halt", "cmd/NAME", "alive/EPOCH"):
         assert f"| `{key}` |" in PROTOCOL, key

@@ -12,7 +12,6 @@ from ...values.enums import Finger
 from ...values.errors import AgentError, ControlLostError, RobotiqError
 from ...values.events import SentRequest
 from ...values.move_result import MoveResult
-from ...values.request import Request
 from ..network.bus import Query
 from ..wire.envelope import AgentAnswer, AgentCall, failure
 from ..wire.settings import Setting, asked_of, is_in, moved_by
@@ -71,9 +70,9 @@ class Job:
     def _look_whether_refused(self) -> None:
         self.was_refused = self.has_failed
 
-    def observe(self, request: Request) -> None:
+    def observe(self, sent: SentRequest) -> None:
         """An image was acknowledged."""
-        self.is_shown = self.is_shown or (bool(self.carries) and is_in(self.carries, request))
+        self.is_shown = self.is_shown or (bool(self.carries) and is_in(self.carries, sent))
 
     def reply(self, answer: bytes, status: bytes) -> None:
         """Answer it, and each of its repetitions."""
@@ -157,7 +156,7 @@ class Jobs:
     def observe(self, what: object) -> None:
         if isinstance(what, SentRequest) and what.acknowledged:
             for job in self._open.values():
-                job.observe(what.request)
+                job.observe(what)
 
     def spawn(self, work: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
         task = asyncio.get_running_loop().create_task(work)

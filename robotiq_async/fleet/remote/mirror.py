@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from ...hands.streams import Channels
-from ...runtime.log import Log, log
+from ...runtime.log import Log
+from ...session.streams import Channels
 from ...values.enums import State, Trigger
 from ...values.events import SentRequest, Transition
 from ...values.inhibit import Inhibit
@@ -86,10 +86,10 @@ class Mirror:
         channels: Channels | None = None,
         entered: Callable[[State], None] = lambda _: None,
         before: Mirror | None = None,
-        log: Log = log,
+        log: Log | None = None,
     ) -> None:
         """Call ``entered`` with each state. State and sequences continue from the mirror ``before``."""
-        self.log = log
+        self.log = log or Log()
         self.clock: AgentClock = AgentClock()
         self.newest: StatusMessage | None = None
         self.status: RobotiqStatus | None = None
