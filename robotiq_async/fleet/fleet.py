@@ -10,9 +10,8 @@ from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import Any, Final, Self
 
-from ..hands.streams import Channel, Listeners, Stream
+from ..hands.streams import Channel, Stream
 from ..runtime.clock import now
-from ..session.streams import Channel, Stream
 from ..values.enums import Fault, State
 from ..values.errors import NotAllStoppedError, ProtocolError, RobotiqError
 from ..values.inhibit import Inhibit

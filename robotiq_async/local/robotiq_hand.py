@@ -39,7 +39,7 @@ from ..hands.options import (
     NoAddress,
     ReconnectPolicy,
 )
-from ..hands.statistics import Counters, Statistics
+from ..hands.statistics import Statistics
 from ..hands.waiting import STALLED_S, StallWatch
 from ..link.tunnel.protocol import Tunnel
 from ..runtime.clock import now
@@ -58,7 +58,6 @@ from ..values.events import SentRequest, Transition
 from ..values.inhibit import Inhibit
 from ..values.model import Model
 from ..values.move_result import MoveResult
-from ..values.statistics import Statistics
 from ..values.status import RobotiqStatus
 from .session import Session
 

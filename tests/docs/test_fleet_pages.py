@@ -21,7 +21,7 @@ from robotiq_async.fleet.wire.envelope import AgentAnswer, AgentCall, failure
 from robotiq_async.fleet.wire.names import ROOT
 from robotiq_async.fleet.wire.settings import COMMANDS
 from robotiq_async.fleet.wire.status_message import StatusMessage
-from robotiq_async.session.options import Place, offered
+from robotiq_async.hands.options import Place, offered
 from robotiq_async.values.errors import ControlLostError
 from robotiq_async.values.events import SentRequest
 from robotiq_async.values.request import AxisRequest, Request

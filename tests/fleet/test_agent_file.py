@@ -200,7 +200,10 @@ def test_a_file_of_openings_says_its_model(tmp_path: Path) -> None:
         (GOOD + "[grippers.right]\nspeed = 3\n", ["line 5", "[grippers.right]", "address", "missing"]),
         (GOOD + "[grippers.right]\naddress = 3\n", ["line 6", "address", "3"]),
         (GOOD + '[grippers.right]\naddress = "ftp://x"\n', ["line 6", "address", "'ftp://x'", "rtu://"]),
-        (GOOD + '[grippers.right]\naddress = "zenoh://a/b/c"\n', ["line 6", "on another host", "zenoh://a/b/c"]),
+        (
+            GOOD + '[grippers.right]\naddress = "zenoh://a/b/c"\n',
+            ["line 6", "on another host", "zenoh://a/b/c"],
+        ),
         (GOOD + '[grippers."r/t"]\naddress = "sim://"\n', ["line 5", "'r/t'", "A-Z"]),
         (GOOD + '[grippers.right]\naddress = "192.168.1.11"\n', ["line 6", "left", "device_id"]),
         (GOOD + '[grippers]\nright = "sim://"\n', ["[grippers.right]", "'sim://'"]),

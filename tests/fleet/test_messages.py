@@ -45,7 +45,6 @@ from robotiq_async.values.errors import (
 )
 from robotiq_async.values.model import MODELS
 from robotiq_async.values.request import AxisRequest, Request
-from robotiq_async.values.statistics import Statistics
 from tests.strategies import ANY
 
 

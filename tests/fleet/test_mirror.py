@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from robotiq_async import RobotiqStatus, State
 from robotiq_async.fleet.remote.mirror import DRIFT, AgentClock, Mirror
 from robotiq_async.fleet.wire.status_message import StatusMessage
-from robotiq_async.session.streams import Channels
+from robotiq_async.hands.streams import Channels
 from robotiq_async.values.enums import Trigger
 from robotiq_async.values.errors import ProtocolError
 from robotiq_async.values.events import Transition

@@ -13,8 +13,8 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any, Final
 
-from ...hand.robotiq_hand import RobotiqHand
-from ...session.options import FILE_OPTIONS, HandOptions
+from ...hands.options import FILE_OPTIONS, HandOptions
+from ...local.robotiq_hand import RobotiqHand
 from ...values.checks import check_seconds
 from ..control.lease import LEASE_WINDOW_S, WINDOW_MAX_S, WINDOW_MIN_S
 from ..keys.access import AccessList

@@ -26,7 +26,6 @@ import logging
 from dataclasses import replace
 from typing import Final
 
-from ...calibration.amounts import UNITS
 from ...control.state_machine import RUNNING
 from ...local.robotiq_hand import RobotiqHand
 from ...runtime.clock import now

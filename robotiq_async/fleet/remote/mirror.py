@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
+from ...hands.streams import Channels
 from ...runtime.log import Log
-from ...session.streams import Channels
 from ...values.enums import State, Trigger
 from ...values.events import SentRequest, Transition
 from ...values.inhibit import Inhibit

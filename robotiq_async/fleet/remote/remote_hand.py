@@ -6,24 +6,23 @@ import asyncio
 from collections.abc import Collection
 from typing import Any, Final, Literal
 
+from ...calibration import ForceCalibration, SpeedCalibration
 from ...control.state_machine import check
-from ...hand import Hand
+from ...hands import Hand
+from ...hands.options import UnitsByModel
+from ...hands.statistics import Statistics
+from ...hands.waiting import StateWaiters
 from ...runtime.limit import Limit
-from ...session.options import UnitsByModel
-from ...session.waiting import StateWaiters
-from ...values.calibration import ForceCalibration, SpeedCalibration
 from ...values.checks import check_seconds
 from ...values.enums import Finger, State, Trigger
 from ...values.errors import (
     AgentError,
     InvalidStateError,
-    NotAllowedError,
     NotStartedError,
     RobotiqConnectionError,
 )
 from ...values.inhibit import Inhibit
 from ...values.move_result import MoveResult
-from ...values.statistics import Statistics
 from ...values.status import RobotiqStatus
 from ..network.bus import Bus
 from ..network.route import parse_remote_address
@@ -307,7 +306,7 @@ class RemoteHand(Hand):
         try:
             with no_answer_as_lost_connection():
                 value: Fields = await dialog.send(call, f"cmd/{name}", timeout=seconds)
-        except (asyncio.CancelledError, RobotiqConnectionError, NotAllowedError):
+        except (asyncio.CancelledError, RobotiqConnectionError):
             # Also after an error that leaves open whether the request was carried out.
             dialog.cancel(name, call)
             raise

@@ -27,7 +27,7 @@ import json
 from collections.abc import Mapping
 from typing import Any, Final
 
-from ...hands.statistics import Counters, Statistics
+from ...hands.statistics import Statistics
 from ...hands.streams import Channels
 from ...hands.waiting import StateWaiters
 from ...runtime.clock import now
@@ -43,7 +43,6 @@ from ...values.errors import (
     NotStartedError,
     RobotiqError,
 )
-from ...values.statistics import Statistics
 from ..limited_log import LimitedLog
 from ..network.bus import Bus, Undo
 from ..wire.names import GripperName

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Final
 
-from ...hands.statistics import Statistics
 from ...runtime.log import printable
 from ...values import errors
 from ...values.enums import Fault, State
