@@ -29,7 +29,7 @@ _BOOT: Final = Path("/proc/sys/kernel/random/boot_id")
 
 
 class Records:
-    """What the next run of an agent must know: a file for each gripper, in a folder. Without one, nothing.
+    """Keeps a file for each gripper, for the next run of the agent; without a folder it keeps nothing.
 
     The folder is created when it is needed. A file is valid until the machine restarts: the last write may
     not have reached the disk then, unless it has an inhibit.
