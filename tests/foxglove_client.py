@@ -46,7 +46,7 @@ class Client:
             number, nanoseconds = struct.unpack_from("<IQ", frame, 1)
             topic = self._topics[number]
             self.received.append((topic, nanoseconds, frame[13:]))
-            if topic not in ("/joint_states", "/robot_description"):
+            if topic not in ("/joint_states", "/robot_description", "/tf"):
                 self._objects.setdefault(topic, []).append(json.loads(frame[13:]))
 
     async def until(self, condition: Callable[[], bool]) -> None:

@@ -37,6 +37,7 @@ from robotiq_async.link.address import parse_address
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, UrcapSimulatorServer
 from robotiq_async.tools.actions import ACTIONS, Operator
 from robotiq_async.tools.measure.campaigns import grasp, time_closing
+from robotiq_async.tools.recording.feed import TOPICS
 from robotiq_async.tools.recording.recorder import Recorder
 from robotiq_async.tools.recording.recordings import read_recording
 from robotiq_async.tools.recording.table import COLUMNS, Table
@@ -530,8 +531,7 @@ async def test_a_recording_has_the_one_axis_and_can_be_read(tmp_path: Path) -> N
             await hand.close(speed=0)
         assert recorder.recorded > 3
     entries = [*read_recording(path)]
-    topics = {"/gripper/status", "/gripper/command", "/gripper/event", "/joint_states"}
-    assert {entry.topic for entry in entries} == topics
+    assert {entry.topic for entry in entries} == {topic.name for topic in TOPICS}
     (last,) = [entry for entry in entries if entry.topic == "/gripper/status"][-1:]
     row = Table("status").row("status", last.nanoseconds, last.fields)
     assert row is not None

@@ -7,17 +7,15 @@
 In this order a slow viewer does not delay the stop of the hand.
 
 The topics are those of a recording (:mod:`.recording.feed`); ``/gripper/state`` with state, fault and
-statistics, once a second and at every event; ``/robot_description`` and ``/tf`` for 3-D panels, and
-``/gripper/parts`` with what a simulation with physics has before the gripper. Viewers only look: there is no
-password, and nothing here moves the gripper.
+statistics, once a second and at every event; and ``/gripper/parts`` with what a simulation with physics has
+before the gripper. Viewers only look: there is no password, and nothing here moves the gripper.
 """
 
 from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Callable, Sequence
 from typing import Any, Final, Self
 
 try:
@@ -35,31 +33,19 @@ from ..runtime.concurrency import in_a_thread, wait_shielded
 from ..values.checks import check_int
 from ..values.enums import State
 from ..values.errors import ViewerError
-from ..values.model import Model
-from ..values.status import RobotiqStatus
-from .description import Pose, Shape, hand_model, urdf
-from .description.joint_states import ENCAPSULATION, add_string
-from .description.kinematics import joint_angles, joint_names
+from .description import Pose, Shape, hand_model
 from .description.simulated import bodies_of, joints_and_parts
-from .recording.feed import EVENT, JOINTS_TOPIC, TOPICS, Feed, Message, Topic, compact, json_topic
+from .description.transforms import encode_description
+from .recording.feed import DESCRIPTION, EVENT, TOPICS, TRANSFORMS, Feed, Message, Topic, compact, json_topic
 from .recording.payloads import INTEGER, NUMBER, SCHEMAS, STRING, object_schema, state_fields, title
 
 LOOPBACK: Final = "127.0.0.1"
 VIEWER_PORT: Final = 8765
 """The default of Foxglove's own dialog."""
 STATE_TOPIC: Final = json_topic("state", SCHEMAS["state"])
-DESCRIPTION: Final = Topic("/robot_description", "cdr", "std_msgs/msg/String", "ros2msg", b"string data\n")
 _TIME: Final = {"title": "time", **object_schema(sec=INTEGER, nsec=INTEGER)}
 _XYZ: Final = object_schema(**dict.fromkeys("xyz", NUMBER))
 _TURN: Final = object_schema(**dict.fromkeys("xyzw", NUMBER))
-_TRANSFORM: Final = object_schema(
-    timestamp=_TIME, parent_frame_id=STRING, child_frame_id=STRING, translation=_XYZ, rotation=_TURN
-)
-_TRANSFORMS_SCHEMA: Final = json.dumps(
-    object_schema(transforms={"type": "array", "items": _TRANSFORM})
-).encode()
-TRANSFORMS: Final = Topic("/tf", "json", "foxglove.FrameTransforms", "jsonschema", _TRANSFORMS_SCHEMA)
-"""Viewers expect a schema of this name."""
 _SOLID: Final = object_schema(
     pose=object_schema(position=_XYZ, orientation=_TURN),
     size=_XYZ,
@@ -78,9 +64,7 @@ _ENTITY: Final = object_schema(
 _SCENE_SCHEMA: Final = json.dumps(object_schema(entities={"type": "array", "items": _ENTITY})).encode()
 PARTS: Final = Topic("/gripper/parts", "json", "foxglove.SceneUpdate", "jsonschema", _SCENE_SCHEMA)
 _YELLOW: Final = {"r": 0.95, "g": 0.76, "b": 0.19, "a": 1.0}
-SHOWN_TOPICS: Final = (*TOPICS, STATE_TOPIC, DESCRIPTION, TRANSFORMS, PARTS)
-TRANSFORMS_S: Final = 0.05
-"""Interval of ``/tf``: smooth to the eye, a tenth of the polls."""
+SHOWN_TOPICS: Final = (*TOPICS, STATE_TOPIC, PARTS)
 STATE_S: Final = 1.0
 """Interval of ``/gripper/state`` when nothing happens."""
 VIEWER_STOP_S: Final = 1.0
@@ -109,8 +93,6 @@ class Viewer:
         """A reference: its channels close with the last one."""
         self._channels: dict[Topic, Channel] = {}
         self._publisher: asyncio.Task[None]
-        self._transformed_at = 0
-        """Time of the last message on ``/tf``, in nanoseconds."""
         self._published_state: State | None = None
 
     @property
@@ -173,23 +155,16 @@ class Viewer:
         # Every command goes to RUNNING_CC and back; publishing these would double the work.
         if message.topic is EVENT and self._hand.state not in (self._published_state, State.RUNNING_CC):
             self._publish_state()
+        if message.topic is TRANSFORMS:
+            self._publish_parts(message.nanoseconds)
 
-        is_due = message.nanoseconds - self._transformed_at >= TRANSFORMS_S * 1e9
-        if message.topic is JOINTS_TOPIC and is_due:
-            self._transformed_at = message.nanoseconds
-            self._publish_bodies(message.nanoseconds)
-
-    def _publish_bodies(self, nanoseconds: int) -> None:
-        told = bodies_of(self._hand)
-        joints, parts = ({}, None) if told is None else joints_and_parts(told)
-        data = compact(transforms(self._hand.status, nanoseconds, joints))
-        self._channels[TRANSFORMS].log(data, log_time=nanoseconds)
-        if parts is not None:
-            data = compact(parts_message(hand_model(self._hand.model).root, parts, nanoseconds))
-            self._channels[PARTS].log(data, log_time=nanoseconds)
+    def _publish_parts(self, nanoseconds: int) -> None:
+        if (told := bodies_of(self._hand)) is not None:
+            parts = parts_message(hand_model(self._hand.model).root, joints_and_parts(told)[1], nanoseconds)
+            self._channels[PARTS].log(compact(parts), log_time=nanoseconds)
 
     def _describe(self) -> None:
-        self._channels[DESCRIPTION].log(_description_message(self._hand.model))
+        self._channels[DESCRIPTION].log(encode_description(self._hand.model))
 
     def _publish_state(self) -> None:
         self._published_state = self._hand.state
@@ -212,36 +187,6 @@ class _Listener(ServerListener):
     def on_subscribe(self, client: Client, channel: ChannelView) -> None:  # noqa: ARG002
         if channel.topic == DESCRIPTION.name:
             self._describe()
-
-
-def _description_message(model: Model) -> bytes:
-    body = bytearray(ENCAPSULATION)
-    add_string(body, urdf(model))
-    return bytes(body)
-
-
-def transforms(
-    status: RobotiqStatus, nanoseconds: int, joints: Mapping[str, float] = MappingProxyType({})
-) -> dict[str, Any]:
-    """The transform of every joint, from parent to child, at a time since 1970.
-
-    ``joints`` has the values that are known otherwise than by the positions of the status.
-    """
-    model = hand_model(status.model)
-    values = model.completed(dict(zip(joint_names(status.model), joint_angles(status), strict=True)))
-    found = []
-    for joint in model.joints:
-        placed = _placed(joint.pose(joints.get(joint.name, values.get(joint.name, 0.0))))
-        found.append(
-            {
-                "timestamp": _time(nanoseconds),
-                "parent_frame_id": joint.parent,
-                "child_frame_id": joint.child,
-                "translation": placed["position"],
-                "rotation": placed["orientation"],
-            }
-        )
-    return {"transforms": found}
 
 
 def parts_message(root: str, parts: Sequence[Shape], nanoseconds: int) -> dict[str, Any]:

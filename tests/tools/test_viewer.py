@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_typestore
 
@@ -25,6 +26,7 @@ from robotiq_async.values.model import MODELS
 from tests.foxglove_client import Client, client
 from tests.grippers import active_gripper, lose_link, shows, until
 from tests.patience import patience
+from tests.tools.drawn import Placed, decoded, of_urdf, placed, rotation
 
 SOCKETS = Path("/proc/net/tcp")
 LINUX = SOCKETS.exists()
@@ -113,20 +115,22 @@ async def test_a_late_client_gets_the_state(hand: RobotiqHand, server: Simulator
 
 async def test_the_hand_can_be_drawn(hand: RobotiqHand) -> None:
     """The description when a viewer begins to listen, and a transform for every joint of it."""
-    store = get_typestore(Stores.ROS2_HUMBLE)
     async with viewed(hand) as one:
         await one.subscribe("/robot_description", "/tf")
         await one.until(lambda: {topic for topic, *_ in one.received} == {"/robot_description", "/tf"})
     data = next(data for topic, _, data in one.received if topic == "/robot_description")
-    message: Any = store.deserialize_cdr(data, "std_msgs/msg/String")
     model = hand_model()
-    assert message.data == urdf()
-    placed = {model.root: (0.0, 0.0, 0.0)}
-    shown = {each["child_frame_id"]: each for each in one.objects("/tf")[-1]["transforms"]}
-    assert {(each["parent_frame_id"], child) for child, each in shown.items()} == {
+    assert decoded(data, "std_msgs/msg/String").data == urdf()
+    shown = links(one)
+    assert {(each.parent, child) for child, each in shown.items()} == {
         (joint.parent, joint.child) for joint in model.joints
     }
-    assert len(placed | shown) == len(model.links)
+    assert shown.keys() | {model.root} == model.links.keys()
+
+
+def links(one: Client) -> dict[str, Placed]:
+    """The links as last published."""
+    return placed([data for topic, _, data in one.received if topic == "/tf"][-1])
 
 
 @pytest.mark.parametrize("name", ["2f85", "2f140", "hand-e"])
@@ -137,15 +141,13 @@ async def test_a_sibling_can_be_drawn(name: str) -> None:
         await jaw.move(120)
         await one.subscribe("/robot_description", "/tf")
         await one.until(lambda: {topic for topic, *_ in one.received} == {"/robot_description", "/tf"})
-    model, angles = hand_model(name), dict(zip(joint_names(jaw.model), joint_angles(jaw.status), strict=True))
-    shown = {each["child_frame_id"]: each for each in one.objects("/tf")[-1]["transforms"]}
-    values = model.completed(angles)
-    for joint in model.joints:
-        pose = joint.pose(values[joint.name])
-        assert list(shown[joint.child]["translation"].values()) == pytest.approx(pose.position, abs=1e-3)
-        assert list(shown[joint.child]["rotation"].values()) == pytest.approx(pose.quaternion, abs=0.02)
     described = next(data for topic, _, data in one.received if topic == "/robot_description")
-    assert f'<robot name="{model.name}">'.encode() in described
+    text = decoded(described, "std_msgs/msg/String").data
+    assert f'<robot name="{hand_model(name).name}">' in text
+    angles = dict(zip(joint_names(jaw.model), joint_angles(jaw.status), strict=True))
+    expected, shown = of_urdf(text, angles), links(one)
+    for link, each in expected.items():
+        np.testing.assert_allclose(shown[link].pose, each.pose, atol=0.02)
 
 
 async def test_a_simulated_part_is_shown_where_its_simulation_has_it() -> None:
@@ -164,10 +166,10 @@ async def test_a_simulated_part_is_shown_where_its_simulation_has_it() -> None:
         assert [cylinder["size"][axis] for axis in "xyz"] == pytest.approx([0.04, 0.04, 0.06])
         assert list(cylinder["pose"]["position"].values()) == pytest.approx(part.position, abs=1e-3)
         assert entity["cubes"] == entity["spheres"] == []
-        shown = {each["child_frame_id"]: each for each in one.objects("/tf")[-1]["transforms"]}
+        shown = links(one)
     for joint in hand_model(jaw.model).moving:
-        pose = joint.pose(bodies.joints[joint.name])
-        assert list(shown[joint.child]["rotation"].values()) == pytest.approx(pose.quaternion, abs=1e-3)
+        turned = rotation(*joint.pose(bodies.joints[joint.name]).quaternion)
+        np.testing.assert_allclose(shown[joint.child].pose[:3, :3], turned, atol=1e-3)
 
 
 # -- beginning and end--------------------------------------------------------------------------------------

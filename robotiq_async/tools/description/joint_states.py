@@ -12,25 +12,26 @@ from typing import Final
 from .kinematics import JOINTS
 
 SCHEMA_NAME: Final = "sensor_msgs/msg/JointState"
-_RULE: Final = "=" * 80
+RULE: Final = "=" * 80
+HEADER_DEFINITION: Final = f"""{RULE}
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+{RULE}
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
 JOINT_STATE_SCHEMA: Final = f"""std_msgs/Header header
 string[] name
 float64[] position
 float64[] velocity
 float64[] effort
-{_RULE}
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-{_RULE}
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-"""
+{HEADER_DEFINITION}"""
 """The message definition and the definitions it refers to, in MCAP's format ros2msg."""
 
 ENCAPSULATION: Final = b"\x00\x01\x00\x00"
-_STAMP: Final = Struct("<iI")
+STAMP: Final = Struct("<iI")
 
 
 class JointStateEncoder:
@@ -38,15 +39,15 @@ class JointStateEncoder:
 
     def __init__(self, frame_id: str = "palm", names: Sequence[str] = JOINTS) -> None:
         """Encode everything but the stamp and the numbers, which are in the order of the names."""
-        body = bytearray(_STAMP.size)
+        body = bytearray(STAMP.size)
         add_string(body, frame_id)
-        _align(body, 4)
+        align(body, 4)
         body += pack("<I", len(names))
         for name in names:
-            _align(body, 4)
+            align(body, 4)
             add_string(body, name)
         self._count = len(names)
-        self._constant = bytes(body[_STAMP.size :])
+        self._constant = bytes(body[STAMP.size :])
         # Three sequences of doubles. CDR aligns each count to 4 bytes and the numbers to 8.
         layout, at = "<", len(body)
         for _ in range(3):
@@ -67,13 +68,14 @@ class JointStateEncoder:
 
         There is a number for each joint: radians, radians per second, motor currents in ampere.
         """
-        stamp = _STAMP.pack(*divmod(nanoseconds, 1_000_000_000))
+        stamp = STAMP.pack(*divmod(nanoseconds, 1_000_000_000))
         count = self._count
         numbers = self._numbers.pack(count, *positions, count, *velocities, count, *efforts)
         return ENCAPSULATION + stamp + self._constant + numbers
 
 
-def _align(body: bytearray, size: int) -> None:
+def align(body: bytearray, size: int) -> None:
+    """Append zeros up to a multiple of this size."""
     body += bytes(-len(body) % size)
 
 

@@ -1,13 +1,15 @@
-"""Everything about a hand as messages on four topics, for recordings and for viewers.
+"""Everything about a hand as messages on six topics, for recordings and for viewers.
 
 ``/gripper/status`` (every poll), ``/gripper/command`` (every request that was written) and ``/gripper/event``
-(transitions, faults, inhibits) are JSON with a JSON Schema; ``/joint_states`` is as ROS 2 encodes it.
+(transitions, faults, inhibits) are JSON with a JSON Schema. ``/joint_states``, ``/robot_description`` (once)
+and ``/tf``, from which viewers draw the gripper in 3-D, are as ROS 2 encodes them.
 """
 
 from __future__ import annotations
 
 import asyncio
 import json
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -19,10 +21,19 @@ from ...runtime.clock import now
 from ...runtime.log import Log
 from ...values.errors import RobotiqConnectionError
 from ...values.events import SentRequest, Transition
-from ...values.model import THREE_FINGER
+from ...values.model import Model
 from ...values.status import RobotiqStatus
 from ..description.joint_states import JOINT_STATE_SCHEMA, SCHEMA_NAME, JointStateEncoder
 from ..description.kinematics import joint_angles, joint_names, joint_velocities
+from ..description.simulated import bodies_of, joints_and_parts
+from ..description.transforms import (
+    STRING_SCHEMA,
+    STRING_SCHEMA_NAME,
+    TRANSFORMS_SCHEMA,
+    TRANSFORMS_SCHEMA_NAME,
+    encode_description,
+    encode_transforms,
+)
 from .payloads import SCHEMAS, InhibitEvents, Properties, efforts, fault_event, mark_fields, transition_fields
 
 FEED_BUFFER: Final = 100_000
@@ -31,6 +42,8 @@ REOPEN_S: Final = 0.2
 """Pause before reopening the streams of a hand that has given up on its link."""
 VELOCITY_S: Final = 0.05
 """Time over which joint velocities are taken: a count is half a degree."""
+TRANSFORMS_S: Final = 0.05
+"""Interval of ``/tf``: smooth to the eye, a tenth of the polls."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +70,17 @@ def compact(fields: Properties) -> bytes:
 STATUS: Final = json_topic("status", SCHEMAS["status"])
 COMMAND: Final = json_topic("command", SCHEMAS["command"])
 EVENT: Final = json_topic("event", SCHEMAS["event"])
-JOINTS_TOPIC: Final = Topic("/joint_states", "cdr", SCHEMA_NAME, "ros2msg", JOINT_STATE_SCHEMA.encode())
-TOPICS: Final = (STATUS, COMMAND, EVENT, JOINTS_TOPIC)
+
+
+def ros_topic(name: str, schema_name: str, schema: str) -> Topic:
+    """A topic of messages of ROS 2."""
+    return Topic(name, "cdr", schema_name, "ros2msg", schema.encode())
+
+
+JOINTS_TOPIC: Final = ros_topic("/joint_states", SCHEMA_NAME, JOINT_STATE_SCHEMA)
+DESCRIPTION: Final = ros_topic("/robot_description", STRING_SCHEMA_NAME, STRING_SCHEMA)
+TRANSFORMS: Final = ros_topic("/tf", TRANSFORMS_SCHEMA_NAME, TRANSFORMS_SCHEMA)
+TOPICS: Final = (STATUS, COMMAND, EVENT, JOINTS_TOPIC, DESCRIPTION, TRANSFORMS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,8 +134,9 @@ class Feed:
         """
         self._hand = hand
         self._publish = publish
-        self._model = THREE_FINGER
+        self._model: Model | None = None
         self._encoder = JointStateEncoder()
+        self._transformed_at = -math.inf
         self._before: list[RobotiqStatus] = []
         self._inhibits = InhibitEvents(hand)
         self._epoch = 0.0
@@ -182,18 +205,27 @@ class Feed:
             self._publish_json(EVENT, status.timestamp, event)
         for event in self._inhibits.new(status.timestamp):
             self._publish_json(EVENT, status.timestamp, event)
-        self._publish_joints(status)
-
-    def _publish_joints(self, status: RobotiqStatus) -> None:
         if self._model is not status.model:  # a remote hand learns it when it starts
             self._model, self._before = status.model, []
             self._encoder = JointStateEncoder(names=joint_names(status.model))
+            self._publish(Message(DESCRIPTION, stamp, encode_description(status.model), status.sequence))
+        if status.timestamp - self._transformed_at >= TRANSFORMS_S:
+            self._publish_transforms(status, stamp)
+        self._publish_joints(status, stamp)
+
+    def _publish_transforms(self, status: RobotiqStatus, stamp: int) -> None:
+        self._transformed_at = status.timestamp
+        bodies = bodies_of(self._hand)
+        joints = {} if bodies is None else joints_and_parts(bodies)[0]
+        data = encode_transforms(status, stamp, joints)
+        self._publish(Message(TRANSFORMS, stamp, data, status.sequence))
+
+    def _publish_joints(self, status: RobotiqStatus, stamp: int) -> None:
         while len(self._before) > 1 and status.timestamp - self._before[1].timestamp >= VELOCITY_S:
             del self._before[0]
         self._before.append(status)
         angles, seconds = joint_angles(status), status.timestamp - self._before[0].timestamp
         velocities = joint_velocities(self._before[0], status) if seconds else (0.0,) * len(angles)
-        stamp = self.nanoseconds(status.timestamp)
         data = self._encoder.encode(stamp, angles, velocities, efforts(status))
         self._publish(Message(JOINTS_TOPIC, stamp, data, status.sequence))
 

@@ -7,11 +7,12 @@
 In this order the file contains start and stop, and a slow disk does not delay the stop. A blocking hand is
 recorded with ``with`` in place of ``async with``.
 
-Four channels: ``/gripper/status`` (every poll), ``/gripper/command`` (every request that was written) and
-``/gripper/event`` (transitions, faults and marks) as JSON with a JSON Schema; ``/joint_states`` as ROS 2
-encodes it. Tools of ROS 2 refuse a file with other channels than ROS's: ``ros2=True`` leaves them out. A
-table has a row for every poll, and no commands. A thread writes to the disk twice a second. A killed program
-loses no more than that, and ``robotiq-async recover`` repairs its file.
+Six channels: ``/gripper/status`` (every poll), ``/gripper/command`` (every request that was written) and
+``/gripper/event`` (transitions, faults and marks) as JSON with a JSON Schema; ``/joint_states``,
+``/robot_description`` and ``/tf`` as ROS 2 encodes them. Tools of ROS 2 refuse a file with other channels
+than ROS's: ``ros2=True`` writes joint states alone. A table has a row for every poll, and no commands. A
+thread writes to the disk twice a second. A killed program loses no more than that, and
+``robotiq-async recover`` repairs its file.
 """
 
 from __future__ import annotations
