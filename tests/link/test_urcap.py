@@ -823,6 +823,20 @@ async def test_a_gripper_that_the_urcap_does_not_reach_is_named_as_such(name: st
         assert len(served.writers) == connections, "the connection stays"
 
 
+@pytest.mark.parametrize("answers", range(1, len(ALL)))
+async def test_an_emergency_stop_that_ends_in_the_middle_of_a_status_is_one(answers: int) -> None:
+    """ACT and GTO are asked for twice: a later answer hid the one without a value, which ended the hand."""
+    async with linked() as (link, served):
+        served.lines.clear()
+
+        def answer(line: str) -> bytes | None:
+            return f"{line[4:]} ?\n".encode() if len(served.lines) <= answers else served.good(line)
+
+        served.answer = answer
+        with pytest.raises(ConnectionLostError, match=r"cannot be read \(ACT \?\)"):
+            await link.read()
+
+
 async def read_on(link: UrcapTransport) -> None:
     """Read until that fails."""
     while True:

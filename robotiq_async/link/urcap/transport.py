@@ -344,8 +344,8 @@ class UrcapTransport:
         outcome = yield questions
         self._unanswered = questions.unanswered
         _check(outcome)
-        found = dict(zip(names, questions.values, strict=True))
-        self._unreadable = next((name for name, value in found.items() if value == lines.UNREADABLE), "")
+        found = zip(names, questions.values, strict=True)  # ACT and GTO twice, and readable once perhaps
+        self._unreadable = next((name for name, value in found if value == lines.UNREADABLE), "")
         if self._unreadable:
             return None
         values = [int(value) for value in questions.values]
