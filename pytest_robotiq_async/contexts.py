@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from robotiq_async import RobotiqHand
-from robotiq_async.runtime.concurrency import running_loop
+from robotiq_async.runtime import running_loop
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 
 

@@ -111,7 +111,9 @@ def test_every_public_method_and_attribute_is_described() -> None:
 
 
 def test_every_error_that_a_docstring_names_is_exported() -> None:
-    errors = {name for name in vars(robotiq_async.values.errors) if name.endswith("Error")}
+    errors = {
+        name for room in (robotiq_async.values, fleet) for name in vars(room.errors) if name.endswith("Error")
+    }
     described = [*methods()]
     for module in (robotiq_async, simulator, fleet, sync):
         described += [(name, getattr(module, name)) for name in module.__all__]

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from robotiq_async.cli.output.messages import forwarded_warnings
-from robotiq_async.runtime.log import Log, log, printable
+from robotiq_async.runtime.logger import Log, log, printable
 
 FORMAT = logging.Formatter("[%(hand)s] %(message)s")
 

@@ -36,6 +36,7 @@ from robotiq_async.cli.output.lines import status_line
 from robotiq_async.link.address import parse_address
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, UrcapSimulatorServer
 from robotiq_async.tools.actions import ACTIONS, Operator
+from robotiq_async.tools.errors import MeasuringError
 from robotiq_async.tools.measure.campaigns import grasp, time_closing
 from robotiq_async.tools.recording.feed import TOPICS
 from robotiq_async.tools.recording.recorder import Recorder
@@ -44,7 +45,7 @@ from robotiq_async.tools.recording.table import COLUMNS, Table
 from robotiq_async.tools.web.page.mirror import HandMirror
 from robotiq_async.tools.web.page.widgets.words import axis_title, opening_words
 from robotiq_async.values.checks import parse_fingers
-from robotiq_async.values.errors import MeasuringError, RobotiqStateError
+from robotiq_async.values.errors import RobotiqStateError
 from robotiq_async.values.model import MODELS, model_of
 from robotiq_async.values.request import AxisRequest, Request
 from tests.contract.bench import MODEL, OTHERWISE, SERVER

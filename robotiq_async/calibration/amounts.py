@@ -11,7 +11,7 @@ from typing import Final
 
 from ..values.checks import check_optional_byte, repr_of
 from ..values.enums import Finger
-from . import Units
+from .units import Units
 
 OPENINGS: Final = ("mm", "open_fraction")
 """The arguments of calls that stand in the place of a position."""

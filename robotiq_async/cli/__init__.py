@@ -25,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ModuleNotFoundError as error:
         if error.name != "cyclopts":
             raise
-        from ..runtime.extras import install
+        from ..runtime import install
 
         print(f"robotiq-async: the command line needs cyclopts: {install('cli')}", file=sys.stderr)
         return 1

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..link.address import is_remote, parse_address
-from ..values.model import Model, model_of
+from ..link import is_remote, parse_address
+from ..values import Model, model_of
 from .failures import usage
 
 

@@ -10,10 +10,9 @@ from typing import Annotated, Any, Final, Literal, NamedTuple
 
 from cyclopts import Parameter, Token
 
-from ..hands.options import Option, Place, offered
-from ..runtime.extras import install
-from ..values.checks import parse_fingers
-from ..values.enums import Finger
+from ..hands import Option, Place, offered
+from ..runtime import install
+from ..values import Finger, parse_fingers
 from .failures import CommandError, UsageError, usage
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import mkstemp
 from typing import Final
 
-from ..runtime.concurrency import in_a_thread
+from ..runtime import in_a_thread
 
 OPEN_S: Final = 1.0
 """Maximum wait for the browser: some return only when they are closed."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from ..hands import Hand
-from ..hands.options import POLL_INTERVAL_S
-from ..link.address import is_remote
-from ..local.robotiq_hand import RobotiqHand
+from ..hands import POLL_INTERVAL_S, Hand
+from ..link import is_remote
+from ..local import RobotiqHand
 from ..tools.actions import Operator
-from ..values.enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ..values import DEFAULT_FORCE, DEFAULT_SPEED
 from .arguments import USUAL_LINK, LinkOptions, need
 from .failures import UsageError, usage
 

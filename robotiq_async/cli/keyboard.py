@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any, Final, Self
 
-from ..runtime.concurrency import in_a_thread
+from ..runtime import in_a_thread
 
 ENTER: Final = "\n"
 END: Final = "q"

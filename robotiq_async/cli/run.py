@@ -19,9 +19,9 @@ from typing import Self
 
 from cyclopts import CycloptsError
 
-from ..hands.options import LATE_POLLS
-from ..runtime.signals import ending_signals
-from ..values.errors import RobotiqError
+from ..hands import LATE_POLLS
+from ..runtime import ending_signals
+from ..values import RobotiqError
 from .app import build
 from .arguments import AMOUNT_UNITS
 from .commands.ports import with_ports

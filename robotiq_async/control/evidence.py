@@ -16,7 +16,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Final, NamedTuple
 
-from ..runtime.log import Log
+from ..runtime.logger import Log
 from ..values import registers as reg
 from ..values.enums import Fault, Initialization, Trigger
 from ..values.model import Model

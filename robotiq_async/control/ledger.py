@@ -29,7 +29,7 @@ from itertools import takewhile
 from operator import attrgetter
 from typing import Final
 
-from ..runtime.log import Log, log
+from ..runtime.logger import Log, log
 from ..values.enums import NO_AXES, Finger, ObjectStatus
 from ..values.model import THREE_FINGER, Model
 from ..values.registers import Echo

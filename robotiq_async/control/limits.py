@@ -20,7 +20,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from ..runtime.log import Log, log
+from ..runtime.logger import Log, log
 from ..values.enums import Finger, ObjectStatus
 from ..values.model import TOLERANCE
 from ..values.registers import Echo

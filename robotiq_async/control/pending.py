@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
-from ..runtime.log import Log, log
+from ..runtime.logger import Log, log
 from ..values.enums import NO_AXES, Finger, ObjectStatus
 from ..values.errors import MoveSupersededError, RobotiqError
 from ..values.move_result import MoveResult

@@ -20,7 +20,7 @@ from collections.abc import Callable
 from enum import Enum
 from typing import Final
 
-from ..runtime.log import Log, log
+from ..runtime.logger import Log, log
 from ..values.enums import Fault, State, Trigger
 from ..values.errors import (
     ConnectionLostError,
@@ -165,7 +165,12 @@ class StateMachine:
 
         ``presses`` is False for a command that neither moves an axis nor makes it press more.
         """
-        return check(trigger, self.state, status, self.inhibited if presses else None, why_down=self.why_down)
+        if presses and trigger in MOVES:
+            self.check_permitted()
+        answer = TABLE[self.state][trigger]
+        if answer in _REFUSALS:
+            raise refusal(trigger, self.state, status, self.why_down)
+        return answer is not Verdict.IGNORED
 
     def inhibit(self, inhibit: Inhibit) -> None:
         """Refuse what may move or press from here on. The first reason stays."""
@@ -206,25 +211,6 @@ class StateMachine:
     def note_down(self, why: object) -> None:
         """The link is down, for the error of what is refused then."""
         self.why_down = why
-
-
-def check(
-    trigger: Trigger,
-    state: State,
-    status: RobotiqStatus | None = None,
-    inhibited: Inhibit | None = None,
-    why_down: object = None,
-) -> bool:
-    """Whether there is anything to do for a trigger. Raises the error if the table or an inhibit refuses it.
-
-    ``inhibited`` counts for what may move or press.
-    """
-    if inhibited is not None and trigger in MOVES:
-        raise MotionInhibitedError(inhibited)
-    answer = TABLE[state][trigger]
-    if answer in _REFUSALS:
-        raise refusal(trigger, state, status, why_down)
-    return answer is not Verdict.IGNORED
 
 
 def refusal(

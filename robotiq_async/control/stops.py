@@ -26,7 +26,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from ..runtime.log import Log
+from ..runtime.logger import Log
 from ..values.enums import Fault, Finger, StopLevel, Trigger
 from ..values.errors import StateTimeoutError
 from ..values.request import Request

@@ -8,9 +8,7 @@ from contextlib import suppress
 from typing import Final, TypeVar
 
 from ..sync import RobotiqHand
-from ..values.checks import check_seconds
-from ..values.errors import NotStartedError, RobotiqConnectionError
-from ..values.status import RobotiqStatus
+from ..values import NotStartedError, RobotiqConnectionError, RobotiqStatus, check_seconds
 
 T = TypeVar("T")
 RECENT_STATUS_S: Final = (

@@ -29,14 +29,10 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final, NoReturn
 
-from ..calibration.conventions import Convention
-from ..runtime.extras import install
-from ..runtime.log import log
-from ..runtime.version import __version__
+from ..calibration import Convention
+from ..runtime import __version__, install, log
 from ..sync import RobotiqHand
-from ..values.enums import Finger, State
-from ..values.errors import GripperFaultError, RobotiqConnectionError, RobotiqError
-from ..values.status import RobotiqStatus
+from ..values import Finger, GripperFaultError, RobotiqConnectionError, RobotiqError, RobotiqStatus, State
 from .patience import CallerPatience
 from .protobuf import FieldValue, decoded, encoded
 

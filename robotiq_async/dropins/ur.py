@@ -28,18 +28,24 @@ from contextlib import suppress
 from enum import Enum
 from typing import Any, Final
 
-from ..runtime.log import Log
+from ..runtime import Log
 from ..sync import RobotiqHand
-from ..values.checks import check_flag, check_int
-from ..values.enums import CLOSED, DEFAULT_FORCE, DEFAULT_SPEED, OPEN, Finger, State
-from ..values.errors import (
+from ..values import (
+    CLOSED,
+    DEFAULT_FORCE,
+    DEFAULT_SPEED,
+    OPEN,
     ConnectionLostError,
+    Finger,
     MoveSupersededError,
     MoveTimeoutError,
     RobotiqConnectionError,
     RobotiqError,
+    RobotiqStatus,
+    State,
+    check_flag,
+    check_int,
 )
-from ..values.status import RobotiqStatus
 from .patience import CallerPatience
 
 TEXT_PORT: Final = 63352

@@ -11,8 +11,8 @@ Programs import from here. That works without zenoh, which is imported when a se
     wire             names, requests, answers, statuses
 """
 
-from ..values.errors import AgentError, ControlLostError, NotAllowedError, NotAllStoppedError
 from .agent.agent import Agent
+from .errors import AgentError, ControlLostError, NotAllowedError, NotAllStoppedError
 from .fleet import Fleet, Member
 from .network.bus import Bus
 from .network.route import Route

@@ -13,7 +13,7 @@ from collections.abc import Callable, Coroutine, Iterable, Iterator
 from typing import TYPE_CHECKING, Any, Final, Generic, Self, TypeVar
 
 from ..runtime.concurrency import check_loop
-from ..runtime.log import Log, log
+from ..runtime.logger import Log, log
 from ..values.checks import check_int, check_seconds
 from ..values.errors import ConnectionLostError, RobotiqError
 from ..values.events import SentRequest, Transition
@@ -296,8 +296,8 @@ class Listeners:
 class Channel(Generic[T]):
     """Gives every item to any number of streams, and to the listeners. A dropped stream is forgotten."""
 
-    def __init__(self, listeners: Listeners | None = None) -> None:
-        self._listeners = listeners or Listeners()
+    def __init__(self, listeners: Listeners) -> None:
+        self._listeners = listeners
         # A list of references and not a WeakSet, which takes several times as long, at every poll.
         self._intakes: list[weakref.ref[Intake[Any]]] = []
         self._has_dropped = False  # whether some of these were dropped by their readers

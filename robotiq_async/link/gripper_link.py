@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Final, Generic, TypeVar
 
-from ..runtime.log import Log
+from ..runtime.logger import Log
 from ..values.checks import repr_of
 from ..values.model import THREE_FINGER, Model, model_of
 from ..values.registers import RegisterMap
@@ -80,18 +80,6 @@ class GripperLink:
     is_slow: bool = False
     model: Model = THREE_FINGER
     stroke: str | None = None
-
-    def why_not_beside(self, other: GripperLink) -> str:
-        """Why one process cannot have hands for both; empty if it can."""
-        own, theirs = self.gripper(), other.gripper()
-        if own.may_be(theirs):
-            return f"both may be one gripper{own.hint}"
-        if own.place != theirs.place:
-            return ""
-        if own.is_on_line is not theirs.is_on_line:
-            return "a socket has one protocol"
-        is_alike = parse_address(self.address).line == parse_address(other.address).line
-        return "" if is_alike else "a port has only one rate"
 
 
 def gripper_link(

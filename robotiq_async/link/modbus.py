@@ -19,7 +19,7 @@ import secrets
 from collections.abc import Callable, Coroutine, Sequence
 from typing import Any, Final
 
-from ..runtime.log import Log, log
+from ..runtime.logger import Log, log
 from ..values.registers import RegisterMap, Registers
 from .address import Address
 from .dialogue import Decide, Dialogues
@@ -90,10 +90,6 @@ class ModbusTransport:
     @property
     def is_open(self) -> bool:
         return self._line.is_open_for(self)
-
-    @property
-    def asked_at(self) -> float:
-        return self._line.asked_at
 
     @property
     def is_shared(self) -> bool:

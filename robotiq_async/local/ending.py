@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable
 from typing import Final
 
 from ..runtime.limit import Limit
-from ..runtime.log import Log
+from ..runtime.logger import Log
 from ..values.enums import StopLevel
 
 STOP_S: Final = 1.4

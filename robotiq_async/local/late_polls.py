@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Final
 
 from ..hands.options import LATE_POLLS
-from ..runtime.log import Log
+from ..runtime.logger import Log
 
 LATE_S: Final = 0.05
 """A poll that is later than this is worth a warning; on a busy machine a few milliseconds are usual."""

@@ -254,7 +254,7 @@ class Session:
             with Limit(timeout):
                 state = await reached
         if state is None:
-            raise self._waiters.late(what, timeout, self.machine.state)
+            raise StateTimeoutError(f"{what} within {timeout:g} s (now {self.machine.state.name})")
         return state
 
     async def activated(self, ask: Callable[[], None] | None = None) -> None:

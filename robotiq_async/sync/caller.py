@@ -27,7 +27,7 @@ from typing import Final, TypeVar
 
 from ..local.robotiq_hand import RobotiqHand as AsyncRobotiqHand
 from ..runtime.concurrency import LateError
-from ..runtime.log import Log, log
+from ..runtime.logger import Log, log
 from ..values.enums import State
 from ..values.errors import RobotiqError
 from .loop_thread import LOOP_THREAD, Function

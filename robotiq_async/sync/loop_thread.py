@@ -30,7 +30,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, Final, Generic, TypeVar
 
 from ..runtime.concurrency import LateError, green_threads
-from ..runtime.log import log
+from ..runtime.logger import log
 
 T = TypeVar("T")
 Function = Callable[[], Coroutine[Any, Any, T]]

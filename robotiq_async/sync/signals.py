@@ -11,7 +11,7 @@ from types import FrameType
 from typing import Any, Final
 
 from ..runtime.concurrency import LateError
-from ..runtime.log import log
+from ..runtime.logger import log
 from ..runtime.signals import INSIST_S, check_main_thread, ending_signals, pass_on
 from ..values.errors import NotStartedError
 from .loop_thread import LOOP_THREAD

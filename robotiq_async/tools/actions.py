@@ -10,9 +10,8 @@ from types import MappingProxyType
 from typing import Final
 
 from ..hands import Hand
-from ..runtime.clock import now
-from ..values.checks import check_byte
-from ..values.enums import (
+from ..runtime import now
+from ..values import (
     DEFAULT_FORCE,
     DEFAULT_SPEED,
     FORCE_MAX,
@@ -23,10 +22,13 @@ from ..values.enums import (
     Fault,
     Finger,
     Initialization,
+    MoveResult,
+    MoveSupersededError,
+    NotStartedError,
+    RobotiqStateError,
     State,
+    check_byte,
 )
-from ..values.errors import MoveSupersededError, NotStartedError, RobotiqStateError
-from ..values.move_result import MoveResult
 
 HALTED: Final = "HALT was pressed"
 """The reason of a person's halt."""

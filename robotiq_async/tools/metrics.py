@@ -23,18 +23,13 @@ try:
     from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
     from prometheus_client.registry import Collector
 except ModuleNotFoundError as error:
-    from ..runtime.extras import install
+    from ..runtime import install
 
     raise ImportError(f"metrics need prometheus-client: {install('metrics')}") from error
 
-from ..hands import Hand
-from ..hands.statistics import Statistics
-from ..runtime.concurrency import in_a_thread, wait_shielded
-from ..runtime.log import log
-from ..runtime.sockets import listen
-from ..values.checks import check_int
-from ..values.enums import Fault, State
-from ..values.errors import NotStartedError
+from ..hands import Hand, Statistics
+from ..runtime import in_a_thread, listen, log, wait_shielded
+from ..values import Fault, NotStartedError, State, check_int
 from .service import health
 
 LOOPBACK: Final = "127.0.0.1"

@@ -28,16 +28,10 @@ from typing import Any, Final
 
 import anyio
 
-from ..control.state_machine import RUNNING
-from ..hands import Hand
-from ..runtime.clock import now
-from ..runtime.log import log
-from ..runtime.signals import INSIST_S, check_main_thread, ending_signals, pass_on
+from ..hands import RUNNING, Hand
+from ..runtime import INSIST_S, check_main_thread, ending_signals, log, now, pass_on
 from ..sync import RobotiqHand as BlockingHand
-from ..values.enums import Fault, Finger, State, names_of
-from ..values.errors import NotStartedError
-from ..values.inhibit import Inhibit
-from ..values.status import RobotiqStatus
+from ..values import Fault, Finger, Inhibit, NotStartedError, RobotiqStatus, State, names_of
 
 HEALTH_S: Final = 1.0
 """A status that is older proves nothing about the gripper: two hundred polls have brought none."""

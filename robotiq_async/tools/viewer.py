@@ -23,19 +23,17 @@ try:
     from foxglove import Channel, Context, Schema
     from foxglove.websocket import ChannelView, Client, ServerListener, WebSocketServer
 except ModuleNotFoundError as error:
-    from ..runtime.extras import install
+    from ..runtime import install
 
     raise ImportError(f"viewers need foxglove-sdk: {install('view')}") from error
 
 from ..hands import Hand
-from ..runtime.clock import now
-from ..runtime.concurrency import in_a_thread, wait_shielded
-from ..values.checks import check_int
-from ..values.enums import State
-from ..values.errors import ViewerError
+from ..runtime import in_a_thread, now, wait_shielded
+from ..values import State, check_int
 from .description import Pose, Shape, hand_model
 from .description.simulated import bodies_of, joints_and_parts
 from .description.transforms import encode_description
+from .errors import ViewerError
 from .recording.feed import DESCRIPTION, EVENT, TOPICS, TRANSFORMS, Feed, Message, Topic, compact, json_topic
 from .recording.payloads import INTEGER, NUMBER, SCHEMAS, STRING, object_schema, state_fields, title
 

@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from ..values.enums import Finger, ObjectStatus, State, Trigger
-from ..values.errors import (
+from ..values import (
+    NO_REQUEST,
+    Finger,
     GripperFaultError,
     InvalidStateError,
+    Model,
     MotionInhibitedError,
     NotActivatedError,
+    ObjectStatus,
     RobotiqError,
+    RobotiqStatus,
+    State,
+    Trigger,
 )
-from ..values.model import Model
-from ..values.status import NO_REQUEST, RobotiqStatus
 
 STATE_WORDS: Final = {
     State.DISCONNECTED: "lost",

@@ -1,4 +1,4 @@
-"""Everything the library raises, bad arguments aside.
+"""Everything that a hand raises, bad arguments aside.
 
 ::
 
@@ -13,30 +13,23 @@
     |   +-- MoveTimeoutError (TimeoutError)     .status
     |   +-- MoveSupersededError                 another command took over an axis of this move
     |   +-- MotionInhibitedError                a person stopped the hand; .reason, .who and .since
-    |   +-- ControlLostError                    on another host: this hand does not hold the lease
-    |   +-- NotAllowedError                     on another host: the fleet's access rules forbid it
     +-- RobotiqConnectionError (ConnectionError)
-    |   +-- ConnectFailedError                  refused, unreachable, no such port; .address
-    |   +-- ConnectionLostError
-    |   +-- ResponseTimeoutError (TimeoutError)
-    |   +-- ProtocolError                       exception reply, wrong function, length or echo
-    |   |   +-- WrongModelError                 a gripper of another model answers
-    |   +-- AgentError                          the agent of another host did not carry it out
-    +-- RecordingError                          a recording that cannot be written, or read
-    +-- ViewerError                             a viewer that cannot be served
-    +-- MeasuringError                          a measurement that went wrong
-    +-- NotAllStoppedError                      the halt of a fleet; .outcomes, .unreached
+        +-- ConnectFailedError                  refused, unreachable, no such port; .address
+        +-- ConnectionLostError
+        +-- ResponseTimeoutError (TimeoutError)
+        +-- ProtocolError                       exception reply, wrong function, length or echo
+            +-- WrongModelError                 a gripper of another model answers
 
-The package exports those of the gripper and the link. Import the errors of other hosts, of recordings,
-viewers and measurements from here. RecordingError, ViewerError and MeasuringError leave the hand running.
+Errors of other hosts are in :mod:`robotiq_async.fleet`, those of recordings, viewers and measurements in
+:mod:`robotiq_async.tools.errors`: each is a RobotiqError, too.
 
 Bad arguments raise ValueError or TypeError.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Self
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Self
 
 from .enums import Fault, State
 from .inhibit import Inhibit
@@ -169,23 +162,6 @@ class MotionInhibitedError(RobotiqStateError):
         )
 
 
-class ControlLostError(RobotiqStateError):
-    """This hand does not hold the lease that commands a gripper on another host, or no longer holds it.
-
-    Attributes:
-        reason: "held", "taken" or "halted" by another client, "expired" (not renewed in time), "released" by
-            this hand, "restarted" (the agent was), "early" or "late" for one request, or "closed".
-    """
-
-    def __init__(self, message: str, reason: str) -> None:
-        self.reason = reason
-        super().__init__(message)
-
-
-class NotAllowedError(RobotiqStateError):
-    """The access rules of the fleet forbid this client the request."""
-
-
 class RobotiqConnectionError(RobotiqError, ConnectionError):
     """The link to the gripper failed."""
 
@@ -219,33 +195,3 @@ class ProtocolError(RobotiqConnectionError):
 
 class WrongModelError(ProtocolError):
     """The registers are those of another model. Nothing was written to them."""
-
-
-class AgentError(RobotiqConnectionError):
-    """An agent on another host failed to carry out a request."""
-
-
-class RecordingError(RobotiqError):
-    """A recording could not be written or read."""
-
-
-class ViewerError(RobotiqError):
-    """A viewer could not be served."""
-
-
-class MeasuringError(RobotiqError):
-    """A measurement failed, or measured something else."""
-
-
-class NotAllStoppedError(RobotiqError):
-    """Not every gripper of a fleet was seen to stop: some MAY STILL MOVE.
-
-    Attributes:
-        outcomes: the outcome of each gripper's halt; "stopped" means seen to stop.
-        unreached: endpoints without a connection; the grippers behind them are unknown.
-    """
-
-    def __init__(self, message: str, outcomes: Mapping[Any, str], unreached: Iterable[str] = ()) -> None:
-        self.outcomes: dict[Any, str] = dict(outcomes)
-        self.unreached: tuple[str, ...] = tuple(unreached)
-        super().__init__(message)

@@ -12,14 +12,13 @@ from operator import attrgetter
 from typing import Any, Final, NamedTuple
 
 from robotiq_async import ConnectionLostError, Finger, RobotiqError, State
+from robotiq_async.fleet.errors import ControlLostError
 from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.wire.envelope import AgentCall, unpack_answer
-from robotiq_async.values.errors import ControlLostError
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
-from robotiq_async.values.status import RobotiqStatus
 from tests.docs.pages import read, table
-from tests.fleet.lab import LEFT
+from tests.fleet.lab import LEFT, instantly
 from tests.fleet.world import PROMPT_S, WINDOW_S, Client, World, motions
 
 Trouble = Callable[[World], Coroutine[Any, Any, None]]
@@ -481,7 +480,7 @@ async def ask(client: Client, verb: str, call: AgentCall, key: str = "") -> Robo
 
     answer = unpack_answer(await client.do(once()))
     try:
-        answer.outcome(RobotiqStatus.from_raw)
+        answer.outcome(instantly)
     except RobotiqError as error:
         return error
     return None

@@ -12,7 +12,7 @@ from robotiq_async.fleet.remote.mirror import Mirror
 from robotiq_async.fleet.wire.values import reading
 from robotiq_async.hands.streams import Channels
 from robotiq_async.runtime.limit import Limit
-from robotiq_async.runtime.log import log
+from robotiq_async.runtime.logger import log
 from robotiq_async.values.errors import ProtocolError
 from tests.fleet.lab import lab
 from tests.virtual import virtual
@@ -52,7 +52,7 @@ async def test_an_agent_takes_requests_in_counts_alone() -> None:
         writes = len(here.gripper.writes)
         for name, arguments in requests:
             with pytest.raises(TypeError, match="requests are in counts, got"):
-                await hand._ask(name, **arguments)
+                await hand._ask(name, arguments, 1.0)
         assert len(here.gripper.writes) == writes
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger, RobotiqError, State, StateTimeoutError
+from robotiq_async.fleet.errors import AgentError, NotAllowedError, NotAllStoppedError
 from robotiq_async.fleet.fleet import Fleet
 from robotiq_async.fleet.network.bus import BusReply
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
@@ -15,7 +16,6 @@ from robotiq_async.fleet.wire.envelope import AgentAnswer, AgentCall
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values import registers as reg
-from robotiq_async.values.errors import AgentError, NotAllowedError, NotAllStoppedError
 from robotiq_async.values.registers import Registers
 from tests.fleet.cell import ask, ending, move_slowly
 from tests.fleet.lab import LEFT, Between, Garbling, Lab, Spoiling, lab

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from robotiq_async import Finger, RobotiqHand
+from robotiq_async.fleet.errors import NotAllowedError
 from robotiq_async.fleet.fleet import Fleet
 from robotiq_async.fleet.keys.access import CLIENTS, AccessList, Role, access_control, rights
 from robotiq_async.fleet.keys.authority import Authority, Pair
@@ -30,7 +31,7 @@ from robotiq_async.fleet.network.route import Route
 from robotiq_async.fleet.network.zenoh_bus import ZenohBus, open_bus
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.simulator import SimulatorServer
-from robotiq_async.values.errors import ConnectFailedError, NotAllowedError
+from robotiq_async.values.errors import ConnectFailedError
 from tests.fleet.lab import LEFT
 from tests.fleet.sessions import PATIENCE, Client, Line, free_port, line
 from tests.grippers import active_gripper

@@ -13,12 +13,12 @@ import pytest
 
 from robotiq_async import Finger, MoveSupersededError, RobotiqHand, State
 from robotiq_async.fleet.agent.agent import Agent
+from robotiq_async.fleet.errors import ControlLostError
 from robotiq_async.fleet.network.bus import Bus, BusReply
 from robotiq_async.fleet.remote.dialog import UNDER_WAY
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import AgentCall
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.values.errors import ControlLostError
 from robotiq_async.values.request import Request
 from tests.fleet.cell import ask
 from tests.fleet.lab import LEFT, Lab, Spoiling, lab, serving

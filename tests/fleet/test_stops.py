@@ -14,10 +14,10 @@ import pytest
 
 from robotiq_async import ConnectionLostError, Finger, NotStartedError, RobotiqError, State
 from robotiq_async.fleet.agent.jobs import Job, Jobs
+from robotiq_async.fleet.errors import ControlLostError
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import AgentCall, unpack_answer
-from robotiq_async.runtime.log import Log
-from robotiq_async.values.errors import ControlLostError
+from robotiq_async.runtime.logger import Log
 from robotiq_async.values.request import Request
 from tests.calls import COMMANDS, called
 from tests.fleet.lab import LEFT, Lab, lab

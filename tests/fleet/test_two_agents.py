@@ -11,12 +11,12 @@ import pytest
 
 from robotiq_async import ConnectionLostError, Finger, RobotiqHand, State
 from robotiq_async.fleet.agent.agent import Agent
+from robotiq_async.fleet.errors import AgentError, ControlLostError, NotAllStoppedError
 from robotiq_async.fleet.fleet import Fleet
 from robotiq_async.fleet.network.bus import PendingQuery, Urgency
 from robotiq_async.fleet.remote.errand import Errand, of_its_run
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import AgentAnswer, AgentCall, failure
-from robotiq_async.values.errors import AgentError, ControlLostError, NotAllStoppedError
 from tests.fleet.lab import LEFT, Answered, Lab, lab, serving
 from tests.fleet.world import ServingAgent, World, world
 from tests.virtual import inside, until

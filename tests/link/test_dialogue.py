@@ -12,7 +12,7 @@ from robotiq_async.link.dialogue import Dialogues
 from robotiq_async.link.exchange import Answer, Exchange, Timing
 from robotiq_async.link.outcome import Lost, Noise, Refused, Silent, Stray
 from robotiq_async.link.serial.silence import Silence
-from robotiq_async.runtime.log import log
+from robotiq_async.runtime.logger import log
 from robotiq_async.values.model import TWO_FINGER_85
 
 IMAGE = (0x0900, 0x00FF, 0x4060, 0, 0, 0, 0, 0)

@@ -23,6 +23,7 @@ from robotiq_async.calibration.thesis import CLOSING_MS, FOAM_GRAMS, RIGID_GRAMS
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.simulator.physics.axis import peak
 from robotiq_async.simulator.physics.scale import SimulatedScale
+from robotiq_async.tools.errors import MeasuringError
 from robotiq_async.tools.measure.campaigns import (
     GRASP_S,
     RUN_PAUSE_S,
@@ -38,7 +39,6 @@ from robotiq_async.tools.measure.campaigns import (
     time_closing,
     write_currents,
 )
-from robotiq_async.values.errors import MeasuringError
 from tests.grippers import activate_beforehand
 from tests.virtual import VirtualLoop, virtual
 

@@ -28,10 +28,10 @@ from robotiq_async import Finger, RobotiqHand, RobotiqStatus, State, sync
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.description.joint_states import SCHEMA_NAME, JointStateEncoder
 from robotiq_async.tools.description.kinematics import JOINTS, joint_angles
+from robotiq_async.tools.errors import RecordingError
 from robotiq_async.tools.recording.recorder import Recorder
 from robotiq_async.tools.recording.recordings import RecordedMessage, read_recording, recover
 from robotiq_async.tools.recording.table import export
-from robotiq_async.values.errors import RecordingError
 from tests.forks import in_the_child
 from tests.grippers import until
 from tests.patience import patience

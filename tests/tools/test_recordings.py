@@ -16,8 +16,8 @@ import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, Chunk, Header, McapRecord, Message, Schema
 
+from robotiq_async.tools.errors import RecordingError
 from robotiq_async.tools.recording.recordings import LARGEST, read_recording, recover
-from robotiq_async.values.errors import RecordingError
 
 MAGIC = b"\x89MCAP0\r\n"
 EVENT = {"timestamp": 1.0, "kind": "state", "target": "RESET"}

@@ -19,9 +19,9 @@ from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.description import hand_model, urdf
 from robotiq_async.tools.description.kinematics import JOINTS, joint_angles, joint_names
 from robotiq_async.tools.description.simulated import bodies_of
+from robotiq_async.tools.errors import ViewerError
 from robotiq_async.tools.recording.payloads import SCHEMAS
 from robotiq_async.tools.viewer import SHOWN_TOPICS, Viewer
-from robotiq_async.values.errors import ViewerError
 from robotiq_async.values.model import MODELS
 from tests.foxglove_client import Client, client
 from tests.grippers import active_gripper, lose_link, shows, until

@@ -29,15 +29,6 @@ TREE = {
     "ProtocolError": "RobotiqConnectionError",
     # Those that a user may distinguish from other time-outs.
     "WrongModelError": "ProtocolError",
-    # Around a hand; not among the names of the package.
-    "RecordingError": "RobotiqError",
-    "ViewerError": "RobotiqError",
-    "MeasuringError": "RobotiqError",
-    # Of hands on other hosts; robotiq_async.fleet has them.
-    "AgentError": "RobotiqConnectionError",
-    "ControlLostError": "RobotiqStateError",
-    "NotAllStoppedError": "RobotiqError",
-    "NotAllowedError": "RobotiqStateError",
 }
 """The contract's tree, and what has been added: each error with its bases."""
 

@@ -22,9 +22,9 @@ from websockets.exceptions import InvalidStatus
 from websockets.typing import Origin
 
 from robotiq_async.tools.actions import ACTIONS
+from robotiq_async.tools.errors import ViewerError
 from robotiq_async.tools.web.server import PageServer
 from robotiq_async.tools.web.settings import PageSettings
-from robotiq_async.values.errors import ViewerError
 from tests.conftest import watched
 from tests.fake_hand import FakeHand
 from tests.forked import PAGE, forking

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ...runtime.log import log
+from ...runtime import log
 from ..addresses import gripper_words, is_simulated
 from ..arguments import Flag, need
 from ..failures import UsageError

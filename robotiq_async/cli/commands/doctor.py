@@ -7,10 +7,9 @@ import sys
 import textwrap
 from typing import TYPE_CHECKING
 
-from ...hands.options import HandOptions
-from ...link.address import is_remote, parse_address
-from ...link.registers import registers_of
-from ...runtime.log import printable
+from ...hands import HandOptions
+from ...link import is_remote, parse_address, registers_of
+from ...runtime import printable
 from ..addresses import full_address, gripper_words
 from ..arguments import AddressArgument, Unit, need
 from ..failures import CommandError, UsageError, usage

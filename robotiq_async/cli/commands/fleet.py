@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter
 
-from ...runtime.clock import now
-from ...runtime.log import printable
+from ...runtime import now, printable
 from ..arguments import Flag, Yes, need
 from ..consent import consent
 from ..failures import CommandError, UsageError, normal_end, usage
@@ -85,8 +84,8 @@ async def halt(site: Site = None, /) -> None:
         robotiq-async fleet halt lab
     """
     need("zenoh", "fleet")
+    from ...fleet.errors import NotAllStoppedError
     from ...fleet.fleet import Fleet
-    from ...values.errors import NotAllStoppedError
 
     with usage():
         seen = Fleet(site)
@@ -116,7 +115,7 @@ async def permit(*addresses: str, yes: Yes = False) -> None:
         yes: Do not ask.
     """
     need("zenoh", "fleet")
-    from ...link.address import is_remote
+    from ...link import is_remote
     from ..connect import make_hand
 
     if not addresses or not all(map(is_remote, addresses)):

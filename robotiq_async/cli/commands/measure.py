@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ...link.address import Simulation, parse_address
-from ...values.enums import Finger
-from ...values.errors import MeasuringError
+from ...link import Simulation, parse_address
+from ...tools.errors import MeasuringError
+from ...values import Finger
 from ..addresses import full_address, gripper_words, is_simulated, named_model
 from ..arguments import AddressArgument, FingersArgument, Flag, Runs, StepCounts, Yes, need
 from ..consent import consent
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ...hands import Hand
     from ...simulator import SimulatedGripper
     from ...tools.measure.campaigns import Campaign
-    from ...values.model import Model
+    from ...values import Model
 
 SPEEDUP = 15.0
 """Speedup of the simulated gripper of sim:// over real time, by default."""
@@ -113,7 +113,7 @@ async def _carry_out(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    from ...calibration.csv_tables import TableError
+    from ...calibration import TableError
 
     if done := len(campaign.table):
         print(f"Continuing {campaign.path}: {done} rows are there, {len(campaign.left)} remain.", flush=True)
@@ -158,7 +158,7 @@ async def _carry_out(
 @contextmanager
 def table_errors() -> Iterator[None]:
     """Turn TableError and OSError of tables and pictures into CommandError."""
-    from ...calibration.csv_tables import TableError
+    from ...calibration import TableError
 
     try:
         yield

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from ...runtime.concurrency import in_a_thread
-from ...values.enums import DEFAULT_SPEED, Finger
-from ...values.model import THREE_FINGER
+from ...runtime import in_a_thread
+from ...values import DEFAULT_SPEED, THREE_FINGER, Finger
 from ..addresses import full_address, is_simulated, named_model
 from ..arguments import AddressArgument, Byte, Runs, StepCounts, Yes
 from ..consent import consent, read_line
@@ -20,7 +19,7 @@ from ..failures import CommandError, UsageError
 from .measure import NoPlot, Speedup, check, measure_left, print_files, table_errors
 
 if TYPE_CHECKING:
-    from ...calibration.csv_tables import RunsTable
+    from ...calibration import RunsTable
     from ...hands import Hand
     from ...simulator import SimulatedGripper
     from ...tools.measure.campaigns import Campaign, Currents
@@ -75,7 +74,7 @@ def force(
     if (model := named_model(address)) is not THREE_FINGER:
         raise UsageError(f"forces are measured with three fingers; {address} names a {model}")
     factor = check(address, path, speedup, plot=not no_plot)
-    from ...calibration.csv_tables import FORCE, read_table
+    from ...calibration import FORCE, read_table
     from ...tools.measure.campaigns import force_campaign
 
     with table_errors():
@@ -104,7 +103,7 @@ async def _measure(
     bar: bool,
     plot: bool,
 ) -> None:
-    from ...calibration.scales import closing_time
+    from ...calibration import closing_time
     from ...tools.measure.campaigns import GRASP_S, grasp, write_currents
 
     output = campaign.path

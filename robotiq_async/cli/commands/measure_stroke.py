@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter
 
-from ...link.address import is_remote
-from ...values.stroke import why_not_after
+from ...link import is_remote
+from ...values import why_not_after
 from ..addresses import gripper_words, is_simulated, named_model
 from ..arguments import AddressArgument, Flag, PointCount, Yes
 from ..consent import consent
@@ -21,7 +21,7 @@ from .measure_force import prompt
 
 if TYPE_CHECKING:
     from ...hands import Hand
-    from ...values.stroke import Point, Points
+    from ...values import Point, Points
 
 STROKE_WARNING: Final = """the jaw MOVES to {count} positions, from open to closed, at its least force, and
 waits at each for the figure of a calliper. Nothing but the calliper may be between the fingertips; take it
@@ -84,7 +84,7 @@ def stroke(
 
 
 async def _measure(address: str, output: Path, count: int) -> None:
-    from ...calibration.csv_tables import write_stroke
+    from ...calibration import write_stroke
 
     print(gripper_words(address), flush=True)
     async with gripper_to_measure(address, 1.0) as hand:

@@ -14,7 +14,7 @@ from cyclopts import Parameter
 
 from ...hands import Hand
 from ...tools.recording.payloads import reading_fields
-from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ...values import DEFAULT_FORCE, DEFAULT_SPEED
 from ..addresses import gripper_words
 from ..arguments import USUAL_LINK, AddressArgument, Byte, Flag, LinkOptions, need
 from ..consent import forget_keys

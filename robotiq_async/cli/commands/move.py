@@ -7,12 +7,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ...calibration import Units
-from ...calibration.amounts import force_of, position_of, speed_of
-from ...link.address import is_remote
+from ...calibration import Units, force_of, position_of, speed_of
+from ...link import is_remote
 from ...tools.wording import axis_name
-from ...values.checks import check_timeout
-from ...values.enums import Finger
+from ...values import Finger, check_timeout
 from ..addresses import gripper_words, is_simulated
 from ..arguments import (
     USUAL_LINK,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from ...link.serial.ports import MISSING, names_of_adapters
-from ...runtime.log import printable
-from ...values.errors import RobotiqError
+from ...link import MISSING, names_of_adapters
+from ...runtime import printable
+from ...values import RobotiqError
 from ..arguments import need
 from ..failures import CommandError
 

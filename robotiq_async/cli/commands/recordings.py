@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from cyclopts import Parameter
 
-from ...calibration.conventions import CONVENTIONS, Convention
-from ...runtime.log import printable
+from ...calibration import CONVENTIONS, Convention
+from ...runtime import printable
 from ..addresses import gripper_words
 from ..arguments import USUAL_LINK, AddressArgument, Flag, LinkOptions, need
 from ..failures import CommandError, UsageError, file_errors, normal_end

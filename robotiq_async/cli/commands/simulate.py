@@ -12,12 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from cyclopts import Parameter
 
-from ...link.serial.ports import why_no_port
-from ...runtime.sockets import is_loopback
-from ...values.enums import Finger
-from ...values.errors import RobotiqError
-from ...values.model import Model, model_of
-from ...values.registers import RTU_REGISTERS
+from ...link import why_no_port
+from ...runtime import is_loopback
+from ...values import RTU_REGISTERS, Finger, Model, RobotiqError, model_of
 from ..arguments import Byte, Flag, Host, Port, UnitIds
 from ..failures import normal_end, usage
 from ..output.messages import tell

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from ...hands.options import HandOptions
-from ...link.address import is_remote, parse_address
-from ...runtime.concurrency import wait_shielded
-from ...values.model import model_of
+from ...hands import HandOptions
+from ...link import is_remote, parse_address
+from ...runtime import wait_shielded
+from ...values import model_of
 from ..addresses import gripper_words
 from ..arguments import AddressArgument, StageNumber, need
 from ..failures import CommandError, UsageError, usage
@@ -96,7 +96,7 @@ async def verify(
     print(gripper_words(address), flush=True)
     async with AsyncExitStack() as stack:
         if parsed.kind == "sim":
-            from ...link.sim_transport import new_gripper
+            from ...link import new_gripper
             from ...simulator import SimulatorServer
 
             gripper = new_gripper(parsed.simulation, model_of(parsed.model))

@@ -9,7 +9,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ...runtime.sockets import is_loopback
+from ...runtime import is_loopback
 from ..addresses import gripper_words
 from ..arguments import USUAL_LINK, AddressArgument, Host, LinkOptions, Port, need
 from ..failures import file_errors, normal_end

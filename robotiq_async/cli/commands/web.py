@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter
 
-from ...runtime.concurrency import wait_shielded
+from ...runtime import wait_shielded
 from ...tools.actions import Operator
 from ...tools.recording.payloads import title
-from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
-from ...values.errors import RobotiqError
+from ...values import DEFAULT_FORCE, DEFAULT_SPEED, RobotiqError
 from ..addresses import gripper_words
 from ..arguments import USUAL_LINK, AddressArgument, Byte, Flag, Host, LinkOptions, Port, need
 from ..browser import opened

@@ -10,12 +10,11 @@ from collections.abc import Callable, Iterator
 from datetime import datetime
 from typing import TYPE_CHECKING, Any, Final
 
-from ...runtime.concurrency import in_a_thread, write_all
+from ...runtime import in_a_thread, write_all
 from ...tools.recording.feed import Timeline, compact
 from ...tools.recording.payloads import Properties, is_command
 from ...tools.wording import JAW_NAME, inhibit_words
-from ...values.enums import Finger, State, Trigger
-from ...values.status import NO_REQUEST, RobotiqStatus
+from ...values import NO_REQUEST, Finger, RobotiqStatus, State, Trigger
 from .messages import forwarded_warnings
 
 if TYPE_CHECKING:

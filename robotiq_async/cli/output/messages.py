@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
-from ...runtime.log import printable
+from ...runtime import printable
 
 
 def forget(stream: TextIO) -> None:

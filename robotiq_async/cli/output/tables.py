@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ...tools.wording import axis_name
-from ...values.enums import Fault, Finger
+from ...values import Fault, Finger
 from .lines import axis_words
 
 if TYPE_CHECKING:

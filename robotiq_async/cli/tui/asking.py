@@ -11,10 +11,9 @@ from typing import Final
 
 from rich.text import Text
 
-from ...runtime.clock import now
+from ...runtime import now
 from ...tools.wording import axis_name
-from ...values.enums import CLOSED, Finger
-from ...values.model import Model
+from ...values import CLOSED, Finger, Model
 
 READING_S: Final = 0.3
 """A yes counts only after this time: an earlier one was typed before the question could be read."""

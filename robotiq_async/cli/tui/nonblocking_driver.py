@@ -14,7 +14,7 @@ from typing import Any, Final
 from textual.app import App
 from textual.drivers.linux_driver import LinuxDriver
 
-from ...runtime.concurrency import write_all
+from ...runtime import write_all
 
 TERMINAL_BACKLOG: Final = 30
 """Writes queued for the terminal; further ones are dropped."""

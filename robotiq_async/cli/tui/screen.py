@@ -16,14 +16,12 @@ from textual.binding import BindingType
 from textual.widgets import RichLog, Static
 from textual.worker import Worker
 
-from ...runtime.clock import now
+from ...runtime import now
 from ...tools.actions import ACTIONS, Operator
 from ...tools.recording.feed import Timeline
 from ...tools.recording.payloads import title
 from ...tools.wording import refusal_words
-from ...values.enums import Finger, State
-from ...values.errors import RobotiqError
-from ...values.status import RobotiqStatus
+from ...values import Finger, RobotiqError, RobotiqStatus, State
 from ..output.lines import clock, event_line
 from .asking import Asking, Question, TargetQuestion
 from .widgets import HINTS, KEYS, Axes, TextLine, link_text, state_text, transition_words

@@ -10,14 +10,22 @@ from rich.text import Text
 from textual.widget import Widget
 from textual.widgets import Static
 
-from ...hands.statistics import Statistics
+from ...hands import Statistics
 from ...tools.description.palette import AXIS_COLORS
 from ...tools.recording.payloads import Properties
 from ...tools.wording import AXIS_WORDS, STATE_WORDS, TRIGGER_WORDS, axis_name
-from ...values.enums import Fault, Finger, ObjectStatus, Severity, State, Trigger
-from ...values.inhibit import Inhibit
-from ...values.model import Model
-from ...values.status import NO_REQUEST, RobotiqStatus
+from ...values import (
+    NO_REQUEST,
+    Fault,
+    Finger,
+    Inhibit,
+    Model,
+    ObjectStatus,
+    RobotiqStatus,
+    Severity,
+    State,
+    Trigger,
+)
 
 KEYS: Final = """\
 o open  c close  1 wide  2 normal  3 pinch  SPACE halt  + - speed  ] [ force

@@ -12,13 +12,24 @@ import time
 from contextlib import suppress
 from typing import Final
 
-from ...calibration.conventions import Convention
-from ...runtime.log import Log
+from ...calibration import Convention
+from ...runtime import Log
 from ...sync import RobotiqHand
-from ...values.checks import as_float, check_flag, check_number, repr_of, single
-from ...values.enums import FORCE_MAX, Finger, State
-from ...values.errors import GripperFaultError, InvalidStateError, NotActivatedError, RobotiqError
-from ...values.status import RobotiqStatus
+from ...values import (
+    FORCE_MAX,
+    Finger,
+    GripperFaultError,
+    InvalidStateError,
+    NotActivatedError,
+    RobotiqError,
+    RobotiqStatus,
+    State,
+    as_float,
+    check_flag,
+    check_number,
+    repr_of,
+    single,
+)
 from ..patience import CallerPatience
 
 LOST_AFTER_S: Final = 1.0

@@ -23,9 +23,9 @@ except ImportError as error:
         "(the part, robotiq_async.dropins.lerobot.GripperPart, needs neither)"
     ) from error
 
-from ...calibration.conventions import Convention
+from ...calibration import Convention
 from ...sync import RobotiqHand
-from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ...values import DEFAULT_FORCE, DEFAULT_SPEED
 from .gripper_part import LOST_AFTER_S, GripperPart
 
 LOOP_RESPONSE_S: Final = 0.1

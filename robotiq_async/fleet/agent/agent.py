@@ -9,17 +9,16 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from ...local.robotiq_hand import RobotiqHand
-from ...runtime.clock import now
-from ...runtime.log import Log
-from ...values.errors import AgentError
+from ...local import RobotiqHand
+from ...runtime import Log, now
 from ..control.lease import LEASE_WINDOW_S
+from ..errors import AgentError
 from ..limited_log import LimitedLog
 from ..network.bus import Bus, MessageKind, Query, Undo
 from ..wire.envelope import AgentCall, failure
 from ..wire.names import ROOT, GripperName
 from .questions import AgentQuestions
-from .records import Records
+from .records import NoRecords, Records
 from .served_hand import ServedHand
 
 SUMMARY_S: Final = 1.0  # seconds from one summary to the next
@@ -64,7 +63,7 @@ class Agent:
         self._suspended_s = self._suspended()
         self.epoch: int = secrets.randbits(EPOCH_BITS)
         self._bus = bus
-        self._records = records or Records()
+        self._records = records or NoRecords()
         self._window = window
         self._running: asyncio.Task[Any] | None = None
         self._invalid_tokens = LimitedLog()

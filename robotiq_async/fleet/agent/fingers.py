@@ -5,12 +5,10 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import Final
 
-from ...control.state_machine import RUNNING
-from ...local.robotiq_hand import RobotiqHand
-from ...runtime.limit import Limit
-from ...runtime.log import Log
-from ...values.enums import Finger
-from ...values.errors import RobotiqConnectionError, RobotiqError
+from ...hands import RUNNING
+from ...local import RobotiqHand
+from ...runtime import Limit, Log
+from ...values import Finger, RobotiqConnectionError, RobotiqError
 
 FINGERS_REST_S: Final = 0.5
 """Seconds for a hand that keeps its grip to come to rest, as long as a stop that keeps one gives it."""

@@ -7,15 +7,13 @@ import math
 from collections.abc import Callable, Coroutine
 from typing import Any, Final, TypeVar
 
-from ...runtime.log import Log, printable
-from ...values.enums import Finger
-from ...values.errors import AgentError, ControlLostError, RobotiqError
-from ...values.events import SentRequest
-from ...values.move_result import MoveResult
+from ...runtime import Log, printable
+from ...values import Finger, MoveResult, Request, RobotiqError, SentRequest
+from ..errors import AgentError, ControlLostError
 from ..network.bus import Query
 from ..wire.envelope import AgentAnswer, AgentCall, failure
 from ..wire.settings import Setting, asked_of, is_in, moved_by
-from ..wire.values import Fields
+from ..wire.values import Fields, result_fields
 from .publisher import HandPublisher
 
 JOBS_KEPT: Final = 512
@@ -70,9 +68,9 @@ class Job:
     def _look_whether_refused(self) -> None:
         self.was_refused = self.has_failed
 
-    def observe(self, sent: SentRequest) -> None:
+    def observe(self, request: Request) -> None:
         """An image was acknowledged."""
-        self.is_shown = self.is_shown or (bool(self.carries) and is_in(self.carries, sent))
+        self.is_shown = self.is_shown or (bool(self.carries) and is_in(self.carries, request))
 
     def reply(self, answer: bytes, status: bytes) -> None:
         """Answer it, and each of its repetitions."""
@@ -156,7 +154,7 @@ class Jobs:
     def observe(self, what: object) -> None:
         if isinstance(what, SentRequest) and what.acknowledged:
             for job in self._open.values():
-                job.observe(what)
+                job.observe(what.request)
 
     def spawn(self, work: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
         task = asyncio.get_running_loop().create_task(work)
@@ -187,9 +185,7 @@ class Jobs:
         if isinstance(error, Exception):
             answer = failure(call, self._epoch, error, begun)
         else:
-            result = task.result()
-            fields = {} if result is None else result.as_dict() | {"status": result.status.as_raw()}
-            value = {**fields, **job.says()}
+            value = {**(result_fields(task.result()) or {}), **job.says()}
             answer = AgentAnswer(call.to, call.number, self._epoch, value, begun=begun)
         if error is not None or is_done:
             self._ended(job, error is None)

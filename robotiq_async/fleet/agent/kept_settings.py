@@ -20,11 +20,9 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any, Final
 
-from ...control.state_machine import RUNNING
-from ...local.robotiq_hand import RobotiqHand
-from ...values.enums import Finger
-from ...values.errors import RobotiqError
-from ...values.events import SentRequest, Transition
+from ...hands import RUNNING
+from ...local import RobotiqHand
+from ...values import Finger, RobotiqError, SentRequest, Transition
 from ..wire.settings import (
     SETTINGS,
     Setting,
@@ -90,7 +88,7 @@ class KeptSettings:
             self._ordered.clear()  # the hand drops what was not acknowledged
         if not (isinstance(what, SentRequest) and what.acknowledged and what.request.activate):
             return
-        before, self._gripper = self._gripper, settings_in(what)
+        before, self._gripper = self._gripper, settings_in(what.request)
         self._keep({each: v for each, v in self._ordered.items() if self._gripper.get(each) == v})
         self._has |= {each for each, value in self._gripper.items() if self._own(*each) == value}
         if before != self._gripper:

@@ -12,16 +12,14 @@ from collections import deque
 from itertools import islice
 from typing import Any, Final
 
-from ...local.robotiq_hand import RobotiqHand
-from ...runtime.clock import now
-from ...values.errors import RobotiqError
-from ...values.events import SentRequest, Transition
-from ...values.status import RobotiqStatus
+from ...local import RobotiqHand
+from ...runtime import now
+from ...values import RobotiqError, RobotiqStatus, SentRequest, Transition
 from ..control.lease import Lease
 from ..network.bus import Bus, Urgency
 from ..wire.names import GripperName
 from ..wire.status_message import StatusMessage
-from ..wire.values import Fields
+from ..wire.values import Fields, inhibit_fields, request_fields, transition_fields
 
 KEPT: Final = 2000
 """Events that are kept for clients that missed them: some seconds of a loop that commands at 200 Hz."""
@@ -58,9 +56,9 @@ class HandPublisher:
         if isinstance(what, RobotiqStatus):
             self.send_status()
         elif isinstance(what, Transition):
-            self.add({"kind": "transition", **what.as_dict()})
+            self.add(transition_fields(what))
         else:
-            self.add({"kind": "request", **what.as_raw()})
+            self.add(request_fields(what))
 
     def add(self, event: Fields) -> None:
         self._count += 1
@@ -81,8 +79,7 @@ class HandPublisher:
 
     def inhibited(self) -> Fields:
         """Whether motion is inhibited, the number that a permit of it names, and when that was so."""
-        inhibit = self._hand.inhibited
-        inhibited = None if inhibit is None else inhibit.as_dict()
+        inhibited = inhibit_fields(self._hand.inhibited)
         return {"stamp": now(), "inhibited": inhibited, "inhibit_number": self.inhibit_number}
 
     def events_since(self, index: int) -> list[Fields]:
@@ -99,16 +96,21 @@ class HandPublisher:
             self.send_status()
 
     def status_message(self) -> bytes:
+        stamp, status = now(), self._status()
         return StatusMessage(
             mark=self._mark,
             epoch=self._epoch,
-            stamp=now(),
+            stamp=stamp,
             state=self._hand.state,
             lease=self._lease.number,
             is_held=self._lease.holder is not None,
             events=self._count,
             is_moving=self._is_moving(),
-            status=self._status(),
+            sequence=0 if status is None else status.sequence,
+            age=0.0 if status is None else stamp - status.timestamp,
+            registers=None if status is None else status.registers,
+            model=self._hand.model,
+            has_current=status is None or status.has_current,
         ).pack()
 
     def send_summary(self) -> None:

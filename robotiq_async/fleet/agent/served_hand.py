@@ -24,23 +24,22 @@ from __future__ import annotations
 import asyncio
 import logging
 from dataclasses import replace
+from inspect import signature
 from typing import Final
 
-from ...control.state_machine import RUNNING
-from ...local.robotiq_hand import RobotiqHand
-from ...runtime.clock import now
-from ...runtime.log import Log
-from ...runtime.version import __version__
-from ...values.errors import AgentError, ControlLostError, RobotiqError
-from ...values.inhibit import Inhibit
-from ...values.move_result import MoveResult
+from ...calibration import UNITS
+from ...hands import RUNNING
+from ...local import RobotiqHand
+from ...runtime import Log, __version__, now
+from ...values import Inhibit, MoveResult, RobotiqError
 from ..control.admission import Admission
 from ..control.lease import Lease
+from ..errors import AgentError, ControlLostError
 from ..network.bus import Bus, Query
 from ..wire.envelope import AgentAnswer, AgentCall, failure, unpack_call
 from ..wire.names import GripperName
-from ..wire.settings import COMMANDS, check_changes, moved_by, read_settings, settings_of
-from ..wire.values import Fields
+from ..wire.settings import check_changes, moved_by, read_settings, settings_of
+from ..wire.values import Fields, inhibit_fields
 from .fingers import Fingers
 from .inhibits import inhibit_asked, inhibit_kept, signed
 from .jobs import Job, Jobs, Work, label_of
@@ -49,6 +48,10 @@ from .publisher import HandPublisher
 from .records import Records
 
 START_RETRY_S: Final = 1.0  # seconds between two attempts to reach the gripper
+COMMANDS: Final = frozenset(
+    {"set_position", "set_speed", "set_force", "move", "hold", "activate", "reset", "atr", "recover"}
+)
+"""Commands of a holder: the methods of a hand by that name. In addition there are command and cancel."""
 
 
 class ServedHand:
@@ -85,8 +88,7 @@ class ServedHand:
         self._keep_record()
 
     def _keep_record(self) -> None:
-        inhibit = self._hand.inhibited
-        inhibited = None if inhibit is None else inhibit.as_dict()
+        inhibited = inhibit_fields(self._hand.inhibited)
         record = {**self._lease.record, "settings": self._settings.record, "inhibited": inhibited}
         self._records.keep(self.name, record)
 
@@ -359,7 +361,7 @@ class ServedHand:
         if name == "cancel":
             self._cancel(call, query)
             return
-        if name not in COMMANDS:
+        if name != "command" and name not in COMMANDS:
             raise AgentError(f"unknown command {name!r}")
         self._admission.admit(call, now())
         job = Job(name, call, query)
@@ -374,14 +376,16 @@ class ServedHand:
 
     def _work(self, job: Job) -> Work:
         name, arguments = job.name, job.call.arguments
+        # Clients convert units: the agent restores the counts that it saw.
+        if own := sorted(UNITS & arguments.keys()):
+            raise TypeError(f"requests are in counts, got {', '.join(own)}")
+        if name == "command":
+            if not isinstance(arguments.get("axes"), dict):
+                raise TypeError("axes must be an object")
+            return self._set(job, **arguments)
         # Checked here: a coroutine raises for wrong arguments only when it is awaited.
-        if wrong := arguments.keys() - COMMANDS[name]:
-            raise TypeError(f"requests are in counts, got {', '.join(sorted(wrong))}")
-        if name != "command":
-            return self._carry_out(job)
-        if not isinstance(arguments.get("axes"), dict):
-            raise TypeError("axes must be an object")
-        return self._set(job, **arguments)
+        signature(getattr(self._hand, name)).bind(**arguments)
+        return self._carry_out(job)
 
     async def _carry_out(self, job: Job) -> MoveResult | None:
         self._settings.ask(job.carries)

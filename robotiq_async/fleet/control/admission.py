@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from ...values.errors import AgentError, ControlLostError
+from ..errors import AgentError, ControlLostError
 from ..wire.envelope import AgentCall
 from .lease import Holder, Lease
 

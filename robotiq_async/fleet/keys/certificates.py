@@ -23,7 +23,7 @@ from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives import serialization
 from cryptography.x509.oid import NameOID
 
-from ...values.checks import check_int
+from ...values import check_int
 from .access import AccessList, Role, check_subject
 from .authority import DAYS_MAX, Authority, Pair
 from .key_folder import ACCESS, AUTHORITY, CERTIFICATE, DAYS, KEY

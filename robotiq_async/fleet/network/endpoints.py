@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from ...runtime.sockets import is_loopback
+from ...runtime import is_loopback
 
 ENDPOINT_FORMS: Final = "tcp/HOST:PORT, tls/HOST:PORT or quic/HOST:PORT"
 _ENDPOINT: Final = re.compile(r"(tcp|tls|quic)/(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9_.-]+):([0-9]{1,5})")

@@ -14,19 +14,19 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from ...runtime.host_names import addresses_of
+from ...runtime import addresses_of
 from .endpoints import parse_endpoint
 
 try:
     import zenoh
     from zenoh.handlers import Callback
 except ModuleNotFoundError as error:
-    from ...runtime.extras import install
+    from ...runtime import install
 
     raise ImportError(f"hands on other hosts need zenoh: {install('fleet')}") from error
 
-from ...runtime.concurrency import in_a_thread
-from ...values.errors import ConnectFailedError
+from ...runtime import in_a_thread
+from ...values import ConnectFailedError
 from ..keys.certificates import common_name
 from .bus import BusReply, MessageKind, PendingQuery, Query, Undo, Urgency, is_any, is_request
 from .mailbox import Mailbox, ReplySender

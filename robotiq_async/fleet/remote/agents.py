@@ -6,8 +6,8 @@ import logging
 from collections.abc import Callable
 from typing import Final
 
-from ...runtime.log import Log
-from ...values.errors import AgentError
+from ...runtime import Log
+from ..errors import AgentError
 from ..limited_log import LimitedLog
 from ..network.bus import Bus, Undo
 from ..wire.names import GripperName

@@ -12,9 +12,9 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, Final
 
-from ...runtime.clock import now
-from ...runtime.limit import Limit
-from ...values.errors import AgentError, ConnectionLostError, RobotiqError
+from ...runtime import Limit, now
+from ...values import ConnectionLostError, RobotiqError
+from ..errors import AgentError
 from ..network.bus import BusReply, Urgency
 from ..wire.envelope import AgentAnswer, AgentCall, unpack_answer
 from ..wire.settings import Setting, asked_of

@@ -11,9 +11,9 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Final
 
-from ...runtime.limit import Limit
-from ...values.enums import StopLevel
-from ...values.errors import ControlLostError, RobotiqError
+from ...runtime import Limit
+from ...values import RobotiqError, StopLevel
+from ..errors import ControlLostError
 from ..wire.values import Fields, reading
 from .agents import Agents
 from .dialog import Dialog, label

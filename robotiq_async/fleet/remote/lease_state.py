@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from ...values.errors import ControlLostError
+from ..errors import ControlLostError
 
 OVERRULING: Final = ("taken", "halted", "held", "restarted")
 """Reasons after which people decide which client commands: only an explicit acquire() gets the lease."""

@@ -7,16 +7,12 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from ...hands.streams import Channels
-from ...runtime.log import Log
-from ...values.enums import State, Trigger
-from ...values.events import SentRequest, Transition
-from ...values.inhibit import Inhibit
-from ...values.status import RobotiqStatus
-from ...values.stroke import check_points
+from ...hands import Channels
+from ...runtime import Log, log
+from ...values import Inhibit, Model, Points, RobotiqStatus, State, Stroke, Transition, Trigger, check_points
 from ..control.lease import LEASE_WINDOW_S
 from ..wire.status_message import StatusMessage
-from ..wire.values import Fields, reading
+from ..wire.values import Fields, read_inhibit, read_request, read_transition, reading
 
 _RUNS: Final = 16  # runs of an agent whose clocks are kept
 DRIFT: Final = 200e-6  # drift between two clocks at most, in seconds per second
@@ -86,10 +82,10 @@ class Mirror:
         channels: Channels | None = None,
         entered: Callable[[State], None] = lambda _: None,
         before: Mirror | None = None,
-        log: Log | None = None,
+        log: Log = log,
     ) -> None:
         """Call ``entered`` with each state. State and sequences continue from the mirror ``before``."""
-        self.log = log or Log()
+        self.log = log
         self.clock: AgentClock = AgentClock()
         self.newest: StatusMessage | None = None
         self.status: RobotiqStatus | None = None
@@ -98,11 +94,12 @@ class Mirror:
         self.events: int = 0
         self.misrouted: int = 0
         self.received_at: float = 0.0
-        self.points: tuple[tuple[int, float], ...] = ()
+        self.points: Points = ()
         self.inhibited: Inhibit | None = None
         self.inhibit_number: int | None = None
         self._inhibit_stamp = -math.inf
         """The agent's time of the newest word about it: a summary may be older than an answer."""
+        self._strokes: dict[Model, Stroke] = {}  # made of the points
         self._mark = mark
         self._channels = channels or Channels()
         self._entered = entered
@@ -210,22 +207,30 @@ class Mirror:
     def has_missed(self) -> bool:
         return self.newest is not None and self.newest.events > self.events
 
-    def read_status(self, fields: Mapping[str, Any]) -> RobotiqStatus:
-        """The status in an answer, with a time and a sequence of ours."""
-        status = RobotiqStatus.from_raw(fields)
-        return self._as_ours(status, self.clock(status.timestamp))
+    def renumbered(self, status: RobotiqStatus) -> RobotiqStatus:
+        """The status of an answer, with a sequence of ours."""
+        model, sequence = status.model, self._base + status.sequence
+        return RobotiqStatus(
+            status.registers, status.timestamp, sequence, model, self._stroke(model), status.has_current
+        )
 
     def receive_points(self, summary: Mapping[str, Any]) -> None:
         """Take over the points that were measured on the gripper; an older agent sends none."""
-        self.points = check_points("stroke", summary["stroke"]) if summary.get("stroke") else ()
+        points = check_points("stroke", summary["stroke"]) if summary.get("stroke") else ()
+        if points != self.points:
+            self.points = points
+            self._strokes.clear()
 
     def receive_inhibit(self, told: Mapping[str, Any]) -> None:
         """Take over whether motion is inhibited; an older agent does not say."""
         if "inhibited" in told and (stamp := float(told["stamp"])) >= self._inhibit_stamp:
-            inhibit = told["inhibited"]
-            self.inhibited = None if inhibit is None else Inhibit.from_dict(inhibit)
-            self._inhibit_stamp = stamp
+            self.inhibited, self._inhibit_stamp = read_inhibit(told["inhibited"]), stamp
             self.inhibit_number = told.get("inhibit_number")
+
+    def _stroke(self, model: Model) -> Stroke | None:
+        if self.points and model not in self._strokes:
+            self._strokes[model] = model.stroke.measured(self.points)
+        return self._strokes.get(model)
 
     def begin(self, at: float) -> None:
         self._report(State.DISCONNECTED, Trigger.ASK_START, at)
@@ -254,8 +259,7 @@ class Mirror:
         self._inhibit_stamp, self.inhibit_number = -math.inf, None
         self.events = message.events
         self._events_state = as_seen_from_here(message.state)
-        first = 0 if message.status is None else message.status.sequence
-        self._base = self.next_sequence if first < self.next_sequence else 0
+        self._base = self.next_sequence if message.sequence < self.next_sequence else 0
 
     def _set_state(self, state: State, arrival: float) -> None:
         if self._is_over:
@@ -269,45 +273,36 @@ class Mirror:
             self._entered(state)
 
     def _status(self, message: StatusMessage) -> RobotiqStatus | None:
-        theirs, newest = message.status, self.status
-        if theirs is None:
+        if message.registers is None:
             return None
-        sequence = self._base + theirs.sequence
+        newest, sequence = self.status, self._base + message.sequence
         if newest is not None and newest.sequence == sequence:
             return newest
         # The estimated clock difference falls and rises, but timestamps must rise with the sequence.
-        at = self.clock(theirs.timestamp)
+        at = self.clock(message.stamp - message.age)
         for other in (self._pushed, newest):
             if other is not None:
                 at = max(at, other.timestamp) if other.sequence < sequence else min(at, other.timestamp)
-        return self._as_ours(theirs, at)
-
-    def _as_ours(self, status: RobotiqStatus, at: float) -> RobotiqStatus:
-        model = status.model
-        stroke = model.stroke.measured(self.points)
-        return RobotiqStatus(
-            status.registers, at, self._base + status.sequence, model, stroke, status.has_current
-        )
+        stroke = self._stroke(message.model)
+        return RobotiqStatus(message.registers, at, sequence, message.model, stroke, message.has_current)
 
     def _hand_on(self, event: Fields) -> None:
         with reading("an event"):
             if event["kind"] == "transition":
-                self._apply(Transition.from_dict(event))
+                self._apply(read_transition(event, self.clock))
             elif event["kind"] == "inhibit":
                 self.receive_inhibit(event)
             elif event["kind"] == "request":
-                sent = SentRequest.from_raw(event)
-                at = self._in_order(self.clock(sent.timestamp))
-                self._channels.requests.push(replace(sent, timestamp=at))
+                sent = read_request(event, self.clock)
+                self._channels.requests.push(replace(sent, timestamp=self._in_order(sent.timestamp)))
 
     def _apply(self, transition: Transition) -> None:
         source, target = as_seen_from_here(transition.source), as_seen_from_here(transition.target)
-        at = self.clock(transition.timestamp)
         self._events_state = target
         if not (self.is_silent or self._is_over):
             # Transitions in between, if any, are lost: the agent keeps only the newest events.
-            self._report(source, _SEEN.get(source, Trigger.SEEN_BUSY), at)
-            self._report(target, transition.trigger, at)
+            self._report(source, _SEEN.get(source, Trigger.SEEN_BUSY), transition.timestamp)
+            self._report(target, transition.trigger, transition.timestamp)
 
     def _report(self, state: State, trigger: Trigger, at: float) -> None:
         source, self._reported = self._reported, state

@@ -1,32 +1,13 @@
-"""The commands of a holder, and the values in them: a position, a speed or a force of an axis.
-
-Speeds and forces are the settings of an axis.
-"""
+"""Values in commands: a position, a speed or a force of an axis. Speeds and forces are its settings."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from ...values.checks import check_byte, check_mask
-from ...values.enums import Finger
-from ...values.events import SentRequest
+from ...values import Finger, Request, check_byte, check_mask
 from .values import Fields
 
-COMMANDS: Final[Mapping[str, frozenset[str]]] = {
-    "set_position": frozenset({"value", "fingers"}),
-    "set_speed": frozenset({"value", "fingers"}),
-    "set_force": frozenset({"value", "fingers"}),
-    "command": frozenset({"axes"}),
-    "move": frozenset({"position", "fingers", "speed", "force", "timeout"}),
-    "hold": frozenset({"fingers"}),
-    "activate": frozenset(),
-    "reset": frozenset(),
-    "atr": frozenset(),
-    "recover": frozenset({"timeout"}),
-}
-"""The methods of a hand that the holder of a lease may call, and ``command`` for several axes at once, with
-their arguments. Clients convert other amounts to counts: the agent restores the counts that it saw."""
 SETTINGS: Final = ("speed", "force")
 _ALL: Final = ("position", *SETTINGS)
 Setting = tuple[Finger, str]
@@ -64,14 +45,13 @@ def settings_of(asked: Mapping[Setting, int]) -> dict[Setting, int]:
     return {each: value for each, value in asked.items() if each[1] in SETTINGS}
 
 
-def settings_in(sent: SentRequest) -> dict[Setting, int]:
-    axes = sent.request.by_axis
-    return {(axis, what): getattr(asked, what) for axis, asked in axes for what in SETTINGS}
+def settings_in(image: Request) -> dict[Setting, int]:
+    return {(axis, what): getattr(request, what) for axis, request in image.by_axis for what in SETTINGS}
 
 
-def is_in(asked: Mapping[Setting, int], sent: SentRequest) -> bool:
+def is_in(asked: Mapping[Setting, int], image: Request) -> bool:
     """Whether a written image has all of it, for the axes that the gripper has."""
-    axes = dict(sent.request.by_axis)
+    axes = dict(image.by_axis)
     return all(
         axis not in axes or getattr(axes[axis], what) == value for (axis, what), value in asked.items()
     )

@@ -16,7 +16,7 @@ import anyio
 
 from ...runtime.concurrency import LateError
 from ...runtime.host_names import why_unreachable
-from ...runtime.log import Log, log
+from ...runtime.logger import Log, log
 from ...values.errors import ConnectionLostError, ProtocolError, ResponseTimeoutError
 from ..address import Address
 from ..outcome import Lost, Noise, Outcome, Silent

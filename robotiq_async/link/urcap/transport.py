@@ -37,7 +37,7 @@ from collections.abc import Callable, Coroutine, Sequence
 from itertools import pairwise
 from typing import Any, Final
 
-from ...runtime.log import Log, log
+from ...runtime.logger import Log, log
 from ...values import registers as reg
 from ...values.errors import ConnectFailedError, ConnectionLostError, ProtocolError, ResponseTimeoutError
 from ...values.registers import Echo, Registers
@@ -178,10 +178,6 @@ class UrcapTransport:
     @property
     def is_open(self) -> bool:
         return self._line.is_open_for(self)
-
-    @property
-    def asked_at(self) -> float:
-        return self._line.asked_at
 
     async def open(self) -> None:
         """Connect, and make sure that no answer to an earlier question is taken for one to come.

@@ -19,22 +19,14 @@ from collections.abc import Awaitable, Callable
 from importlib.util import find_spec
 from typing import Final
 
+from ...fleet.errors import ControlLostError
 from ...fleet.remote.remote_hand import RemoteHand
 from ...hands import Hand
-from ...link.address import is_remote
-from ...local.robotiq_hand import RobotiqHand
-from ...runtime.clock import now
-from ...runtime.extras import install
-from ...runtime.log import Log
+from ...link import is_remote
+from ...local import RobotiqHand
+from ...runtime import Log, install, now
 from ...tools.actions import ACTIONS, Operator
-from ...values.enums import State
-from ...values.errors import (
-    ControlLostError,
-    NotStartedError,
-    RobotiqConnectionError,
-    RobotiqError,
-    StateTimeoutError,
-)
+from ...values import NotStartedError, RobotiqConnectionError, RobotiqError, State, StateTimeoutError
 from ..translation.diagnosis import why_not
 from ..translation.joints import Targets
 from ..translation.settings import NodeSettings

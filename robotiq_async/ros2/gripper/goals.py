@@ -9,11 +9,8 @@ from enum import Enum
 from typing import Final
 
 from ...hands import Hand
-from ...runtime.concurrency import wait_shielded
-from ...runtime.log import Log
-from ...values.enums import Finger
-from ...values.errors import RobotiqConnectionError, RobotiqError
-from ...values.move_result import MoveResult
+from ...runtime import Log, wait_shielded
+from ...values import Finger, MoveResult, RobotiqConnectionError, RobotiqError
 from ..translation.joints import Targets
 
 FEEDBACK_S: Final = 0.05  # seconds between two feedbacks: 20 Hz

@@ -20,8 +20,8 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import qos_profile_action_status_default
 
-from ...runtime.clock import now
-from ...values.errors import NotStartedError
+from ...runtime import now
+from ...values import NotStartedError
 from ..gripper.connection import GripperConnection, RefusedError
 from ..gripper.goals import GoalEnding, GoalOutcome
 from ..translation.joints import GoalError, Targets, targets

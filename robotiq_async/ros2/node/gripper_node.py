@@ -18,7 +18,7 @@ from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
 from ...hands import Hand
-from ...values.errors import RobotiqError
+from ...values import RobotiqError
 from ..gripper.connection import NODE_COMMANDS, GripperConnection, RefusedError, make_hand
 from ..translation.description import robot_description
 from . import parameters

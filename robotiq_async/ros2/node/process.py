@@ -20,8 +20,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.signals import SignalHandlerOptions
 
-from ...runtime.log import log
-from ...runtime.signals import ending_signals
+from ...runtime import ending_signals, log
 from .bridge import Bridge
 from .gripper_node import GripperNode
 

@@ -21,10 +21,9 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from ...runtime.clock import now
+from ...runtime import now
 from ...tools.description.joint_states import JointStateEncoder
-from ...values.model import THREE_FINGER, Model
-from ...values.status import RobotiqStatus
+from ...values import THREE_FINGER, Model, RobotiqStatus
 from ..gripper.connection import GripperConnection
 from ..translation.diagnosis import Diagnosis, diagnose, is_connected, status_text
 from ..translation.joints import Motion, joint_names, positions

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 
-from ...values.errors import NotStartedError
+from ...values import NotStartedError
 
 
 class Pace:

@@ -10,7 +10,7 @@ import math
 from contextlib import suppress
 from typing import Final
 
-from ...runtime.clock import now
+from ...runtime import now
 
 ASKING_S: Final = 3.0
 """Seconds after the end of a goal in which its client may ask for the result. On a busy machine requests came

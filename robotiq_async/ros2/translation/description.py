@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from ...tools.description import urdf
-from ...values.model import Model
+from ...values import Model
 
 _REFERENCES: Final = {"parent": "link", "child": "link", "mimic": "joint"}
 """Elements of a joint that refer to another part, with the attribute that has its name."""

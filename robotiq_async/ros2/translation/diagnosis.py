@@ -7,11 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from ...control.state_machine import RUNNING
-from ...hands import Hand
-from ...values.enums import Severity, State
-from ...values.errors import NotStartedError
-from ...values.status import RobotiqStatus
+from ...hands import RUNNING, Hand
+from ...values import NotStartedError, RobotiqStatus, Severity, State
 
 
 class DiagnosticLevel(IntEnum):

@@ -27,9 +27,7 @@ from ...tools.description.kinematics import (
     AngleTable,
     joint_angles,
 )
-from ...values.enums import JAW, Finger
-from ...values.model import HAND_E, THREE_FINGER, Model
-from ...values.status import RobotiqStatus
+from ...values import HAND_E, JAW, THREE_FINGER, Finger, Model, RobotiqStatus
 
 FINGERS_JOINT: Final = "fingers"
 """Name for all three fingers in a goal: one angle, the sum of base and middle joint."""

@@ -7,12 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Final
 
-from ...calibration.csv_tables import read_stroke
+from ...calibration import read_stroke
 from ...fleet.network.route import parse_remote_address
-from ...hands.options import Option, Place, offered
-from ...link.address import is_remote, parse_address
-from ...values.checks import check_int, check_number
-from ...values.model import model_of
+from ...hands import Option, Place, offered
+from ...link import is_remote, parse_address
+from ...values import check_int, check_number, model_of
 
 Value = str | int | float | bool
 AS_USUAL: Final = -1  # represents None: a parameter of ROS always has a value

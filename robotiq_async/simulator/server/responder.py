@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from typing import TYPE_CHECKING, Final, Protocol
 
-from robotiq_async.runtime.log import log
+from robotiq_async.runtime.logger import log
 
 from .framing import Frame, take_tcp, tcp_reply
 from .register_bank import RegisterBank

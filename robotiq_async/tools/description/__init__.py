@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from importlib.resources import files
 
-from ...values.model import HAND_E, THREE_FINGER, Model, model_of
+from ...values import HAND_E, THREE_FINGER, Model, model_of
 from .geometry import Pose
 from .hand_e import hand_e
 from .kinematics import named_states

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from ...values.model import HAND_E, MODELS, THREE_FINGER, Model
+from ...values import HAND_E, MODELS, THREE_FINGER, Model
 from . import hand_model
 from .kinematics import FINGER_NAMES
 from .mjcf_writer import write_mjcf

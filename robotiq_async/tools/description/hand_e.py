@@ -13,8 +13,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Final
 
-from ...values.enums import JAW
-from ...values.model import HAND_E
+from ...values import HAND_E, JAW
 from .geometry import Pose
 from .kinematics import JAW_JOINTS
 from .model import HandModel, Joint, Mimic, RigidLink, Shape

@@ -23,10 +23,17 @@ from math import radians
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from ...values.enums import JAW, Finger
-from ...values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model
-from ...values.status import RobotiqStatus
-from ...values.stroke import Stroke
+from ...values import (
+    HAND_E,
+    JAW,
+    THREE_FINGER,
+    TWO_FINGER_85,
+    TWO_FINGER_140,
+    Finger,
+    Model,
+    RobotiqStatus,
+    Stroke,
+)
 
 AngleTable = tuple[tuple[int, float], ...]
 """Position in counts, rising, and angle in degrees; straight in between, level beyond the ends."""

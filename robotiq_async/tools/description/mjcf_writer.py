@@ -14,7 +14,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from typing import Final
 
-from ...values.enums import Finger
+from ...values import Finger
 from .geometry import Pose
 from .model import HandModel, Joint, Mimic, RigidLink, Shape
 from .shapes import inertia

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
-from ...values.enums import Finger
+from ...values import Finger
 from .geometry import Pose, Vector, turned
 
 Color = tuple[float, float, float, float]

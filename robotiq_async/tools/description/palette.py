@@ -9,7 +9,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import Final
 
-from ...values.enums import Finger
+from ...values import Finger
 
 AXIS_COLORS: Final = MappingProxyType(
     {Finger.A: "#2f7ae5", Finger.B: "#1d9150", Finger.C: "#c96a06", Finger.SCISSOR: "#a04ff0"}

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from ...link.sim_transport import simulated
+from ...link import simulated
 from .geometry import Pose
 from .model import Shape
 

@@ -32,7 +32,7 @@ from functools import cache
 from math import ceil, copysign, pi, radians
 from typing import Final
 
-from ...values.enums import Finger
+from ...values import Finger
 from .geometry import Pose, from_rpy
 from .kinematics import BASE, FINGER_NAMES, MIDDLE, PALM, TIP
 from .model import HandModel, Joint, Mimic, RigidLink, Shape, Tendon

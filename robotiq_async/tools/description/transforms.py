@@ -10,8 +10,7 @@ from struct import Struct, pack
 from types import MappingProxyType
 from typing import Final
 
-from ...values.model import Model
-from ...values.status import RobotiqStatus
+from ...values import Model, RobotiqStatus
 from . import hand_model, urdf
 from .joint_states import ENCAPSULATION, HEADER_DEFINITION, RULE, STAMP, add_string, align
 from .kinematics import joint_angles, joint_names

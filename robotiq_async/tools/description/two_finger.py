@@ -25,8 +25,7 @@ from functools import cache
 from math import acos, cos, pi, sin
 from typing import Final, NamedTuple
 
-from ...values.enums import JAW
-from ...values.model import TWO_FINGER_85, TWO_FINGER_140, Model
+from ...values import JAW, TWO_FINGER_85, TWO_FINGER_140, Model
 from .geometry import Pose, Vector
 from .kinematics import JAW_JOINTS
 from .model import HandModel, Joint, Mimic, RigidLink, Shape

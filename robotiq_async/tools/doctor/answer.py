@@ -8,22 +8,21 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from ...hands.options import LONGEST_RESPONSE_S
-from ...link.address import Address
-from ...link.modbus import ModbusTransport
-from ...link.registers import registers_of
-from ...link.sim_transport import SimulatedTransport, new_gripper
-from ...link.transport import Link
-from ...values.errors import (
+from ...hands import LONGEST_RESPONSE_S
+from ...link import Address, Link, ModbusTransport, SimulatedTransport, new_gripper, registers_of
+from ...values import (
+    RTU_REGISTERS,
+    TCP_REGISTERS,
     ConnectFailedError,
     ConnectionLostError,
     ProtocolError,
+    RegisterMap,
     ResponseTimeoutError,
     RobotiqConnectionError,
+    RobotiqStatus,
+    model_of,
+    why_stranger,
 )
-from ...values.model import model_of, why_stranger
-from ...values.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap
-from ...values.status import RobotiqStatus
 from .findings import Finding, GiveUpError, Level, ReportFinding
 
 REACH_S: Final = 3.0  # timeout for resolving the name, and for connecting to the port

@@ -19,7 +19,7 @@ from ...fleet.network.bus import Bus
 from ...fleet.network.endpoints import Endpoint, parse_endpoint
 from ...fleet.network.route import Route, parse_remote_address
 from ...fleet.wire.names import ROOT, GripperName
-from ...values.errors import ConnectFailedError
+from ...values import ConnectFailedError
 from .agent import examine_agent
 from .findings import Finding, GiveUpError, Level, ReportFinding
 

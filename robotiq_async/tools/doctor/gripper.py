@@ -10,19 +10,20 @@ import math
 from pathlib import Path
 from typing import Final
 
-from ...hands.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S
-from ...hands.statistics import percentile
-from ...link.address import Address
-from ...link.modbus import ModbusTransport
-from ...link.registers import registers_of
-from ...link.serial.ports import USB_SERIAL, latency_file, latency_timer
-from ...link.transport import Link
-from ...runtime.host_names import addresses_of
-from ...values.enums import Severity
-from ...values.errors import ConnectionLostError, RobotiqConnectionError
-from ...values.model import MODELS, Model, model_of, names_that_fit
-from ...values.registers import Registers
-from ...values.status import RobotiqStatus
+from ...hands import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S, percentile
+from ...link import USB_SERIAL, Address, Link, ModbusTransport, latency_file, latency_timer, registers_of
+from ...runtime import addresses_of
+from ...values import (
+    MODELS,
+    ConnectionLostError,
+    Model,
+    Registers,
+    RobotiqConnectionError,
+    RobotiqStatus,
+    Severity,
+    model_of,
+    names_that_fit,
+)
 from .answer import DAMAGED, LOST_PORT, REACH_S, find_gripper, long_enough
 from .findings import Finding, GiveUpError, Level, ReportFinding
 from .urcap import find_urcap

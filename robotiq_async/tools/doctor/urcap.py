@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from typing import Final
 
-from ...link.address import URCAP_PORT, Address
-from ...link.transport import Link
-from ...link.urcap.transport import UrcapTransport
-from ...values.errors import (
+from ...link import URCAP_PORT, Address, Link, UrcapTransport
+from ...values import (
     ConnectFailedError,
     ConnectionLostError,
     ResponseTimeoutError,
     RobotiqConnectionError,
+    RobotiqStatus,
 )
-from ...values.status import RobotiqStatus
 from .answer import ANSWER_S, REACH_S, no_connection, report_silence
 from .findings import Finding, GiveUpError, Level, ReportFinding
 

@@ -14,11 +14,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from ...calibration.csv_tables import (
+from ...calibration import (
     FORCE,
     SPEED_LAYOUT,
     Layout,
     RunsTable,
+    SpeedCalibration,
     TableError,
     integer,
     read_measured,
@@ -26,12 +27,10 @@ from ...calibration.csv_tables import (
     write_rows,
     write_table,
 )
-from ...calibration.scales import SpeedCalibration
 from ...hands import Hand
-from ...runtime.clock import now
-from ...values.enums import SPEED_MAX, Finger
-from ...values.errors import MeasuringError
-from ...values.model import THREE_FINGER, Model
+from ...runtime import now
+from ...values import SPEED_MAX, THREE_FINGER, Finger, Model
+from ..errors import MeasuringError
 
 RUN_PAUSE_S: Final = 0.3
 """Pause between runs, in the gripper's time: a finger that has just stopped may still swing."""

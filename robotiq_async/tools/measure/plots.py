@@ -14,13 +14,12 @@ try:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 except ModuleNotFoundError as error:
-    from ...runtime.extras import install
+    from ...runtime import install
 
     raise ImportError(f"pictures need matplotlib: {install('plot')}") from error
 
-from ...calibration.csv_tables import RunsTable
-from ...calibration.scales import ForceCalibration, SpeedCalibration, mean, newton
-from ...runtime.log import printable
+from ...calibration import ForceCalibration, RunsTable, SpeedCalibration, mean, newton
+from ...runtime import printable
 from ..description.palette import AXIS_COLORS
 from ..recording.payloads import is_command
 from ..recording.table import CURRENT_COLUMN

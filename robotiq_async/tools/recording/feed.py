@@ -15,14 +15,9 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from ...hands import Hand
-from ...hands.streams import Stream
-from ...runtime.clock import now
-from ...runtime.log import Log
-from ...values.errors import RobotiqConnectionError
-from ...values.events import SentRequest, Transition
-from ...values.model import Model
-from ...values.status import RobotiqStatus
+from ...hands import Hand, Stream
+from ...runtime import Log, now
+from ...values import Model, RobotiqConnectionError, RobotiqStatus, SentRequest, Transition
 from ..description.joint_states import JOINT_STATE_SCHEMA, SCHEMA_NAME, JointStateEncoder
 from ..description.kinematics import joint_angles, joint_names, joint_velocities
 from ..description.simulated import bodies_of, joints_and_parts

@@ -11,13 +11,18 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from ...hands import Hand
-from ...values.checks import repr_of
-from ...values.enums import JAW, Fault, Finger, State
-from ...values.errors import NotStartedError
-from ...values.events import Transition
-from ...values.inhibit import Inhibit
-from ...values.model import THREE_FINGER
-from ...values.status import RobotiqStatus
+from ...values import (
+    JAW,
+    THREE_FINGER,
+    Fault,
+    Finger,
+    Inhibit,
+    NotStartedError,
+    RobotiqStatus,
+    State,
+    Transition,
+    repr_of,
+)
 from ..description.kinematics import FINGER_NAMES
 
 Properties = dict[str, Any]

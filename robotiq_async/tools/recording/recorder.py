@@ -27,11 +27,10 @@ from types import TracebackType
 from typing import Final, Protocol, Self
 
 from ...hands import Hand
-from ...runtime.concurrency import NoThreadError, in_a_thread, wait_shielded, write_all
-from ...runtime.log import Log
-from ...sync.robotiq_hand import RobotiqHand as BlockingHand
+from ...runtime import Log, NoThreadError, in_a_thread, wait_shielded, write_all
+from ...sync import RobotiqHand as BlockingHand
 from ...sync.robotiq_hand import caller_of
-from ...values.errors import RecordingError
+from ..errors import RecordingError
 from .feed import JOINTS_TOPIC, Feed, Message
 from .table import CsvFile
 

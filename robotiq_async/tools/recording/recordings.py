@@ -21,13 +21,12 @@ try:
     from mcap.stream_reader import StreamReader, breakup_chunk
     from mcap.writer import CompressionType, Writer
 except ModuleNotFoundError as error:
-    from ...runtime.extras import install
+    from ...runtime import install
 
     raise ImportError(f"recordings need mcap: {install('record')}") from error
 
-from ...runtime.log import log
-from ...runtime.version import __version__
-from ...values.errors import RecordingError
+from ...runtime import __version__, log
+from ..errors import RecordingError
 from .feed import JOINTS_TOPIC, TOPICS, Topic
 from .feed import Message as FeedMessage
 

@@ -16,8 +16,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from ...calibration.conventions import Convention
-from ...calibration.csv_tables import write_rows
+from ...calibration import Convention, write_rows
 from .feed import EVENT, STATUS, Message
 from .payloads import SCHEMAS, Properties
 

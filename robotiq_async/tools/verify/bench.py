@@ -7,15 +7,9 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Final
 
-from ...hands.options import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S
-from ...link.address import Address
-from ...link.modbus import ModbusTransport
-from ...link.transport import Link
-from ...link.urcap.transport import UrcapTransport
-from ...values.enums import Finger
-from ...values.model import Model, model_of
-from ...values.registers import RegisterMap
-from ...values.status import RobotiqStatus
+from ...hands import POLL_INTERVAL_S, RESPONSE_TIMEOUT_S
+from ...link import Address, Link, ModbusTransport, UrcapTransport
+from ...values import Finger, Model, RegisterMap, RobotiqStatus, model_of
 from .catalogue import CATALOGUE, NO_OPTIONS, Check, CheckVerdict, EndError, Figure, Options
 from .recorded_link import RecordedExchange, RecordedLink
 from .watch import Person, StageWatch

@@ -8,7 +8,7 @@ from enum import Enum
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
-from ...values.model import Model
+from ...values import Model
 
 
 class Assumption(NamedTuple):

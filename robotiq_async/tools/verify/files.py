@@ -16,12 +16,9 @@ from io import FileIO
 from pathlib import Path
 from typing import Final, TypeVar, cast
 
-from ...link.address import Address
-from ...runtime.concurrency import in_a_thread, write_all
-from ...values.events import SentRequest
-from ...values.model import Model, model_of
-from ...values.request import Request
-from ...values.status import RobotiqStatus
+from ...link import Address
+from ...runtime import in_a_thread, write_all
+from ...values import Model, Request, RobotiqStatus, SentRequest, model_of
 from ..recording.feed import COMMAND, EVENT, STATUS, Message, Topic, compact
 from ..recording.payloads import Properties
 from ..recording.recorder import FLUSH_S, Outbox

@@ -5,11 +5,9 @@ from __future__ import annotations
 import asyncio
 from typing import Final
 
-from ...hands.options import POLL_INTERVAL_S
-from ...link.registers import registers_of
-from ...values.enums import Fault
-from ...values.model import names_that_fit, why_stranger
-from ...values.status import RobotiqStatus
+from ...hands import POLL_INTERVAL_S
+from ...link import registers_of
+from ...values import Fault, RobotiqStatus, names_that_fit, why_stranger
 from ..doctor.answer import STRANGER, find_gripper
 from ..doctor.findings import Finding, GiveUpError
 from ..doctor.urcap import find_urcap

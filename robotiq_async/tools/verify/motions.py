@@ -7,10 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
-from ...values.enums import Finger
-from ...values.errors import RobotiqConnectionError
-from ...values.request import AxisRequest, Request
-from ...values.status import RobotiqStatus
+from ...values import AxisRequest, Finger, Request, RobotiqConnectionError, RobotiqStatus
 from .catalogue import EndError
 from .recorded_link import RecordedLink
 from .watch import ANYWHERE, StageWatch, describe

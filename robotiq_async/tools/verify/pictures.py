@@ -13,14 +13,11 @@ try:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 except ModuleNotFoundError as error:
-    from ...runtime.extras import install
+    from ...runtime import install
 
     raise ImportError(f"pictures need matplotlib: {install('plot')}") from error
 
-from ...values.enums import CLOSED, Finger, ObjectStatus
-from ...values.model import THREE_FINGER, Model, model_of
-from ...values.request import Request
-from ...values.status import RobotiqStatus
+from ...values import CLOSED, THREE_FINGER, Finger, Model, ObjectStatus, Request, RobotiqStatus, model_of
 from ..recording.feed import COMMAND, EVENT, STATUS
 from ..recording.recordings import read_recording
 from .catalogue import STAGE

@@ -9,13 +9,9 @@ from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from typing import Any, Final, TypeVar
 
-from ...link.transport import CyclicLink, Link
-from ...runtime.concurrency import wait_shielded
-from ...values.errors import RobotiqConnectionError
-from ...values.model import Model
-from ...values.registers import Echo, Registers
-from ...values.request import Request
-from ...values.status import RobotiqStatus
+from ...link import CyclicLink, Link
+from ...runtime import wait_shielded
+from ...values import Echo, Model, Registers, Request, RobotiqConnectionError, RobotiqStatus
 
 T = TypeVar("T")
 

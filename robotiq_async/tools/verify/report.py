@@ -6,10 +6,8 @@ import platform
 from dataclasses import dataclass, field
 from typing import Any, Final, TypeVar
 
-from ...runtime.version import __version__
-from ...values.model import THREE_FINGER, Model
-from ...values.registers import RegisterMap
-from ...values.status import RobotiqStatus
+from ...runtime import __version__
+from ...values import THREE_FINGER, Model, RegisterMap, RobotiqStatus
 from .catalogue import CATALOGUE, ENDINGS, HARMLESS, LAST, Check, CheckVerdict, checks_of, left_out
 
 T = TypeVar("T")

@@ -21,11 +21,9 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Final, Protocol
 
-from ...link.address import Address
-from ...runtime.concurrency import wait_shielded
-from ...values.errors import RobotiqConnectionError
-from ...values.model import model_of
-from ...values.request import Request
+from ...link import Address
+from ...runtime import wait_shielded
+from ...values import Request, RobotiqConnectionError, model_of
 from .bench import Bench, Lengths
 from .catalogue import HARMLESS, LAST, EndError
 from .identification import check_before_writing, find

@@ -9,10 +9,7 @@ import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final, Protocol
 
-from ...values.enums import Fault, Finger
-from ...values.model import Model
-from ...values.request import Request
-from ...values.status import RobotiqStatus
+from ...values import Fault, Finger, Model, Request, RobotiqStatus
 from .catalogue import EndError
 from .recorded_link import RecordedLink
 

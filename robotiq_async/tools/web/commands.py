@@ -10,9 +10,7 @@ from time import monotonic
 from types import MappingProxyType
 from typing import Any, Final
 
-from ...values.checks import parse_fingers
-from ...values.enums import State
-from ...values.errors import RobotiqError
+from ...values import RobotiqError, State, parse_fingers
 from ..actions import ACTIONS, Action, Operator
 from ..recording.payloads import Properties
 from ..wording import refusal_words

@@ -22,21 +22,18 @@ from pathlib import Path
 from typing import Final, Self
 
 from ...hands import Hand
-from ...runtime.clock import now
-from ...runtime.concurrency import wait_shielded
-from ...runtime.extras import is_frozen
-from ...runtime.log import log
-from ...values.errors import NotStartedError, ViewerError
-from ...values.status import RobotiqStatus
+from ...runtime import is_frozen, log, now, wait_shielded
+from ...values import NotStartedError, RobotiqStatus
 from ..actions import Operator
 from ..description.simulated import bodies_of
+from ..errors import ViewerError
 from ..recording.feed import Timeline
 from ..recording.payloads import Properties, is_command, title
 from .commands import PageCommands
 from .settings import LOOPBACK, PAGE_PORT, PageSettings
 
 if find_spec("nicegui") is None:
-    from ...runtime.extras import install
+    from ...runtime import install
 
     raise ImportError(f"the page needs nicegui: {install('web')}")
 

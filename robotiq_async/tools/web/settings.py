@@ -8,9 +8,8 @@ from dataclasses import asdict, dataclass, field
 from socket import gethostname
 from typing import Final, Self
 
-from ...runtime.sockets import is_loopback
-from ...values.checks import check_int
-from ...values.enums import DEFAULT_FORCE, DEFAULT_SPEED
+from ...runtime import is_loopback
+from ...values import DEFAULT_FORCE, DEFAULT_SPEED, check_int
 
 LOOPBACK: Final = "127.0.0.1"
 EVERYWHERE: Final = ("0.0.0.0", "::", "")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 from typing import Final, NamedTuple
 
-from ....values.model import THREE_FINGER, Model
+from ....values import THREE_FINGER, Model
 from ..bench import Bench
 from ..catalogue import HARMLESS
 from . import first_motions, full_strokes, loss, reading, soak, soft_part, stopping, writing

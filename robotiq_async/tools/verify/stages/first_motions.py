@@ -6,10 +6,8 @@ import asyncio
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from ....hands.options import ACTIVATION_TIMEOUT_S, POLL_INTERVAL_S
-from ....values.enums import Finger, ObjectStatus
-from ....values.request import Request
-from ....values.status import RobotiqStatus
+from ....hands import ACTIVATION_TIMEOUT_S, POLL_INTERVAL_S
+from ....values import Finger, ObjectStatus, Request, RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError
 from ..motions import ACTIVATION_S, activate, are_near, in_place, motion_envelope

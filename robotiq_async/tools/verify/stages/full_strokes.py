@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from ....calibration.motion_profile import profile_of
-from ....hands.options import units_of
-from ....values.enums import CLOSED, FORCE_MAX, OPEN, Finger, ObjectStatus
-from ....values.request import Request
-from ....values.status import RobotiqStatus
+from ....calibration import profile_of
+from ....hands import units_of
+from ....values import CLOSED, FORCE_MAX, OPEN, Finger, ObjectStatus, Request, RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError, Figure
 from ..motions import in_place, resting_envelope

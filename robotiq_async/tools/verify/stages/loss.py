@@ -6,10 +6,7 @@ import asyncio
 from dataclasses import replace
 from typing import Final
 
-from ....values.enums import Fault, Finger
-from ....values.errors import RobotiqConnectionError
-from ....values.request import Request
-from ....values.status import RobotiqStatus
+from ....values import Fault, Finger, Request, RobotiqConnectionError, RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError, Figure
 from ..motions import MARGIN, activate, are_near, in_place, motion_envelope

@@ -8,14 +8,10 @@ from collections import Counter
 from dataclasses import replace
 from typing import Final
 
-from ....hands.options import POLL_INTERVAL_S
-from ....hands.statistics import percentile
-from ....link.registers import registers_of
-from ....link.serial.ports import latency_file, latency_timer
-from ....runtime.sockets import is_loopback
-from ....values.enums import Fault
-from ....values.errors import RobotiqConnectionError
-from ....values.registers import RTU_REGISTERS, TCP_REGISTERS, RegisterMap, Registers
+from ....hands import POLL_INTERVAL_S, percentile
+from ....link import latency_file, latency_timer, registers_of
+from ....runtime import is_loopback
+from ....values import RTU_REGISTERS, TCP_REGISTERS, Fault, RegisterMap, Registers, RobotiqConnectionError
 from ..bench import Bench
 from ..catalogue import CheckVerdict, EndError, Figure
 from ..recorded_link import RecordedExchange, RecordedLink

@@ -6,12 +6,9 @@ import asyncio
 from dataclasses import replace
 from typing import Final
 
-from ....hands.options import POLL_INTERVAL_S
-from ....hands.statistics import percentile
-from ....link.modbus import ModbusTransport
-from ....values.enums import Finger
-from ....values.errors import RobotiqConnectionError
-from ....values.request import Request
+from ....hands import POLL_INTERVAL_S, percentile
+from ....link import ModbusTransport
+from ....values import Finger, Request, RobotiqConnectionError
 from ..bench import Bench
 from ..catalogue import EndError, Figure
 from ..motions import MARGIN, are_near, go, in_place, resting_envelope

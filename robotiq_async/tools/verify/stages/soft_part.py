@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from ....values.enums import CLOSED, SPEED_MAX, Finger, ObjectStatus
-from ....values.status import RobotiqStatus
+from ....values import CLOSED, SPEED_MAX, Finger, ObjectStatus, RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError, Figure
 from ..motions import MARGIN, are_near, in_place, resting_envelope

@@ -6,10 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from ....calibration.scales import SpeedCalibration
-from ....values.enums import Finger
-from ....values.request import Request
-from ....values.status import RobotiqStatus
+from ....calibration import SpeedCalibration
+from ....values import Finger, Request, RobotiqStatus
 from ..bench import Bench
 from ..catalogue import EndError, Figure
 from ..motions import MARGIN, are_near, go, in_place, motion_envelope

@@ -5,13 +5,9 @@ from __future__ import annotations
 import asyncio
 from typing import Final
 
-from ....hands.options import LONGEST_SPACING_S, usual_write_spacing
-from ....hands.statistics import percentile
-from ....link.registers import registers_of
-from ....values.enums import Finger
-from ....values.errors import RobotiqConnectionError
-from ....values.request import Request
-from ....values.status import RobotiqStatus
+from ....hands import LONGEST_SPACING_S, percentile, usual_write_spacing
+from ....link import registers_of
+from ....values import Finger, Request, RobotiqConnectionError, RobotiqStatus
 from ..bench import Bench
 from ..catalogue import NO_OPTIONS, Figure, Options
 from ..motions import as_found

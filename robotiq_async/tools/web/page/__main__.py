@@ -9,7 +9,7 @@ import sys
 from contextlib import suppress
 from tempfile import TemporaryDirectory
 
-from ....runtime.sockets import listen
+from ....runtime import listen
 from ..settings import PageSettings
 from .pipes import Pipes
 

@@ -11,11 +11,18 @@ from itertools import count, zip_longest
 from time import monotonic
 from typing import Any, Final
 
-from ....values.enums import DEFAULT_FORCE, DEFAULT_SPEED, State
-from ....values.inhibit import Inhibit
-from ....values.model import THREE_FINGER, Model, model_of
-from ....values.status import RobotiqStatus
-from ....values.stroke import Points, Stroke
+from ....values import (
+    DEFAULT_FORCE,
+    DEFAULT_SPEED,
+    THREE_FINGER,
+    Inhibit,
+    Model,
+    Points,
+    RobotiqStatus,
+    State,
+    Stroke,
+    model_of,
+)
 from ...description import Shape
 from ...description.simulated import joints_and_parts
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import Final
 
-from .....control.state_machine import MOVES, RUNNING, TABLE, Verdict
-from .....values.enums import State, Trigger
+from .....hands import MOVES, RUNNING, TABLE, Verdict
+from .....values import State, Trigger
 from ....wording import STATE_WORDS
 from ..mirror import HandMirror
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from nicegui import events, ui
 
-from .....values.enums import CLOSED, FORCE_MAX, OPEN, SPEED_MAX, Finger, names_of
+from .....values import CLOSED, FORCE_MAX, OPEN, SPEED_MAX, Finger, names_of
 from ....actions import ACTIONS, Action
 from ....wording import JAW_NAME
 from ..heartbeat import PRESS, PRESS_WITH_VALUE, Heartbeat

@@ -18,9 +18,7 @@ from functools import lru_cache
 from math import asin, degrees, dist, radians
 from typing import Final
 
-from .....values.enums import JAW, Finger, ObjectStatus
-from .....values.model import THREE_FINGER
-from .....values.status import RobotiqStatus
+from .....values import JAW, THREE_FINGER, Finger, ObjectStatus, RobotiqStatus
 from ....description import HandModel, Pose
 from ....description.geometry import Vector
 from ....description.kinematics import BASE, FINGER_NAMES, MIDDLE, TIP, joint_angles, joint_names

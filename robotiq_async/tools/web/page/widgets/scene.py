@@ -15,9 +15,7 @@ from typing import Any, Final
 from nicegui import ui
 from nicegui.elements.scene.scene_object3d import Object3D
 
-from .....values.enums import Finger, ObjectStatus
-from .....values.model import THREE_FINGER, Model
-from .....values.status import RobotiqStatus
+from .....values import THREE_FINGER, Finger, Model, ObjectStatus, RobotiqStatus
 from ....description import HandModel, Pose, Shape, hand_model
 from ....description.geometry import turned
 from ....description.kinematics import FINGER_NAMES, joint_names, requested_angles

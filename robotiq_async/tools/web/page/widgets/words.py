@@ -6,8 +6,7 @@ from datetime import datetime
 from time import time
 from typing import Any, Final
 
-from .....values.enums import JAW, Fault, Finger, Severity, State
-from .....values.status import NO_REQUEST
+from .....values import JAW, NO_REQUEST, Fault, Finger, Severity, State
 from ....description.palette import AXIS_COLORS
 from ....wording import AXIS_WORDS, JAW_NAME, STATE_WORDS, holding_words, inhibit_words
 from ..mirror import HandMirror
