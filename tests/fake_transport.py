@@ -76,6 +76,7 @@ class Wire(Exchanging):
 
     exchange_s = EXCHANGE_S
     has_current = True
+    asked_at = -math.inf  # each read leaves as its poll begins
 
     def __init__(self, speedup: float = 1.0, **options: Any) -> None:
         time = asyncio.get_running_loop().time

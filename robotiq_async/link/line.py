@@ -28,6 +28,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 from collections.abc import Callable, Generator
 from enum import Enum
 from typing import Final, TypeVar
@@ -99,6 +100,7 @@ class Line:
         keeps_silence: whether this end keeps the silence between frames; a serial server keeps its own.
         silence: that silence.
         echo: whether the line brings back what is sent.
+        asked_at: the time of the last request, by the loop's own clock.
     """
 
     def __init__(
@@ -120,6 +122,7 @@ class Line:
         self.keeps_silence: bool = address.kind == "rtu"
         self.silence: Silence = Silence(address.line.character_s)
         self.echo: EchoFilter = EchoFilter()
+        self.asked_at: float = -math.inf
         self.address: Final = address
         self._wire: Final = wire or wire_to(address)
         self._stray: Final = stray
@@ -326,7 +329,7 @@ class Line:
             answer.set_result(obstacle)
             return answer
         self._exchange = exchange
-        self._watchdog.watch(self._allowed(exchange), exchange.timing.by)
+        self.asked_at = self._watchdog.watch(self._allowed(exchange), exchange.timing.by)
         if self._shares:
             self._patience.asked(self.now())
         try:

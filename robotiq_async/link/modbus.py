@@ -92,6 +92,10 @@ class ModbusTransport:
         return self._line.is_open_for(self)
 
     @property
+    def asked_at(self) -> float:
+        return self._line.asked_at
+
+    @property
     def is_shared(self) -> bool:
         return self._shares_line and self._line.is_shared
 

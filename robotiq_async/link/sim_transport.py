@@ -84,6 +84,10 @@ class SimulatedTransport:
     def is_open(self) -> bool:
         return self._inner is not None and self._inner.is_open
 
+    @property
+    def asked_at(self) -> float:
+        return self._connected().asked_at
+
     async def open(self) -> None:
         """Start the simulator if it does not run, and connect to it."""
         if self._server.failure is not None:

@@ -35,6 +35,10 @@ class Link(Protocol):
     def is_open(self) -> bool:
         """Whether requests can be sent."""
 
+    @property
+    def asked_at(self) -> float:
+        """When the status that was read last was asked for: a read may be repeated, or wait for its turn."""
+
     async def open(self) -> None:
         """Connect.
 

@@ -37,9 +37,10 @@ class Watchdog:
         self._timer: asyncio.Handle | None = None
         self._timer_due = math.inf
 
-    def watch(self, seconds: float, by: float) -> None:
-        """Watch an exchange that may take some seconds, and no longer than ``by`` in the loop's time."""
-        self._due = self.loop.time() + seconds
+    def watch(self, seconds: float, by: float) -> float:
+        """Watch an exchange that may take some seconds, and no longer than ``by``; return the loop's time."""
+        began = self.loop.time()
+        self._due = began + seconds
         if by < self._due:
             self._due = by
         self._has_grace = False
@@ -47,6 +48,7 @@ class Watchdog:
             self.stop()
         if self._timer is None:
             self._set_timer()
+        return began
 
     def stop(self) -> None:
         """Stop watching."""

@@ -293,9 +293,9 @@ class Poller:
         return RobotiqStatus(registers, answered, number, self._model, self._stroke, has_current)
 
     def _take(self, status: RobotiqStatus, asked: float) -> None:
-        """Pass on a status that was asked for at ``asked``."""
+        """Pass on a status whose poll began at ``asked``, by a read that may have left later."""
         period = None if self._last_poll is None else asked - self._last_poll
         self._counters.note_poll(asked, status.timestamp, period)
-        self._last_poll = self._asked = asked
-        self._controller.see(status, asked)
+        self._last_poll, self._asked = asked, max(asked, self._link.asked_at)
+        self._controller.see(status, self._asked)
         self._publisher.publish_status(status)

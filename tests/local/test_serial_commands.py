@@ -10,8 +10,14 @@ from typing import Any
 
 import pytest
 
-from robotiq_async import ConnectionLostError, Finger, RobotiqHand
-from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer, parse_troubles
+from robotiq_async import ConnectionLostError, Finger, MoveSupersededError, RobotiqHand
+from robotiq_async.simulator import (
+    SerialSimulatorServer,
+    SimulatedGripper,
+    SimulatorServer,
+    Trouble,
+    parse_troubles,
+)
 from robotiq_async.simulator.server.serial_server import RtuResponder
 from robotiq_async.values.model import model_of
 from robotiq_async.values.request import Request
@@ -192,6 +198,28 @@ async def test_a_damaged_reply_costs_no_command_and_no_link(
         await asyncio.sleep(2.0)
         assert gripper.position(A) == pytest.approx(200, abs=3)
         assert hand.statistics.reconnects == 0
+
+
+@pytest.mark.parametrize("to", [90, 250])
+async def test_a_hold_behind_a_read_that_is_repeated_stops_where_the_axis_is(
+    monkeypatch: pytest.MonkeyPatch, model: str, to: int
+) -> None:
+    """The status counted from the read that nobody heard: the axis was asked for a place far ahead."""
+    async with at_a_line(monkeypatch, model) as (hand, replies):
+        injector, gripper = replies.server.fault_injector, replies.server.gripper
+        moving = asyncio.create_task(hand.move(to, A, speed=0))
+        await asyncio.sleep(0.5)
+        async with injector.making(Trouble("silence")):
+            await asyncio.sleep(0.02)  # a read is not heard
+            holding = asyncio.create_task(hand.hold(A))
+            await asyncio.sleep(0.3)
+        await holding
+        assert hand.status.is_moving, "it is held on its way"
+        held_at = gripper.position(A)
+        await asyncio.sleep(1.0)
+        assert gripper.position(A) == pytest.approx(held_at, abs=2)
+        with pytest.raises(MoveSupersededError):
+            await moving
 
 
 async def test_a_write_that_was_not_heard_is_lost_and_not_repeated(monkeypatch: pytest.MonkeyPatch) -> None:

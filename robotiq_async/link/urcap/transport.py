@@ -179,6 +179,10 @@ class UrcapTransport:
     def is_open(self) -> bool:
         return self._line.is_open_for(self)
 
+    @property
+    def asked_at(self) -> float:
+        return self._line.asked_at
+
     async def open(self) -> None:
         """Connect, and make sure that no answer to an earlier question is taken for one to come.
 
