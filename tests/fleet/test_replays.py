@@ -7,7 +7,7 @@ import asyncio
 import pytest
 
 from robotiq_async import ConnectionLostError, Finger, RobotiqError, State
-from robotiq_async.simulator.physics.gripper import HeardWrite
+from robotiq_async.simulator.physics.inbox import HeardWrite
 from robotiq_async.values.request import Request
 from tests.fleet.cell import ending, move_slowly
 from tests.fleet.lab import LEFT, Garbling, Lab, lab

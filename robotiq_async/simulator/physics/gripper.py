@@ -5,41 +5,38 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections import deque
 from functools import reduce
 from operator import or_
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from robotiq_async.values import registers as reg
-from robotiq_async.values.checks import check_int, check_number, check_seconds
+from robotiq_async.values.checks import check_byte, check_int, check_number, check_seconds
 from robotiq_async.values.enums import NO_AXES, Fault, Finger
 from robotiq_async.values.model import Model, model_of
 from robotiq_async.values.request import Request
 
+from .axis import Axis, Obstacle
 from .control_modes import SCISSOR_HIGH, SCISSOR_LOW, check_ends, check_scissor_limit
-from .controller import ZEROS, GripperController
+from .controller import GripperController
 from .driven_axis import PhysicsError
 from .habits import Habits
+from .inbox import HeardWrite, Inbox
 from .spread import SEED
-from .surroundings import Surroundings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from robotiq_async.calibration.motion_profile import MotionProfile
 
-    from .axis import Axis
     from .bodies import Bodies
     from .driven_axis import Mechanism
 
 _LONGEST: Final = 1e9
-_HISTORY: Final = 10_000
-_ROUNDING: Final = 1e-9
 _CYCLE: Final = 0.005
 """Device cycle of a 3-Finger: its registers are renewed at 200 Hz (manual)."""
 
 
-class SimulatedGripper(Surroundings):
+class SimulatedGripper:
     """A gripper that behaves like the real one, as far as public sources go: a 3-Finger, or a sibling.
 
     Nothing runs in the background: the gripper catches up with its clock whenever it is read, written or
@@ -120,9 +117,10 @@ class SimulatedGripper(Surroundings):
         if physics is not None:
             physics.attach(kind, clock, self._speedup)
         ends = None if ends is None else check_ends(ends)
-        super().__init__(
-            GripperController(kind, limit, seed_or_none, habits or Habits(), physics, motion, ends)
+        self._controller = GripperController(
+            kind, limit, seed_or_none, habits or Habits(), physics, motion, ends
         )
+        self._time = 0.0
         self._clock = clock
         self._began = clock()
         self._off_until = -math.inf if powered else math.inf
@@ -212,9 +210,170 @@ class SimulatedGripper(Surroundings):
             request = Request(
                 activate=True, individual_fingers=False, individual_scissor=False, model=self.model
             )
-            self._inbox.clear()
-            self._inbox.image = request.registers
+            self._inbox.clear(request.registers)
             self._controller.strand(self._time, request)
+
+    # Influences from outside: objects, faults, an emergency stop.
+
+    def place_object(
+        self,
+        fingers: Finger | int,
+        position: int,
+        *,
+        opening: bool = False,
+        soft: int = 0,
+        thin: bool = False,
+        fixed: bool = False,
+    ) -> None:
+        """Put something in the way of some axes.
+
+        An axis that has passed the position already has the object behind it: no contact until it comes
+        from the other side. Each axis has room for one object per direction; a second replaces the first.
+        An axis in contact stays there, wherever the object is now.
+
+        Args:
+            fingers: the axes it is in the way of.
+            position: count at which an axis touches it, 0..255.
+            opening: it is met when opening (gDT = 1) instead of closing (gDT = 2).
+            soft: counts by which a force of 255 presses the axis into it, 0..255.
+            thin: it is a thin object between fingertips, which the gripper may hold without ever reporting a
+                contact (manual 2012, 4.7). Here it never does: the axes continue to their request or stops.
+            fixed: it stays there in an activation, which then fails with fault 0x0D (manual 2012, 4.7: see
+                that nothing interferes). Anything else is taken out for an activation, and put back after it.
+
+        Raises:
+            TypeError: an argument is not an int.
+            ValueError: fingers is not a mask of axes, or another argument is outside 0..255.
+        """
+        if self._controller.driven:
+            raise ValueError("a gripper with physics meets the parts of its scene, not obstacles at a count")
+        met = Obstacle(check_byte("position", position), check_byte("soft", soft), fixed)
+        obstacle = None if thin else met
+        for axis in self._axes_in(self.model.mask(fingers)):
+            if opening:
+                axis.in_opening = obstacle
+            else:
+                axis.in_closing = obstacle
+            axis.look_again(self._time)
+
+    def remove_object(self, fingers: Finger | int = Finger.ALL) -> None:
+        """Remove the obstacles of some axes.
+
+        Those it has stopped stay in their contact until a position on the other side is requested, the force
+        is raised or rGTO goes from 0 to 1 (manual 2014, p. 51).
+
+        Raises:
+            TypeError: fingers is not an int.
+            ValueError: fingers is not a mask of axes.
+        """
+        for axis in self._axes_in(self.model.mask(fingers)):
+            axis.in_closing = axis.in_opening = None
+            axis.look_again(self._time)
+
+    def inject_fault(self, fault: Fault | int, duration: float | None = None) -> None:
+        """Make a fault appear. A minor or major one stops the axes; interference, see :meth:`interfere`.
+
+        Args:
+            fault: the code, 1..15; unassigned codes count as major.
+            duration: simulated seconds until it ends; None: until :meth:`clear_faults` or a reset.
+
+        Raises:
+            TypeError: duration is not a number.
+            ValueError: no such fault, or duration is negative.
+        """
+        if not isinstance(fault, Fault):
+            fault = self._controller.model.fault(fault)
+        if fault is Fault.NONE:
+            raise ValueError("fault must be a code in 1..15, got 0; clear_faults() ends faults")
+        lasts = None if duration is None else check_seconds("duration", duration, 0, _LONGEST)
+        self._catch_up()
+        self._controller.faults.begin(fault, self._time, lasts)
+        self._controller.update(self._time)
+
+    def interfere(self, duration: float | None = None) -> None:
+        """Block the scissor: fault 0x0A, which stops it alone, and after 20 s 0x0E, which stops everything.
+
+        Args:
+            duration: simulated seconds, None: until :meth:`clear_faults` or a reset.
+
+        Raises:
+            TypeError: duration is not a number.
+            ValueError: duration is negative, or the model has no scissor.
+        """
+        self._controller.model.index(Finger.SCISSOR)
+        self.inject_fault(Fault.SCISSOR_INTERFERENCE, duration)
+
+    @property
+    def controller_fault(self) -> int:
+        """kFLT, 0..15: the fault that the Universal Controller before a jaw reports; 0 for none.
+
+        Raises:
+            TypeError: not an int.
+            ValueError: outside 0..15, or the model is a 3-Finger.
+        """
+        return self._controller.controller_fault
+
+    @controller_fault.setter
+    def controller_fault(self, code: int) -> None:
+        if self._controller.model.has_modes:
+            raise ValueError(f"a {self._controller.model.title} has no controller fault (kFLT)")
+        self._catch_up()
+        self._controller.controller_fault = check_int("controller_fault", code, 0, 15)
+
+    def emergency_stop(self, resets: int = 1) -> None:
+        """Press the emergency stop: an active gripper stops, reports fault 0x05, and stays at gIMC = 1.
+
+        Args:
+            resets: number of resets needed after :meth:`end_emergency_stop`; before it none helps.
+
+        Raises:
+            TypeError: resets is not an int.
+            ValueError: resets is outside 1..9.
+        """
+        self._catch_up()
+        self._controller.stop(self._time, check_int("resets", resets, 1, 9))
+
+    def end_emergency_stop(self) -> None:
+        """Unlock the emergency stop."""
+        self._catch_up()
+        self._controller.end_stop()
+
+    @property
+    def is_asleep(self) -> bool:
+        """Whether the next image with rACT = 1 only wakes the gripper: it is echoed, and moves nothing.
+
+        Axes that move run on, and rGTO = 0 stops them. One driver found that a gripper ignores motions on a
+        new connection until rACT = 1 has been written.
+        """
+        self._catch_up()
+        return self._controller.is_asleep
+
+    @is_asleep.setter
+    def is_asleep(self, value: bool) -> None:
+        self._catch_up()
+        self._controller.is_asleep = value
+
+    def clear_faults(self) -> None:
+        """End the injected faults; a request with rGTO = 1 resumes."""
+        self._catch_up()
+        self._controller.faults.clear()
+        self._controller.update(self._time)
+
+    def emergency_release(self) -> None:
+        """Begin an automatic release as rATR = 1 would; without effect while reset."""
+        self._catch_up()
+        self._controller.release(self._time)
+
+    @property
+    def fail_activation(self) -> bool:
+        """Whether the next activation ends in fault 0x0D; False again when it has."""
+        self._catch_up()
+        return self._controller.fail_activation
+
+    @fail_activation.setter
+    def fail_activation(self, value: bool) -> None:
+        self._catch_up()
+        self._controller.fail_activation = value
 
     # Bodies.
 
@@ -342,6 +501,14 @@ class SimulatedGripper(Surroundings):
         self._catch_up()
         return self._controller.axes[index]
 
+    def _axes_in(self, fingers: Finger) -> list[Axis]:
+        self._catch_up()
+        return [
+            axis
+            for name, axis in zip(self._controller.model.axes, self._controller.axes, strict=True)
+            if name in fingers
+        ]
+
     def _catch_up(self) -> None:
         """Let everything happen that is due, each thing at its own time."""
         now = max(self._time, self._now)
@@ -367,62 +534,3 @@ class SimulatedGripper(Surroundings):
             reports = [axis.observe(time) for axis in axes]
             if any(reports):
                 return
-
-
-class HeardWrite(NamedTuple):
-    """One write that was kept.
-
-    Attributes:
-        time: reading of the gripper's clock, in seconds.
-        registers: the full image after the write.
-    """
-
-    time: float
-    registers: reg.Registers
-
-
-class Inbox:
-    """Takes writes; each takes effect a device cycle later. Times are simulated seconds.
-
-    Attributes:
-        image: the registers as written, in effect or not yet.
-        pending: writes that will take effect, with their times, oldest first.
-        writes: the last writes that were kept, oldest first.
-    """
-
-    def __init__(self, model: Model) -> None:
-        self._model = model
-        self.image: reg.Registers = ZEROS
-        self.pending: deque[tuple[float, Request]] = deque()
-        self.writes: deque[HeardWrite] = deque(maxlen=_HISTORY)
-        self._kept_at: float | None = None
-
-    def checked(self, address_offset: int, registers: Sequence[int]) -> reg.Registers:
-        """The image with some registers replaced; raises what :meth:`SimulatedGripper.write` does."""
-        offset = check_int("address_offset", address_offset, 0, reg.REGISTER_COUNT - 1)
-        room = reg.REGISTER_COUNT - offset
-        if not 1 <= len(registers) <= room:
-            raise ValueError(f"registers: expected 1..{room} from offset {offset}, got {len(registers)}")
-        image = list(self.image)
-        image[offset : offset + len(registers)] = registers
-        return reg.check_registers(image)
-
-    def keep(self, time: float, write: HeardWrite, cycle: float, spacing: float) -> None:
-        """Keep a write, unless it follows the last one too closely: then it is forgotten."""
-        if self._kept_at is not None and time - self._kept_at < spacing - _ROUNDING:
-            return
-        self._kept_at = time
-        self.image = write.registers
-        self.writes.append(write)
-        # Keep their order, even if the device cycle has been shortened.
-        due = max(time + cycle, self.pending[-1][0] if self.pending else 0.0)
-        self.pending.append((due, Request.from_registers(write.registers, self._model)))
-
-    def hasten(self, time: float) -> None:
-        """Let all that is pending take effect now."""
-        self.pending = deque((min(due, time), request) for due, request in self.pending)
-
-    def clear(self) -> None:
-        self.image = ZEROS
-        self.pending.clear()
-        self._kept_at = None
