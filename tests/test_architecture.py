@@ -36,6 +36,17 @@ def test_what_stands_around_the_core_uses_no_private_names_of_it() -> None:
     assert [str(path) for path in files if "SLF001" in path.read_text(encoding="utf-8")] == []
 
 
+def test_the_index_of_the_tools_says_of_each_for_whom_it_is() -> None:
+    """One that is for nobody else is part of another one; what they share is named, and no more than that."""
+    tools = PACKAGE / "tools"
+    text = ast.get_docstring(ast.parse((tools / "__init__.py").read_text(encoding="utf-8"))) or ""
+    products, _, shared = text.partition("They share")
+    found = {path.name.partition(".")[0] for path in tools.iterdir()} - OUTSIDE
+    rows = re.findall(r"^``(\w+)`` +for (?:people|programs) .+$", products, re.MULTILINE)
+    assert sorted(found) == sorted([*rows, *re.findall(r"``(\w+)``", shared)])
+    assert len(rows) <= 9
+
+
 def test_no_module_is_too_long_to_read() -> None:
     """A class is not cut into a chain of files to stay short; what must stay short is a function."""
     long = {
