@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -86,7 +87,8 @@ class SimulatedTransport:
 
     @property
     def asked_at(self) -> float:
-        return self._connected().asked_at
+        # Also before it is open: a protocol's isinstance() reads every property.
+        return -math.inf if self._inner is None else self._inner.asked_at
 
     async def open(self) -> None:
         """Start the simulator if it does not run, and connect to it."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 import os
 from collections.abc import Iterator
 
@@ -83,3 +84,10 @@ async def test_without_a_free_descriptor_a_simulated_gripper_says_so(few_files: 
         await hand.start()
     assert caught.value.address
     assert hand.state is State.SHUTDOWN
+
+
+def test_a_link_that_is_not_open_yet_can_be_asked_for_all_it_promises() -> None:
+    """isinstance() of a protocol reads the properties, in an order that changes with each process."""
+    link = RobotiqHand("sim://").options.make_transport()
+    assert link.asked_at == -math.inf
+    assert not link.is_open
