@@ -4,8 +4,8 @@
 #
 # Three things are known, and every decision compares them:
 #
-# * what callers have asked: changes and holds (pending.py), one stop (stops.py), one procedure
-#   (procedures.py), moves that wait for their end (motion.py);
+# * what callers have asked: changes, holds and moves (pending.py, motion.py), and one task: a stop (stops.py)
+#   or a procedure (procedures.py);
 # * what the gripper may have: the images written, by us or by others (ledger.py);
 # * what it shows: one of six conditions (evidence.py), which axes rest or may press (rest.py), and where
 #   those that move will be (course.py).
@@ -40,8 +40,8 @@
 # A stop goes before commands and holds: a halt, a reset, the end of the hand. It may be written again, as it
 # only ends motion; stops.py has for each level when it is written, and when it is over. A halt that does not
 # show after two writes fails. A halt and a reset fail with the link, too: sent later they would stop another
-# client, or drop a part. Once it is back, what we move is held instead. A hand that was ending asks for its
-# stop again on a new link.
+# client, or drop a part. Once it is back, what we move is held instead; and an activation or a release that
+# they were to end, and that goes on, is reset. A hand that was ending asks for its stop again on a new link.
 #
 # Procedures raise rACT or rATR. While one runs, it alone judges what a status shows. When it ends, no write
 # of ours is on its way: the ledger begins again with our last image, and what shows in place of it is another
@@ -52,7 +52,8 @@
 # next write is never seen: our image repeats the older request of every axis. What is seen is adopted: its
 # image becomes the base, the moves whose request is gone fail, the others continue, and our writes on their
 # way are in doubt. An adopted axis gets time to show where it goes, or that it rests. A gripper that is found
-# is written to for two reasons only: to hold what we moved, and to activate it if the hand was told to.
+# is written to for three reasons only: to hold what we moved, to reset what a stop was to end, and to be
+# activated if the hand was told to.
 #
 # "Is it reached" is two questions: does the write act, and does a status show it. What shows may be from
 # before the write, and what acts may have been undone by another client.

@@ -4,14 +4,13 @@ No I/O, no clock and no event loop. The task that owns the link calls see() with
 next_write() to learn whether there is something to write; decide() for the image, in the turn in which the
 link writes, and acknowledged(); and lost() if the link goes down at any point.
 
-A request ends what others wait for: a halt the moves, a command that of its axes. Their callers wait until
-answer_ended(), which the task calls after the write: what they do then may hold up the loop.
+A request ends what others wait for: a halt the moves, a command that of its axes. Their callers are handed
+over and not answered: what they do then may hold up the loop, and the write goes first.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 from ..values.enums import NO_AXES, Fault, Finger, Initialization, State, StopLevel, Trigger
@@ -24,6 +23,7 @@ from ..values.errors import (
     NotStartedError,
     RobotiqError,
 )
+from ..values.inhibit import Inhibit
 from ..values.model import THREE_FINGER, Model
 from ..values.request import Request
 from ..values.status import RobotiqStatus
@@ -35,8 +35,8 @@ from .motion import Move
 from .pending import Command, OpenRequests, Pending
 from .procedures import Begun, Procedure, activation, automatic_release, reset_and_activation
 from .state_machine import RUNNING, SEEN, StateMachine
-from .stops import Keeping, Stop
-from .waiters import Waiter, fail
+from .stops import Ended, Keeping, Stop, Task
+from .waiters import AnswerCallers, Waiter, fail
 
 WARNING_S: Final = 1.0
 """Seconds between two warnings about another client."""
@@ -71,25 +71,26 @@ class Controller:
         machine: StateMachine,
         speed: int,
         force: int,
-        closing_time: Callable[[int], float],
         write_spacing: float = 0.0,
         model: Model = THREE_FINGER,
         left: Left | None = None,
         assumed: Mapping[tuple[Finger, str], int] | None = None,
+        ended: AnswerCallers = fail,
     ) -> None:
+        """``ended`` gets the callers whom a request has ended, and the error for each."""
         self.machine: Final = machine
         self.status: RobotiqStatus | None = None  # the newest; None before the first
         self.activates: bool = False  # whether a gripper that is found reset is activated
         self.foreign_commands: int = 0  # how often another client was seen to command the gripper
         self._ledger: Final = Ledger(speed, force, model, machine.log, left and left.ledger, assumed)
-        self._closing_time: Final = closing_time  # seconds of a full closing at a speed
         # Seconds from sending a write to the next one: a gripper may acknowledge one that comes sooner and
         # forget it. A stop does not wait; it is repeated.
         self._spacing: Final = write_spacing
-        self._evidence: Final = Evidence(machine.log)
-        self._requests: Final = OpenRequests(machine.log)
-        self._stop: Stop | None = None
-        self._procedure: Procedure | None = None
+        self._ended: Final = ended
+        self.evidence: Final = Evidence(machine.log)
+        self._requests: Final = OpenRequests(machine.log, ended)
+        self._task: Stop | Procedure | None = None  # without one the pending changes are written
+        self._owes_reset = False  # a stop was lost with the link while something drove the fingers
         self._activation = left and left.activation  # stopping the hand takes it back
         self._why_no_grip = ""  # why a hand that is being stopped must not leave rGTO set
         self._warned = NEVER  # when another client was warned of
@@ -108,14 +109,10 @@ class Controller:
         self._requests.command(command, waiter)
         self._update_state(Trigger.ASK_COMMAND)
 
-    def move(self, move: Move, speed: int | None, force: int | None) -> float:
-        """Add a move as a command; return its default timeout in seconds."""
+    def move(self, move: Move, speed: int | None, force: int | None) -> None:
+        """Add a move as a command."""
         self.command(Command(move.axes, move.position, speed, force))
         self._requests.add(move)
-        assert self.status is not None, "the hand takes commands, so a status has been read"
-        written = {axis: asked.speed for axis, asked in self._ledger.base.by_axis}
-        speeds = written | self._requests.pending.speeds
-        return move.default_timeout(self.status, speeds, self._closing_time)
 
     def abandon(self, move: Move, *, unseen: bool = False) -> None:
         """The caller of a move has left: if it has given up, hold those of its axes that still move."""
@@ -126,7 +123,7 @@ class Controller:
             requests.hold(left, "a move was given up")
             # Its other axes follow it until what has taken them over is written, and that may be lost.
             requests.merge_hold(move.axes & requests.pending.moved)
-        if unseen and not is_open and self._evidence.condition is not None:
+        if unseen and not is_open and self.evidence.condition is not None:
             # Axes that another client moves by now are left to it. On a new link that is found out first.
             requests.hold_only(self._ledger.ours)
 
@@ -146,14 +143,10 @@ class Controller:
         if not self.machine.ask(Trigger.ASK_HALT, self.status):
             waiter.set_result(None)
             return
-        if self.machine.inhibited is None:
-            self._requests.supersede(Finger.ALL, "a halt stopped the fingers")
-        else:  # a force that was not sent would tighten a grip
-            ended = MotionInhibitedError(self.machine.inhibited)
-            self._requests.end(self._requests.drop(holds=False), ended)
-        if self._stop is None or self._stop.is_delivered:  # a new halt is sent again
-            self._stop = Stop(StopLevel.HALT, self._stop)
-        self._stop.add(waiter)
+        self._requests.halt(waiter)
+        task = self._task
+        if task is None or not task.is_halt or task.is_delivered:  # a new halt is sent again
+            self._task = Stop(StopLevel.HALT)
         self._update_state(Trigger.ASK_HALT)
 
     def activate(self) -> None:
@@ -167,96 +160,93 @@ class Controller:
             who = "reset" if trigger is Trigger.ASK_RESET else "halt"
             self._begin_reset(trigger, MoveSupersededError(f"a {who} took over"))
 
-    def hold_when_back(self) -> None:
-        """The link is down: once it is back, what this hand moves is held; a sequence is reset by see()."""
-        self._requests.merge_hold(Finger.ALL, "motion was inhibited while the link was down")
+    def inhibit(self, inhibit: Inhibit) -> None:
+        """Refuse what may move, and end what was asked of that. A halt comes next, if the link is up."""
+        self.machine.inhibit(inhibit)
+        ended = MotionInhibitedError(self.machine.inhibited or inhibit)  # the first reason stays
+        self._ended(self._requests.drop(holds=False), ended)
+        if self.machine.state is State.DISCONNECTED:
+            self._requests.merge_hold(Finger.ALL, "motion was inhibited while the link was down")
 
     def release(self) -> None:
         """Begin an automatic release. Of a gripper that is reset it would raise rACT and activate it."""
         if self.machine.state is State.FAULT and self.status is not None and not self.status.activation_echo:
             raise NotActivatedError("the gripper is reset: there is nothing to release")
         self.machine.ask(Trigger.ASK_RELEASE, self.status)
-        self._requests.end(self._drop_all(), MoveSupersededError("a release took over"))
+        self._ended(self._drop_all(), MoveSupersededError("a release took over"))
         self._begin(Trigger.ASK_RELEASE)
 
     def drop_requests(self, error: RobotiqError) -> None:
         """End every command and every move, sent or not. Halts, and holds with a caller, remain."""
-        self._requests.end(self._requests.drop(holds=False), error)
+        self._ended(self._requests.drop(holds=False), error)
         self._update_state(Trigger.DELIVERED)
 
     def refuse_requests(self) -> None:
         """The hand is to stop: refuse requests from here on, and end all that are open, sent or not."""
-        state, stop = self.machine.state, self._stop
-        halts = stop is not None and stop.level is StopLevel.HALT and not stop.writes
+        state, task = self.machine.state, self._task
+        halts = task is not None and task.is_halt and not task.writes
         was_elsewhere = "" if state in RUNNING else f"the hand was in {state.name}"
         self._why_no_grip = "halt() was asked for" if halts else was_elsewhere
         if not self._requests.pending.is_empty or halts:
             self.machine.log.info("stopped: requests that were not sent are dropped")
         if self.machine.ask(Trigger.ASK_STOP):
             self.machine.show(State.DO_SHUTDOWN, Trigger.ASK_STOP)
-        self._requests.end(self._drop_all(), NotStartedError("the hand was stopped"))
-        self._procedure = None
+        self._ended(self._drop_all(), NotStartedError("the hand was stopped"))
 
     def close(self) -> None:
         """The hand has stopped, or the time for that is over."""
-        self._stop = None
+        self._task = None
         if self.machine.ask(Trigger.STOPPED):
             self.machine.show(State.SHUTDOWN, Trigger.STOPPED)
 
     def keep_no_grip(self) -> None:
         """Make a stop that has begun to keep a grip clear rGTO after all."""
-        if isinstance(self._stop, Keeping):
-            self._stop = Stop(StopLevel.SHUTDOWN)
+        if isinstance(self._task, Keeping):
+            self._task = Stop(StopLevel.SHUTDOWN)
 
     def stop_fingers(self, level: StopLevel = StopLevel.SHUTDOWN) -> None:
         """Begin to stop the fingers, if any may move, by KEEP or SHUTDOWN, or an activation of ours."""
         # An activation that this hand began is taken back with rACT = 0: clearing rGTO would not stop it.
-        self._procedure, status = None, self._evidence.status
+        status = self.evidence.status
         if self._activation is not None:
-            self._stop = Stop(StopLevel.RESET)
+            self._task = Stop(StopLevel.RESET)
         elif status is not None and level is StopLevel.KEEP:
-            self._stop = Keeping(status, self._why_no_grip).after(self._ledger, status, self.machine.log)
-        elif status is not None:
-            self._stop = Stop(StopLevel.SHUTDOWN)
-
-    @property
-    def has_ended_callers(self) -> bool:
-        """Whether callers whom a request has ended wait for :meth:`answer_ended`."""
-        return bool(self._requests.ended)
-
-    def answer_ended(self) -> None:
-        """Answer the callers whom a request has ended: its write has left, or there is none."""
-        self._requests.answer_ended()
+            keeping = Keeping(status, self._why_no_grip, self.machine.log)
+            self._task = keeping.see(self._ledger, status)
+        else:
+            self._task = None if status is None else Stop(StopLevel.SHUTDOWN)
 
     # -- what follows from that ------------------------------------------------------------------------
 
     def _begin(self, trigger: Trigger) -> None:
-        is_stranded = self._evidence.condition is Trigger.SEEN_STRANDED
+        is_stranded = self.evidence.condition is Trigger.SEEN_STRANDED
         activates = reset_and_activation if is_stranded else activation
         begin = automatic_release if trigger is Trigger.ASK_RELEASE else activates
-        self._procedure, self._stop = Procedure(self._ledger, begin), None
+        self._task = Procedure(self._ledger, begin)
         self._update_state(trigger)
 
     def _begin_reset(self, trigger: Trigger, error: RobotiqError) -> None:
         """Reset; ``error`` is what the callers get whose requests end with it."""
-        self._requests.end(self._drop_all(), error)
-        self._procedure, self._stop = None, Stop(StopLevel.RESET)
+        self._ended(self._drop_all(), error)
+        self._task = Stop(StopLevel.RESET)
         self._update_state(trigger)
 
     def _drop_all(self) -> list[Waiter[Any]]:
-        """Drop everything asked so far, halts too, and return its callers. A write may be on the line."""
-        stop, self._stop = self._stop, None
-        return [*self._requests.drop(holds=True), *(stop.callers if stop is not None else ())]
+        """Drop everything asked so far, a task too, and return the callers. A write may be on the line."""
+        self._task = None
+        return self._requests.drop(holds=True)
 
     # -- what is known ---------------------------------------------------------------------------------
-
-    @property
-    def passing_faults(self) -> int:
-        return self._evidence.passed
 
     def left(self) -> Left:
         """The part of the ledger that the next session of this gripper needs."""
         return Left(self._ledger, self._activation)
+
+    @property
+    def speeds(self) -> dict[Finger, int]:
+        """The speed of each axis, as far as it is known, once what is pending is written."""
+        base = {axis: request.speed for axis, request in self._ledger.base.by_axis}
+        return base | self._requests.pending.speeds
 
     @property
     def is_moving(self) -> bool:
@@ -273,26 +263,20 @@ class Controller:
     def is_driven(self) -> bool:
         """Whether an activation or a release moves the fingers, or may begin: only rACT = 0 ends these."""
         status = self.status
-        if status is None or self._procedure is not None:
+        if status is None or isinstance(self._task, Procedure):
             return status is not None
-        condition = self._evidence.condition
+        condition = self.evidence.condition
         shows = condition is Trigger.SEEN_BUSY or status.fault is Fault.AUTOMATIC_RELEASE
         return shows or is_interrupted(status) or self._ledger.may_drive(status)
 
     @property
     def is_busy(self) -> bool:
         """Whether a procedure, a reset or the end of the hand has begun and not ended."""
-        is_stopping = self._stop is not None and self._stop.level is not StopLevel.HALT
-        return is_stopping or self._procedure is not None
-
-    @property
-    def is_undecided(self) -> bool:
-        """Whether it takes more statuses to tell the condition on a new link."""
-        return self._evidence.is_undecided
+        return self._task is not None and not self._task.is_halt
 
     @property
     def has_request(self) -> bool:
-        return self._stop is not None or self._procedure is not None or not self._requests.pending.is_empty
+        return self._task is not None or not self._requests.pending.is_empty
 
     @property
     def is_off(self) -> bool:
@@ -302,7 +286,7 @@ class Controller:
     @property
     def has_open_stop(self) -> bool:
         """Whether a halt or a reset is not over, or a hold waits for its acknowledgement."""
-        return self._stop is not None or self._requests.has_undelivered_hold
+        return isinstance(self._task, Stop) or self._requests.has_undelivered_hold
 
     @property
     def may_have_to_stop(self) -> bool:
@@ -310,20 +294,18 @@ class Controller:
         return self.status is not None or self._activation is not None or not self._ledger.is_settled
 
     def _view(self) -> State:
-        """The state: that of the stop or procedure that runs; if none does, what the gripper shows."""
-        if self.machine.state in _OFF:
+        """The state: that of the task; if it makes none, what the gripper shows."""
+        if self.is_off:
             return self.machine.state
-        if self._evidence.condition is None:
+        task, condition = self._task, self.evidence.condition
+        if condition is None:
             return State.DISCONNECTED
-        stop = self._stop
-        if stop is not None and stop.level is StopLevel.RESET:
-            return State.WF_RESET if stop.is_delivered else State.DO_RESET
-        if self._procedure is not None:
-            return self._procedure.state
-        if self._evidence.condition is not Trigger.SEEN_READY:
-            return SEEN[self._evidence.condition]
-        halts = stop is not None and not stop.is_delivered
-        return State.RUNNING_CC if halts or self._requests.has_caller else State.RUNNING_IDLE
+        if task is not None and task.state is not None:
+            return task.state
+        if condition is not Trigger.SEEN_READY:
+            return SEEN[condition]
+        is_asked = (task is not None and not task.is_delivered) or self._requests.has_caller
+        return State.RUNNING_CC if is_asked else State.RUNNING_IDLE
 
     def _update_state(self, trigger: Trigger) -> None:
         state = self._view()
@@ -337,92 +319,95 @@ class Controller:
         """Take in a status that was read after every acknowledgement so far."""
         # ``asked`` is when it was asked for, in monotonic seconds; None for the time of the reply.
         asked = status.timestamp if asked is None else asked
-        ledger, stop, before = self._ledger, self._stop, self._evidence.condition
+        ledger, task, before = self._ledger, self._task, self.evidence.condition
         self.status = status
         ledger.update(status, asked)
-        condition = self._evidence.update(status, asked)
+        condition = self.evidence.update(status, asked)
         # This runs at every poll, so it works out only what is waited for.
         if self._activation is not None and self._activation.is_over(ledger, status):
             self._activation = None
-        if stop is not None:
-            self._advance_stop(stop, status)
-            if stop.level is not StopLevel.HALT:
-                return  # what shows during a stop is its business, and so is what shows in a procedure
-        if condition is None or self.is_busy:
+        if task is not None:
+            was_busy = self.is_busy
+            if isinstance(task, Stop):
+                self._advance(task)
+            if was_busy or self.is_busy:
+                return  # what shows then is its business
+        if condition is None:
             return
         if condition is not before or ledger.match is None:
-            if self.machine.state in _OFF:
+            if self.is_off:
                 return
             self._note_news(before, condition, status)
-            is_reset = condition in (Trigger.SEEN_RESET, Trigger.SEEN_STRANDED)
-            if before is None and is_reset and self.activates and self.machine.inhibited is None:
-                self._begin(Trigger.ACTIVATES)
-                return
             if condition is not before:
-                self._update_state(condition)
-            if before is None and self._must_reset(status):
-                self._take_back("motion is inhibited: an activation or a release that goes on is reset")
+                self._note_condition(before, condition, status)
+            if self.is_busy:
                 return
         if condition is Trigger.SEEN_READY:
             ledger.update_rest(status)
-            if self._requests.calls:
+            if self._requests.moves:
                 self._requests.end_arrived(status, ledger)
         elif condition is Trigger.SEEN_BUSY:
             self._follow_activation(status)
 
-    def _must_reset(self, status: RobotiqStatus) -> bool:
-        """Whether a sequence goes on as the link is back, and motion is inhibited: a hold does not end it."""
-        # A reset in a change of mode would drop a part.
-        changes_mode = status.initialization is Initialization.CHANGING_MODE
-        return self.machine.inhibited is not None and self.is_driven and not changes_mode
-
     def _note_news(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
         """A new condition, or an image that no entry explains: whose image acts, what ends, what is held."""
         ledger, requests = self._ledger, self._requests
-        if before is None:  # the link is back: continue from our image if the gripper shows one
-            if ledger.match is None or not ledger.match.is_ours:
-                ledger.adopt(status)
-            requests.hold_only(ledger.ours)
-        elif before not in FOLLOWS and condition in FOLLOWS:
-            # Others have reset and activated it, even if its image is equal to one of ours [follows].
-            ledger.adopt(status, is_found=True)
-        elif ledger.match is None and condition in FOLLOWS:
-            self._adopt_other_client(status)  # before a fault's hold, which would undo what it wrote
-        if condition is not before:
-            if before in FOLLOWS:
-                self._end_requests(condition, status)
-            if condition is Trigger.SEEN_FAULT and status.activation_echo:
-                # When it clears [manual 2012, 4.7: if it is minor], no motion may resume, and none begin that
-                # was sent just before and does not act yet. Which axes need it is decided when it is written.
-                requests.merge_hold(ledger.ours, f"the gripper reports {status.fault.description}")
-            elif condition not in FOLLOWS:
-                requests.hold_only(NO_AXES)
-        if ledger.match is None:
-            ledger.adopt(status)  # after a reset or a power cycle no image from before acts [follows]
-
-    def _end_requests(self, condition: Trigger, status: RobotiqStatus) -> None:
-        """The gripper has a fault, or does not follow requests any more."""
-        match condition:
-            case Trigger.SEEN_FAULT:
-                fail(self._requests.drop(holds=False), GripperFaultError(status.fault))
-            case Trigger.SEEN_RELEASED:
+        # It followed requests before (None: the link was down), it does now, an entry explains its image.
+        match before and before in FOLLOWS, condition in FOLLOWS, ledger.match is not None:
+            case None, _, _:  # continue from our image if the gripper shows one
+                if ledger.match is None or not ledger.match.is_ours:
+                    ledger.adopt(status)
+                requests.hold_only(ledger.ours)
+            case False, True, _:
+                # Others have reset and activated it, even if its image is equal to one of ours [follows].
+                ledger.adopt(status, is_found=True)
+            case True, True, False:
+                self._adopt_other_client(status)  # before a fault's hold, which would undo what it wrote
+            case _, False, False:
+                ledger.adopt(status)  # after a reset or a power cycle no image from before acts [follows]
+        if condition is before:
+            return
+        match before in FOLLOWS, condition:
+            case True, Trigger.SEEN_FAULT:
+                fail(requests.drop(holds=False), GripperFaultError(status.fault))
+            case True, Trigger.SEEN_RELEASED:
                 fail(self._drop_all(), GripperFaultError(status.fault))
-            case Trigger.SEEN_BUSY | Trigger.SEEN_RESET | Trigger.SEEN_STRANDED:
+            case True, Trigger.SEEN_BUSY | Trigger.SEEN_RESET | Trigger.SEEN_STRANDED:
                 fail(self._drop_all(), NotActivatedError("the gripper lost its activation"))
+        if condition is Trigger.SEEN_FAULT and status.activation_echo:
+            # When it clears [manual 2012, 4.7: if it is minor], no motion may resume, and none begin that was
+            # sent just before and does not act yet. Which axes need it is decided when it is written.
+            requests.merge_hold(ledger.ours, f"the gripper reports {status.fault.description}")
+        elif condition not in FOLLOWS:
+            requests.hold_only(NO_AXES)
 
-    def _advance_stop(self, stop: Stop, status: RobotiqStatus) -> None:
-        log, judged = self.machine.log, self._evidence.status
+    def _note_condition(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
+        """Show a new condition; begin what it calls for as the link is back."""
+        is_found, is_inhibited = before is None, self.machine.inhibited is not None
+        is_reset = condition in (Trigger.SEEN_RESET, Trigger.SEEN_STRANDED)
+        if is_found and is_reset and self.activates and not is_inhibited:
+            self._begin(Trigger.ACTIVATES)
+            return
+        self._update_state(condition)
+        # A hold ends no sequence. A reset in a change of mode would drop a part.
+        owes, self._owes_reset = self._owes_reset or is_inhibited, False
+        changes_mode = status.initialization is Initialization.CHANGING_MODE
+        if is_found and owes and self.is_driven and not changes_mode:
+            why = "motion is inhibited" if is_inhibited else "a stop was lost with the link"
+            self._take_back(f"{why}: an activation or a release that goes on is reset")
+
+    def _advance(self, stop: Stop) -> None:
+        """Let a stop see the newest status."""
+        ledger, judged = self._ledger, self.evidence.status
         assert judged is not None
-        stop.fail_overdue(self._ledger, status, log)
-        if stop.has_activated(self._ledger, status):
+        if stop.has_activated(ledger, judged):
             self._take_back("the gripper was reset as it was stopped: its activation is taken back")
-        elif isinstance(stop, Keeping):
-            self._stop = stop.after(self._ledger, judged, log)
-        elif stop.is_reached(self._ledger, status):
-            self._stop = None
-            stop.answer(status, log)
-            if stop.level is not StopLevel.HALT:
-                self._finish(status, is_known=self._ledger.restart(status))
+            return
+        self._task = stop.see(ledger, judged)
+        if stop.is_halt:
+            self._requests.answer_halts(ledger, judged, is_over=self._task is None)
+        elif self._task is None and stop.level is not StopLevel.KEEP:
+            self._finish(stop, judged)
 
     def _follow_activation(self, status: RobotiqStatus) -> None:
         if self._activation is None and is_activating(status) and self._ledger.may_activate(status):
@@ -447,12 +432,19 @@ class Controller:
         self._requests.hold_only(ledger.ours)
         self._requests.fail_replaced(status, ledger.limits.limited)
 
-    def _finish(self, status: RobotiqStatus, *, is_known: bool) -> None:
+    def _finish(self, task: Task, status: RobotiqStatus) -> None:
         """A procedure, a reset or a shutdown is over: the condition counts again."""
+        if task.writes:
+            is_known = self._ledger.restart(status)
+        else:  # it had nothing to do; WF_ shows for a moment, as DO_ leads nowhere else in the table
+            is_known = self._ledger.match is not None
+            task.written(self._ledger.shown, status)
+            self._update_state(Trigger.DELIVERED)
+        self._task = None
         # On a new link a hand that ends stops the fingers before the condition is decided.
-        condition = self._evidence.condition or classify(status)
+        condition = self.evidence.condition or classify(status)
         self._update_state(condition)
-        if condition in FOLLOWS and not is_known and self.machine.state not in _OFF:
+        if condition in FOLLOWS and not is_known and not self.is_off:
             self._adopt_other_client(status)
 
     # -- what is written -------------------------------------------------------------------------------
@@ -464,91 +456,52 @@ class Controller:
 
     def next_write(self, now: float) -> NextWrite | None:
         """The next write; None if nothing is due. It changes nothing, and makes no image."""
-        stop, status, pending = self._stop, self._evidence.status, self._requests.pending
-        is_command = stop is None and self._procedure is None
-        if is_command and pending.is_empty:
+        task, status, pending = self._task, self.evidence.status, self._requests.pending
+        if task is None and pending.is_empty:
             return None  # most cycles end here
-        urgent = stop is not None and status is not None and stop.is_urgent(self._ledger, status)
-        return NextWrite(self._wait(now), urgent, is_command, urgent or bool(pending.hold))
+        urgent = isinstance(task, Stop) and status is not None and task.is_urgent(self._ledger, status)
+        return NextWrite(self._wait(now), urgent, task is None, urgent or bool(pending.hold))
 
     def _wait(self, now: float) -> float:
-        stop = self._stop
-        is_free = stop is not None and stop.level is not StopLevel.KEEP and not stop.writes
+        task = self._task
+        is_free = isinstance(task, Stop) and task.level is not StopLevel.KEEP and not task.writes
         return 0.0 if is_free or now >= self._free_at else self._free_at - now
 
     def decide(self, now: float) -> Request | None:
         """Return the image to write now, or None. It counts as sent from here on."""
-        status, stop = self._evidence.status, self._stop
+        status, task = self.evidence.status, self._task
         if status is None or not self.has_request or self._wait(now):
             return None  # most cycles end here
-        if stop is not None:
-            return self._next_stop(stop, status, now)
-        if self._procedure is not None:
-            return self._next_step(self._procedure, status, now)
-        return self._next_changes(status, now)
+        return self._next_changes(status, now) if task is None else self._next_of(task, status, now)
 
-    def _next_stop(self, stop: Stop, status: RobotiqStatus, now: float) -> Request | None:
-        ledger = self._ledger
-        if stop.writes:
-            image = stop.again(ledger, status)
-        else:
-            is_ready = self._evidence.condition is Trigger.SEEN_READY
-            if stop.level is StopLevel.SHUTDOWN and ledger.match is None and is_ready:
-                ledger.adopt(status)  # stop the fingers whichever client moves them
-            image = stop.image(ledger, status)
-            if image is None and stop.level is StopLevel.SHUTDOWN:
-                self._stop = None
-        if image is None:
-            return None
-        is_early = now < self._free_at
-        # A halt also stops the axes to be held, so the callers of hold() have their answer with it.
-        left = self._requests.pending
-        left = replace(left, hold=NO_AXES) if stop.level is StopLevel.HALT else left
-        entry = self._send(image, status, now, left)
-        stop.written(entry, status, is_early=is_early)
-        return entry.image
-
-    def _next_step(self, procedure: Procedure, status: RobotiqStatus, now: float) -> Request | None:
-        ledger, entry = self._ledger, procedure.writes[-1] if procedure.writes else None
-        if entry is not None and not ledger.acts(entry):
-            return None
-        if entry is None and not procedure.releases and self._evidence.may_pass:
+    def _next_of(self, task: Stop | Procedure, status: RobotiqStatus, now: float) -> Request | None:
+        if task.activates and not task.writes and self.evidence.may_pass:
             return None  # if the fault lasts, no activation is begun
-        try:
-            image = procedure.steps.send(status)
-        except (StopIteration, RobotiqError) as end:
-            if isinstance(end, RobotiqError):
-                self.machine.log.warning("%s", end)
-            if entry is not None:
-                is_known = ledger.restart(status)
-            else:  # it had nothing to do; WF_ shows for a moment, as DO_ leads nowhere else in the table
-                is_known = ledger.match is not None
-                procedure.written(ledger.shown)
-                self._update_state(Trigger.DELIVERED)
-            self._procedure = None
-            self._finish(status, is_known=is_known)
-            return None
-        if image is None:
-            return None
-        entry = self._send(image, status, now, self._requests.pending, procedure)
-        procedure.written(entry)
-        if not procedure.releases:
-            self._activation = Begun(entry)
-        return entry.image
+        image = task.next_image(self._ledger, status)
+        if isinstance(image, Ended):
+            if image.why:
+                self.machine.log.warning("%s", image.why)
+            self._finish(task, status)
+        elif image is not None:
+            # A halt also stops the axes to be held, so the callers of hold() have their answer with it.
+            pending = self._requests.pending
+            return self._send(image, status, now, pending.without_hold if task.is_halt else pending, task)
+        return None
 
     def _next_changes(self, status: RobotiqStatus, now: float) -> Request | None:
         ledger, pending = self._ledger, self._requests.pending
-        if self._evidence.condition not in FOLLOWS or not ledger.is_certain:
+        if self.evidence.condition not in FOLLOWS or not ledger.is_certain:
             return None
-        if self._evidence.may_pass and pending.has_changes:
+        if self.evidence.may_pass and pending.has_changes:
             return None  # if the fault lasts, no motion is sent at all
         base = ledger.base
         gripping = ledger.gripping(status) if pending.positions else NO_AXES
         held, left = {}, Pending()
         if pending.hold:
+            pending = self._requests.begin_hold(now)
             held = ledger.held(pending.hold, status, now - ledger.now.time)
             # What may press on its part is not held before that is known.
-            left = pending.held_later(ledger.may_press(status, pending.note_hold(now)))
+            left = pending.held_later(ledger.may_press(status, pending.hold_began))
         image = merged(base, pending, status, gripping=gripping, held=held)
         if not pending.has_changes and gate(image, status, may_reset=ledger.may_reset) == base:
             # No axis moves, so there is nothing to write, and what the gripper has answers the callers. If an
@@ -558,21 +511,25 @@ class Controller:
                 self._requests.acknowledged()
                 self._update_state(Trigger.DELIVERED)
             return None
-        return self._send(image, status, now, left).image
+        return self._send(image, status, now, left)
 
     def _send(
-        self, image: Request, status: RobotiqStatus, now: float, left: Pending, of: Procedure | None = None
-    ) -> Entry:
+        self, image: Request, status: RobotiqStatus, now: float, left: Pending, task: Task | None = None
+    ) -> Request:
         """Put an image through the gate and into the ledger; decide() returns it to be sent."""
         # ``left`` is what it has not of all that is pending.
-        releases = of is not None and of.releases
-        activates, may_reset = of is not None and not releases, self._ledger.may_reset
+        activates, releases = (False, False) if task is None else (task.activates, task.releases)
+        may_reset = self._ledger.may_reset
         image = gate(image, status, may_reset=may_reset, activates=activates, releases=releases)
         moved = NO_AXES if left.positions else self._requests.pending.moved
         entry = self._ledger.write(image, moved, now)
-        self._requests.sending(entry, left)
+        self._requests.sending(entry, left, halts=task is not None and task.is_halt)
+        if task is not None:
+            task.written(entry, status, is_early=now < self._free_at)
+        if activates:
+            self._activation = Begun(entry)
         self._free_at = now + self._spacing
-        return entry
+        return image
 
     def note_repeat(self, now: float) -> None:
         """The link has written the last image again: the next write keeps its distance from that, too."""
@@ -588,13 +545,13 @@ class Controller:
         self._why_no_grip = "the link went down"
         error = ConnectionLostError(f"the link went down before this was done: {why}")
         error.__cause__ = why
-        if self._stop is not None:
-            fail(self._stop.callers, error)
-            # A halt and a reset are not sent again: once the link is back, what we move is held instead.
-            if self._stop.level in (StopLevel.HALT, StopLevel.RESET):
-                self._requests.merge_hold(Finger.ALL, "a stop was lost with the link: once it is back")
+        task, self._task = self._task, None
+        # A halt and a reset are not sent again: once the link is back, what we move is held instead, and what
+        # drives the fingers is reset.
+        if isinstance(task, Stop) and task.level in (StopLevel.HALT, StopLevel.RESET):
+            self._requests.merge_hold(Finger.ALL, "a stop was lost with the link: once it is back")
+            self._owes_reset = self.is_driven
         self._requests.lost(error)
-        self._procedure, self._stop = None, None
-        self._evidence.lost()
+        self.evidence.lost()
         self._ledger.lost(now)
         self._update_state(Trigger.LINK_LOST)

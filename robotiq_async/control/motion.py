@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Final
 
 from ..values.enums import Finger
 from ..values.move_result import MoveResult
 from ..values.status import RobotiqStatus
 from .waiters import Call, Waiter
-
-MARGIN_S: Final = 2.0
-"""Added to twice the expected time for the default timeout of a move."""
 
 
 class Move(Call):
@@ -22,17 +19,6 @@ class Move(Call):
         self.position: Final = position
         self._started: Final = now
         self._peak: Final = dict.fromkeys(axes, 0)
-
-    def default_timeout(
-        self, status: RobotiqStatus, speeds: Mapping[Finger, int], closing_time: Callable[[int], float]
-    ) -> float:
-        """Seconds it may take: twice the expected time of its slowest axis plus 2 s."""
-        # ``closing_time`` gives the seconds of a full stroke at a speed. No time is published for the
-        # scissor: it counts as a finger.
-        full = status.model.stroke.counts
-        strokes = {axis: abs(self.position - status.position(axis)) / full for axis in self.axes}
-        # The times are those of one gripper without load [thesis, table A1.1]: twice leaves room.
-        return 2 * max(stroke * closing_time(speeds[axis]) for axis, stroke in strokes.items()) + MARGIN_S
 
     def is_under(self, status: RobotiqStatus, limited: Mapping[Finger, int]) -> bool:
         """Whether a status echoes the target for every axis of the move, or the limit in place of it."""
@@ -48,7 +34,9 @@ class Move(Call):
         # An axis may be known to rest by its position, and move by its gDT, which is then from before.
         return self.axes in resting and not status.moving & self.axes and self.is_under(status, limited)
 
-    def end(self, status: RobotiqStatus) -> MoveResult:
+    def end(self, status: RobotiqStatus) -> None:
+        if self.waiter.done():
+            return
         result = MoveResult(
             outcomes={axis: status.finger_status(axis) for axis in self.axes},
             positions={axis: status.position(axis) for axis in self.axes},
@@ -58,6 +46,4 @@ class Move(Call):
             peak_current_ma={axis: peak if status.has_current else None for axis, peak in self._peak.items()},
             status=status,
         )
-        if not self.waiter.done():
-            self.waiter.set_result(result)
-        return result
+        self.waiter.set_result(result)

@@ -8,19 +8,21 @@ a lost link, because it can only stop one. One without a caller goes if another 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from ..runtime.logger import Log, log
-from ..values.enums import NO_AXES, Finger, ObjectStatus
-from ..values.errors import MoveSupersededError, RobotiqError
-from ..values.move_result import MoveResult
+from ..values.enums import NO_AXES, Finger
+from ..values.errors import MoveSupersededError, RobotiqError, StateTimeoutError
 from ..values.status import RobotiqStatus
 from .entry import Entry
-from .ledger import Ledger
+from .ledger import WINDOW_S, Ledger
 from .motion import Move
-from .waiters import Call, Waiter, fail, resolve
+from .waiters import AnswerCallers, Call, Waiter, fail, resolve
+
+MOST_HALTS: Final = 2
+"""The most times that a halt is sent. If rGTO still shows then, its callers get an error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +62,9 @@ class Pending:
     def moved(self) -> Finger:
         return Finger(sum(self.positions))
 
-    def note_hold(self, now: float) -> float:
-        """The hold is about to be written; return when it first was."""
-        self.hold_began = min(self.hold_began, now)
-        return self.hold_began
+    @property
+    def without_hold(self) -> Pending:
+        return replace(self, hold=NO_AXES)
 
     def held_later(self, axes: Finger) -> Pending:
         """The hold of those of these axes that are not moved, for a later write."""
@@ -78,19 +79,19 @@ class Pending:
 
 
 class OpenRequests:
-    """Commands, holds and moves. Halts belong to their stop."""
+    """The requests of callers, but for procedures and resets: those callers wait for a state."""
 
-    def __init__(self, log: Log = log) -> None:
+    def __init__(self, log: Log = log, ended: AnswerCallers = fail) -> None:
         self.pending: Pending = Pending()  # for the next write
-        self.calls: list[Call] = []  # those that wait for their answer
         self._sent = Pending()  # in the write in flight
-        # The move that an axis follows, until something else takes the axis over. A failed move counts as
-        # well: a caller that gives up as its move fails does not see the error, and counts on a hold.
-        self._followed: Final[dict[Finger, Move]] = {}
+        self.calls: list[Call] = []  # the commands, holds and halts whose callers wait
+        # By axis the move that it follows, until something else takes the axis over; the oldest move first.
+        self.moves: Final[dict[Finger, Move]] = {}
+        # The same of moves that have failed: a caller that gives up as its move fails does not see the error,
+        # and counts on a hold.
+        self._failed: Final[dict[Finger, Move]] = {}
         self._log: Final = log
-        # Callers whom a request has ended, each with the error. What they do then may hold up the loop.
-        self.ended: list[tuple[Waiter[Any], RobotiqError]] = []
-        self._has_warned = False
+        self._ended: Final = ended  # gets the callers whom a request has ended
 
     @property
     def has_caller(self) -> bool:
@@ -101,10 +102,16 @@ class OpenRequests:
     def has_undelivered_hold(self) -> bool:
         return bool(self.pending.hold or self._sent.hold)
 
+    @property
+    def _open_moves(self) -> list[Move]:
+        """The moves whose callers wait, in the order of their calls."""
+        return [*dict.fromkeys(self.moves.values())]
+
     # -- what is asked ---------------------------------------------------------------------------------
 
     def command(self, command: Command, waiter: Waiter[None] | None = None) -> None:
-        if command.position is not None and self._followed:  # few loops at 200 Hz have a move to end
+        # Few loops at 200 Hz have a move to end.
+        if command.position is not None and (self.moves or self._failed):
             self._end(self._take_over(command.axes), f"another command moves {command.axes}")
         self.pending.merge(command)
         if waiter is not None:
@@ -112,8 +119,7 @@ class OpenRequests:
 
     def add(self, move: Move) -> None:
         """Add a move whose command is pending."""
-        self.calls.append(move)
-        self._followed.update(dict.fromkeys(move.axes, move))
+        self.moves.update(dict.fromkeys(move.axes, move))
 
     def hold(self, axes: Finger, why: str, waiter: Waiter[None] | None = None) -> None:
         """Hold those axes that move. It supersedes what moves them."""
@@ -122,6 +128,10 @@ class OpenRequests:
         if waiter is not None:
             self.calls.append(Call(waiter, held=axes))
 
+    def halt(self, waiter: Waiter[None]) -> None:
+        self.supersede(Finger.ALL, "a halt stopped the fingers")
+        self.calls.append(Call(waiter, halts=True))
+
     def merge_hold(self, axes: Finger, why: str = "") -> None:
         """Hold those axes that move; ``why`` is for the log, if no caller has asked for it."""
         if axes and why:
@@ -129,6 +139,12 @@ class OpenRequests:
         pending = self.pending
         began = math.inf if axes & ~pending.hold else pending.hold_began  # an axis more has its own time
         self.pending = replace(pending, hold=pending.hold | axes, hold_began=began)
+
+    def begin_hold(self, now: float) -> Pending:
+        """The hold is about to be written; return what is pending, with when it first was."""
+        if self.pending.hold_began == math.inf:
+            self.pending = replace(self.pending, hold_began=now)
+        return self.pending
 
     def hold_only(self, axes: Finger) -> None:
         """Drop all holds but those of these axes, and those that callers of hold() wait for."""
@@ -144,42 +160,59 @@ class OpenRequests:
             self.pending.positions.pop(axis, None)
         self._end([call for call in self.calls if call.entry is None and call.axes & axes], why)
 
-    def _take_over(self, axes: Finger) -> list[Call]:
-        # The other axes of these moves still follow them.
-        taken = [self._followed.pop(axis) for axis in axes if axis in self._followed]
-        return [call for call in self.calls if call in taken]
+    def _take_over(self, axes: Finger) -> list[Move]:
+        """Let these axes follow no move; return the open ones that they followed."""
+        taken = [move for move in self._open_moves if move.axes & axes]
+        self._close(taken)
+        for axis in axes:  # the other axes of these moves still follow them
+            self._failed.pop(axis, None)
+        return taken
 
     def _end(self, calls: Sequence[Call], why: str) -> None:
-        self._remove(calls)
-        self.end((call.waiter for call in calls), MoveSupersededError(why))
+        self._ended(self._close(calls), MoveSupersededError(why))
 
-    def end(self, waiters: Iterable[Waiter[Any]], error: RobotiqError) -> None:
-        """A request has ended what these callers wait for: they are to be answered after its write."""
-        self.ended += [(waiter, error) for waiter in waiters]
-
-    def answer_ended(self) -> None:
-        ended, self.ended = self.ended, []
-        for waiter, error in ended:
-            fail([waiter], error)
+    def _close(self, calls: Sequence[Call]) -> list[Waiter[Any]]:
+        """These calls have ended; return their callers."""
+        if not calls:
+            return []
+        self.calls = [call for call in self.calls if call not in calls]
+        for axis, move in [*self.moves.items()]:
+            if move in calls:
+                self._failed[axis] = self.moves.pop(axis)
+        return [call.waiter for call in calls]
 
     # -- what becomes of it ----------------------------------------------------------------------------
 
-    def sending(self, entry: Entry, left: Pending) -> None:
-        """An entry has what is pending, but for what is left."""
+    def sending(self, entry: Entry, left: Pending, *, halts: bool = False) -> None:
+        """An entry has what is pending, but for what is left; ``halts`` if it is a halt."""
         pending, self.pending = self.pending, left
         keeps = left.has_changes
         has_sent = pending.has_changes and not keeps
         self._sent = pending if has_sent else Pending(hold=pending.hold & ~left.hold)
-        for call in self.calls:
-            is_left = call.held & left.hold if call.held else keeps
+        for call in (*self.calls, *self.moves.values()):
+            is_left = call.held & left.hold if call.held else not halts if call.halts else keeps
             if call.entry is None and not is_left:
                 call.written(entry)
 
     def acknowledged(self) -> None:
         self._sent = Pending()
-        done = [call for call in self.calls if call.entry is not None and not isinstance(call, Move)]
-        self._remove(done)
-        resolve(call.waiter for call in done)
+        if self.calls:
+            resolve(self._close([call for call in self.calls if call.entry is not None and not call.halts]))
+
+    def answer_halts(self, ledger: Ledger, status: RobotiqStatus, *, is_over: bool) -> None:
+        """Answer the callers of halts if these are over, and those that have waited too long in any case."""
+        # However often a halt is replaced by a newer one, its callers do not wait for ever.
+        since = ledger.now.time - MOST_HALTS * WINDOW_S
+        halts = [call for call in self.calls if call.halts and (is_over or call.was_written_by(since))]
+        if halts and status.go_echo:
+            error = StateTimeoutError(
+                f"the gripper does not show that it has stopped after {MOST_HALTS} halts: the fingers may "
+                "still move (another client commands it, or it forgets writes)"
+            )
+            self._log.warning("%s", error)
+            fail(self._close(halts), error)
+        elif is_over:
+            resolve(self._close(halts))
 
     def end_arrived(self, status: RobotiqStatus, ledger: Ledger) -> None:
         """End the moves that a status shows to have arrived."""
@@ -188,67 +221,43 @@ class OpenRequests:
             assert move.entry is not None
             if move.see(status, resting, limited) and ledger.acts(move.entry):
                 self.leave(move)
-                self._warn_of_unreached(move, move.end(status), limited)
-
-    def _warn_of_unreached(self, move: Move, result: MoveResult, limited: Mapping[Finger, int]) -> None:
-        """Warn once if a gripper shows "at position" and stands far from where it was asked to go."""
-        # Not of the scissor: its range ends within 15..232 (drivers), and programs ask it for 0 and 255.
-        for axis, how in result.outcomes.items():
-            is_there = axis in result.reached or axis in limited or axis is Finger.SCISSOR
-            if self._has_warned or is_there or how is not ObjectStatus.AT_POSITION:
-                continue
-            self._has_warned = True
-            self._log.warning(
-                "%s was asked for %d, and the gripper says that it is at position, at %d: it ends there (a "
-                "software limit, fingertips of your own), or it did not follow. See MoveResult.reached; "
-                "logged once",
-                axis,
-                move.position,
-                result.positions[axis],
-            )
+                move.end(status)
 
     def leave(self, move: Move) -> tuple[bool, Finger]:
         """A move has ended, or its caller has left: whether it was open, and the axes that followed it."""
-        axes = [axis for axis, followed in self._followed.items() if followed is move]
+        is_open = move in self.moves.values()
+        self._close([move])
+        axes = [axis for axis, followed in self._failed.items() if followed is move]
         for axis in axes:
-            del self._followed[axis]
-        is_open = move in self.calls
-        self._remove([move])
+            del self._failed[axis]
         return is_open, Finger(sum(axes))
 
     def drop(self, *, holds: bool) -> list[Waiter[Any]]:
-        """Drop all that would move an axis, sent or not, and with ``holds`` those that callers have named.
+        """Drop all that would move an axis, sent or not, and with ``holds`` what callers have asked to stop.
 
         Returns:
             The callers that wait for it.
         """
         # A write may be on the line all the same. Holds of our own making go in any case.
-        dropped = [call for call in self.calls if holds or not call.held]
-        self._remove(dropped)
-        self._followed.clear()
+        dropped = self._close([call for call in self.calls if holds or not (call.held or call.halts)])
+        dropped += self._close(self._open_moves)
+        self._failed.clear()
         self.pending = Pending(hold=self.pending.hold)
         self.hold_only(NO_AXES)
-        return [call.waiter for call in dropped]
+        return dropped
 
     def fail_replaced(self, status: RobotiqStatus, limited: Mapping[Finger, int]) -> None:
         """Fail the moves whose request another client has replaced. Their axes still follow them."""
         replaced = [move for move in self._written_moves if not move.is_under(status, limited)]
-        self._fail(replaced, MoveSupersededError("another client commands the gripper"))
+        fail(self._close(replaced), MoveSupersededError("another client commands the gripper"))
 
     def lost(self, error: RobotiqError) -> None:
         """The link is down: fail everything. Holds stop motion: their axes remain, for when it is back."""
         # A hold of our own making has no caller to get the error.
         hold = self.pending.hold | self._sent.hold
-        self._fail(self.calls, error)
+        fail(self._close([*self.calls, *self._open_moves]), error)
         self.pending, self._sent = Pending(hold=hold), Pending()
 
     @property
     def _written_moves(self) -> list[Move]:
-        return [call for call in self.calls if isinstance(call, Move) and call.entry is not None]
-
-    def _fail(self, calls: Sequence[Call], error: RobotiqError) -> None:
-        self._remove(calls)
-        fail((call.waiter for call in calls), error)
-
-    def _remove(self, calls: Sequence[Call]) -> None:
-        self.calls = [call for call in self.calls if call not in calls]
+        return [move for move in self._open_moves if move.entry is not None]

@@ -4,8 +4,8 @@ A procedure is sent a status and yields the image to write now, or None. After a
 sent is one that can show the effect. The first status decides whether the procedure begins at all: another
 client may have changed the gripper since the call. A procedure does no I/O and has no clock; its caller
 limits its time. It never yields its image again, even if a gripper may have forgotten it: the image moves the
-fingers. An activation may outlast its procedure: one that a fault has stopped may go on as that clears, and
-one whose link was lost goes on. Begun is about that of the gripper.
+fingers. It returns why it has failed, if it has. An activation may outlast it: one that a fault has stopped
+may go on as that clears, and one whose link was lost goes on. Begun is about that of the gripper.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ from dataclasses import replace
 from typing import Final, NamedTuple
 
 from ..values.enums import Fault, Severity, State, Trigger
-from ..values.errors import GripperFaultError, NotActivatedError
+from ..values.errors import GripperFaultError
 from ..values.request import Request
 from ..values.status import RobotiqStatus
 from .entry import Entry
 from .evidence import classify
 from .gate import at_rest
 from .ledger import WINDOW_S, Ledger
+from .stops import Ended, Task
 
 STRAY_COUNTS: Final = 10
 """An axis that moves further in an activation is driven by it. One that a stop catches at full speed goes on
@@ -30,27 +31,34 @@ for less: 10 counts take 0.09 s [thesis]."""
 RESET_S: Final = 5.0
 """Time for a stranded gripper to show a reset: as long as reset() waits for one."""
 
-Steps = Generator[Request | None, RobotiqStatus, None]
+Steps = Generator[Request | None, RobotiqStatus, str]
 Image = Callable[[RobotiqStatus], Request]  # makes the image to begin from, given the newest status
 
 
-class Procedure:
-    """An activation or an automatic release, from its request to its end."""
+class Procedure(Task):
+    """An activation or an automatic release. If it has no image to send, what shows counts as its write."""
 
     def __init__(self, ledger: Ledger, begin: Callable[[Image], Steps]) -> None:
-        self.releases: Final = begin is automatic_release
-        self.steps: Final = begin(lambda status: at_rest(ledger.base, status))
-        self.writes: Final[list[Entry]] = []  # its images; if it has none to send, what shows instead
-        next(self.steps)  # to its first yield: what the gripper shows decides whether it begins
-
-    def written(self, entry: Entry) -> None:
-        self.writes.append(entry)
+        super().__init__()
+        self.releases = begin is automatic_release
+        self.activates = not self.releases
+        self._steps: Final = begin(lambda status: at_rest(ledger.base, status))
+        next(self._steps)  # to its first yield: what the gripper shows decides whether it begins
 
     @property
     def state(self) -> State:
-        if not self.writes or self.writes[0].acknowledged is None:
-            return State.DO_ATR if self.releases else State.DO_ACTIVATION
-        return State.WF_ATR if self.releases else State.WF_ACTIVATION
+        if self.is_delivered:
+            return State.WF_ATR if self.releases else State.WF_ACTIVATION
+        return State.DO_ATR if self.releases else State.DO_ACTIVATION
+
+    def next_image(self, ledger: Ledger, status: RobotiqStatus) -> Request | Ended | None:
+        """The image to write now; None if it waits."""
+        if self.writes and not ledger.acts(self.writes[-1].entry):
+            return None
+        try:
+            return self._steps.send(status)
+        except StopIteration as end:
+            return Ended(end.value)
 
 
 class Begun(NamedTuple):
@@ -82,20 +90,21 @@ def activation(image: Image) -> Steps:
     status = yield None
     # Only a rising rACT activates [manual 2012, 4.6]: there is none unless the gripper is reset.
     if classify(status) is not Trigger.SEEN_RESET:
-        return
+        return ""
     status = yield replace(image(status), activate=True)
     asked, begun = status.timestamp, False
     while classify(status) is not Trigger.SEEN_READY:
         if status.fault.severity is Severity.MAJOR:
-            raise GripperFaultError(status.fault)
+            return str(GripperFaultError(status.fault))
         # The first statuses may be from before the write: until the activation shows, a reset counts only if
         # it lasts [follows]. The gripper may have forgotten the write, or another client have taken it back.
         is_sure = begun or status.timestamp - asked > WINDOW_S
         if is_sure and classify(status) is Trigger.SEEN_RESET:
             why = "was reset while it activated" if begun else "does not show the activation"
-            raise NotActivatedError(f"the gripper {why} (power cycle, or another client)")
+            return f"the gripper {why} (power cycle, or another client)"
         begun = begun or status.activation_echo
         status = yield None
+    return ""
 
 
 def reset_and_activation(image: Image) -> Steps:
@@ -104,9 +113,9 @@ def reset_and_activation(image: Image) -> Steps:
     asked, status = status.timestamp, (yield replace(image(status), activate=False))
     while classify(status) is not Trigger.SEEN_RESET:
         if status.timestamp - asked > RESET_S:
-            raise NotActivatedError("the gripper has rACT, does not activate, and does not report a reset")
+            return "the gripper has rACT, does not activate, and does not report a reset"
         status = yield None
-    yield from activation(image)
+    return (yield from activation(image))
 
 
 def automatic_release(image: Image) -> Steps:
@@ -114,7 +123,7 @@ def automatic_release(image: Image) -> Steps:
     status = yield None
     # The image has rACT set, and would activate a gripper that was reset.
     if not status.activation_echo:
-        return
+        return ""
     asked, begun = status.timestamp, False
     status = yield replace(image(status), activate=True, release=True)
     while status.fault is not Fault.AUTOMATIC_RELEASE_DONE:
@@ -122,10 +131,11 @@ def automatic_release(image: Image) -> Steps:
         # gIMC is 0 during a release [manual 2014, p. 50].
         releases = status.is_reset or status.fault is Fault.AUTOMATIC_RELEASE
         if classify(status) is Trigger.SEEN_RESET or (begun and not releases):
-            raise NotActivatedError("the gripper was reset during the automatic release")
+            return "the gripper was reset during the automatic release"
         # Until the release shows, a status may be from before the write, and its fault from before the
         # release [follows].
         is_sure = status.timestamp - asked > WINDOW_S and not status.fault.is_serious
         if is_sure and not releases:
-            raise NotActivatedError("the gripper does not show the automatic release (its write was lost)")
+            return "the gripper does not show the automatic release (its write was lost)"
         status = yield None
+    return ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
@@ -24,17 +24,25 @@ class Waiter(Protocol[T_contra]):
     def set_exception(self, exception: RobotiqError, /) -> None: ...
 
 
+AnswerCallers = Callable[[Iterable[Waiter[Any]], RobotiqError], None]
+"""Takes callers that have ended, and the error for each of them."""
+
+
 @dataclass(slots=True, eq=False)
 class Call:
-    """A caller that waits: for the acknowledgement of a command or a hold, or for the end of a Move."""
+    """A caller that waits: for the acknowledgement of a command or a hold, or the end of a move or a halt."""
 
     waiter: Waiter[Any]
     axes: Finger = NO_AXES  # those that it moves
     held: Finger = NO_AXES  # those that it has named to be held: they are, whichever client moves them
-    entry: Entry | None = None
+    halts: bool = False  # it waits for the end of a halt
+    entry: Entry | None = None  # the write that has what it asked for
 
     def written(self, entry: Entry) -> None:
         self.entry = entry
+
+    def was_written_by(self, time: float) -> bool:
+        return self.entry is not None and self.entry.time <= time
 
 
 def resolve(waiters: Iterable[Waiter[None]]) -> None:

@@ -1,4 +1,4 @@
-"""FaultNews: the log of a gripper's faults, and of a reset, once each.
+"""News of a gripper, logged once each: its faults, a reset, an axis that does not get where it was sent.
 
 A fault is logged when the hand counts it as one: a passing 0x09 is none. A reset is logged, whoever it was,
 once the gripper has been active in this run: what it held may have fallen.
@@ -9,8 +9,10 @@ from __future__ import annotations
 from typing import Final
 
 from ..control.state_machine import RUNNING, StateMachine
-from ..values.enums import Fault, Severity, State
+from ..runtime.logger import Log
+from ..values.enums import Fault, Finger, ObjectStatus, Severity, State
 from ..values.events import Transition
+from ..values.move_result import MoveResult
 from ..values.status import RobotiqStatus
 
 BITS: Final = 0xFF00  # of the second register: gFLT, and kFLT of the controller before a jaw
@@ -73,6 +75,33 @@ class FaultNews:
             is_ours = change.source is State.WF_RESET
             who = "by this program" if is_ours else "by another client or for lack of power"
             self._machine.log.warning("the gripper is back in RESET, %s; %s", who, OF_A_RESET)
+
+
+class UnreachedNews:
+    """Warns once of an axis that says "at position" far from where it was asked to go."""
+
+    def __init__(self, log: Log) -> None:
+        self._log: Final = log
+        self._has_warned = False
+
+    def ended(self, target: int, result: MoveResult) -> None:
+        """A move has ended."""
+        # Not of the scissor: its range ends within 15..232 (drivers), and programs ask it for 0 and 255. Nor
+        # where the gripper echoes its own limit in place of the request.
+        for axis, how in result.outcomes.items():
+            is_limited = axis is Finger.SCISSOR or result.status.requested_position(axis) != target
+            is_there = axis in result.reached or how is not ObjectStatus.AT_POSITION
+            if is_limited or is_there or self._has_warned:
+                continue
+            self._has_warned = True
+            self._log.warning(
+                "%s was asked for %d, and the gripper says that it is at position, at %d: it ends there (a "
+                "software limit, fingertips of your own), or it did not follow. See MoveResult.reached; "
+                "logged once",
+                axis,
+                target,
+                result.positions[axis],
+            )
 
 
 def fault_words(fault: Fault) -> str:

@@ -22,11 +22,13 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Final
 
-from ..control.controller import Controller
+from ..control.state_machine import StateMachine
+from ..control.waiters import Waiter, fail
 from ..hands.streams import Channel, Channels
+from ..values.errors import RobotiqError
 from ..values.events import SentRequest, Transition
 from ..values.status import RobotiqStatus
 from .news import BITS, FaultNews
@@ -40,15 +42,15 @@ class Publisher:
         has_to_tell: whether somebody waits for the next write.
     """
 
-    def __init__(self, channels: Channels, controller: Controller) -> None:
-        self._news: Final = FaultNews(controller.machine)
+    def __init__(self, channels: Channels, machine: StateMachine) -> None:
+        self._news: Final = FaultNews(machine)
         self.numbers: Final = channels.numbers
         self.has_to_tell: bool = False
         self._channels: Final = channels
-        self._controller: Final = controller
         self._loop: Final = asyncio.get_running_loop()
         self._queue: Final[deque[tuple[Channel[Any], Any, Callable[[], None] | None]]] = deque()
         self._is_held_back = False
+        self._ended: list[tuple[Waiter[Any], RobotiqError]] = []  # the callers whom a request has ended
 
     def note(self, change: Transition, wake: Callable[[], None] | None) -> None:
         """Note a change of state, to be published after the present call; ``wake`` is called before that."""
@@ -87,11 +89,25 @@ class Publisher:
 
     def image_leaves(self) -> None:
         """An image leaves in this turn of the loop."""
-        if self.has_to_tell or self._controller.has_ended_callers:
+        if self.has_to_tell or self._ended:
             self._loop.call_soon(self.tell)
 
     def tell(self) -> None:
         """Let everybody hear who waits for a write: it has left, or there is none."""
         self.has_to_tell = self._is_held_back = False
         self.publish_changes()
-        self._controller.answer_ended()
+        self.answer_ended()
+
+    def end(self, callers: Iterable[Waiter[Any]], error: RobotiqError) -> None:
+        """A request has ended what these callers wait for."""
+        self._ended += [(caller, error) for caller in callers]
+
+    @property
+    def has_ended_callers(self) -> bool:
+        return bool(self._ended)
+
+    def answer_ended(self) -> None:
+        """Answer those whom a request has ended: its write has left, or there is none."""
+        ended, self._ended = self._ended, []
+        for caller, error in ended:
+            fail([caller], error)

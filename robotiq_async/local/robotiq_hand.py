@@ -247,6 +247,7 @@ class RobotiqHand(Hand):
             with Limit(limit):
                 result = await ended
                 note(result)
+                session.unreached.ended(target, result)
                 return result
             raise MoveTimeoutError(
                 f"{axes} still moved after {limit:.2f} s on the way to {target}", self.status
@@ -263,10 +264,8 @@ class RobotiqHand(Hand):
             return
         if not session.is_over:
             session.check_loop("the hand")
-        self._machine.inhibit(inhibit)
-        if self.state is State.DISCONNECTED:
-            session.controller.hold_when_back()
-        elif self.state is State.DO_SHUTDOWN:
+        session.controller.inhibit(inhibit)
+        if self.state is State.DO_SHUTDOWN:
             await session.stop(halt=True)  # it may be one that leaves the fingers moving
         await self._halt()  # raises if the hand runs no more: the fingers may still move
 
@@ -449,7 +448,7 @@ class RobotiqHand(Hand):
         if self._session is None:
             return Counters().snapshot(0)
         controller = self._session.controller
-        return self._session.counters.snapshot(controller.foreign_commands, controller.passing_faults)
+        return self._session.counters.snapshot(controller.foreign_commands, controller.evidence.passed)
 
     @property
     def _newest_status(self) -> RobotiqStatus | None:

@@ -123,11 +123,11 @@ class Run:
 
         Who must not hear of it before the write waits for that, unless it is far.
         """
-        publisher, controller, write = self._parts.publisher, self._parts.controller, self._poller.hurry()
-        if write is not None and (write.is_stop or controller.has_ended_callers) and self._is_soon(write):
+        publisher, write = self._parts.publisher, self._poller.hurry()
+        if write is not None and (write.is_stop or publisher.has_ended_callers) and self._is_soon(write):
             publisher.hold_back(publication=write.is_stop)
         elif not publisher.has_to_tell:
-            controller.answer_ended()
+            publisher.answer_ended()
         publisher.publish_changes()
 
     def _is_soon(self, write: NextWrite) -> bool:
@@ -236,7 +236,7 @@ class Run:
         await self._open()
         self._poller.break_period()
         await self._poller.read(is_first=True)
-        while self._parts.controller.is_undecided:  # the silence before may show as a fault, once
+        while self._parts.controller.evidence.is_undecided:  # the silence before may show as a fault, once
             await asyncio.sleep(self._parts.options.poll_interval)
             await self._poller.read()
         self._poller.start_ticking()

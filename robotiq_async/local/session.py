@@ -20,7 +20,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, ClassVar, ParamSpec, TypeVar
+from typing import Any, ClassVar, Final, ParamSpec, TypeVar
 
 from ..control.controller import Controller, Left
 from ..control.motion import Move
@@ -48,14 +48,35 @@ from ..values.errors import (
 from ..values.events import Transition
 from ..values.move_result import MoveResult
 from ..values.status import RobotiqStatus
+from .news import UnreachedNews
 from .poller import RunParts
 from .publisher import Publisher
 from .run import Run, RunState
 
 P = ParamSpec("P")
 T = TypeVar("T")
+MARGIN_S: Final = 2.0
+"""Added to twice the expected time for the default timeout of a move."""
 Failing = Mapping[State, Callable[[], RobotiqError]]
 """The states in which a wait is in vain, each with the error for the caller."""
+
+
+def usual_time(
+    position: int,
+    axes: Finger,
+    status: RobotiqStatus,
+    speeds: Mapping[Finger, int],
+    closing_s: Callable[[int], float],
+) -> float:
+    """Seconds that a move may take by default: twice the expected time of its slowest axis plus MARGIN_S.
+
+    ``closing_s`` gives the seconds of a full stroke at a speed.
+    """
+    # No time is published for the scissor: it counts as a finger. The times are those of one gripper without
+    # load [thesis, table A1.1]: twice leaves room.
+    full = status.model.stroke.counts
+    strokes = {axis: abs(position - status.position(axis)) / full for axis in axes}
+    return 2 * max(stroke * closing_s(speeds[axis]) for axis, stroke in strokes.items()) + MARGIN_S
 
 
 class Session:
@@ -88,18 +109,19 @@ class Session:
         self._waiters = StateWaiters()
         self._progress = ActivationProgress(self._loop, options.log)
         self.counters: Counters = Counters()
+        self.unreached: UnreachedNews = UnreachedNews(options.log)
+        self._publisher = Publisher(channels, machine)
         self.controller: Controller = Controller(
             machine,
             options.speed,
             options.force,
-            options.units.closing_s,
             options.write_spacing,
             options.model,
             left,
             assumed,
+            self._publisher.end,
         )
         self.controller.allow_activation(activate)
-        self._publisher = Publisher(channels, self.controller)
         try:
             link = options.make_transport()
         except BaseException:
@@ -219,7 +241,11 @@ class Session:
         ended: asyncio.Future[MoveResult] = self.waiter()
         move, is_seen = Move(position, axes, now(), ended), True
         try:
-            yield ended, self.ask(self.controller.move, move, speed, force)
+            self.ask(self.controller.move, move, speed, force)
+            status = self.controller.status
+            assert status is not None, "the hand takes commands, so a status has been read"
+            closing_s = self.options.units.closing_s
+            yield ended, usual_time(position, axes, status, self.controller.speeds, closing_s)
         except asyncio.CancelledError:
             is_seen = False
             if ended.done() and not ended.cancelled():

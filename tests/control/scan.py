@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from robotiq_async import Finger, MoveResult, RobotiqStatus, State
@@ -11,7 +11,7 @@ from robotiq_async.control.controller import Controller
 from robotiq_async.control.motion import Move
 from robotiq_async.control.pending import Command
 from robotiq_async.control.state_machine import TABLE, StateMachine
-from robotiq_async.hands.options import units_of
+from robotiq_async.control.waiters import Waiter, fail
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.enums import StopLevel, Trigger
 from robotiq_async.values.errors import RobotiqError
@@ -60,6 +60,21 @@ class Outcome:
         return self.answers[0]
 
 
+class Ended:
+    """The callers whom requests have ended, until the write has left."""
+
+    def __init__(self) -> None:
+        self._callers: list[tuple[Waiter[Any], RobotiqError]] = []
+
+    def add(self, callers: Iterable[Waiter[Any]], error: RobotiqError) -> None:
+        self._callers += [(caller, error) for caller in callers]
+
+    def answer(self) -> None:
+        callers, self._callers = self._callers, []
+        for caller, error in callers:
+            fail([caller], error)
+
+
 class Scan:
     """Steps the controller and the gripper through them."""
 
@@ -93,14 +108,15 @@ class Scan:
             )
         self.transitions: list[tuple[State, State, Trigger]] = []
         self.machine = StateMachine(self._change)
+        self._ended = Ended()
         self.controller: Controller = Controller(
             self.machine,
             speed,
             64,
-            units_of(None, None, model).closing_s,
             spacing,
             model,
             after.controller.left() if after is not None and goes_on else None,
+            ended=self._ended.add,
         )
         self.written: list[Registers] = []
         self.forgets = 0
@@ -137,7 +153,7 @@ class Scan:
     def connect(self, *, activate: bool = True) -> None:
         self.controller.activates = activate
         self.controller.see(self.status())
-        while self.controller.is_undecided:
+        while self.controller.evidence.is_undecided:
             self.now += POLL_S
             self.controller.see(self.status())
         self.controller.activates = False
@@ -152,14 +168,17 @@ class Scan:
         self.now += poll
         self.controller.see(self.status())
         self._write(answer=answer, arrives=arrives, lost=lost)
-        self.controller.answer_ended()
+        self.answer_ended()
 
     def hurry(self) -> None:
         """Write what is urgent before the next read, as the poller does."""
         write = self.controller.next_write(self.now)
         if write is not None and write.is_urgent and not write.wait:
             self._write(answer=True)
-            self.controller.answer_ended()
+            self.answer_ended()
+
+    def answer_ended(self) -> None:
+        self._ended.answer()
 
     def decide(self) -> Request | None:
         return self.controller.decide(self.now)
@@ -240,7 +259,7 @@ class Scan:
         outcome = Outcome()
         move = Move(position, axes, self.now, outcome)
         self.controller.move(move, speed, force)
-        self.controller.answer_ended()
+        self.answer_ended()
         return move, outcome
 
     def moved(self, position: int, axes: Finger = Finger.ABC, **options: int) -> MoveResult:
@@ -258,19 +277,19 @@ class Scan:
     ) -> Outcome:
         outcome = Outcome()
         self.controller.command(Command(axes, position, speed, force), outcome)
-        self.controller.answer_ended()
+        self.answer_ended()
         return outcome
 
     def hold(self, axes: Finger = Finger.ALL) -> Outcome:
         outcome = Outcome()
         self.controller.hold(axes, outcome)
-        self.controller.answer_ended()
+        self.answer_ended()
         return outcome
 
     def halt(self) -> Outcome:
         outcome = Outcome()
         self.controller.halt(outcome)
-        self.controller.answer_ended()
+        self.answer_ended()
         return outcome
 
     def halted(self) -> None:
@@ -280,7 +299,7 @@ class Scan:
 
     def stop(self, *, keep_grip: bool = False) -> None:
         self.controller.refuse_requests()
-        self.controller.answer_ended()
+        self.answer_ended()
         self.controller.stop_fingers(StopLevel.KEEP if keep_grip else StopLevel.SHUTDOWN)
         self.until(lambda: not self.controller.is_busy, 1.0)
 

@@ -119,7 +119,7 @@ def test_a_sequence_begun_while_a_write_is_on_the_line(scan: Scan, what: str) ->
     request = scan.controller.decide(scan.now)
     assert request is not None
     (scan.controller.reset if what == "reset" else scan.controller.release)()
-    scan.controller.answer_ended()
+    scan.answer_ended()
     assert isinstance(pending.error, MoveSupersededError)
     scan.gripper.write(0, request.registers)
     scan.controller.acknowledged(scan.now)

@@ -84,7 +84,7 @@ def test_a_request_that_failed_on_the_line_is_not_answered_again() -> None:
     asking = scan.command(A, position=100)
     assert scan.controller.decide(scan.now) is not None
     scan.controller.drop_requests(MoveSupersededError("its client is gone"))
-    scan.controller.answer_ended()
+    scan.answer_ended()
     scan.controller.acknowledged(scan.now)
     assert isinstance(asking.error, MoveSupersededError)
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import pytest
 
 from robotiq_async import ConnectionLostError, Finger, NotActivatedError
+from robotiq_async.calibration.scales import closing_time
 from robotiq_async.control.motion import Move
 from robotiq_async.control.pending import Command
+from robotiq_async.local.session import usual_time
 from tests.control.other_client import going_to
 from tests.control.scan import Outcome, Scan
 
@@ -37,7 +39,8 @@ def test_is_moving_from_the_command_until_the_end(scan: Scan) -> None:
 
 
 def default_timeout(scan: Scan, position: int, axes: Finger, speed: int | None = None) -> float:
-    return scan.controller.move(Move(position, axes, scan.now, Outcome()), speed, None)
+    scan.controller.move(Move(position, axes, scan.now, Outcome()), speed, None)
+    return usual_time(position, axes, scan.latest, scan.controller.speeds, closing_time)
 
 
 def test_the_default_timeout_follows_from_distance_and_speed(scan: Scan) -> None:

@@ -15,7 +15,6 @@ from robotiq_async.control.gate import gate
 from robotiq_async.control.motion import Move
 from robotiq_async.control.pending import Command
 from robotiq_async.control.state_machine import StateMachine
-from robotiq_async.hands.options import units_of
 from robotiq_async.values.enums import StopLevel
 from robotiq_async.values.model import MODELS, Model
 from robotiq_async.values.request import Request
@@ -69,7 +68,7 @@ def test_whatever_is_asked_and_shown_ract_rises_and_ratr_is_set_only_where_it_wa
     model: Model, spacing: float, activates: bool, life: list[tuple[str, int, tuple[int, ...], bool]]
 ) -> None:
     machine = StateMachine()
-    hand = Controller(machine, 128, 64, units_of(None, None, model).closing_s, spacing, model)
+    hand = Controller(machine, 128, 64, spacing, model)
     hand.activates = activates
     for number, (call, value, registers, is_answered) in enumerate(life):
         now = 100 + number * POLL_S

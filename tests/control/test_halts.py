@@ -271,3 +271,17 @@ def test_a_stop_in_a_change_of_mode_of_another_client_resets_nothing(how: str) -
         scan.stop()
     assert all(Request.from_registers(registers).activate for registers in scan.written[1:])
     assert scan.latest.activation_echo
+
+
+def test_a_halt_that_joins_one_on_the_line_is_answered_with_it(scan: Scan) -> None:
+    scan.move(200, speed=0)
+    scan.run(0.1)
+    first = scan.halt()
+    request = scan.decide()
+    assert request is not None
+    second = scan.halt()
+    scan.gripper.write(0, request.registers)
+    scan.controller.acknowledged(scan.now)
+    scan.run(0.1)
+    assert first.answers == second.answers == [None]
+    assert not scan.gripper.is_moving

@@ -5,10 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from robotiq_async.calibration.scales import closing_time
 from robotiq_async.control.entry import Entry
 from robotiq_async.control.ledger import Ledger
 from robotiq_async.control.motion import Move
@@ -19,7 +16,7 @@ from robotiq_async.values.errors import MoveSupersededError
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.move_result import MoveResult
 from robotiq_async.values.status import RobotiqStatus
-from tests.control.scan import Outcome
+from tests.control.scan import Ended, Outcome
 from tests.register_words import status_of
 
 A, B, C, S = THREE_FINGER.axes
@@ -77,7 +74,7 @@ def test_a_move_ends_once_with_the_first_outcome() -> None:
     each, outcome = move()
     moves = live(each)
     moves.supersede(A, "first")
-    moves.answer_ended()
+    ENDED.answer()
     fail(moves.drop(holds=True), MoveSupersededError("second"))
     each.end(status_of(0xF9, 0xFF))
     assert [str(error) for error in outcome.answers] == ["first"]
@@ -96,7 +93,7 @@ def test_it_is_known_which_axes_still_follow_a_move() -> None:
     assert live(each).leave(each) == (True, ABC)
     moves = live(failed)
     moves.supersede(A, "A")
-    moves.answer_ended()
+    ENDED.answer()
     moves.command(Command(B, 0))
     assert moves.leave(failed) == (False, C)
     moves = live(arrived)
@@ -159,57 +156,17 @@ def test_a_result_does_not_change_with_what_is_seen_later() -> None:
     assert dict(result.peak_current_ma) == {A: 0}
 
 
-# -- the default timeout ----------------------------------------------------------------------------------
-
-SLOWEST_S, FASTEST_S = 10.021, (2097 + 2122 + 2137) / 3000
-"""A full closing, 6 to 241 (thesis, table A1.1, mean of three runs)."""
-
-
-def timeout(position: int, axes: Finger, at: int | tuple[int, ...], speed: int | tuple[int, ...]) -> float:
-    speeds = dict(zip(THREE_FINGER.axes, speed if isinstance(speed, tuple) else (speed,) * 4, strict=True))
-    move = Move(position, axes, 0.0, Outcome())
-    return move.default_timeout(status_of(0x31, position=at), speeds, closing_time)
-
-
-@pytest.mark.parametrize(
-    ("position", "axes", "at", "speed", "seconds"),
-    [
-        (241, ABC, 6, 0, SLOWEST_S),
-        (6, ABC, 241, 0, SLOWEST_S),
-        (241, ABC, 6, 255, FASTEST_S),
-        (6, ABC, 241, 255, FASTEST_S),
-        (118, A, 6, 0, SLOWEST_S * 112 / 235),  # half the distance
-        (100, ABC, 100, 0, 0.0),
-        # The slowest addressed axis counts, and no other.
-        (241, A | B, 6, (255, 0, 255, 255), SLOWEST_S),
-        (241, A | B, (240, 6, 6, 6), (0, 255, 0, 0), FASTEST_S),
-        (241, A, 6, (255, 0, 0, 0), FASTEST_S),
-    ],
-)
-def test_a_move_may_take_twice_the_measured_time_and_two_seconds(
-    position: int, axes: Finger, at: int | tuple[int, ...], speed: int | tuple[int, ...], seconds: float
-) -> None:
-    assert timeout(position, axes, at, speed) == pytest.approx(2 * seconds + 2)
-
-
-@given(st.integers(0, 255), st.integers(1, 15), st.integers(0, 255), st.integers(0, 255))
-def test_any_move_may_take_at_least_the_margin_and_at_most_the_slowest_full_stroke(
-    position: int, axes: int, at: int, speed: int
-) -> None:
-    seconds = timeout(position, Finger(axes), at, speed)
-    assert 2.0 <= seconds <= 2 * SLOWEST_S * 255 / 235 + 2.0
-
-
 # -- the moves that run ------------------------------------------------------------------------------------
 
 LEDGER = Ledger(128, 64)
+ENDED = Ended()
 ENTRY = LEDGER.last
 ARRIVED = status_of(0xF9, 0xFF, echo=255, current=7)
 MOVING = status_of(0x39, 0x00, echo=255, current=9)
 
 
 def live(*each: Move) -> OpenRequests:
-    moves = OpenRequests()
+    moves = OpenRequests(ended=ENDED.add)
     for move in each:
         ask(moves, move)
     return moves
@@ -233,7 +190,7 @@ def test_a_move_that_was_not_written_yet_does_not_end() -> None:
     write(moves)
     moves.end_arrived(ARRIVED, LEDGER)
     assert outcome.result.positions == {A: 0, B: 0, C: 0}
-    assert not moves.calls
+    assert not moves.moves
 
 
 def test_a_move_whose_write_does_not_act_yet_does_not_end() -> None:
@@ -275,20 +232,20 @@ def test_every_move_that_has_arrived_ends_and_the_others_go_on() -> None:
     assert one.is_answered
     assert other.is_answered
     assert not goes_on.answers
-    assert moves.calls == [third]
+    assert moves.moves == {C: third}
 
 
 def test_an_error_fails_its_moves_and_the_others_go_on() -> None:
     (first, one), (second, other) = move(axes=A), move(axes=B)
     moves = live(first, second)
     moves.supersede(A, "A")
-    moves.answer_ended()
+    ENDED.answer()
     assert isinstance(one.error, MoveSupersededError)
     assert not other.answers
     fail(moves.drop(holds=False), error := MoveSupersededError("all"))
     assert isinstance(other.error, MoveSupersededError)
     assert other.error is not error, "each caller has one of its own"
-    assert not moves.calls
+    assert not moves.moves
 
 
 def test_a_move_leaves_once() -> None:

@@ -7,6 +7,7 @@ import pytest
 from robotiq_async import Finger, MoveSupersededError, ObjectStatus, State
 from robotiq_async.calibration.scales import closing_time
 from robotiq_async.control.motion import Move
+from robotiq_async.local.session import usual_time
 from robotiq_async.values.request import Request
 from tests.control.scan import POLL_S, Outcome, Scan, started
 
@@ -105,7 +106,7 @@ def test_an_abandoned_move_is_held_where_it_is(scan: Scan) -> None:
     scan.run(1.0)
     scan.controller.abandon(move)
     at = scan.gripper.position(A)
-    assert not scan.controller._requests.calls, "no caller waits for it"
+    assert not scan.controller._requests.moves, "no caller waits for it"
     scan.run(2.0)
     assert not scan.gripper.is_moving
     assert scan.gripper.position(A) == pytest.approx(at, abs=3)
@@ -220,7 +221,8 @@ def test_the_default_timeout_knows_the_speeds_at_the_call(scan: Scan, slower: bo
     scan.command(A, speed=255)
     if slower:
         scan.command(A, speed=0)
-    limit = scan.controller.move(Move(255, A, scan.now, Outcome()), None, None)
+    scan.controller.move(Move(255, A, scan.now, Outcome()), None, None)
+    limit = usual_time(255, A, scan.latest, scan.controller.speeds, closing_time)
     scan.command(A, speed=0)
     assert limit == pytest.approx(2 * (slow if slower else fast) + 2, rel=0.15)
 
@@ -258,7 +260,7 @@ def test_a_move_that_was_dropped_goes_on(scan: Scan) -> None:
     move, outcome = scan.move(255, A)
     scan.run(0.5)
     scan.controller.drop_requests(MoveSupersededError("its client is gone"))
-    scan.controller.answer_ended()
+    scan.answer_ended()
     assert isinstance(outcome.error, MoveSupersededError)
     scan.controller.abandon(move, unseen=True)
     scan.run(5)

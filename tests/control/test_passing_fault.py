@@ -58,7 +58,7 @@ def test_it_decides_nothing_about_a_gripper_before_it_has_looked_past_it() -> No
     scan = quiet()
     scan.controller.activates = True
     scan.controller.see(scan.status())
-    assert scan.controller.is_undecided
+    assert scan.controller.evidence.is_undecided
     assert scan.state is State.DISCONNECTED
     assert scan.controller.decide(scan.now) is None
 
@@ -71,7 +71,7 @@ def test_a_move_goes_on_through_a_loop_that_is_held_up(silent: Scan) -> None:
         silent.step()
     silent.until(lambda: outcome.is_answered)
     assert all(position >= 240 for position in outcome.result.positions.values())
-    assert silent.controller.passing_faults == 5, "the start, and each time"
+    assert silent.controller.evidence.passed == 5, "the start, and each time"
     assert State.FAULT not in [target for _, target, _ in silent.transitions]
 
 
@@ -79,7 +79,7 @@ def test_a_loop_that_is_held_up_at_every_poll_sees_no_fault(silent: Scan) -> Non
     for _ in range(10):
         silent.now += 1.2
         silent.step()
-    assert silent.controller.passing_faults == 10, "the start, and all but the last one, which may last"
+    assert silent.controller.evidence.passed == 10, "the start, and all but the last one, which may last"
     assert silent.state is State.RUNNING_IDLE
 
 
@@ -140,11 +140,11 @@ def test_a_grip_is_kept_after_a_silence(silent: Scan) -> None:
 
 def test_it_is_logged_once(silent: Scan, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO)
-    before = silent.controller.passing_faults
+    before = silent.controller.evidence.passed
     for _ in range(3):
         silent.now += 1.2
         silent.run(0.1)
-    assert silent.controller.passing_faults == before + 3
+    assert silent.controller.evidence.passed == before + 3
     assert caplog.text.count("0x09") == (before == 0)
 
 
@@ -159,7 +159,7 @@ def test_a_lasting_0x09_is_a_fault_after_some_reads(silent: Scan) -> None:
     assert took <= (LASTS_READS + 1) * POLL_S
     assert isinstance(outcome.error, GripperFaultError)
     assert silent.state is State.FAULT
-    assert silent.controller.passing_faults == 1, "that of the start"
+    assert silent.controller.evidence.passed == 1, "that of the start"
 
 
 @pytest.mark.parametrize("how", ["command", "activate"])

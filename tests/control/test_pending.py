@@ -16,7 +16,7 @@ from robotiq_async.control.waiters import fail
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.errors import ConnectionLostError, MoveSupersededError
 from robotiq_async.values.model import THREE_FINGER
-from tests.control.scan import Outcome
+from tests.control.scan import Ended, Outcome
 
 A, B, C, S = THREE_FINGER.axes
 ABC, NONE = Finger.ABC, Finger(0)
@@ -66,7 +66,6 @@ def hold(axes: Finger) -> Step:
 
 def halt(requests: OpenRequests) -> None:
     requests.supersede(Finger.ALL, "halt")
-    requests.answer_ended()
 
 
 @pytest.mark.parametrize(
@@ -95,13 +94,14 @@ def test_holds_and_halts_drop_positions_and_nothing_else(
 
 
 def test_a_hold_fails_only_the_callers_that_move_its_axes() -> None:
-    requests, held, other, setting = OpenRequests(), Outcome(), Outcome(), Outcome()
+    ended = Ended()
+    requests, held, other, setting = OpenRequests(ended=ended.add), Outcome(), Outcome(), Outcome()
     requests.command(Command(A, 100), held)
     requests.command(Command(B, 100), other)
     requests.command(Command(A, None, 50), setting)
     hold(A)(requests)
     assert not held.answers, "they hear after the write"
-    requests.answer_ended()
+    ended.answer()
     assert isinstance(held.error, MoveSupersededError)
     assert not other.answers
     assert not setting.answers
@@ -131,7 +131,7 @@ def test_a_pending_command_knows_whether_there_is_something_to_write(
 
 
 def waiting(requests: OpenRequests) -> list[object]:
-    return [call.waiter for call in requests.calls]
+    return [call.waiter for call in (*requests.calls, *dict.fromkeys(requests.moves.values()))]
 
 
 def test_a_halt_drops_positions_and_leaves_pending_speeds() -> None:
@@ -177,7 +177,6 @@ def test_moves_that_end_together_are_answered_in_the_order_of_their_calls() -> N
         requests.command(Command(axes, 100))
         requests.add(Move(100, axes, 0.0, caller))
     hold(Finger.ALL)(requests)
-    requests.answer_ended()
     assert answered == callers
 
 

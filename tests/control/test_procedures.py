@@ -9,7 +9,6 @@ import pytest
 
 from robotiq_async.control.procedures import Steps, activation, automatic_release
 from robotiq_async.values.enums import Fault, Mode
-from robotiq_async.values.errors import GripperFaultError, NotActivatedError
 from robotiq_async.values.request import AxisRequest, Request
 from robotiq_async.values.status import RobotiqStatus
 from tests.control.histories import BUSY, FAULTY, READY, RELEASED, RESET, RUNNING
@@ -49,6 +48,15 @@ def begun(begin: Begin, *shown: RobotiqStatus) -> Steps:
     return steps
 
 
+def end_of(steps: Steps, status: RobotiqStatus) -> str:
+    """Why a procedure has failed that ends with a status; empty if it has not."""
+    with pytest.raises(StopIteration) as end:
+        steps.send(status)
+    why = end.value.value
+    assert isinstance(why, str)
+    return why
+
+
 # -- the first status, and what is written -----------------------------------------------------------------
 
 
@@ -83,8 +91,7 @@ def test_an_activation_needs_a_reset_gripper_and_a_release_one_that_is_not(
 ) -> None:
     steps = begin(lambda _: IMAGE)
     next(steps)
-    with pytest.raises(StopIteration):
-        steps.send(shown)
+    assert end_of(steps, shown) == ""
 
 
 @pytest.mark.parametrize("begin", BEGIN_WITH)
@@ -125,27 +132,22 @@ def test_an_activation_and_a_release_raise_their_bit() -> None:
 )
 def test_a_procedure_waits_and_ends(begin: Begin, shown: list[RobotiqStatus], end: RobotiqStatus) -> None:
     steps = begun(begin, *shown)
-    with pytest.raises(StopIteration):
-        steps.send(end)
+    assert end_of(steps, end) == ""
 
 
 @pytest.mark.parametrize(
-    ("begin", "shown", "then", "error", "message"),
+    ("begin", "shown", "then", "why"),
     [
         *(
-            (activation, [RESET, shown], RESET, NotActivatedError, "reset while it activated")
+            (activation, [RESET, shown], RESET, "reset while it activated")
             for shown in (status_of(0x01), BUSY, status_of(0x21))
         ),
         *(
-            (activation, [BUSY], status_of(0x11, fault=code), GripperFaultError, f"0x{code:02X}")
+            (activation, [BUSY], status_of(0x11, fault=code), f"0x{code:02X}")
             for code in (Fault(0x0D), Fault(0x0E), Fault(0x0F), Fault(0x01), Fault(0x0C))
         ),
-        (automatic_release, [RELEASING], RESET, NotActivatedError, "reset during the automatic release"),
+        (automatic_release, [RELEASING], RESET, "reset during the automatic release"),
     ],
 )
-def test_a_procedure_fails(
-    begin: Begin, shown: list[RobotiqStatus], then: RobotiqStatus, error: type[Exception], message: str
-) -> None:
-    steps = begun(begin, *shown)
-    with pytest.raises(error, match=message):
-        steps.send(then)
+def test_a_procedure_fails(begin: Begin, shown: list[RobotiqStatus], then: RobotiqStatus, why: str) -> None:
+    assert why in end_of(begun(begin, *shown), then)

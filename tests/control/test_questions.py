@@ -11,7 +11,6 @@ from robotiq_async.control.controller import Controller
 from robotiq_async.control.ledger import Ledger
 from robotiq_async.control.rest import LAG_READS, LAG_S
 from robotiq_async.control.state_machine import StateMachine
-from robotiq_async.hands.options import units_of
 from robotiq_async.values.enums import NO_AXES, Finger
 from robotiq_async.values.errors import RobotiqError
 from robotiq_async.values.model import THREE_FINGER
@@ -25,7 +24,7 @@ def answers(hand: Controller, now: float) -> list[object]:
     """The answers to all queries of a hand."""
     return [
         hand.is_moving,
-        hand.is_undecided,
+        hand.evidence.is_undecided,
         hand.has_request,
         hand.has_open_stop,
         hand.is_busy,
@@ -38,9 +37,7 @@ class Hand:
 
     def __init__(self, *, is_asked: bool, activates: bool) -> None:
         self.machine = StateMachine()
-        self.controller = Controller(
-            self.machine, 128, 64, units_of(None, None, THREE_FINGER).closing_s, 0.01, THREE_FINGER
-        )
+        self.controller = Controller(self.machine, 128, 64, 0.01, THREE_FINGER)
         self.controller.activates = activates
         self.is_asked = is_asked
         self.done: list[object] = []

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import pytest
 
 from robotiq_async.control.ledger import WINDOW_S, Ledger
-from robotiq_async.control.stops import Stop
+from robotiq_async.control.stops import Ended, Stop
 from robotiq_async.values.enums import NO_AXES, Mode
 from robotiq_async.values.enums import StopLevel as Level
 from robotiq_async.values.request import AxisRequest, Request
@@ -47,8 +47,8 @@ class Stopping:
         self.ledger.update(BEFORE, 2 * WINDOW_S)
         self.now = 2 * WINDOW_S
         self.stop = Stop(level)
-        image = self.stop.image(self.ledger, BEFORE)
-        assert image is not None
+        image = self.stop.next_image(self.ledger, BEFORE)
+        assert isinstance(image, Request)
         self.image = image
         self.write(image, is_early=is_early)
 
@@ -61,11 +61,11 @@ class Stopping:
         """Whether the stop is reached."""
         self.now += after
         self.ledger.update(status, self.now)
-        return self.stop.is_reached(self.ledger, status)
+        return self.stop.see(self.ledger, status) is None
 
     def again(self, status: RobotiqStatus) -> bool:
-        image = self.stop.again(self.ledger, status)
-        if image is not None:
+        image = self.stop.next_image(self.ledger, status)
+        if isinstance(image, Request):
             assert image == self.image
             self.write(image)
         return image is not None
@@ -93,8 +93,8 @@ def test_a_reset_begins_for_any_status(shown: RobotiqStatus) -> None:
     ledger = Ledger(0, 0)
     ledger.update(shown, 0.0)
     ledger.adopt(shown)
-    image = Stop(Level.RESET).image(ledger, shown)
-    assert image is not None
+    image = Stop(Level.RESET).next_image(ledger, shown)
+    assert isinstance(image, Request)
     assert not image.activate
 
 
@@ -102,7 +102,7 @@ def test_a_shutdown_with_nothing_to_stop_writes_nothing() -> None:
     ledger = Ledger(0, 0)
     ledger.update(READY, 0.0)
     ledger.adopt(READY)
-    assert Stop(Level.SHUTDOWN).image(ledger, READY) is None
+    assert Stop(Level.SHUTDOWN).next_image(ledger, READY) == Ended()
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from robotiq_async import Fault, Finger, Inhibit, Mode, State
+from robotiq_async.values.enums import Trigger
 from robotiq_async.values.request import Request
 from tests.control.scan import POLL_S, Scan, started
 
@@ -20,6 +21,17 @@ def activating() -> Scan:
     scan.connect()
     scan.run(1.0)
     assert scan.gripper.is_moving
+    return scan
+
+
+def releasing() -> Scan:
+    """Some time after this hand has begun an automatic release."""
+    scan = started()
+    scan.moved(100)
+    scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
+    scan.run(0.05)
+    scan.controller.release()
+    scan.run(0.5)
     return scan
 
 
@@ -41,7 +53,7 @@ def test_an_activation_that_runs_as_the_link_is_back_is_reset_while_inhibited(fa
     scan = activating()
     scan.controller.lost(None, scan.now)
     scan.machine.inhibit(INHIBIT)
-    scan.controller.hold_when_back()
+    scan.controller.inhibit(INHIBIT)
     if fault is not None:
         scan.gripper.inject_fault(fault, 0.5)
     scan.come_back(0.05)
@@ -51,12 +63,7 @@ def test_an_activation_that_runs_as_the_link_is_back_is_reset_while_inhibited(fa
 @pytest.mark.parametrize("halted", [True, False])
 def test_a_release_that_runs_as_the_link_is_back_is_reset_while_inhibited(halted: bool) -> None:
     """The reset of an inhibit was lost with the link, or was never sent."""
-    scan = started()
-    scan.moved(100)
-    scan.gripper.inject_fault(Fault.SCISSOR_BLOCKED)
-    scan.run(0.05)
-    scan.controller.release()
-    scan.run(0.5)
+    scan = releasing()
     scan.machine.inhibit(INHIBIT)
     if halted:
         scan.controller.reset()
@@ -110,6 +117,64 @@ def test_once_it_is_permitted_an_activation_goes_on_as_the_link_is_back() -> Non
     scan.machine.inhibit(INHIBIT)
     scan.machine.permit("PLC")
     scan.come_back(0.05)
+    scan.until(lambda: scan.state is State.RUNNING_IDLE)
+
+
+# -- a halt that is lost with the link ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("is_written", [False, True])
+@pytest.mark.parametrize("trigger", [Trigger.ASK_HALT, Trigger.ASK_RESET])
+def test_an_activation_whose_halt_was_lost_is_reset_once_the_link_is_back(
+    trigger: Trigger, is_written: bool
+) -> None:
+    """Only a hold was kept for that, which ends no activation: 428 counts."""
+    scan = activating()
+    scan.controller.reset(trigger)
+    if is_written:
+        scan.forgets = 1
+        scan.step(answer=False)
+    else:
+        scan.controller.lost(None, scan.now)
+    scan.come_back(0.05)
+    is_reset_at_once(scan)
+
+
+def test_a_release_whose_halt_was_lost_is_reset_once_the_link_is_back() -> None:
+    scan = releasing()
+    scan.controller.reset(Trigger.ASK_HALT)
+    scan.blink()
+    assert scan.gripper.is_moving
+    is_reset_at_once(scan)
+
+
+def test_a_halt_that_was_lost_ends_no_activation_that_another_client_begins_later() -> None:
+    scan = started()
+    scan.move(200, speed=0)
+    scan.run(0.5)
+    scan.halt()
+    scan.controller.lost(None, scan.now)
+    for image in ([0], ACTIVATE):
+        scan.gripper.write(0, image)
+        scan.now += 1.0
+    scan.come_back(0.05)
+    scan.until(lambda: scan.state is State.RUNNING_IDLE)
+    assert scan.latest.activation_echo
+
+
+def test_a_halt_that_was_lost_counts_at_the_next_link_alone() -> None:
+    """If nothing drives the fingers by then, it is over."""
+    scan = activating()
+    scan.controller.reset(Trigger.ASK_HALT)
+    scan.controller.lost(None, scan.now)
+    scan.now += 60.0
+    scan.come_back(0.05)
+    assert scan.state is State.RUNNING_IDLE
+    scan.blink()
+    for image in ([0], ACTIVATE):
+        scan.gripper.write(0, image)
+        scan.now += 1.0
+    scan.blink()
     scan.until(lambda: scan.state is State.RUNNING_IDLE)
 
 

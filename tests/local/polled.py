@@ -9,7 +9,6 @@ from contextlib import asynccontextmanager
 from dataclasses import replace
 from typing import TypeVar
 
-from robotiq_async.calibration.scales import closing_time
 from robotiq_async.control.controller import Controller
 from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.hands.options import ReconnectPolicy
@@ -52,8 +51,6 @@ class Polled:
         self.wire = Wire()
         self.changes: list[tuple[State, State, Trigger]] = []
         self.machine = StateMachine(lambda *change: self.changes.append(change))
-        self.controller = Controller(self.machine, 128, 64, closing_time)
-        self.controller.allow_activation(activate)
         self.counters = Counters()
         self.statuses: list[RobotiqStatus] = []
         self.requests: list[SentRequest] = []
@@ -62,7 +59,9 @@ class Polled:
         channels.requests = Published(self.requests.append)
         channels.numbers = itertools.count(7)
         given = replace(options(self.wire, policy), poll_interval=poll_interval)
-        publisher = Publisher(channels, self.controller)
+        publisher = Publisher(channels, self.machine)
+        self.controller = Controller(self.machine, 128, 64, ended=publisher.end)
+        self.controller.allow_activation(activate)
         self.run = Run(RunParts(self.wire, self.controller, self.counters, publisher, given))
         self.at_next_status: Callable[[], None] | None = None
         self._published = asyncio.Event()
