@@ -7,8 +7,8 @@
 # * what callers have asked: changes, holds and moves (pending.py, motion.py), and one task: a stop (stops.py)
 #   or a procedure (procedures.py);
 # * what the gripper may have: the images written, by us or by others (ledger.py);
-# * what it shows: one of six conditions (evidence.py), which axes rest or may press (rest.py), and where
-#   those that move will be (course.py).
+# * what it shows: one of six conditions (evidence.py), and which axes rest, may press, or move where
+#   (rest.py).
 #
 # What a status shows may change without a further write: an image of ours may be on its way, or was lost
 # with the link and acts all the same. So whoever asks what the gripper will do asks the ledger for what is

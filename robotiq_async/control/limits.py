@@ -17,7 +17,7 @@ position at which the axis came to rest, and not with MoveSupersededError.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 from ..runtime.logger import Log, log
@@ -42,17 +42,13 @@ class Limits:
         self.limited: dict[Finger, int] = {}  # by axis, the limit that shows in place of the last request
         self._log: Final = log
         # By axis, and whether it limits closing: the limit, and whether an axis has come to rest there.
-        self._known: dict[tuple[Finger, bool], tuple[int, bool]] = {}
+        self.known: dict[tuple[Finger, bool], tuple[int, bool]] = {}
         self._others_at = -math.inf
 
     def forget(self, axes: Finger) -> None:
         """These axes are asked for another position."""
         if self.limited:
             self.limited = {axis: at for axis, at in self.limited.items() if axis not in axes}
-
-    def has_alias(self, waiting: Callable[[], Sequence[Entry]]) -> bool:
-        """Whether an entry that waits may show as another echo than its own. Usually no limit is known."""
-        return bool(self._known) and any(self.apply(each.image) for each in waiting())
 
     def shows(self, entry: Entry, echo: Echo) -> bool:
         """Whether an echo shows an entry with limits in place of its requests."""
@@ -69,7 +65,7 @@ class Limits:
         """If an entry shows as limits in place of requests, make it an entry of these limits."""
         limits = self.apply(entry.image)
         if echo == entry.echo:  # it is refuted by an image that shows as it was written
-            self._known = {key: known for key, known in self._known.items() if key[0] not in limits}
+            self.known = {key: known for key, known in self.known.items() if key[0] not in limits}
             return
         # Later entries with the same request would echo the limit as well; the last is the base.
         for axis, limit in limits.items():
@@ -83,9 +79,9 @@ class Limits:
         """An axis has come to rest: at its limit it proves that."""
         if axis not in self.limited or status.finger_status(axis) is not ObjectStatus.AT_POSITION:
             return
-        for key, (limit, is_proven) in self._known.items():
+        for key, (limit, is_proven) in self.known.items():
             if key[0] is axis and not is_proven and abs(limit - status.position(axis)) <= TOLERANCE:
-                self._known[key] = limit, True
+                self.known[key] = limit, True
                 self._log.info("the gripper replaces requests of %s by its limit %d", axis, limit)
                 return
 
@@ -93,13 +89,13 @@ class Limits:
         """Drop the limits that no axis has proven: they may be the other client's requests."""
         # A write that shows such a limit after that counts as the other client's: it may be [conceivable].
         self._others_at = now
-        self._known = {key: known for key, known in self._known.items() if known[1]}
+        self.known = {key: known for key, known in self.known.items() if known[1]}
 
     def apply(self, image: Request) -> dict[Finger, int]:
         """The limits that replace requests of an image, by axis."""
         return {
             axis: limit
-            for (axis, closing), (limit, _) in self._known.items()
+            for (axis, closing), (limit, _) in self.known.items()
             if (image.position(axis) > limit if closing else image.position(axis) < limit)
         }
 
@@ -117,7 +113,7 @@ class Limits:
             if request == before.position(axis) or not _may_be_limit(axis, request, shown, status):
                 return False
             found[axis, request > shown] = shown, False
-        self._known |= found
+        self.known |= found
         return bool(found)
 
 

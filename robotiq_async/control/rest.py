@@ -5,14 +5,18 @@ two-finger grippers they trail the echo by some exchanges [vendor]. So a gDT tha
 acts may be from before it. It counts at once if it can result from no other request than the last; if it
 says "at position" and the axis is where it was last asked to be, as a position is never late; or if it is a
 contact that no request contradicts since it was true. In any case it counts when the lag is over.
-docs/decisions/late-status.md has the reasons. The functions here are questions about the last requests of
-one axis.
+docs/decisions/late-status.md has the reasons.
+
+A hold acts a device cycle after it was sent. Asked for where it was seen, an axis would drive back, 20 counts
+if the cycle is 0.2 s. So it is asked for where it will be, as far as statuses tell.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import Enum
 from functools import cache
 from typing import Final, NamedTuple
@@ -21,6 +25,7 @@ from ..values.enums import NO_AXES, Finger, ObjectStatus
 from ..values.model import TOLERANCE, Model
 from ..values.request import Request
 from ..values.status import RobotiqStatus
+from .entry import Entry
 
 LAG_S: Final = 0.25
 """Time in which gDT may show the state before a request, from the first status that echoes the request. The
@@ -33,6 +38,11 @@ them."""
 PAD_MM: Final = 1.6
 """The most by which pads and part yield as the force rises [conceivable]: 7 counts of a Hand-E, for 10 ms in
 simulation, 4 of a 2F-85, 2 of the others."""
+
+BASELINE_S: Final = 0.25
+"""The statuses of this time give the speed. Positions are whole counts: it is right to 4 counts a second."""
+SPACING_S: Final = 0.02
+"""Seconds between the statuses that are kept."""
 
 
 def agrees(model: Model, request: int, what: ObjectStatus, position: int, direction: int) -> bool:
@@ -78,15 +88,29 @@ class Moment(NamedTuple):
 LONG_AGO: Final = Moment(-math.inf, -LAG_READS)
 
 
-class Target(NamedTuple):
+@dataclass(slots=True, eq=False)
+class Target:
     """One request of an axis."""
 
-    position: int | None  # None while rGTO is clear, where gDT has no meaning [manual 2014, p. 51]
+    axis: Finger
+    entry: Entry | None  # None if it is not known
     again: bool = False  # it makes an axis in contact try again: it sets rGTO or raises the force
     since: Moment | None = LONG_AGO  # the first status that showed that it acts; None before that
+    rested: bool = False  # the axis was proven to rest under it: any motion is due to a later one
+
+    @property
+    def position(self) -> int | None:
+        """Its position; None while rGTO is clear, where gDT has no meaning [manual 2014, p. 51]."""
+        image = None if self.entry is None else self.entry.image
+        return None if image is None or not image.go else image.position(self.axis)
+
+    def act(self, now: Moment) -> None:
+        """Note that it acts, or may have acted unseen, since a status."""
+        self.since = now
 
     def fits(self, model: Model, what: ObjectStatus, position: int) -> bool:
-        return self.position is None or agrees(model, self.position, what, position, direction=0)
+        request = self.position
+        return request is None or agrees(model, request, what, position, direction=0)
 
 
 class Rest(Enum):
@@ -97,49 +121,162 @@ class Rest(Enum):
     PROVEN = "what it shows is from after its last request, so that no older status can follow"
 
 
-def rest_of(targets: Iterator[Target], model: Model, what: ObjectStatus, position: int) -> Rest:
-    """Whether an axis rests under the last of its targets, the newest first. Its position is never late."""
-    # Only the newest requests are looked at where they decide: this runs at every poll of a motion, and a
-    # control loop leaves fifty requests in the lag.
-    last = next(targets, None)
-    if what is ObjectStatus.IN_MOTION or (last is not None and last.since is None):
+def rest_of(targets: Sequence[Target], model: Model, what: ObjectStatus, position: int) -> Rest:
+    """Whether an axis rests under the last of its targets. Its position is never late."""
+    # Only the last is looked at where that decides: this runs at every poll of a motion, and a control loop
+    # leaves fifty requests in the lag.
+    last = targets[-1]
+    if what is ObjectStatus.IN_MOTION or last.since is None:
         return Rest.UNKNOWN
-    before = next(targets, None)
-    if last is None or before is None:
+    if len(targets) == 1:
         # gDT results from the only request that is left, even if it contradicts it: the axis may be at a
         # software limit, or blocked.
         return Rest.PROVEN
     if what is ObjectStatus.AT_POSITION:  # within its tolerance, whatever the age of gDT
         return Rest.KNOWN if last.fits(model, what, position) else Rest.UNKNOWN
-    is_true = _is_true_since((last, before, *targets), model, what, position, unless_again=True)
+    is_true = _is_true_since(targets, model, what, position, unless_again=True)
     return Rest.PROVEN if is_true else Rest.UNKNOWN
 
 
-def may_move(targets: Iterable[Target], model: Model, what: ObjectStatus, position: int) -> bool:
-    """Whether an axis may move, or be about to, although it shows rest; its newest target comes first."""
+def may_move(targets: Sequence[Target], model: Model, what: ObjectStatus, position: int) -> bool:
+    """Whether an axis may move, or be about to, although it shows rest."""
     # A contact is doubted only if a request within the lag contradicts it: a needless doubt would cost the
     # grip. An axis close to the request before the last may have some counts to go [conceivable].
-    last, *before = [*targets] or [Target(None)]
+    *before, last = targets
     if not before or what is ObjectStatus.IN_MOTION:
         return False
     if what is ObjectStatus.AT_POSITION:
         others = (each for each in before if each.position != last.position)
         fits_other = any(each.fits(model, what, position) for each in others)
         return fits_other or not last.fits(model, what, position)
-    return not _is_true_since((last, *before), model, what, position, unless_again=False)
+    return not _is_true_since(targets, model, what, position, unless_again=False)
 
 
 def _is_true_since(
-    targets: tuple[Target, ...], model: Model, what: ObjectStatus, position: int, *, unless_again: bool
+    targets: Sequence[Target], model: Model, what: ObjectStatus, position: int, *, unless_again: bool
 ) -> bool:
     """Whether this fits the last request, and every request since the first that it fits."""
     # It was true under that one. If no later request contradicts it, it is still true.
     fits = False
-    for each in reversed(targets):
+    for each in targets:
         was_fitting, fits = fits, each.fits(model, what, position)
         if was_fitting and ((unless_again and each.again) or not fits):
             return False
     return fits
+
+
+class RecentRequests:
+    """The requests that the object status of each axis may be from, until it is proven to rest.
+
+    Attributes:
+        targets: by axis, the oldest first. All unrested axes have some. Usually none has, which spares a poll
+            all questions about them.
+        unrested: the axes that are not known to rest under their last request.
+        course: of those that have recent requests.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.unrested: Finger = NO_AXES
+        self.course: Final = Course()
+        self._model: Final = model
+        self.targets: Final[dict[Finger, list[Target]]] = {}
+
+    def ask(
+        self, entry: Entry, before: Entry, *, is_at_rest: bool = False, later: Sequence[Entry] = ()
+    ) -> Finger:
+        """An image asks for something else than the one before it; return the axes of which it does.
+
+        It acts before the ``later`` entries. With ``is_at_rest`` other axes have proven to rest until now.
+        """
+        image, replaced, changed = entry.image, before.image, NO_AXES
+        is_switched = image.go is not replaced.go
+        is_raised = is_switched and image.go and entry.is_ours
+        for (axis, old), new in zip(replaced.by_axis, image.axes, strict=True):
+            is_pressed = new.force > old.force
+            is_new = is_switched or new.position != old.position
+            # More force lets an axis in contact try again [conceivable]; one that moves keeps moving.
+            if not is_new and not (is_pressed and not axis & self.unrested):
+                continue
+            if (targets := self.targets.get(axis)) is None:
+                # Before another client's it is unknown, if rGTO was clear.
+                known = before if replaced.go or entry.is_ours else entry
+                targets = self.targets[axis] = [Target(axis, known, rested=is_at_rest)]
+            target, place = Target(axis, entry, is_pressed or is_raised, since=None), len(targets)
+            if later:
+                after = (n for n, each in enumerate(targets) if each.since is None and each.entry in later)
+                place = next(after, place)
+            targets.insert(place, target)
+            changed |= axis
+        if image.go and entry.is_ours:
+            self.unrested |= changed
+        return changed
+
+    def lose(self, entry: Entry) -> None:
+        """The newest entry may act, or never: what moves its axes is not known."""
+        for axis, targets in self.targets.items():
+            if targets[-1].entry is entry:
+                targets.pop()
+                if targets and targets[0].since is LONG_AGO:
+                    targets[0] = Target(axis, targets[0].entry)
+                else:
+                    targets.insert(0, Target(axis, None))
+
+    def overtake(self, now: Moment) -> None:
+        """Another client's image shows: what does not act yet may have acted until now, unseen."""
+        for targets in self.targets.values():
+            for each in targets:
+                if each.since is None:
+                    each.act(now)
+
+    def forget(self) -> None:
+        self.unrested = NO_AXES
+        self.targets.clear()
+
+    def see(
+        self, status: RobotiqStatus, now: Moment, unsettled: Sequence[Entry], *, is_known: bool
+    ) -> Finger:
+        """Take in a status; return the axes that have come to rest, if their requests are known."""
+        # The ``unsettled`` entries do not act yet.
+        self.course.keep(status, now.time)
+        rested = NO_AXES
+        for axis, targets in [*self.targets.items()]:
+            for each in reversed(targets):
+                if each.since is not None:
+                    break
+                if each.entry not in unsettled:
+                    each.act(now)
+            _forget_old(targets, now)
+            if not is_known:
+                continue
+            what = status.finger_status(axis)
+            if what is ObjectStatus.IN_MOTION:
+                # An axis at rest moves only for a new request: every later status is from after it [follows].
+                if targets[0].rested:
+                    del targets[0]
+                continue
+            rest = rest_of(targets, self._model, what, status.position(axis))
+            if rest is not Rest.UNKNOWN:
+                rested |= axis
+            if rest is Rest.PROVEN:
+                del self.targets[axis]
+        rested &= self.unrested
+        self.unrested &= ~rested
+        return rested
+
+    def may_move(self, status: RobotiqStatus, now: Moment) -> Finger:
+        """The axes that may move, or be about to, although a status shows them at rest."""
+        moving = NO_AXES
+        for axis, targets in self.targets.items():
+            _forget_old(targets, now)
+            if may_move(targets, self._model, status.finger_status(axis), status.position(axis)):
+                moving |= axis
+        return moving
+
+
+def _forget_old(targets: list[Target], now: Moment) -> None:
+    """Drop the targets from which no status can be any more."""
+    while len(targets) > 1 and (since := targets[1].since) is not None and since.is_lag_over(now):
+        del targets[0]
 
 
 @cache
@@ -149,7 +286,7 @@ def yields(model: Model) -> int:
 
 
 class Contacts:
-    """Where each axis was last seen in contact, until it has moved off: what may press. False while empty.
+    """Where each axis was last seen in contact, until it has moved off: what may press.
 
     An axis in contact that is asked to press on keeps its request, and with it its grip: when others are
     held, and when rGTO rises (gDT shows no contact while that is clear; what becomes of a grip then is
@@ -158,37 +295,66 @@ class Contacts:
     """
 
     def __init__(self) -> None:
-        self._shown: dict[Finger, RobotiqStatus] = {}  # by axis, the newest status that shows it in contact
+        self.shown: dict[Finger, RobotiqStatus] = {}  # by axis, the newest status that shows it in contact
         self.open: Finger = NO_AXES
-
-    def __bool__(self) -> bool:
-        return bool(self._shown)
 
     def see(self, status: RobotiqStatus, contacts: Finger) -> None:
         """Take in a status with gGTO = 1, and those of its contacts that can be believed."""
-        before, self.open = self._shown, NO_AXES
-        self._shown = dict.fromkeys(contacts, status)
-        for axis in before.keys() - self._shown.keys():  # usually none
+        before, self.open = self.shown, NO_AXES
+        self.shown = dict.fromkeys(contacts, status)
+        for axis in before.keys() - self.shown.keys():  # usually none
             at = before[axis].position(axis)
             if axis in status.moving and abs(status.position(axis) - at) <= yields(status.model):
-                self._shown[axis] = before[axis]
+                self.shown[axis] = before[axis]
                 self.open |= axis
 
     def ask(self, axes: Finger) -> None:
         """Axes are asked for a position, perhaps the same: what they do next is open."""
-        if self._shown:
+        if self.shown:
             self.open |= axes
 
     def forget(self) -> None:
         """A reset and an activation end every grip."""
-        self._shown = {}
+        self.shown = {}
 
     def pressing(self, status: RobotiqStatus, base: Request) -> Finger:
         """The axes that have not moved since, and that ``base`` asks to press on."""
         pressing = NO_AXES
-        for axis, shown in self._shown.items():
+        for axis, shown in self.shown.items():
             what, at = shown.finger_status(axis), shown.position(axis)
             is_there = abs(status.position(axis) - at) <= yields(status.model)
             if is_there and agrees(status.model, base.position(axis), what, at, direction=0):
                 pressing |= axis
         return pressing
+
+
+class Course:
+    """Some of the statuses in which an axis moves: how far it will have gone when a write acts."""
+
+    def __init__(self) -> None:
+        # Each with the time at which it was asked for: a loop that is held up reads a reply late, and a speed
+        # by the times of the replies would drive a held axis on to its request.
+        self._kept: Final[deque[tuple[float, RobotiqStatus]]] = deque(
+            maxlen=math.ceil(BASELINE_S / SPACING_S)
+        )
+
+    def keep(self, status: RobotiqStatus, asked: float) -> None:
+        if not self._kept or asked >= self._kept[-1][0] + SPACING_S:
+            self._kept.append((asked, status))
+
+    def after(self, axis: Finger, request: int, status: RobotiqStatus, asked: float, seconds: float) -> int:
+        """Its position so long after a status, on its way to a request; as it shows if it may stand.
+
+        The status was asked for at ``asked``.
+        """
+        at, since, first = status.position(axis), asked, status
+        # A fault stops the axes, and gDT shows a motion.
+        if axis not in status.moving or status.fault.is_serious:
+            return at
+        for kept, each in reversed(self._kept):
+            if axis not in each.moving or asked - kept > BASELINE_S:
+                break
+            since, first = kept, each
+        time = asked - since
+        place = at if time == 0 else at + int((at - first.position(axis)) * seconds / time)
+        return sorted((at, place, request))[1]

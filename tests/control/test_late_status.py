@@ -8,11 +8,12 @@ from dataclasses import replace
 import pytest
 
 from robotiq_async import Finger, MoveResult, MoveSupersededError, ObjectStatus
+from robotiq_async.control.entry import Entry
 from robotiq_async.control.rest import LAG_READS, LAG_S, LONG_AGO, Moment, Rest, Target, may_move, rest_of
 from robotiq_async.values.enums import NO_AXES
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85, Model
 from robotiq_async.values.registers import Registers
-from robotiq_async.values.request import Request
+from robotiq_async.values.request import AxisRequest, Request
 from tests.control.other_client import image
 from tests.control.scan import POLL_S, Outcome, Scan, started
 
@@ -411,30 +412,36 @@ NOW = Moment(10.0, 1000)
 OLD = Moment(NOW.time - LAG_S, NOW.reads - LAG_READS)
 
 
+def asked(position: int, *, again: bool = False, since: Moment | None = LONG_AGO) -> Target:
+    """One request of A."""
+    request = Request(go=True, axes=(AxisRequest(position),) * 4)
+    return Target(A, Entry(request, request.echo, is_ours=True, sent=0.0), again, since)
+
+
 def rest(what: ObjectStatus, position: int, *asked: Target) -> Rest:
     """The known rest of an axis with these requests, the oldest first."""
-    return rest_of(reversed(asked), THREE_FINGER, what, position)
+    return rest_of(asked, THREE_FINGER, what, position)
 
 
 def doubted(what: ObjectStatus, position: int, *asked: Target) -> bool:
-    return may_move(reversed(asked), THREE_FINGER, what, position)
+    return may_move(asked, THREE_FINGER, what, position)
 
 
 def test_a_status_is_trusted_unless_an_earlier_request_explains_it() -> None:
-    assert rest(THERE, 100) is Rest.PROVEN
-    assert rest(MOVING, 100) is Rest.UNKNOWN
-    assert not doubted(CLOSING, 100)
-    assert rest(CLOSING, 9, Target(0), Target(255)) is Rest.PROVEN, "it fits the new request alone"
-    assert rest(CLOSING, 9, Target(255), Target(0)) is Rest.UNKNOWN
-    asked = Target(255), Target(0), Target(255)
-    assert rest(CLOSING, 150, *asked) is Rest.UNKNOWN, "it fitted before, and was contradicted since"
-    assert doubted(CLOSING, 150, *asked)
+    assert rest(THERE, 100, asked(255)) is Rest.PROVEN
+    assert rest(MOVING, 100, asked(255)) is Rest.UNKNOWN
+    assert not doubted(CLOSING, 100, asked(0))
+    assert rest(CLOSING, 9, asked(0), asked(255)) is Rest.PROVEN, "it fits the new request alone"
+    assert rest(CLOSING, 9, asked(255), asked(0)) is Rest.UNKNOWN
+    to_and_fro = asked(255), asked(0), asked(255)
+    assert rest(CLOSING, 150, *to_and_fro) is Rest.UNKNOWN, "it fitted before, and was contradicted since"
+    assert doubted(CLOSING, 150, *to_and_fro)
 
 
 def test_an_axis_that_is_where_it_was_asked_to_be_rests_and_an_older_status_may_follow() -> None:
-    assert rest(THERE, 101, Target(0), Target(100)) is Rest.KNOWN
-    assert rest(THERE, 101, Target(100)) is Rest.PROVEN
-    assert rest(THERE, 110, Target(0), Target(100)) is Rest.UNKNOWN
+    assert rest(THERE, 101, asked(0), asked(100)) is Rest.KNOWN
+    assert rest(THERE, 101, asked(100)) is Rest.PROVEN
+    assert rest(THERE, 110, asked(0), asked(100)) is Rest.UNKNOWN
 
 
 @pytest.mark.parametrize(("seconds", "reads"), [(0.001, 0), (0.0, 1)])
@@ -445,13 +452,12 @@ def test_the_lag_takes_both_time_and_reads(seconds: float, reads: int) -> None:
 
 
 def test_nothing_is_known_under_what_does_not_act() -> None:
-    assert rest(THERE, 100, Target(101), Target(100, since=None)) is Rest.UNKNOWN
+    assert rest(THERE, 100, asked(101), asked(100, since=None)) is Rest.UNKNOWN
 
 
 def asked_of(scan: Scan, axis: Finger) -> int:
     """The number of requests of an axis that a status may be from."""
-    ledger = scan.controller._ledger
-    return len([*ledger._unproven[axis].targets(ledger.now)])
+    return len(scan.controller._ledger.requests.targets[axis])
 
 
 @LAGS
@@ -479,14 +485,14 @@ def test_a_status_after_a_motion_is_not_from_before_it() -> None:
 
 @pytest.mark.parametrize(("position", "doubtful"), [(100, True), (102, True), (103, False), (105, False)])
 def test_an_axis_between_two_requests_may_have_some_counts_to_go(position: int, doubtful: bool) -> None:
-    assert doubted(THERE, position, Target(100), Target(104)) is doubtful
+    assert doubted(THERE, position, asked(100), asked(104)) is doubtful
 
 
 def test_a_contact_that_is_tried_again_is_known_when_the_lag_is_over() -> None:
-    asked = Target(255), Target(255, again=True)
-    assert rest(CLOSING, 150, *asked) is Rest.UNKNOWN
-    assert not doubted(CLOSING, 150, *asked), "for a hold it is a grip"
-    assert rest(CLOSING, 150, *asked[1:]) is Rest.PROVEN
+    twice = asked(255), asked(255, again=True)
+    assert rest(CLOSING, 150, *twice) is Rest.UNKNOWN
+    assert not doubted(CLOSING, 150, *twice), "for a hold it is a grip"
+    assert rest(CLOSING, 150, *twice[1:]) is Rest.PROVEN
 
 
 # -- another client, while the object status is late ------------------------------------------------------

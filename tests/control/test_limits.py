@@ -297,7 +297,7 @@ def test_a_halt_and_a_reset_by_others_are_no_limits(byte_0: int) -> None:
 
 def shown(limits: Limits, image: Request) -> None:
     """The gripper echoes an image as it was written."""
-    entry = Entry(1, image, image.echo, is_ours=True, sent=0.0)
+    entry = Entry(image, image.echo, is_ours=True, sent=0.0)
     limits.settle(entry, entry, image.echo)
 
 
