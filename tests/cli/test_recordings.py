@@ -23,6 +23,7 @@ from mcap.writer import Writer
 from rosbags.highlevel import AnyReader
 
 from robotiq_async import RobotiqHand, State
+from robotiq_async.cli.commands.recordings import TOPIC_KINDS
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.recording.recorder import Recorder
 from robotiq_async.tools.recording.recordings import read_recording
@@ -102,7 +103,10 @@ def test_a_recording_named_csv_is_a_table_and_needs_no_mcap(
 
 
 async def test_a_recorder_makes_the_same_table(call: Call, tmp_path: Path) -> None:
-    """The table equals an export of the same recording, except for the rows at which a state begins."""
+    """The table equals an export of the same recording, except for the rows at which a state begins.
+
+    It has all columns: a recorder does not know which will get a value.
+    """
     table, file, exported = tmp_path / "it.csv", tmp_path / "it.mcap", tmp_path / "exported.csv"
     hand = RobotiqHand("sim://?speedup=20")
     async with Recorder(hand, table), Recorder(hand, file), hand:
@@ -111,7 +115,7 @@ async def test_a_recorder_makes_the_same_table(call: Call, tmp_path: Path) -> No
     for one, other in zip(rows_of(table), rows_of(exported), strict=True):
         for row in (one, other):
             del row["state"], row["time"]  # each recorder compares the clocks by itself
-        assert one == other
+        assert one == dict.fromkeys(one, "") | other
     with pytest.raises(ValueError, match="ros2 is for MCAP files"):
         Recorder(hand, tmp_path / "joints.csv", ros2=True)
 
@@ -188,6 +192,76 @@ def test_export_has_a_row_for_every_poll(grasp: Path, call: Call) -> None:
     assert len(rows[0]["registers"].split()) == 8
 
 
+JAW_LACKS = {name for name in COLUMNS["status"] if name.startswith(("B.", "C.", "SCISSOR."))}
+FINGER_LACKS = {"label", "values", "contacts"}
+"""Nothing is marked and nothing touched in the recordings below."""
+
+
+@pytest.mark.parametrize(
+    ("address", "lacks"),
+    [
+        ("sim://?", FINGER_LACKS),
+        ("sim://?model=2f85&", FINGER_LACKS | JAW_LACKS),
+        ("sim://?model=2f140&", FINGER_LACKS | JAW_LACKS),
+        ("sim://?model=hand-e&", FINGER_LACKS | JAW_LACKS),
+    ],
+)
+@pytest.mark.parametrize("kind", ["statuses", "commands", "events"])
+async def test_a_column_without_a_value_is_left_out(
+    address: str, lacks: set[str], kind: str, call: Call, tmp_path: Path
+) -> None:
+    file, table = tmp_path / "it.mcap", tmp_path / "it.csv"
+    hand = RobotiqHand(f"{address}speedup=20")
+    async with hand, Recorder(hand, file):
+        await hand.move(60)
+    convention = ["--convention", "COUNTS"] * (kind == "statuses")
+    outcome = call("export", str(file), "--of", kind, *convention)
+    outcome.assert_succeeded()
+    rows = rows_of(table)
+    columns = list(rows[0])
+    assert [name for name in columns if not any(row[name] for row in rows)] == []
+    left_out = [name for name in COLUMNS[TOPIC_KINDS[kind]] if name not in columns]
+    words = f"Left out, without a value in any row: {', '.join(left_out)}\n"
+    assert outcome.err == words * bool(left_out)
+    assert columns == [name for name in COLUMNS[TOPIC_KINDS[kind]] if name not in left_out], "in their order"
+    if kind == "statuses":
+        assert set(left_out) == lacks
+
+
+async def test_a_column_that_gets_its_first_value_late_is_kept(call: Call, tmp_path: Path) -> None:
+    file = tmp_path / "it.mcap"
+    hand = RobotiqHand("sim://?model=2f85&speedup=20")
+    async with hand, Recorder(hand, file) as recorder:
+        await hand.move(60)
+        recorder.mark("late", object="cup")
+        await hand.move(90)
+    call("export", str(file), "--convention", "COUNTS").assert_succeeded()
+    rows = rows_of(file.with_suffix(".csv"))
+    labels = [row["label"] for row in rows]
+    assert labels == sorted(labels), "empty ones first"
+    assert {"", "late"} == {*labels}
+    assert [json.loads(row["values"]) for row in rows if row["values"]] == [{"object": "cup"}] * labels.count(
+        "late"
+    )
+
+
+def test_a_value_that_only_the_last_row_has_is_kept(foreign: Callable[..., Path], call: Call) -> None:
+    states = [event(kind="state", target="RESET")] * 300
+    file = foreign(*states, event(kind="fault", fault="NONE", fault_code=0, description="0"))
+    outcome = call("export", str(file), "--of", "events")
+    rows = rows_of(file.with_suffix(".csv"))
+    assert [row["fault_code"] for row in rows] == [""] * 300 + ["0"]
+    assert rows[0].keys() == {"time", "kind", "timestamp", "target", "fault", "fault_code", "description"}
+    assert "source" in outcome.err
+
+
+def test_an_export_that_leaves_nothing_out_says_nothing(foreign: Callable[..., Path], call: Call) -> None:
+    filled = dict.fromkeys(COLUMNS["event"][1:], "x") | {"values": {"a": 1}}
+    outcome = call("export", str(foreign(json.dumps(filled).encode())), "--of", "events")
+    outcome.assert_succeeded()
+    assert outcome.err == ""
+
+
 def test_export_in_the_numbers_of_a_learning_stack(grasp: Path, call: Call) -> None:
     """The name of the column has the sign: no reader guesses it."""
     table = grasp.with_name("stack.csv")
@@ -196,7 +270,7 @@ def test_export_in_the_numbers_of_a_learning_stack(grasp: Path, call: Call) -> N
     for row, (_, fields) in zip(rows, polls, strict=True):
         shares: list[float] = [fields[finger]["open_fraction"] for finger in "ABC"]  # type: ignore[index]
         assert float(row["DROID"]) == pytest.approx(1 - sum(shares) / 3)
-    assert rows[0].keys() - {"DROID"} == {*COLUMNS["status"]}
+    assert rows[0].keys() - {"DROID"} == {*COLUMNS["status"]} - {"label", "values"}
 
 
 def test_a_scale_that_export_does_not_know_and_one_without_an_opening_are_wrong_usage(

@@ -143,7 +143,7 @@ async def test_marks_are_events_and_label_what_comes_after_them(hand: RobotiqHan
         ("grasp 2", {}),
         ("", {}),
     ]
-    assert export(read_recording(mcap), "status", exported, None)
+    assert export(read_recording(mcap), "status", exported, None).rows
     for file in (csv_file, exported):
         rows = table(file)
         labels = [row["label"] for row in rows]
@@ -155,7 +155,7 @@ async def test_marks_are_events_and_label_what_comes_after_them(hand: RobotiqHan
             "grasp 2": "",
             "": "",
         }, "a table has nowhere else for them"
-    assert export(read_recording(mcap), "event", exported, None)
+    assert export(read_recording(mcap), "event", exported, None).rows
     row = next(each for each in table(exported) if each["label"] == "grasp 1")
     assert json.loads(row["values"]) == {"object": "cup", "weight": 0.25, "wet": False}
 
@@ -213,7 +213,7 @@ def test_text_that_utf_8_does_not_have_is_exported_all_the_same(tmp_path: Path) 
     foreign = RecordedMessage(
         "/gripper/event", 0, 1, b'{"kind": "mark", "label": "part \\udcff", "values": {}}', is_json=True
     )
-    assert export([foreign], "event", tmp_path / "it.csv", None) == 1
+    assert export([foreign], "event", tmp_path / "it.csv", None).rows == 1
     assert table(tmp_path / "it.csv")[0]["label"] == "part \\udcff"
 
 

@@ -119,9 +119,10 @@ def export(
     """Write a recording as a table, CSV, for spreadsheets and pandas.
 
     A row for each poll, with the time of the wall clock in UTC. With --of a row for each
-    command or event. Stacks differ in the sign of an opening, so a table of polls says whose
-    numbers it has: COUNTS are the gripper's own, 0 open .. 255 closed, and any other adds a
-    column of its name.
+    command or event. Columns that have no value in any row are left out, and named on
+    stderr: the axes that a model lacks, label and values where there are no marks. Stacks
+    differ in the sign of an opening, so a table of polls says whose numbers it has: COUNTS
+    are the gripper's own, 0 open .. 255 closed, and any other adds a column of its name.
 
     For example:
 
@@ -146,10 +147,12 @@ def export(
         raise UsageError(f"{file} is the table itself: name the recording")
     _keep(table, overwrite=overwrite)
     with file_errors(table):
-        rows = write(entries, TOPIC_KINDS[of], table, named)
-    if not rows:
+        written = write(entries, TOPIC_KINDS[of], table, named)
+    if not written.rows:
         raise CommandError(f"{file}: it contains no {of}")
-    print(f"{rows} {of} in {table}")
+    print(f"{written.rows} {of} in {table}")
+    if written.left_out:
+        print(f"Left out, without a value in any row: {', '.join(written.left_out)}", file=sys.stderr)
 
 
 def _convention(name: str | None, of: str) -> Convention | None:

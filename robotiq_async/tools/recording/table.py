@@ -9,12 +9,14 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import UTC, datetime
 from heapq import heappop, heappush
-from itertools import chain
+from itertools import chain, compress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from tempfile import TemporaryFile
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ...calibration import Convention, write_rows
 from .feed import EVENT, STATUS, Message
@@ -155,34 +157,45 @@ class CsvFile:
         self._write(line.getvalue().encode())
 
 
+class Exported(NamedTuple):
+    """The outcome of :func:`export`.
+
+    Attributes:
+        rows: their number; 0 writes no file.
+        left_out: columns that have no value in any row.
+    """
+
+    rows: int
+    left_out: tuple[str, ...]
+
+
 def export(
     entries: Iterable[RecordedMessage], kind: str, target: Path | str, convention: Convention | None
-) -> int:
+) -> Exported:
     """Write the messages of one kind into a CSV file, all or none; an existing file is replaced.
 
-    With a convention statuses have a last column of its name: the opening in its numbers. It is asked for, as
-    None, too, so that nobody guesses the sign of another column.
-
-    Returns:
-        The number of rows; 0 writes no file.
+    A column that has no value in any row is left out. With a convention statuses have a last column of its
+    name: the opening in its numbers. It is asked for, as None, too, so that nobody guesses the sign of
+    another column.
 
     Raises:
         RecordingError: a message does not have a recorder's format.
         OSError: the file cannot be written; it is unchanged.
     """
-    count = 0
-
-    def counted() -> Iterator[list[object]]:
-        nonlocal count
+    table = Table(kind, convention)
+    count, filled = 0, [False] * len(table.columns)
+    # Which columns have a value is known at the last row, and memory does not hold the rows of an hour.
+    with TemporaryFile("w+", encoding="ascii", dir=Path(os.path.realpath(target)).parent) as waiting:
         for row in _rows(entries, kind, table):
             count += 1
-            yield row
-
-    table = Table(kind, convention)
-    rows = counted()
-    if (first := next(rows, None)) is not None:
-        write_rows(target, chain([table.columns, first], rows))
-    return count
+            filled = [had or cell not in (None, "") for had, cell in zip(filled, row, strict=True)]
+            waiting.write(f"{json.dumps(row)}\n")
+        if count:
+            waiting.seek(0)
+            rows = chain([table.columns], map(json.loads, waiting))
+            write_rows(target, (list(compress(row, filled)) for row in rows))
+    left_out = (name for name, has_value in zip(table.columns, filled, strict=True) if not has_value)
+    return Exported(count, tuple(left_out))
 
 
 def _rows(entries: Iterable[RecordedMessage], kind: str, table: Table) -> Iterator[list[object]]:
