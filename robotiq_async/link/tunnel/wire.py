@@ -64,8 +64,7 @@ class TunnelWire:
 
     def _send(self, pdu: bytes) -> None:
         self._give_up()
-        self._call = call = self._worker.begin(lambda: self._tunnel.exchange(pdu))
-        call.done.add_done_callback(lambda _: self._take(call))
+        self._call = call = self._worker.begin(lambda: self._tunnel.exchange(pdu), lambda: self._take(call))
 
     def _take(self, call: TunnelCall) -> None:
         """Pass on what a call came to, if it is still waited for."""

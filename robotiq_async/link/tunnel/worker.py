@@ -1,4 +1,4 @@
-"""_Calls of foreign coroutines, made in a task of their own so that they cannot block the caller."""
+"""Calls of foreign coroutines, made in a task of their own so that they cannot block the caller."""
 
 from __future__ import annotations
 
@@ -37,16 +37,17 @@ class Worker:
             Exception: raised by the call; a CancelledError of its own becomes a RuntimeError.
         """
         loop = asyncio.get_running_loop()
-        call = self._put(what)
+        ended = loop.create_future()
+        call = self._put(what, lambda: ended.set_result(None))
         due = loop.time() + seconds
         try:
-            await asyncio.wait({call.done}, timeout=seconds)
-            if not call.done.done() and loop.time() - due > HELD_S:
+            await asyncio.wait({ended}, timeout=seconds)
+            if not ended.done() and loop.time() - due > HELD_S:
                 # The loop was blocked: a result that waits by now is in time.
-                await asyncio.wait({call.done}, timeout=GRACE_S)
+                await asyncio.wait({ended}, timeout=GRACE_S)
         finally:
             call.give_up()
-        if not call.done.done():
+        if not ended.done():
             why = "" if call.task else ": the previous call ignored its cancellation"
             raise LateError(f"within {seconds:g} s{why}")
         if call.error is None:
@@ -56,13 +57,13 @@ class Worker:
             raise call.error
         raise RuntimeError(f"it ended with {call.error!r}") from call.error
 
-    def begin(self, what: Callable[[], Awaitable[Any]]) -> TunnelCall:
-        """Begin a call, after those before it; its ``done`` comes when it has ended."""
-        return self._put(what)
+    def begin(self, what: Callable[[], Awaitable[Any]], on_end: Callable[[], None]) -> TunnelCall:
+        """Begin a call, after those before it; ``on_end`` is called as soon as it has ended."""
+        return self._put(what, on_end)
 
     def end(self, what: Callable[[], Awaitable[None]]) -> None:
         """Make a last call, which must limit its own time and not fail, then end the task. Does not wait."""
-        self._put(what, is_last=True)
+        self._put(what, lambda: None, is_last=True)
 
     async def ended(self, seconds: float) -> bool:
         """Wait for the end of the task; returns whether it has ended."""
@@ -70,9 +71,11 @@ class Worker:
             await asyncio.wait({self._task}, timeout=seconds)
         return self._task is None or self._task.done()
 
-    def _put(self, what: Callable[[], Awaitable[Any]], *, is_last: bool = False) -> TunnelCall:
+    def _put(
+        self, what: Callable[[], Awaitable[Any]], on_end: Callable[[], None], *, is_last: bool = False
+    ) -> TunnelCall:
         loop = asyncio.get_running_loop()
-        call = TunnelCall(what, loop.create_future(), is_last)
+        call = TunnelCall(what, on_end, is_last)
         if self._task is None or self._task.done() or self._task.get_loop() is not loop:
             self._calls = _Calls()
             self._start(loop)
@@ -125,17 +128,17 @@ class TunnelCall:
     """One call and its outcome.
 
     Attributes:
-        done: comes to None when the call has ended; never if it was given up before it began.
-        result: what it returned.
-        error: what it raised.
+        task: the task that runs the call, as long as it runs.
+        result: the value that it returned.
+        error: the exception that it raised.
     """
 
-    def __init__(self, what: Callable[[], Awaitable[Any]], done: asyncio.Future[None], is_last: bool) -> None:
+    def __init__(self, what: Callable[[], Awaitable[Any]], on_end: Callable[[], None], is_last: bool) -> None:
         self._what: Final = what
-        self.done: Final = done
+        self._on_end: Final = on_end
         self.is_last: Final = is_last
         self.is_given_up: bool = False
-        self.task: asyncio.Task[Any] | None = None  # the task that runs the call, once it has begun
+        self.task: asyncio.Task[Any] | None = None
         self.result: Any = None
         self.error: BaseException | None = None
 
@@ -150,14 +153,14 @@ class TunnelCall:
             if not (isinstance(error, Exception) or self.is_given_up):
                 raise
         finally:
-            if not self.done.get_loop().is_closed():
-                self.done.set_result(None)
+            self.task = None
+            if not task.get_loop().is_closed():
+                self._on_end()
         while self.is_given_up and task.cancelling():
             task.uncancel()
 
     def give_up(self) -> None:
         """Cancel the call if it has not ended."""
-        if not self.done.done():
-            self.is_given_up = True
-            if self.task is not None:
-                self.task.cancel()
+        self.is_given_up = True
+        if self.task is not None:
+            self.task.cancel()
