@@ -20,18 +20,19 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
+from itertools import cycle
 from typing import Final
 
 from ..runtime.logger import Log
 from ..values.errors import ResponseTimeoutError, RobotiqConnectionError
 from ..values.registers import REGISTER_COUNT, RegisterMap, Registers
 from . import transport
-from .exchange import Answer, Exchange, Timing
+from .exchange import Exchange, Timing
 from .frames import read_request, registers_in, write_and_read_request, write_request
 from .in_force import image_in_force, shows
 from .line import Dialogue, Line, Step
-from .outcome import Noise, Outcome, Refused, Silent
+from .outcome import Answer, Noise, Outcome, Refused, Silent, check
 from .serial.patience import USUAL_RESPONSE_S
 
 REPEAT_S: Final = 0.15
@@ -49,8 +50,6 @@ REPEAT_WARNING_S: Final = 60.0
 
 Decide = Callable[[], Sequence[int] | None]
 """Returns the image to write, or None; called in the turn of the loop in which a write leaves."""
-DialoguePart = Generator[Exchange | Step, Answer | None, Outcome | None]
-"""A part of a dialogue; returns the outcome that ended it badly, or None."""
 
 
 class Dialogues:
@@ -59,8 +58,7 @@ class Dialogues:
     Attributes:
         line: the line to it.
         repeats: number of reads repeated because an answer was missing or damaged.
-        serves_23: whether function 23 is used; None while it has yet to be tried.
-        has_served_23: whether it was answered once.
+        serves_23: whether the gripper serves function 23; None while it has not shown that.
     """
 
     def __init__(
@@ -74,8 +72,7 @@ class Dialogues:
         """``make`` makes the exchange of a request (unit and PDU) in the form of the line."""
         self.line: Line = line
         self.repeats: int = 0
-        self.serves_23: bool | None = registers.write_function == 23 and (True if registers.is_sure else None)
-        self.has_served_23: bool = False
+        self.serves_23: bool | None = None if registers.write_function == 23 else False
         self._map: Final = registers
         self._make: Final = make
         self._usual: Final = Timing(response_timeout)
@@ -85,14 +82,13 @@ class Dialogues:
         self._repeat_s: Final = response_timeout if response_timeout > USUAL_RESPONSE_S else REPEAT_S
         self._log: Final = log
         self._poll: Final = read_request(registers, registers.count)
-        self._has_probed = False
-        self._probe = registers.count - 1
-        """Registers that the last read to bring the line in step asked for."""
-        self._rest: Registers = ()
-        """The registers after those that a poll reads, as the first opening found them, if any was not 0."""
+        self._probes: Final = cycle(read_request(registers, count) for count in range(1, registers.count))
+        """Reads to bring the line in step, each of another number of registers than the one before."""
+        self._rest: Registers | None = None
+        """The registers after those that a poll reads, as the first probe found them; None before it."""
         self._outstanding: Final[deque[bytes]] = deque(maxlen=MOST_OUTSTANDING)
         """Requests whose answers may still come, in order: function, address and number of registers."""
-        self._unanswered: Final[deque[float]] = deque(maxlen=MOST_UNANSWERED)
+        self._unanswered: Final = deque((-math.inf,) * MOST_UNANSWERED, MOST_UNANSWERED)
         """The times of the last reads that were repeated because there was no answer."""
         self._image: Sequence[int] | None = None
         """The last image that was acknowledged; empty after one that was not, None before the first."""
@@ -115,14 +111,14 @@ class Dialogues:
         when it sees one. Over TCP an answer that is only late gives itself away by its transaction id. A
         device with three registers may refuse the read of eight, or not answer it.
         """
-        asks_for_rest = not self._has_probed and self._map.count < REGISTER_COUNT
+        asks_for_rest = self._rest is None and self._map.count < REGISTER_COUNT
         first = yield from self._probed()
-        if first is not None:
+        if isinstance(first, Outcome):
             is_harmless = isinstance(first, Silent) or (asks_for_rest and isinstance(first, Refused))
             if not (is_harmless or self._can_repeat(first)):
                 raise first.error
             yield Step.TURN
-            if (again := (yield from self._in_step(self._repeated()))) is not None:
+            if isinstance(again := (yield from self._in_step(self._repeated())), Outcome):
                 raise first.error from again.error
             if asks_for_rest:
                 what = "%s did not answer a read of all registers: %s"
@@ -133,7 +129,7 @@ class Dialogues:
     def read(self) -> Dialogue[Registers]:
         """Read the status."""
         came_to = yield self._ask(self._poll)
-        if not isinstance(came_to, bytes):
+        if isinstance(came_to, Outcome):
             came_to = yield from self._again(came_to)
         return self._status_in(came_to)
 
@@ -142,8 +138,7 @@ class Dialogues:
         yield from self._ready()
         if (image := decide()) is None:
             return False
-        if (bad := (yield from self._written(image, self._whole))) is not None:
-            raise bad.error
+        check((yield from self._written(image, self._whole)))
         return True
 
     def write_and_read(self, decide: Decide) -> Dialogue[transport.WriteAnswer | None]:
@@ -156,38 +151,36 @@ class Dialogues:
         which it would decide is too old.
         """
         yield from self._ready()
-        if self.serves_23 is None and (in_force := self._to_try()):
-            came_to = yield from self._tried(in_force)
+        uses_23 = self._map.is_sure if self.serves_23 is None else self.serves_23
+        if self.serves_23 is None and not uses_23 and (known := image_in_force(self._status, self._image)):
+            came_to = yield from self._written(known, self._usual, reads=True)
             if isinstance(came_to, Outcome) and not isinstance(came_to, Refused):
                 yield from self._again(came_to)
             return None
         if (image := decide()) is None:
             return None
-        bad: bytes | Outcome | None
-        timing = self._timing_of(image)
-        if self.serves_23:
-            bad = yield from self._tried(image, timing)
-            if isinstance(bad, bytes):
-                return transport.WriteAnswer(self._status_in(bad), None)
-            if isinstance(bad, Refused) and bad.is_unknown_function:
-                if not (yield from self.write(decide)):
-                    return None
-                yield Step.TURN
-                return transport.WriteAnswer((yield from self.read()), None)
-        elif (bad := (yield from self._written(image, timing))) is None:
+        # A status that follows tells nothing if it had that echo before.
+        is_shown = self.line.is_shared and self._status and shows(self._status, image)
+        came_to = yield from self._written(image, self._whole if is_shown else self._usual, reads=uses_23)
+        if isinstance(came_to, bytes):
+            status = self._status_in(came_to) if uses_23 else (yield from self.read())
+            return transport.WriteAnswer(status, None)
+        if uses_23 and isinstance(came_to, Refused) and came_to.is_unknown_function:
+            if not (yield from self.write(decide)):
+                return None
+            yield Step.TURN
             return transport.WriteAnswer((yield from self.read()), None)
-        if not (isinstance(bad, Refused) or self._can_repeat(bad)):
-            raise bad.error
-        return transport.WriteAnswer(self._status_in((yield from self._second(bad))), bad.error)
+        again = self._second if isinstance(came_to, Refused) else self._again
+        return transport.WriteAnswer(self._status_in((yield from again(came_to))), came_to.error)
 
     def stop_or_read(self, decide: Decide) -> Dialogue[Registers | None]:
         """Write what ``decide`` returns when the turn has come; read the status if that is nothing.
 
         After a disturbance it reads, which brings the line in step before a write.
         """
-        if (yield Step.READY) is None and (image := decide()) is not None:
-            if (bad := (yield from self._written(image, self._whole))) is not None:
-                raise bad.error
+        is_ready = not isinstance((yield Step.READY), Outcome)
+        if is_ready and (image := decide()) is not None:
+            check((yield from self._written(image, self._whole)))
             return None
         return (yield from self.read())
 
@@ -197,49 +190,32 @@ class Dialogues:
         """Make sure that a write leaves at once: it must not meet what is left of a disturbance."""
         obstacle = yield Step.READY
         if isinstance(obstacle, Outcome) and self._can_repeat(obstacle):
-            if (worse := (yield from self._in_step())) is not None:
-                raise worse.error
+            check((yield from self._in_step()))
             obstacle = yield Step.READY  # once: some lines add a byte to every reply
-        if isinstance(obstacle, Outcome):
-            raise obstacle.error
+        check(obstacle)
 
-    def _written(self, image: Sequence[int], timing: Timing | None = None) -> DialoguePart:
-        """Write an image with function 16."""
+    def _written(self, image: Sequence[int], timing: Timing, *, reads: bool = False) -> Dialogue[Answer]:
+        """Write an image: with function 16, or with 23 if it also reads; learn whether that is served."""
         self._image = ()
-        came_to = yield self._ask(write_request(self._map, image), timing)
-        if isinstance(came_to, Outcome):
-            self._note_unheard(came_to)
-            return came_to
-        self._outstanding.clear()
-        self._image = image
-        return None
-
-    def _tried(self, image: Sequence[int], timing: Timing | None = None) -> Dialogue[bytes | Outcome]:
-        """Write an image with function 23, and learn whether that is served."""
-        self._image = ()
-        came_to = yield self._ask(write_and_read_request(self._map, image), timing)
-        assert came_to is not None, "an exchange comes to something"
+        request = (write_and_read_request if reads else write_request)(self._map, image)
+        came_to = yield self._ask(request, timing)
         if isinstance(came_to, bytes):
-            self.serves_23, self.has_served_23, self._image = True, True, image
-        elif not self.has_served_23 and isinstance(came_to, Refused | Silent):
+            self._outstanding.clear()
+            self._image = image
+            self.serves_23 = reads or self.serves_23
+        elif reads and self.serves_23 is None and isinstance(came_to, Refused | Silent):
             self.serves_23 = False
             what = "%s is written with function 16: %s"
             self._log.warning(what, self.line.address, came_to.error)
-        else:
-            self._note_unheard(came_to)
+        elif isinstance(came_to, Silent) and not self.line.is_shared:
+            # A stop that comes again must be heard. The trial at the next opening would cost another response
+            # timeout, in which fingers go on. On a line that others use it takes a short question, and they
+            # would pay for a gripper that is dead.
+            self._keep_long_silence(came_to.error)
         return came_to
 
-    def _timing_of(self, image: Sequence[int]) -> Timing:
-        """The limits of a write that a status follows, which tells nothing if it had that echo before."""
-        is_shown = self.line.is_shared and self._status and shows(self._status, image)
-        return self._whole if is_shown else self._usual
-
-    def _to_try(self) -> Sequence[int]:
-        """The image with which function 23 may be tried, or empty."""
-        return image_in_force(self._status, self._image) if self._map.count < REGISTER_COUNT else ()
-
-    def _again(self, first: Answer | None) -> Dialogue[bytes]:
-        assert isinstance(first, Outcome)
+    def _again(self, first: Outcome) -> Dialogue[bytes]:
+        """Read once more, if that can help."""
         if not self._can_repeat(first):
             raise first.error
         return (yield from self._second(first))
@@ -257,23 +233,22 @@ class Dialogues:
         while True:
             yield Step.TURN
             timing = self._repeated(is_long=True)  # the shorter silence may be why there was no answer
-            came_to: Answer | None = yield from self._in_step(timing)
-            if came_to is None:
+            came_to = yield from self._in_step(timing)
+            if isinstance(came_to, bytes):
                 came_to = yield self._ask(self._poll, timing)
             if isinstance(came_to, bytes):
                 self._note_repeat(first.error)
                 return came_to
-            assert came_to is not None, "an exchange comes to something"
             is_asked_again = isinstance(came_to, Silent | Noise) and self.line.is_shared
             if not is_asked_again or self.line.now() > until:
                 raise first.error from came_to.error
 
-    def _in_step(self, timing: Timing | None = None) -> DialoguePart:
+    def _in_step(self, timing: Timing | None = None) -> Dialogue[Answer]:
         """Wait for silence, and drop the rest of a damaged reply; then make sure that nothing can come."""
         noise = yield Step.HUSH
         return noise if isinstance(noise, Outcome) else (yield from self._probed(timing))
 
-    def _probed(self, timing: Timing | None = None) -> DialoguePart:
+    def _probed(self, timing: Timing | None = None) -> Dialogue[Answer]:
         """Make sure that no answer to an earlier request is still on its way.
 
         Serial replies carry no transaction id, and a gateway from TCP to a serial line gives a late reply the
@@ -284,22 +259,19 @@ class Dialogues:
 
         The first one of all asks a jaw for eight registers, which show a wrong model.
         """
-        count, is_first, self._has_probed = self._map.count, not self._has_probed, True
-        if is_first and count < REGISTER_COUNT:
-            came_to = yield self._ask(read_request(self._map, REGISTER_COUNT), timing)
-            if isinstance(came_to, bytes):
-                rest = registers_in(came_to)[count:]
-                self._rest = rest if any(rest) else ()
-                self._outstanding.clear()
-            return came_to if isinstance(came_to, Outcome) else None
-        while True:
-            self._probe = self._probe % (count - 1) + 1
-            request = read_request(self._map, self._probe)
-            came_to = yield self._ask(request, timing)
-            if isinstance(came_to, Outcome):
+        if self._rest is None:
+            self._rest = ()
+            if self._map.count < REGISTER_COUNT:
+                came_to = yield self._ask(read_request(self._map, REGISTER_COUNT), timing)
+                if isinstance(came_to, bytes):
+                    self._rest = registers_in(came_to)[self._map.count :]
+                    self._outstanding.clear()
                 return came_to
-            if self._is_in_step_after(request):
-                return None
+        while True:
+            request = next(self._probes)
+            came_to = yield self._ask(request, timing)
+            if isinstance(came_to, Outcome) or self._is_in_step_after(request):
+                return came_to
 
     def _is_in_step_after(self, request: bytes) -> bool:
         """Whether no answer but those to probes can follow an answer to this probe."""
@@ -312,15 +284,15 @@ class Dialogues:
         """Read a few times after 3.5 characters of silence; take the longer one if an answer is missing."""
         for _ in range(SHORT_READS):
             yield Step.TURN  # one exchange for each: a slow gripper keeps others waiting
-            if (bad := (yield from self._probed())) is None:
+            came_to = yield from self._probed()
+            if isinstance(came_to, bytes):
                 continue
-            if not self._can_repeat(bad):
-                raise bad.error
-            if not isinstance(bad, Refused):
-                self._keep_long_silence(bad.error)
+            if not self._can_repeat(came_to):
+                raise came_to.error
+            if not isinstance(came_to, Refused):
+                self._keep_long_silence(came_to.error)
             yield Step.TURN
-            if (worse := (yield from self._in_step())) is not None:
-                raise worse.error
+            check((yield from self._in_step()))
             return
 
     # -- requests, and what outcomes mean ------------------------------------------------------------------
@@ -341,8 +313,8 @@ class Dialogues:
         return self._usual._replace(by=by, is_long=is_long)
 
     def _status_in(self, answer: bytes) -> Registers:
-        registers = registers_in(answer)
         self._outstanding.clear()
+        registers = registers_in(answer)
         self._status = registers[: self._map.count] + self._rest if self._rest else registers
         return self._status
 
@@ -350,31 +322,17 @@ class Dialogues:
         self.repeats += 1
         now = self.line.now()
         if isinstance(why, ResponseTimeoutError):
-            self._note_unanswered(why, now)
+            self._unanswered.append(now)
+            if now - self._unanswered[0] < UNANSWERED_S:
+                self._keep_long_silence(why)
         if now - self._warned >= REPEAT_WARNING_S:
             self._warned = now
             self._log.warning("a read was repeated: %s (%d times so far)", why, self.repeats)
 
-    def _note_unanswered(self, why: RobotiqConnectionError, now: float) -> None:
-        """Take the longer silence if reads stay unanswered that are answered when they are repeated."""
-        self._unanswered.append(now)
-        is_often = len(self._unanswered) == MOST_UNANSWERED and now - self._unanswered[0] < UNANSWERED_S
-        if is_often and self.line.keeps_silence and not self.line.silence.is_long:
-            self._keep_long_silence(why)
-
-    def _note_unheard(self, outcome: Outcome) -> None:
-        """Take the longer silence after a write without an answer: a stop that comes again must be heard.
-
-        The trial at the next opening would cost another response timeout, in which fingers go on. On a line
-        that others use it takes a short question, and they would pay for a gripper that is dead.
-        """
-        line = self.line
-        is_ours = line.keeps_silence and not line.is_shared
-        if isinstance(outcome, Silent) and is_ours and not line.silence.is_long:
-            self._keep_long_silence(outcome.error)
-
     def _keep_long_silence(self, why: RobotiqConnectionError) -> None:
-        silence = self.line.silence
-        silence.lengthen()
-        what = "%s does not answer after a silence of %.1f ms, so it gets 1.75 ms: %s"
-        self._log.warning(what, self.line.address, 1000 * silence.short_s, why)
+        """Take the longer silence from here on, because a request after the shorter one had no answer."""
+        line = self.line
+        if line.keeps_silence and not line.silence.is_long:
+            line.silence.lengthen()
+            what = "%s does not answer after a silence of %.1f ms, so it gets 1.75 ms: %s"
+            self._log.warning(what, line.address, 1000 * line.silence.short_s, why)

@@ -14,13 +14,11 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
-from ..values.errors import ProtocolError, ResponseTimeoutError
+from ..values.errors import ResponseTimeoutError
 from . import frames
-from .outcome import Noise, Outcome, Silent, Stray
-
-Answer = bytes | Outcome
+from .outcome import Answer, Noise, Silent, Stray
 
 
 class Timing(NamedTuple):
@@ -51,13 +49,18 @@ class Exchange(ABC):
     extra: Stray | None = None
 
     def __init__(self, frame: bytes, timing: Timing) -> None:
-        self.frame = frame
-        self.timing = timing
+        self.frame: Final = frame
+        self.timing: Final = timing
         self._received = b""
 
-    @abstractmethod
     def feed(self, data: bytes) -> Answer | None:
         """Take bytes; None while more must come."""
+        self._received += data
+        return self._verdict(self._received)
+
+    @abstractmethod
+    def _verdict(self, received: bytes) -> Answer | None:
+        """The verdict on all bytes so far; None while more must come."""
 
     def late(self, place: object, seconds: float) -> Silent:
         """The outcome when the reply has not come within so many seconds."""
@@ -71,8 +74,7 @@ class TcpExchange(Exchange):
         super().__init__(frames.tcp_frame(number, request), timing)
         self._expected = frames.expected_over_tcp(request)
 
-    def feed(self, data: bytes) -> Answer | None:
-        self._received = received = self._received + data
+    def _verdict(self, received: bytes) -> Answer | None:
         header, expected = self.frame[:4], self._expected
         # The usual case, which is cheap: the header is the only part of a reply that is not as the last time.
         is_usual = len(received) == 4 + expected.size and received.startswith(expected.start, 4)
@@ -88,8 +90,8 @@ class PduExchange(Exchange):
         super().__init__(request[1:], timing)
         self._expected = frames.expected_in_a_tunnel(request)
 
-    def feed(self, data: bytes) -> Answer | None:
-        return self._expected.verdict(data) or Noise(ProtocolError(f"half an answer: {frames.show(data)}"))
+    def _verdict(self, received: bytes) -> Answer | None:
+        return self._expected.verdict(received) or frames.noise(f"half an answer: {frames.show(received)}")
 
 
 class EchoFilter:
@@ -102,11 +104,8 @@ class EchoFilter:
     def __init__(self) -> None:
         self.is_on: bool | None = False
 
-    def begin(self, *, may_be_on: bool) -> None:
-        """A connection begins: what it does is not known, unless the wire cannot echo."""
-        self.is_on = None if may_be_on else False
-
-    def found(self, *, is_on: bool) -> None:
+    def learn(self, *, is_on: bool | None) -> None:
+        """Take what an exchange has shown; None for a new connection that may echo."""
         self.is_on = is_on
 
 
@@ -123,21 +122,21 @@ class SerialExchange(Exchange):
         self._has_others = has_others
         self._expected = frames.expected_reply(request, checksum=frames.CHECKSUM)
 
-    def feed(self, data: bytes) -> Answer | None:
-        self._received += data
-        reply = self._received if self._echo.is_on is False else self._without_echo(self._received)
+    def _verdict(self, received: bytes) -> Answer | None:
+        reply = received if self._echo.is_on is False else self._without_echo(received)
         if isinstance(reply, Noise):
             return reply
         if self._has_others:
             reply = frames.after_others(reply, self.frame[0])
-        size = self._expected.size
-        if len(reply) > size and frames.is_write(self.frame):
-            # A floating line makes up a byte when the device stops sending. The write is acknowledged
-            # nonetheless, and reporting it as in doubt would end the motion. A read is cheap to repeat.
-            reply, self.extra = reply[:size], frames.stray(reply[size:])
-        verdict = self._expected.verdict(reply)
+        # A floating line makes up a byte when the device stops sending. A write is acknowledged nonetheless,
+        # and reporting it as in doubt would end the motion. A read is cheap to repeat.
+        size = self._expected.size if frames.is_write(self.frame) else len(reply)
+        verdict = self._expected.verdict(reply[:size])
         if type(verdict) is bytes:
-            self._echo.found(is_on=bool(self._echo.is_on))
+            if self._echo.is_on is None:
+                self._echo.learn(is_on=False)
+            if len(reply) > size:
+                self.extra = frames.stray(reply[size:])
         return verdict
 
     def _without_echo(self, received: bytes) -> bytes | Noise:
@@ -146,9 +145,9 @@ class SerialExchange(Exchange):
         if received[:size] != self.frame[: len(received)]:
             if self._echo.is_on:
                 what = f"the line echoes what is sent, but not this time: {frames.show(received)}"
-                return Noise(ProtocolError(what))
+                return frames.noise(what)
             return received
         if len(received) < size:
             return b""
-        self._echo.found(is_on=True)
+        self._echo.learn(is_on=True)
         return received[size:]

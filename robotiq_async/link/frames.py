@@ -116,9 +116,9 @@ class Expected(NamedTuple):
         if _agree(frame, self.start):
             if len(frame) < self.size:
                 return None
-            return _noise(f"{len(frame) - self.size} bytes more than the answer: {show(frame)}")
+            return noise(f"{len(frame) - self.size} bytes more than the answer: {show(frame)}")
         if not _agree(frame, self.refusal):
-            return _noise(self._misfit(frame))
+            return noise(self._misfit(frame))
         if len(frame) < self.refusal_size:
             return None
         code = frame[len(self.refusal)]  # but a damaged reply refuses nothing
@@ -128,7 +128,7 @@ class Expected(NamedTuple):
         end = len(frame) - self.checksum
         if not self.checksum or FramerRTU.check_CRC(frame[:end], int.from_bytes(frame[end:], "big")):
             return None
-        return _noise(f"a wrong checksum: {show(frame)}")
+        return noise(f"a wrong checksum: {show(frame)}")
 
     def after(self, header: bytes) -> Expected:
         """The same reply with a header before it."""
@@ -230,7 +230,8 @@ def show(frame: bytes) -> str:
     return frame.hex(" ") if len(frame) <= 32 else f"{frame[:32].hex(' ')}... ({len(frame)} bytes)"
 
 
-def _noise(message: str) -> Noise:
+def noise(message: str) -> Noise:
+    """The outcome of bytes that cannot become the answer."""
     return Noise(ProtocolError(message))
 
 

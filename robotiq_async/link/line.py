@@ -27,6 +27,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import inspect
 import logging
 import math
 from collections.abc import Callable, Generator
@@ -39,9 +40,9 @@ from ..runtime.logger import Log, log
 from ..values.errors import ConnectFailedError, ConnectionLostError, ProtocolError, RobotiqConnectionError
 from .address import Address
 from .canonical import canonical_address
-from .exchange import Answer, EchoFilter, Exchange
+from .exchange import EchoFilter, Exchange
 from .frames import stray
-from .outcome import Lost, Noise, Outcome, Refused, Stray
+from .outcome import Answer, Lost, Noise, Outcome, Refused, Stray, check
 from .serial.patience import LinePatience
 from .serial.silence import Silence
 from .watchdog import Watchdog
@@ -70,8 +71,6 @@ class LineState(Enum):
 
 # Python 3.11 finds a member of an Enum by a detour that costs as much as a call: each poll asks for several.
 CLOSED, OPENING, IN_STEP, DISTURBED, HUSHING = LineState
-_IS_NEWS: Final = (OPENING, IN_STEP)
-"""The states in which bytes without a request mean something new."""
 
 
 class Step(Enum):
@@ -79,15 +78,17 @@ class Step(Enum):
 
     READY = "all that a request waits for; comes to what prevents one, if anything does"
     HUSH = "silence; comes to noise if there is none"
-    TURN = "that others have their turn; comes to nothing"
+    TURN = "that others have their turn"
 
 
 READY: Final = Step.READY
 HUSH: Final = Step.HUSH
 TURN: Final = Step.TURN
+DONE: Final = b""
+"""A wish that was fulfilled comes to this."""
 
-Dialogue = Generator[Exchange | Step, Answer | None, T]
-"""Yields steps and gets what they come to; an exchange always comes to an answer or an outcome."""
+Dialogue = Generator[Exchange | Step, Answer, T]
+"""Yields steps and gets what each comes to: an answer, or the outcome that prevents it."""
 
 
 class Line:
@@ -135,15 +136,34 @@ class Line:
         self._patience: Final = LinePatience()
         self._speaker: object = None
         """Who had the last turn, and has not left since."""
-        self._exchange: Exchange | None = None
-        """The exchange in flight."""
-        self._answer: asyncio.Future[Answer]
-        """The answer, or the outcome."""
+        self._in_flight: tuple[Exchange, asyncio.Future[Answer], float] | None = None
+        """The exchange in flight, what it comes to, and the longest time for that in seconds."""
         self._send: Send
         self._watchdog: Watchdog
 
     state: LineState
     why: Outcome | None
+
+    @classmethod
+    def shared(cls, address: Address, user: object, log: Log) -> Line:
+        """The line at an address, which all its users in the running event loop share.
+
+        It is held for ``user``, who has ``log``, until :meth:`release`, also while the connection is down.
+
+        Raises:
+            ConnectFailedError: others hold it with another rate, parity or number of stop bits.
+        """
+        place = asyncio.get_running_loop(), canonical_address(address)
+        line = _shared.get(place) or cls(address, shares=True)
+        holders = line._holders  # noqa: SLF001  # of the same kind
+        if line.address.line != address.line:
+            if holders:
+                raise ConnectFailedError(str(address), f"the port is in use as {line.address}")
+            line = cls(address, shares=True)
+            holders = line._holders
+        _shared[place] = line
+        holders[user] = log
+        return line
 
     def _become(self, state: LineState, why: Outcome | None = None) -> None:
         """Change the state; the log of each hand that has the line tells, at DEBUG."""
@@ -157,11 +177,6 @@ class Line:
     def is_shared(self) -> bool:
         """Whether several have it, be they users now or about to open it again."""
         return self._shares and len(self._holders) > 1
-
-    @property
-    def is_held(self) -> bool:
-        """Whether somebody will open it again."""
-        return bool(self._holders)
 
     def is_open_for(self, user: object) -> bool:
         return user in self._users
@@ -183,26 +198,24 @@ class Line:
             if self.state is CLOSED:
                 await self._connect(seconds)
             self._users.add(user)
-            try:
-                if self.address.is_socket and len(self._users) == 1:
-                    await self._settle()
-            except BaseException:
-                self.leave(user)
-                raise
 
     async def _connect(self, seconds: float) -> None:
         _close_left()
-        self._watchdog = Watchdog(lambda: self._exchange is not None, self._on_timeout)
-        self.echo.begin(may_be_on=self._wire.may_echo)
+        self._watchdog = Watchdog(lambda: self._in_flight is not None, self._on_timeout)
+        self.echo.learn(is_on=None if self._wire.may_echo else False)
         self._become(OPENING)
-        is_open = False
         try:
-            with Limit(seconds):
+            with Limit(seconds) as limit:
                 self._send = await self._wire.open(self._heard, self._note, seconds)
-                is_open = True
-            if not is_open:
+            if limit.is_over:
                 raise ConnectFailedError(str(self.address), f"no connection within {seconds:g} s")
-            if self.why is not None and (isinstance(self.why, Lost) or not self.forgives):
+            if self.address.is_socket:
+                # A gateway that keeps its own connection to the gripper may send late replies to its next
+                # client. Their transaction ids give them away too, but only when a request is already on its
+                # way. The reply to that request would be left over for the next connection, and so on
+                # without end.
+                await asyncio.sleep(SETTLE_S)
+            if self.why is not None and (isinstance(self.why, Lost) or self.address.is_socket):
                 raise renewed(self.why.error)
         except BaseException:
             self._close()
@@ -210,21 +223,6 @@ class Line:
         self._become(IN_STEP if self.why is None else DISTURBED, self.why)
         _opened[id(self)] = self
         self.silence.hear(self._watchdog.clock())  # whatever the line carried for the last connection
-
-    async def _settle(self) -> None:
-        """Wait for bytes left over from an earlier connection before the first request.
-
-        A gateway that keeps its own connection to the gripper may send late replies to its next client. Their
-        transaction ids give them away too, but only when a request is already on its way. The reply to that
-        request would be left over for the next connection, and so on without end.
-        """
-        await asyncio.sleep(SETTLE_S)
-        if self.why is not None:
-            raise renewed(self.why.error)
-
-    def hold(self, user: object, log: Log) -> None:
-        """Keep the line at this rate until :meth:`release`, also while the connection is down."""
-        self._holders[user] = log
 
     def release(self, user: object) -> None:
         """End the use of the line for good."""
@@ -239,30 +237,23 @@ class Line:
 
     def _break_off(self, user: object) -> None:
         """End the use of a line on which a reply may still come."""
-        self._give_up()
-        if user in self._users:
-            self._become(DISTURBED)
+        if self._in_flight is not None or user in self._users:
+            self._end(Lost(self._not_connected()))
             self._speaker = None
             self.leave(user)
 
     def _close(self, why: Outcome | None = None) -> None:
-        if self.state is CLOSED:
-            return
-        self._become(CLOSED, why)
-        self._users.clear()
-        self._watchdog.stop()
-        self._give_up(why)
-        self._wire.close()
-
-    def _give_up(self, why: Outcome | None = None) -> None:
-        """End the exchange in flight, if there is one."""
-        if self._exchange is not None:
+        if self.state is not CLOSED:
+            self._become(CLOSED, why)
+            self._users.clear()
+            self._watchdog.stop()
             self._end(why or Lost(self._not_connected()))
+            self._wire.close()
 
     def close_if_loop_closed(self) -> None:
         """Close it if the loop was closed before."""
         if self.state is not CLOSED and self._watchdog.loop.is_closed():
-            self._exchange = None  # its user has gone with the loop
+            self._in_flight = None  # its user has gone with the loop
             with contextlib.suppress(RuntimeError):  # asyncio's sockets tell the loop that they close
                 self._close()
 
@@ -274,28 +265,28 @@ class Line:
         Raises:
             RobotiqConnectionError: the dialogue has raised it; the user has left the line.
         """
-        has_begun = False
         while True:
             try:
                 must_hush = self._shares and await self._take_turn(user)
             except BaseException:
                 # Before the first turn the user has nothing on its way, and stays. Between two turns it may
                 # have, and another one has the line: that exchange goes on.
-                if has_begun:
+                if inspect.getgeneratorstate(dialogue) != inspect.GEN_CREATED:
                     self.leave(user)
                 raise
-            has_begun = True
             try:
-                if must_hush and (noise := await self._hush()) is not None:
-                    raise noise.error
-                came_to: Answer | None = None
-                while (step := dialogue.send(came_to)) is not TURN:
+                if must_hush:
+                    check(await self._hush())
+                step = next(dialogue)
+                while step is not TURN:
                     if step is HUSH:
                         came_to = await self._hush()
-                        continue
-                    if self.keeps_silence:
-                        await self._keep_silence(step)
-                    came_to = self._obstacle(user) if step is READY else await self._begin(user, step)
+                    else:
+                        if self.keeps_silence and self.state is not CLOSED:
+                            is_long = step is not READY and step.timing.is_long
+                            await self.silence.keep(self._watchdog.clock, is_long=is_long)
+                        came_to = self._obstacle(user) or (DONE if step is READY else await self._begin(step))
+                    step = dialogue.send(came_to)
             except StopIteration as end:
                 result: T = end.value
                 return result
@@ -315,36 +306,6 @@ class Line:
         is_left_over = self.state is DISTURBED and not isinstance(self.why, Stray)
         return is_left_over and before is not user and user in self._users
 
-    async def _keep_silence(self, step: Exchange | Step) -> None:
-        if self.state is not CLOSED:
-            is_long = not isinstance(step, Step) and step.timing.is_long
-            await self.silence.keep(self._watchdog.clock, is_long=is_long)
-
-    def _begin(self, user: object, exchange: Exchange) -> asyncio.Future[Answer]:
-        """Send a request; what is returned comes to its answer, or to what prevents it."""
-        self._answer = answer = self._watchdog.loop.create_future()
-        if self.state is not IN_STEP or user not in self._users:
-            obstacle = self._obstacle(user)
-            assert obstacle is not None
-            answer.set_result(obstacle)
-            return answer
-        self._exchange = exchange
-        self.asked_at = self._watchdog.watch(self._allowed(exchange), exchange.timing.by)
-        if self._shares:
-            self._patience.asked(self.now())
-        try:
-            self._send(exchange.frame)
-        except OSError as error:
-            self._close(Lost(ConnectionLostError(f"{self.address}: {error}")))
-        return answer
-
-    def _allowed(self, exchange: Exchange) -> float:
-        """The longest time for the answer to a request of this turn, in seconds."""
-        timing = exchange.timing
-        if timing.is_whole or not (self._shares and self.is_shared):
-            return timing.seconds
-        return self._patience.seconds(self._speaker, timing.seconds)
-
     def _obstacle(self, user: object) -> Outcome | None:
         """The obstacle to a request of this user."""
         if self.state is CLOSED and self.why is not None:
@@ -354,58 +315,57 @@ class Line:
     def _not_connected(self) -> ConnectionLostError:
         return ConnectionLostError(f"not connected to {self.address}")
 
-    async def _hush(self) -> Noise | None:
+    def _begin(self, exchange: Exchange) -> asyncio.Future[Answer]:
+        """Send a request; return the future of its answer."""
+        timing = exchange.timing
+        seconds = timing.seconds
+        if self._shares and self.is_shared and not timing.is_whole:
+            seconds = self._patience.seconds(self._speaker, seconds)
+        answer: asyncio.Future[Answer] = self._watchdog.loop.create_future()
+        self._in_flight = exchange, answer, seconds
+        self.asked_at = self._watchdog.watch(seconds, timing.by)
+        try:
+            self._send(exchange.frame)
+        except OSError as error:
+            self._close(Lost(ConnectionLostError(f"{self.address}: {error}")))
+        return answer
+
+    async def _hush(self) -> Answer:
         """Drop what arrives until the line is silent."""
         # Closed, the next request has the reason. Another user may have brought the line in step since.
         if self.state is CLOSED or (self.state is IN_STEP and self.is_shared):
-            return None
+            return DONE
         self._become(HUSHING)
         clock = self._watchdog.clock
         began = clock()
         until = began + HUSH_S
         while (left := until - clock()) > 0:
             if clock() - began > LONGEST_HUSH_S:
-                return Noise(ProtocolError(f"{self.address}: the line does not become silent"))
+                noise = Noise(ProtocolError(f"{self.address}: the line does not become silent"))
+                self._end(noise)
+                return noise
             await asyncio.sleep(left)
             until = max(until, self.silence.heard + HUSH_S)
         if self.state is HUSHING:
             self._become(IN_STEP)
-        return None
+        return DONE
 
     # -- what the wire and the watchdog call -------------------------------------------------------------
 
     def _heard(self, data: bytes) -> None:
         """Take what has arrived; the last byte of the reply ends the exchange, or the first wrong one."""
-        if self.forgives:
+        if self.forgives or self.state is HUSHING:
             self.silence.hear(self._watchdog.clock())
-        if self._exchange is not None:
-            if (answer := self._exchange.feed(data)) is not None:
+        if self._in_flight is not None:
+            if (answer := self._in_flight[0].feed(data)) is not None:
                 self._end(answer)
-        elif self.state is HUSHING:
-            self.silence.hear(self._watchdog.clock())  # and dropped
-        elif (self.state in _IS_NEWS or not self.forgives) and (news := self._stray(data)) is not None:
+        elif self._expects_nothing and (news := self._stray(data)) is not None:
             self._note(news)
 
-    def _on_timeout(self) -> None:
-        assert self._exchange is not None, "only an exchange is watched"
-        late = self._exchange.late(self.address, self._allowed(self._exchange))
-        if self._shares:
-            self._patience.missed(self._speaker, self.now())
-        self._end(late)
-
-    def _end(self, answer: Answer) -> None:
-        """End the exchange in flight."""
-        exchange, self._exchange = self._exchange, None
-        assert exchange is not None, "in flight"
-        if type(answer) is bytes:
-            if self._shares:
-                self._patience.answered(self._speaker, self.now())
-            if exchange.extra is not None:
-                self._note(exchange.extra)
-        elif not isinstance(answer, bytes | Refused) and self.state is not CLOSED:
-            self._become(DISTURBED, answer)
-        if not self._answer.done():  # as it is when its user was cancelled
-            self._answer.set_result(answer)
+    @property
+    def _expects_nothing(self) -> bool:
+        """Whether bytes without a request mean something new."""
+        return self.state in (OPENING, IN_STEP) or (self.state is DISTURBED and not self.forgives)
 
     def _note(self, outcome: Outcome) -> None:
         """Take news that are no bytes, or that no exchange waits for, or the end of the wire."""
@@ -413,10 +373,27 @@ class Line:
             self._become(OPENING, outcome)
         elif isinstance(outcome, Lost) or not self.forgives:
             self._close(outcome)
-        elif self._exchange is not None:
-            self._end(outcome)
         else:
-            self._become(DISTURBED, outcome)
+            self._end(outcome)
+
+    def _on_timeout(self) -> None:
+        assert self._in_flight is not None, "only an exchange is watched"
+        exchange, _, seconds = self._in_flight
+        self._end(exchange.late(self.address, seconds))
+
+    def _end(self, answer: Answer) -> None:
+        """End the exchange in flight, if there is one; after all but an answer more may come."""
+        if isinstance(answer, Outcome) and not isinstance(answer, Refused) and self.state is not CLOSED:
+            self._become(DISTURBED, answer)
+        if self._in_flight is None:
+            return
+        (exchange, comes_to, _), self._in_flight = self._in_flight, None
+        if self._shares:
+            self._patience.note(self._speaker, answer, self.asked_at, self.now())
+        if exchange.extra is not None:
+            self._note(exchange.extra)
+        if not comes_to.done():  # as it is when its user was cancelled
+            comes_to.set_result(answer)
 
 
 def renewed(error: RobotiqConnectionError) -> RobotiqConnectionError:
@@ -436,21 +413,3 @@ def _close_left() -> None:
 
 
 _shared: Final[WeakValueDictionary[tuple[asyncio.AbstractEventLoop, str], Line]] = WeakValueDictionary()
-
-
-def shared_line(address: Address, user: object, log: Log) -> Line:
-    """The line at an address, which all its users in the running event loop share.
-
-    Held for ``user``, who has ``log``, from here on.
-
-    Raises:
-        ConnectFailedError: others hold it with another rate, parity or number of stop bits.
-    """
-    place = asyncio.get_running_loop(), canonical_address(address)
-    line = _shared.get(place)
-    if line is None or (line.address.line != address.line and not line.is_held):
-        _shared[place] = line = Line(address, shares=True)
-    elif line.address.line != address.line:
-        raise ConnectFailedError(str(address), f"the port is in use as {line.address}")
-    line.hold(user, log)
-    return line

@@ -17,6 +17,7 @@ from __future__ import annotations
 import logging
 import secrets
 from collections.abc import Callable, Coroutine, Sequence
+from itertools import count
 from typing import Any, Final
 
 from ..runtime.logger import Log, log
@@ -24,7 +25,7 @@ from ..values.registers import RegisterMap, Registers
 from .address import Address
 from .dialogue import Decide, Dialogues
 from .exchange import Exchange, PduExchange, SerialExchange, TcpExchange, Timing
-from .line import Line, shared_line
+from .line import Line
 from .transport import WriteAnswer
 from .tunnel.protocol import Tunnel, tunnel_to
 from .tunnel.wire import TunnelWire
@@ -68,19 +69,19 @@ class ModbusTransport:
             tunnel = tunnel_to(address, registers.device_id)
         self._tunnel: Final = None if tunnel is None else TunnelWire(tunnel, address, log)
         self._log: Final = log
-        self._line = Line(address, wire=self._tunnel, log=log)
-        self._number = secrets.randbelow(LAST_NUMBER)
-        """Transaction id of the last request; starts at random to differ from those of other programs."""
+        self._numbers: Final = count(secrets.randbelow(LAST_NUMBER))
+        """For the transaction ids; start at random to differ from those of other programs."""
         make: Callable[[bytes, Timing], Exchange] = self._over_a_line if address.is_rtu else self._over_tcp
+        line = Line(address, wire=self._tunnel, log=log)
         make = make if tunnel is None else PduExchange
-        self._dialogues: Final = Dialogues(self._line, registers, make, response_timeout, log)
+        self._dialogues: Final = Dialogues(line, registers, make, response_timeout, log)
 
     def _over_tcp(self, request: bytes, timing: Timing) -> Exchange:
-        self._number = self._number % LAST_NUMBER + 1  # never 0, which some devices answer to anything
-        return TcpExchange(self._number, request, timing)
+        number = next(self._numbers) % LAST_NUMBER + 1  # never 0, which some devices answer to anything
+        return TcpExchange(number, request, timing)
 
     def _over_a_line(self, request: bytes, timing: Timing) -> Exchange:
-        return SerialExchange(request, timing, self._line.echo, has_others=self._shares_line)
+        return SerialExchange(request, timing, self._dialogues.line.echo, has_others=self._shares_line)
 
     @property
     def repeats(self) -> int:
@@ -89,28 +90,24 @@ class ModbusTransport:
 
     @property
     def is_open(self) -> bool:
-        return self._line.is_open_for(self)
+        return self._dialogues.line.is_open_for(self)
 
     @property
     def asked_at(self) -> float:
-        return self._line.asked_at
+        return self._dialogues.line.asked_at
 
     @property
     def is_shared(self) -> bool:
-        return self._shares_line and self._line.is_shared
+        return self._dialogues.line.is_shared
 
     @property
     def echoes(self) -> bool:
         """Whether the line was seen to echo what is sent; the echo is dropped."""
-        return bool(self._line.echo.is_on)
+        return bool(self._dialogues.line.echo.is_on)
 
     @property
     def reads_with_writes(self) -> bool:
         return self._dialogues.serves_23 is not False
-
-    @property
-    def has_read_with_write(self) -> bool:
-        return self._dialogues.has_served_23
 
     async def open(self) -> None:
         """Connect, and make sure that no answer to an earlier request is taken for one to come.
@@ -121,17 +118,16 @@ class ModbusTransport:
             ConnectionLostError: the connection was closed at once.
             ResponseTimeoutError: the connection is open, but no answer comes.
         """
-        self._line.leave(self)
+        self._dialogues.line.leave(self)
         if self._shares_line:
-            self._line = shared_line(self._address, self, self._log)
-            self._dialogues.move_to(self._line)
-        await self._line.open(self, self._connect_timeout)
-        await self._line.talk(self, self._dialogues.opening())
+            self._dialogues.move_to(Line.shared(self._address, self, self._log))
+        await self._dialogues.line.open(self, self._connect_timeout)
+        await self._dialogues.line.talk(self, self._dialogues.opening())
 
     # Each poll makes one of these calls: no coroutine of their own, which would cost as much as the request.
 
     def read(self) -> Coroutine[Any, Any, Registers]:
-        return self._line.talk(self, self._dialogues.read())
+        return self._dialogues.line.talk(self, self._dialogues.read())
 
     def send(self, decide: Decide) -> Coroutine[Any, Any, bool]:
         """Write what ``decide`` returns, if anything; on a serial line after the silence between frames.
@@ -139,7 +135,7 @@ class ModbusTransport:
         Raises:
             RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
         """
-        return self._line.talk(self, self._dialogues.write(decide))
+        return self._dialogues.line.talk(self, self._dialogues.write(decide))
 
     def send_and_read(self, decide: Decide) -> Coroutine[Any, Any, WriteAnswer | None]:
         """Write what ``decide`` returns, if anything, and read the status, with function 23.
@@ -147,7 +143,7 @@ class ModbusTransport:
         Raises:
             RobotiqConnectionError: no clean answer in time, and no status after it; the transport is closed.
         """
-        return self._line.talk(self, self._dialogues.write_and_read(decide))
+        return self._dialogues.line.talk(self, self._dialogues.write_and_read(decide))
 
     def stop_or_read(self, decide: Decide) -> Coroutine[Any, Any, Registers | None]:
         """Write what ``decide`` returns when the turn comes, if anything; else read the status.
@@ -155,7 +151,7 @@ class ModbusTransport:
         Raises:
             RobotiqConnectionError: no clean answer in time; the transport is closed.
         """
-        return self._line.talk(self, self._dialogues.stop_or_read(decide))
+        return self._dialogues.line.talk(self, self._dialogues.stop_or_read(decide))
 
     async def write(self, registers: Sequence[int]) -> None:
         """Write the request registers with one FC16, exactly once; a jaw has three of the eight.
@@ -167,6 +163,6 @@ class ModbusTransport:
 
     async def close(self) -> None:
         """Disconnect; does nothing when closed. Waits for a tunnel to close, half a second at most."""
-        self._line.release(self)
+        self._dialogues.line.release(self)
         if self._tunnel is not None:
             await self._tunnel.closed()

@@ -61,3 +61,18 @@ class Silent(Outcome):
 
 class Lost(Outcome):
     """There is no wire, or none any more."""
+
+
+Answer = bytes | Outcome
+"""The answer to a request, or what came in place of one."""
+
+
+def check(answer: Answer) -> bytes:
+    """Return an answer.
+
+    Raises:
+        RobotiqConnectionError: there is none.
+    """
+    if isinstance(answer, Outcome):
+        raise answer.error
+    return answer

@@ -79,10 +79,6 @@ class CyclicLink(Link, Protocol):
     def reads_with_writes(self) -> bool:
         """Whether the gripper can, too, as far as is known."""
 
-    @property
-    def has_read_with_write(self) -> bool:
-        """Whether it has, once."""
-
     async def send_and_read(self, decide: Callable[[], Sequence[int] | None]) -> WriteAnswer | None:
         """As :meth:`send`, and read the status in the same exchange; None if nothing new was written.
 

@@ -9,8 +9,8 @@ import pytest
 
 from robotiq_async import ConnectionLostError, ProtocolError, ResponseTimeoutError
 from robotiq_async.link.dialogue import Dialogues
-from robotiq_async.link.exchange import Answer, Exchange, Timing
-from robotiq_async.link.outcome import Lost, Noise, Refused, Silent, Stray
+from robotiq_async.link.exchange import Exchange, Timing
+from robotiq_async.link.outcome import Answer, Lost, Noise, Refused, Silent, Stray
 from robotiq_async.link.serial.silence import Silence
 from robotiq_async.runtime.logger import log
 from robotiq_async.values.model import TWO_FINGER_85
@@ -31,7 +31,7 @@ class PduExchange(Exchange):
     def __init__(self, request: bytes, timing: Timing) -> None:
         super().__init__(request[1:], timing)
 
-    def feed(self, data: bytes) -> Answer | None:
+    def _verdict(self, received: bytes) -> Answer | None:
         raise NotImplementedError
 
 

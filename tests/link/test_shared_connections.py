@@ -10,11 +10,13 @@ from itertools import pairwise
 
 import pytest
 
-from robotiq_async import RobotiqConnectionError
+from robotiq_async import ProtocolError, ResponseTimeoutError, RobotiqConnectionError
+from robotiq_async.link.address import parse_address
 from robotiq_async.link.modbus import ModbusTransport
+from robotiq_async.link.outcome import Silent
 from robotiq_async.link.serial.patience import SOON, LinePatience
 from robotiq_async.values.registers import REGISTER_COUNT, RTU_REGISTERS
-from tests.link.scripted_device import Device, unopened
+from tests.link.scripted_device import Device, reopened, unopened
 from tests.serial_line import with_crc
 from tests.virtual import until
 from tests.virtual_line import VirtualLine
@@ -24,6 +26,7 @@ pytestmark = pytest.mark.virtual_time
 LEFT, RIGHT = 9, 12
 IMAGE = (0,) * REGISTER_COUNT
 SILENT_S = 1e6
+SILENT = Silent(ResponseTimeoutError("no answer"))
 
 
 @pytest.fixture
@@ -118,15 +121,13 @@ def test_a_question_waits_longer_where_answers_have_just_taken_long() -> None:
     patience, left, right = LinePatience(), Device, ModbusTransport
     assert patience.seconds(left, 0.4) == 0.06
     assert patience.seconds(left, 2.0) == pytest.approx(0.3), "by the response timeout"
-    patience.missed(left, 0.0)
+    patience.note(left, SILENT, 0.0, 0.0)
     assert patience.seconds(left, 0.4) == 0.024
-    patience.asked(1.0)
-    patience.answered(right, 1.04)
+    patience.note(right, b"", 1.0, 1.04)
     assert patience.seconds(left, 0.4) == patience.seconds(right, 0.4) == pytest.approx(0.16)
     assert patience.seconds(left, 0.1) == 0.1, "never beyond the response timeout"
     for _ in range(100):
-        patience.asked(2.0)
-        patience.answered(right, 2.003)
+        patience.note(right, b"", 2.0, 2.003)
     assert (patience.seconds(left, 0.4), patience.seconds(right, 0.4)) == (0.024, 0.06)
 
 
@@ -209,3 +210,35 @@ async def test_a_link_that_was_lost_decides_nothing(pair: Pair, device: Device) 
         await right.stop_or_read(lambda: asked.append(None))
     assert not asked
     assert not device.requests
+
+
+async def test_a_line_that_never_becomes_silent_is_a_protocol_error_for_each(device: Device) -> None:
+    """One gives its turn away when its wait for silence is over, and the line still talks."""
+    left, right = (
+        ModbusTransport(
+            parse_address(f"rtu://{VirtualLine.NEAR}"),
+            replace(RTU_REGISTERS, device_id=unit),
+            connect_timeout=1.0,
+            response_timeout=0.4,
+            shares_line=True,
+        )
+        for unit in (LEFT, RIGHT)
+    )
+    await left.open()
+    await right.open()
+
+    async def babble() -> None:
+        while True:
+            device.send(b"\x00")
+            await asyncio.sleep(0.01)
+
+    babbling = asyncio.create_task(babble())
+    reading = asyncio.create_task(left.read())
+    await asyncio.sleep(0.05)
+    ends = await asyncio.gather(reading, right.read(), return_exceptions=True)
+    babbling.cancel()
+    assert [type(end) for end in ends] == [ProtocolError] * 2
+    for each in (left, right):
+        await reopened(each)
+        await each.read()
+        await each.close()

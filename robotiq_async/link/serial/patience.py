@@ -27,6 +27,8 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 from weakref import WeakKeyDictionary
 
+from ..outcome import Answer, Silent
+
 USUAL_RESPONSE_S: Final = 0.4
 """A longer response timeout means a slow line."""
 QUESTION_S: Final = 0.06
@@ -44,7 +46,7 @@ LINE_REST_S: Final = 1.0
 """A hand that stops has time for one try at least."""
 
 
-class _Silent(NamedTuple):
+class _SilentUser(NamedTuple):
     misses: int
     until: float
     """The time of the next question."""
@@ -54,13 +56,9 @@ class LinePatience:
     """The share of a line that each user may take. Users are told apart, and forgotten with their objects."""
 
     def __init__(self) -> None:
-        self._silent: Final[WeakKeyDictionary[object, _Silent]] = WeakKeyDictionary()
-        self._asked = 0.0
+        self._silent: Final[WeakKeyDictionary[object, _SilentUser]] = WeakKeyDictionary()
         self._slowest = 0.0
         """The slowest answer of late, in seconds."""
-
-    def asked(self, now: float) -> None:
-        self._asked = now
 
     def seconds(self, user: object, response_s: float) -> float:
         """The longest time for the next answer; ``response_s`` is the response timeout."""
@@ -70,15 +68,15 @@ class LinePatience:
             response_s, max(usual * max(1.0, response_s / USUAL_RESPONSE_S), TIMES_SLOWEST * self._slowest)
         )
 
-    def missed(self, user: object, now: float) -> None:
-        """There was no answer."""
-        misses = 1 + (self._silent[user].misses if user in self._silent else 0)
-        rest = 0.0 if misses == 1 else TURN_SOON_S if misses <= SOON else LINE_REST_S
-        self._silent[user] = _Silent(misses, now + rest)
-
-    def answered(self, user: object, now: float) -> None:
-        self._slowest = max(now - self._asked, FADES * self._slowest)
-        self._silent.pop(user, None)
+    def note(self, user: object, answer: Answer, asked: float, now: float) -> None:
+        """Take what a question of the time ``asked`` has come to."""
+        if isinstance(answer, Silent):
+            misses = 1 + (self._silent[user].misses if user in self._silent else 0)
+            rest = 0.0 if misses == 1 else TURN_SOON_S if misses <= SOON else LINE_REST_S
+            self._silent[user] = _SilentUser(misses, now + rest)
+        elif isinstance(answer, bytes):
+            self._slowest = max(now - asked, FADES * self._slowest)
+            self._silent.pop(user, None)
 
     def until(self, user: object) -> float:
         """The time before which the user leaves the line to others."""

@@ -42,9 +42,9 @@ from ...values import registers as reg
 from ...values.errors import ConnectFailedError, ConnectionLostError, ProtocolError, ResponseTimeoutError
 from ...values.registers import Echo, Registers
 from ..address import Address
-from ..exchange import Answer, Exchange, Timing
+from ..exchange import Exchange, Timing
 from ..line import Dialogue, Line, Step
-from ..outcome import Noise, Outcome, Silent
+from ..outcome import Answer, Noise, Outcome, Silent
 from . import lines
 
 SHOWS_S: Final = 0.5
@@ -86,8 +86,8 @@ class Questions(Exchange):
         """The first variable without an answer; empty if each has one."""
         return self.names[len(self.values)] if len(self.values) < len(self.names) else ""
 
-    def feed(self, data: bytes) -> Answer | None:
-        self._received = lines.without_ends(self._received + data)
+    def _verdict(self, received: bytes) -> Answer | None:
+        self._received = lines.without_ends(received)  # without answers: below they are taken off
         try:
             while name := self.unanswered:
                 end = self._received.find(b"\n") + 1 or len(self._received)
@@ -107,10 +107,9 @@ class Questions(Exchange):
 class UrcapSetting(Exchange):
     """A line that sets variables."""
 
-    def feed(self, data: bytes) -> Answer | None:
-        self._received += data
+    def _verdict(self, received: bytes) -> Answer | None:
         try:
-            return self._received if lines.is_acknowledged(self._received) else None
+            return received if lines.is_acknowledged(received) else None
         except ProtocolError as error:
             return Noise(error)
 

@@ -88,7 +88,7 @@ class RecordedLink:
         ended = asyncio.get_running_loop().time()
         self._keep(RecordedExchange(self.wrote, ended, "command", request.registers))
         self._keep(RecordedExchange(self.wrote, ended, "status", answer.registers))
-        return answer.doubt is None and self.link.has_read_with_write
+        return answer.doubt is None and self.link.reads_with_writes
 
     async def _sent(self, request: Request, exchange: Coroutine[Any, Any, T]) -> T:
         loop = asyncio.get_running_loop()
