@@ -11,6 +11,7 @@ over and not answered: what they do then may hold up the loop, and the write goe
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 from ..values.enums import NO_AXES, Fault, Finger, Initialization, State, StopLevel, Trigger
@@ -32,10 +33,10 @@ from .evidence import FOLLOWS, Evidence, classify, is_activating, is_interrupted
 from .gate import gate, merged
 from .ledger import NEVER, Ledger
 from .motion import Move
-from .pending import Command, OpenRequests, Pending
+from .pending import NONE_PENDING, Command, OpenRequests, Pending
 from .procedures import Begun, Procedure, activation, automatic_release, reset_and_activation
 from .state_machine import RUNNING, SEEN, StateMachine
-from .stops import Ended, Keeping, Stop, Task
+from .stops import Duty, Ended, Keeping, Stop
 from .waiters import AnswerCallers, Waiter, fail
 
 WARNING_S: Final = 1.0
@@ -89,7 +90,7 @@ class Controller:
         self._ended: Final = ended
         self.evidence: Final = Evidence(machine.log)
         self._requests: Final = OpenRequests(machine.log, ended)
-        self._task: Stop | Procedure | None = None  # without one the pending changes are written
+        self._duty: Stop | Procedure | None = None  # without one the pending changes are written
         self._owes_reset = False  # a stop was lost with the link while something drove the fingers
         self._activation = left and left.activation  # stopping the hand takes it back
         self._why_no_grip = ""  # why a hand that is being stopped must not leave rGTO set
@@ -144,9 +145,9 @@ class Controller:
             waiter.set_result(None)
             return
         self._requests.halt(waiter)
-        task = self._task
-        if task is None or not task.is_halt or task.is_delivered:  # a new halt is sent again
-            self._task = Stop(StopLevel.HALT)
+        duty = self._duty
+        if duty is None or not duty.is_halt or duty.is_delivered:  # a new halt is sent again
+            self._duty = Stop(StopLevel.HALT)
         self._update_state(Trigger.ASK_HALT)
 
     def activate(self) -> None:
@@ -183,11 +184,11 @@ class Controller:
 
     def refuse_requests(self) -> None:
         """The hand is to stop: refuse requests from here on, and end all that are open, sent or not."""
-        state, task = self.machine.state, self._task
-        halts = task is not None and task.is_halt and not task.writes
+        state, duty = self.machine.state, self._duty
+        halts = duty is not None and duty.is_halt and not duty.writes
         was_elsewhere = "" if state in RUNNING else f"the hand was in {state.name}"
         self._why_no_grip = "halt() was asked for" if halts else was_elsewhere
-        if not self._requests.pending.is_empty or halts:
+        if self._requests.pending is not NONE_PENDING or halts:
             self.machine.log.info("stopped: requests that were not sent are dropped")
         if self.machine.ask(Trigger.ASK_STOP):
             self.machine.show(State.DO_SHUTDOWN, Trigger.ASK_STOP)
@@ -195,26 +196,26 @@ class Controller:
 
     def close(self) -> None:
         """The hand has stopped, or the time for that is over."""
-        self._task = None
+        self._duty = None
         if self.machine.ask(Trigger.STOPPED):
             self.machine.show(State.SHUTDOWN, Trigger.STOPPED)
 
     def keep_no_grip(self) -> None:
         """Make a stop that has begun to keep a grip clear rGTO after all."""
-        if isinstance(self._task, Keeping):
-            self._task = Stop(StopLevel.SHUTDOWN)
+        if isinstance(self._duty, Keeping):
+            self._duty = Stop(StopLevel.SHUTDOWN)
 
     def stop_fingers(self, level: StopLevel = StopLevel.SHUTDOWN) -> None:
         """Begin to stop the fingers, if any may move, by KEEP or SHUTDOWN, or an activation of ours."""
         # An activation that this hand began is taken back with rACT = 0: clearing rGTO would not stop it.
         status = self.evidence.status
         if self._activation is not None:
-            self._task = Stop(StopLevel.RESET)
+            self._duty = Stop(StopLevel.RESET)
         elif status is not None and level is StopLevel.KEEP:
             keeping = Keeping(status, self._why_no_grip, self.machine.log)
-            self._task = keeping.see(self._ledger, status)
+            self._duty = keeping.see(self._ledger, status)
         else:
-            self._task = None if status is None else Stop(StopLevel.SHUTDOWN)
+            self._duty = None if status is None else Stop(StopLevel.SHUTDOWN)
 
     # -- what follows from that ------------------------------------------------------------------------
 
@@ -222,18 +223,18 @@ class Controller:
         is_stranded = self.evidence.condition is Trigger.SEEN_STRANDED
         activates = reset_and_activation if is_stranded else activation
         begin = automatic_release if trigger is Trigger.ASK_RELEASE else activates
-        self._task = Procedure(self._ledger, begin)
+        self._duty = Procedure(self._ledger, begin)
         self._update_state(trigger)
 
     def _begin_reset(self, trigger: Trigger, error: RobotiqError) -> None:
         """Reset; ``error`` is what the callers get whose requests end with it."""
         self._ended(self._drop_all(), error)
-        self._task = Stop(StopLevel.RESET)
+        self._duty = Stop(StopLevel.RESET)
         self._update_state(trigger)
 
     def _drop_all(self) -> list[Waiter[Any]]:
-        """Drop everything asked so far, a task too, and return the callers. A write may be on the line."""
-        self._task = None
+        """Drop everything asked so far, a duty too, and return the callers. A write may be on the line."""
+        self._duty = None
         return self._requests.drop(holds=True)
 
     # -- what is known ---------------------------------------------------------------------------------
@@ -246,7 +247,7 @@ class Controller:
     def speeds(self) -> dict[Finger, int]:
         """The speed of each axis, as far as it is known, once what is pending is written."""
         base = {axis: request.speed for axis, request in self._ledger.base.by_axis}
-        return base | self._requests.pending.speeds
+        return {**base, **self._requests.pending.speeds}
 
     @property
     def is_moving(self) -> bool:
@@ -262,21 +263,20 @@ class Controller:
     @property
     def is_driven(self) -> bool:
         """Whether an activation or a release moves the fingers, or may begin: only rACT = 0 ends these."""
-        status = self.status
-        if status is None or isinstance(self._task, Procedure):
-            return status is not None
-        condition = self.evidence.condition
-        shows = condition is Trigger.SEEN_BUSY or status.fault is Fault.AUTOMATIC_RELEASE
-        return shows or is_interrupted(status) or self._ledger.may_drive(status)
+        if (status := self.status) is None:
+            return False
+        is_busy = self.evidence.condition is Trigger.SEEN_BUSY or isinstance(self._duty, Procedure)
+        shows = is_busy or status.fault is Fault.AUTOMATIC_RELEASE or is_interrupted(status)
+        return shows or self._ledger.may_drive(status)
 
     @property
     def is_busy(self) -> bool:
         """Whether a procedure, a reset or the end of the hand has begun and not ended."""
-        return self._task is not None and not self._task.is_halt
+        return self._duty is not None and not self._duty.is_halt
 
     @property
     def has_request(self) -> bool:
-        return self._task is not None or not self._requests.pending.is_empty
+        return self._duty is not None or self._requests.pending is not NONE_PENDING
 
     @property
     def is_off(self) -> bool:
@@ -286,7 +286,7 @@ class Controller:
     @property
     def has_open_stop(self) -> bool:
         """Whether a halt or a reset is not over, or a hold waits for its acknowledgement."""
-        return isinstance(self._task, Stop) or self._requests.has_undelivered_hold
+        return isinstance(self._duty, Stop) or self._requests.has_undelivered_hold
 
     @property
     def may_have_to_stop(self) -> bool:
@@ -294,17 +294,17 @@ class Controller:
         return self.status is not None or self._activation is not None or not self._ledger.is_settled
 
     def _view(self) -> State:
-        """The state: that of the task; if it makes none, what the gripper shows."""
-        if self.is_off:
-            return self.machine.state
-        task, condition = self._task, self.evidence.condition
+        """The state: that of the duty; if it makes none, what the gripper shows."""
+        duty, condition, state = self._duty, self.evidence.condition, self.machine.state
+        if state in _OFF:
+            return state
         if condition is None:
             return State.DISCONNECTED
-        if task is not None and task.state is not None:
-            return task.state
+        if duty is not None and not duty.is_halt and (made := duty.state) is not None:
+            return made
         if condition is not Trigger.SEEN_READY:
             return SEEN[condition]
-        is_asked = (task is not None and not task.is_delivered) or self._requests.has_caller
+        is_asked = (duty is not None and not duty.is_delivered) or self._requests.has_caller
         return State.RUNNING_CC if is_asked else State.RUNNING_IDLE
 
     def _update_state(self, trigger: Trigger) -> None:
@@ -319,18 +319,17 @@ class Controller:
         """Take in a status that was read after every acknowledgement so far."""
         # ``asked`` is when it was asked for, in monotonic seconds; None for the time of the reply.
         asked = status.timestamp if asked is None else asked
-        ledger, task, before = self._ledger, self._task, self.evidence.condition
+        ledger, duty, before = self._ledger, self._duty, self.evidence.condition
         self.status = status
         ledger.update(status, asked)
         condition = self.evidence.update(status, asked)
         # This runs at every poll, so it works out only what is waited for.
         if self._activation is not None and self._activation.is_over(ledger, status):
             self._activation = None
-        if task is not None:
-            was_busy = self.is_busy
-            if isinstance(task, Stop):
-                self._advance(task)
-            if was_busy or self.is_busy:
+        if duty is not None:
+            if isinstance(duty, Stop):
+                self._advance(duty)
+            if not duty.is_halt or self.is_busy:
                 return  # what shows then is its business
         if condition is None:
             return
@@ -403,10 +402,10 @@ class Controller:
         if stop.has_activated(ledger, judged):
             self._take_back("the gripper was reset as it was stopped: its activation is taken back")
             return
-        self._task = stop.see(ledger, judged)
+        self._duty = stop.see(ledger, judged)
         if stop.is_halt:
-            self._requests.answer_halts(ledger, judged, is_over=self._task is None)
-        elif self._task is None and stop.level is not StopLevel.KEEP:
+            self._requests.answer_halts(ledger, judged, is_over=self._duty is None)
+        elif self._duty is None and stop.level is not StopLevel.KEEP:
             self._finish(stop, judged)
 
     def _follow_activation(self, status: RobotiqStatus) -> None:
@@ -432,15 +431,15 @@ class Controller:
         self._requests.hold_only(ledger.ours)
         self._requests.fail_replaced(status, ledger.limits.limited)
 
-    def _finish(self, task: Task, status: RobotiqStatus) -> None:
+    def _finish(self, duty: Duty, status: RobotiqStatus) -> None:
         """A procedure, a reset or a shutdown is over: the condition counts again."""
-        if task.writes:
+        if duty.writes:
             is_known = self._ledger.restart(status)
         else:  # it had nothing to do; WF_ shows for a moment, as DO_ leads nowhere else in the table
             is_known = self._ledger.match is not None
-            task.written(self._ledger.shown, status)
+            duty.written(self._ledger.shown, status)
             self._update_state(Trigger.DELIVERED)
-        self._task = None
+        self._duty = None
         # On a new link a hand that ends stops the fingers before the condition is decided.
         condition = self.evidence.condition or classify(status)
         self._update_state(condition)
@@ -456,36 +455,38 @@ class Controller:
 
     def next_write(self, now: float) -> NextWrite | None:
         """The next write; None if nothing is due. It changes nothing, and makes no image."""
-        task, status, pending = self._task, self.evidence.status, self._requests.pending
-        if task is None and pending.is_empty:
+        duty, status, pending = self._duty, self.evidence.status, self._requests.pending
+        if duty is None and pending is NONE_PENDING:
             return None  # most cycles end here
-        urgent = isinstance(task, Stop) and status is not None and task.is_urgent(self._ledger, status)
-        return NextWrite(self._wait(now), urgent, task is None, urgent or bool(pending.hold))
+        urgent = isinstance(duty, Stop) and status is not None and duty.is_urgent(self._ledger, status)
+        return NextWrite(self._wait(now), urgent, duty is None, urgent or bool(pending.hold))
 
     def _wait(self, now: float) -> float:
-        task = self._task
-        is_free = isinstance(task, Stop) and task.level is not StopLevel.KEEP and not task.writes
+        duty = self._duty
+        is_free = isinstance(duty, Stop) and duty.level is not StopLevel.KEEP and not duty.writes
         return 0.0 if is_free or now >= self._free_at else self._free_at - now
 
     def decide(self, now: float) -> Request | None:
         """Return the image to write now, or None. It counts as sent from here on."""
-        status, task = self.evidence.status, self._task
+        status, duty = self.evidence.status, self._duty
         if status is None or not self.has_request or self._wait(now):
             return None  # most cycles end here
-        return self._next_changes(status, now) if task is None else self._next_of(task, status, now)
+        return self._next_changes(status, now) if duty is None else self._next_of(duty, status, now)
 
-    def _next_of(self, task: Stop | Procedure, status: RobotiqStatus, now: float) -> Request | None:
-        if task.activates and not task.writes and self.evidence.may_pass:
+    def _next_of(self, duty: Stop | Procedure, status: RobotiqStatus, now: float) -> Request | None:
+        if duty.activates and not duty.writes and self.evidence.may_pass:
             return None  # if the fault lasts, no activation is begun
-        image = task.next_image(self._ledger, status)
+        image = duty.next_image(self._ledger, status)
         if isinstance(image, Ended):
             if image.why:
                 self.machine.log.warning("%s", image.why)
-            self._finish(task, status)
+            self._finish(duty, status)
         elif image is not None:
             # A halt also stops the axes to be held, so the callers of hold() have their answer with it.
             pending = self._requests.pending
-            return self._send(image, status, now, pending.without_hold if task.is_halt else pending, task)
+            return self._send(
+                image, status, now, replace(pending, hold=NO_AXES) if duty.is_halt else pending, duty
+            )
         return None
 
     def _next_changes(self, status: RobotiqStatus, now: float) -> Request | None:
@@ -495,8 +496,8 @@ class Controller:
         if self.evidence.may_pass and pending.has_changes:
             return None  # if the fault lasts, no motion is sent at all
         base = ledger.base
-        gripping = ledger.gripping(status) if pending.positions else NO_AXES
-        held, left = {}, Pending()
+        gripping = ledger.gripping(status) if pending.positions and not base.go else NO_AXES
+        held, left = {}, NONE_PENDING
         if pending.hold:
             pending = self._requests.begin_hold(now)
             held = ledger.held(pending.hold, status, now - ledger.now.time)
@@ -514,18 +515,18 @@ class Controller:
         return self._send(image, status, now, left)
 
     def _send(
-        self, image: Request, status: RobotiqStatus, now: float, left: Pending, task: Task | None = None
+        self, image: Request, status: RobotiqStatus, now: float, left: Pending, duty: Duty | None = None
     ) -> Request:
         """Put an image through the gate and into the ledger; decide() returns it to be sent."""
         # ``left`` is what it has not of all that is pending.
-        activates, releases = (False, False) if task is None else (task.activates, task.releases)
+        activates, releases = (False, False) if duty is None else (duty.activates, duty.releases)
         may_reset = self._ledger.may_reset
         image = gate(image, status, may_reset=may_reset, activates=activates, releases=releases)
         moved = NO_AXES if left.positions else self._requests.pending.moved
         entry = self._ledger.write(image, moved, now)
-        self._requests.sending(entry, left, halts=task is not None and task.is_halt)
-        if task is not None:
-            task.written(entry, status, is_early=now < self._free_at)
+        self._requests.sending(entry, left)
+        if duty is not None:
+            duty.written(entry, status, is_early=now < self._free_at)
         if activates:
             self._activation = Begun(entry)
         self._free_at = now + self._spacing
@@ -545,10 +546,10 @@ class Controller:
         self._why_no_grip = "the link went down"
         error = ConnectionLostError(f"the link went down before this was done: {why}")
         error.__cause__ = why
-        task, self._task = self._task, None
+        duty, self._duty = self._duty, None
         # A halt and a reset are not sent again: once the link is back, what we move is held instead, and what
         # drives the fingers is reset.
-        if isinstance(task, Stop) and task.level in (StopLevel.HALT, StopLevel.RESET):
+        if isinstance(duty, Stop) and duty.level in (StopLevel.HALT, StopLevel.RESET):
             self._requests.merge_hold(Finger.ALL, "a stop was lost with the link: once it is back")
             self._owes_reset = self.is_driven
         self._requests.lost(error)

@@ -35,23 +35,18 @@ class Command:
     force: int | None = None
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Pending:
     """The changes of one write, by axis."""
 
-    positions: dict[Finger, int] = field(default_factory=dict)
-    speeds: dict[Finger, int] = field(default_factory=dict)
-    forces: dict[Finger, int] = field(default_factory=dict)
+    positions: Mapping[Finger, int] = field(default_factory=dict)
+    speeds: Mapping[Finger, int] = field(default_factory=dict)
+    forces: Mapping[Finger, int] = field(default_factory=dict)
     # Axes to hold if they move. A position of the same axis goes before it, but does not end it: if the link
     # goes down before the write, the hold remains and the position does not.
     hold: Finger = NO_AXES
     # When the hold was first about to be written: what may press on a part is held later, or not at all.
     hold_began: float = math.inf
-
-    @property
-    def is_empty(self) -> bool:
-        # Written out, because this runs at every poll.
-        return not (self.positions or self.speeds or self.forces or self.hold)
 
     @property
     def has_changes(self) -> bool:
@@ -62,28 +57,34 @@ class Pending:
     def moved(self) -> Finger:
         return Finger(sum(self.positions))
 
-    @property
-    def without_hold(self) -> Pending:
-        return replace(self, hold=NO_AXES)
-
     def held_later(self, axes: Finger) -> Pending:
         """The hold of those of these axes that are not moved, for a later write."""
         return Pending(hold=self.hold & ~self.moved & axes, hold_began=self.hold_began)
 
-    def merge(self, new: Command) -> None:
+    def merged(self, new: Command) -> Pending:
         # The last value wins, per axis and field; an axis keeps what a command does not name.
-        values = (new.position, new.speed, new.force)
-        for changes, value in zip((self.positions, self.speeds, self.forces), values, strict=True):
-            if value is not None:
-                changes.update(dict.fromkeys(new.axes, value))
+        return replace(
+            self,
+            positions=_with(self.positions, new.axes, new.position),
+            speeds=_with(self.speeds, new.axes, new.speed),
+            forces=_with(self.forces, new.axes, new.force),
+        )
+
+
+def _with(changes: Mapping[Finger, int], axes: Finger, value: int | None) -> Mapping[Finger, int]:
+    return changes if value is None else {**changes, **dict.fromkeys(axes, value)}
+
+
+NONE_PENDING: Final = Pending()
+"""Nothing is pending: there is no other object for that, so that a poll can tell it without a look inside."""
 
 
 class OpenRequests:
     """The requests of callers, but for procedures and resets: those callers wait for a state."""
 
     def __init__(self, log: Log = log, ended: AnswerCallers = fail) -> None:
-        self.pending: Pending = Pending()  # for the next write
-        self._sent = Pending()  # in the write in flight
+        self.pending: Pending = NONE_PENDING  # for the next write
+        self._sent = NONE_PENDING  # in the write in flight
         self.calls: list[Call] = []  # the commands, holds and halts whose callers wait
         # By axis the move that it follows, until something else takes the axis over; the oldest move first.
         self.moves: Final[dict[Finger, Move]] = {}
@@ -112,8 +113,8 @@ class OpenRequests:
     def command(self, command: Command, waiter: Waiter[None] | None = None) -> None:
         # Few loops at 200 Hz have a move to end.
         if command.position is not None and (self.moves or self._failed):
-            self._end(self._take_over(command.axes), f"another command moves {command.axes}")
-        self.pending.merge(command)
+            self._take_over(command.axes, f"another command moves {command.axes}")
+        self.pending = self.pending.merged(command)
         if waiter is not None:
             self.calls.append(Call(waiter, NO_AXES if command.position is None else command.axes))
 
@@ -138,7 +139,7 @@ class OpenRequests:
             self._log.info("%s: what moves of %s is held", why, axes)
         pending = self.pending
         began = math.inf if axes & ~pending.hold else pending.hold_began  # an axis more has its own time
-        self.pending = replace(pending, hold=pending.hold | axes, hold_began=began)
+        self._keep(replace(pending, hold=pending.hold | axes, hold_began=began))
 
     def begin_hold(self, now: float) -> Pending:
         """The hold is about to be written; return what is pending, with when it first was."""
@@ -150,26 +151,24 @@ class OpenRequests:
         """Drop all holds but those of these axes, and those that callers of hold() wait for."""
         for call in self.calls:
             axes |= call.held if call.entry is None else NO_AXES
-        self.pending = replace(self.pending, hold=self.pending.hold & axes)
+        self._keep(replace(self.pending, hold=self.pending.hold & axes))
+
+    def _keep(self, pending: Pending) -> None:
+        self.pending = pending if pending.has_changes or pending.hold else NONE_PENDING
 
     def supersede(self, axes: Finger, why: str) -> None:
         """End the moves of these axes, and the calls that would move one of them and are not sent."""
         # Of a call for several axes the others are sent all the same.
-        self._end(self._take_over(axes), why)
-        for axis in axes:
-            self.pending.positions.pop(axis, None)
-        self._end([call for call in self.calls if call.entry is None and call.axes & axes], why)
+        positions = {axis: at for axis, at in self.pending.positions.items() if axis not in axes}
+        self._keep(replace(self.pending, positions=positions))
+        self._take_over(axes, why, [call for call in self.calls if call.entry is None and call.axes & axes])
 
-    def _take_over(self, axes: Finger) -> list[Move]:
-        """Let these axes follow no move; return the open ones that they followed."""
-        taken = [move for move in self._open_moves if move.axes & axes]
-        self._close(taken)
+    def _take_over(self, axes: Finger, why: str, calls: Sequence[Call] = ()) -> None:
+        """Let these axes follow no move; end the moves that they followed, and some other calls."""
+        moves = [move for move in self._open_moves if move.axes & axes]
+        self._ended(self._close([*moves, *calls]), MoveSupersededError(why))
         for axis in axes:  # the other axes of these moves still follow them
             self._failed.pop(axis, None)
-        return taken
-
-    def _end(self, calls: Sequence[Call], why: str) -> None:
-        self._ended(self._close(calls), MoveSupersededError(why))
 
     def _close(self, calls: Sequence[Call]) -> list[Waiter[Any]]:
         """These calls have ended; return their callers."""
@@ -183,19 +182,19 @@ class OpenRequests:
 
     # -- what becomes of it ----------------------------------------------------------------------------
 
-    def sending(self, entry: Entry, left: Pending, *, halts: bool = False) -> None:
-        """An entry has what is pending, but for what is left; ``halts`` if it is a halt."""
-        pending, self.pending = self.pending, left
+    def sending(self, entry: Entry, left: Pending) -> None:
+        """An entry has what is pending, but for what is left. While a halt is open, no other is sent."""
         keeps = left.has_changes
-        has_sent = pending.has_changes and not keeps
-        self._sent = pending if has_sent else Pending(hold=pending.hold & ~left.hold)
+        has_sent = self.pending.has_changes and not keeps
+        self._sent = self.pending if has_sent else Pending(hold=self.pending.hold & ~left.hold)
+        self._keep(left)
         for call in (*self.calls, *self.moves.values()):
-            is_left = call.held & left.hold if call.held else not halts if call.halts else keeps
+            is_left = call.held & left.hold if call.held else keeps and not call.halts
             if call.entry is None and not is_left:
                 call.written(entry)
 
     def acknowledged(self) -> None:
-        self._sent = Pending()
+        self._sent = NONE_PENDING
         if self.calls:
             resolve(self._close([call for call in self.calls if call.entry is not None and not call.halts]))
 
@@ -256,7 +255,8 @@ class OpenRequests:
         # A hold of our own making has no caller to get the error.
         hold = self.pending.hold | self._sent.hold
         fail(self._close([*self.calls, *self._open_moves]), error)
-        self.pending, self._sent = Pending(hold=hold), Pending()
+        self._keep(Pending(hold=hold))
+        self._sent = NONE_PENDING
 
     @property
     def _written_moves(self) -> list[Move]:

@@ -22,7 +22,7 @@ from .entry import Entry
 from .evidence import classify
 from .gate import at_rest
 from .ledger import WINDOW_S, Ledger
-from .stops import Ended, Task
+from .stops import Duty, Ended
 
 STRAY_COUNTS: Final = 10
 """An axis that moves further in an activation is driven by it. One that a stop catches at full speed goes on
@@ -35,7 +35,7 @@ Steps = Generator[Request | None, RobotiqStatus, str]
 Image = Callable[[RobotiqStatus], Request]  # makes the image to begin from, given the newest status
 
 
-class Procedure(Task):
+class Procedure(Duty):
     """An activation or an automatic release. If it has no image to send, what shows counts as its write."""
 
     def __init__(self, ledger: Ledger, begin: Callable[[Image], Steps]) -> None:

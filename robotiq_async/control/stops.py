@@ -6,7 +6,7 @@ and forget it [manual 2014, pp. 58, 75: space them by 10 ms]; a first write that
 before it counts. Keeping is the exception to all this.
 """
 
-# Task        Begun by                          First image          Over when
+# Duty        Begun by                          First image          Over when
 #
 # RESET       reset(); a halt, while something  rACT = 0             it shows
 #             drives the fingers
@@ -16,9 +16,9 @@ before it counts. Keeping is the exception to all this.
 #                                                                    SHUTDOWN replaces it
 # Procedure   activate(), atr()                 rACT or rATR = 1     it has ended or failed, see there
 #
-# A hand has one task or none: then the pending changes are written. A new task replaces the one before, and a
+# A hand has one duty or none: then the pending changes are written. A new duty replaces the one before, and a
 # lost link ends it. A halt takes a device cycle, and what a status shows counts meanwhile; in all others it
-# counts for the task alone, and the condition counts again afterwards. A task is asked twice in a cycle: in
+# counts for the duty alone, and the condition counts again afterwards. A duty is asked twice in a cycle: in
 # see() after the read, and in next_image() in the turn of the loop in which the link writes.
 
 from __future__ import annotations
@@ -54,16 +54,16 @@ class Write(NamedTuple):
 
 
 class Ended(NamedTuple):
-    """A task is over, and has nothing to write; ``why`` it has failed, if it has."""
+    """A duty is over, and has nothing to write; ``why`` it has failed, if it has."""
 
     why: str = ""
 
 
-class Task:
+class Duty:
     """A stop or a procedure, until its end. A hand does one at a time; a new one replaces it."""
 
     activates = releases = False  # whether its images may raise rACT, and rATR
-    is_halt = False  # in all others what a status shows is the matter of the task alone
+    is_halt = False  # in all others what a status shows is the matter of the duty alone
 
     def __init__(self) -> None:
         self.writes: Final[list[Write]] = []
@@ -77,7 +77,7 @@ class Task:
         self.writes.append(Write(entry, is_early, status.is_activated))
 
 
-class Stop(Task):
+class Stop(Duty):
     """One stop, until it is reached. A new level is a new stop; so is the same one, to be written again."""
 
     def __init__(self, level: StopLevel) -> None:
@@ -120,8 +120,8 @@ class Stop(Task):
     def first_image(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
         if self.level is StopLevel.RESET:  # rACT = 0 clears faults and ends what runs [manual 2012, 4.6]
             return replace(at_rest(ledger.base, status), activate=False)
-        is_ready = classify(status) is Trigger.SEEN_READY
-        if self.level is StopLevel.SHUTDOWN and ledger.match is None and is_ready:
+        is_foreign = self.level is StopLevel.SHUTDOWN and ledger.match is None
+        if is_foreign and classify(status) is Trigger.SEEN_READY:
             ledger.adopt(status)  # stop the fingers whichever client moves them
         # Positions and speeds stay as they were asked, and what is active stays so: the gate sees to rACT.
         return replace(ledger.base, activate=True, go=False)

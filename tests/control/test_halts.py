@@ -285,3 +285,17 @@ def test_a_halt_that_joins_one_on_the_line_is_answered_with_it(scan: Scan) -> No
     scan.run(0.1)
     assert first.answers == second.answers == [None]
     assert not scan.gripper.is_moving
+
+
+def test_a_halt_that_came_early_is_not_one_of_the_two() -> None:
+    """A gripper may forget a write that comes soon after another one."""
+    scan = Scan(spacing=0.01)
+    scan.start()
+    scan.command(A, position=200, speed=0)
+    scan.step()
+    halted = scan.halt()
+    scan.forgets = 2
+    scan.hurry()
+    scan.until(lambda: halted.is_answered, 2.0)
+    assert halted.answers == [None]
+    assert not scan.gripper.is_moving

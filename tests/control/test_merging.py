@@ -51,9 +51,7 @@ def places(base: Request, pending: Pending, status: RobotiqStatus, may_move: Fin
 def command(
     axes: Finger, position: int | None = None, speed: int | None = None, force: int | None = None
 ) -> Pending:
-    pending = Pending()
-    pending.merge(Command(axes, position, speed, force))
-    return pending
+    return Pending().merged(Command(axes, position, speed, force))
 
 
 def hold(axes: Finger) -> Pending:
@@ -116,8 +114,7 @@ def test_axes_not_addressed_stay_or_keep_their_requests(
 
 
 def test_an_axis_may_be_held_while_another_is_sent_somewhere() -> None:
-    pending = hold(A | B)
-    pending.merge(Command(B, 200))
+    pending = hold(A | B).merged(Command(B, 200))
     assert positions(after(GOING, pending)) == (101, 200, 30, 40)
 
 
@@ -149,7 +146,7 @@ def test_an_axis_not_addressed_keeps_its_request_or_stays(
 ) -> None:
     pending = Pending(hold=held)
     for each in commands:
-        pending.merge(Command(*each))
+        pending = pending.merged(Command(*each))
     stopped = places(base, pending, status, may_move)
     image = merged(base, pending, status, gripping=gripping, held=stopped)
     assert (image.mode, image.individual_fingers, image.individual_scissor) == (base.mode, True, True)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from robotiq_async.control.ledger import Ledger
 from robotiq_async.control.motion import Move
-from robotiq_async.control.pending import Command, OpenRequests, Pending
+from robotiq_async.control.pending import NONE_PENDING, Command, OpenRequests, Pending
 from robotiq_async.control.waiters import fail
 from robotiq_async.values.enums import Finger
 from robotiq_async.values.errors import ConnectionLostError, MoveSupersededError
@@ -40,14 +40,14 @@ def test_any_commands_leave_the_last_value_of_each_axis_and_field(
 ) -> None:
     pending = Pending()
     for axes, position, speed, force in commands:
-        pending.merge(Command(axes, position, speed, force))
+        pending = pending.merged(Command(axes, position, speed, force))
     for field, merged in enumerate((pending.positions, pending.speeds, pending.forces)):
         for axis in THREE_FINGER.axes:
             values = [
                 values[field] for axes, *values in commands if axis in axes and values[field] is not None
             ]
             assert merged.get(axis) == (values[-1] if values else None)
-    assert pending.is_empty == (not any(value is not None for _, *values in commands for value in values))
+    assert pending.has_changes == any(value is not None for _, *values in commands for value in values)
 
 
 # -- holding and halting -----------------------------------------------------------------------------------
@@ -123,7 +123,7 @@ def test_a_pending_command_knows_whether_there_is_something_to_write(
 ) -> None:
     requests = OpenRequests()
     fill(requests)
-    assert requests.pending.is_empty == empty
+    assert (requests.pending is NONE_PENDING) == empty
     assert requests.pending.has_changes == has_changes
 
 
@@ -190,7 +190,7 @@ def test_what_moves_is_dropped_alone_or_with_the_holds() -> None:
     assert (requests.pending, holder.is_answered) == (Pending(hold=B), False)
     fail(requests.drop(holds=True), LOST)
     assert isinstance(holder.error, ConnectionLostError)
-    assert requests.pending.is_empty
+    assert requests.pending is NONE_PENDING
 
 
 def test_a_halt_takes_the_holds_with_it() -> None:
