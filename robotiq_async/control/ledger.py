@@ -12,9 +12,9 @@ No I/O and no clock: callers give the time of a write, and questions are about t
 #   have: the base of the next image.
 # * shown: a status has repeated its echo. A slow gripper may show an older one again, or skip one [follows];
 #   one from before another client's image counts as that client's.
-# * doubtful: the link went down before the acknowledgement, or another client's image showed first
-#   [follows]. It may act, and is not the base. If it shows, it is certain again, and so is what was
-#   acknowledged after it.
+# * doubtful: the link went down before it showed (a URCap acknowledges before its gripper), or another
+#   client's image showed first [follows]. It may act, and is not the base. If it shows, it is certain again,
+#   and so is what was acknowledged after it.
 #
 # The newest that showed divides the entries, and no entry has a number:
 #
@@ -256,9 +256,12 @@ class Ledger:
     def lost(self, now: float = NEVER) -> None:
         """The link is down: a write without acknowledgement may have arrived at any time until now."""
         self._settle_base()
-        if (entry := self.in_flight) is not None:
-            entry.doubt(now)
-            self.requests.lose(entry)
+        certain, echo = [each for each in self.ahead if not each.is_doubtful], self.shown.echo
+        # A speed or a force alone cannot show: there the acknowledgement counts.
+        kept = [*takewhile(lambda each: each.echo == echo and not each.is_on_the_line, certain)]
+        for each in reversed(certain[len(kept) :]):
+            each.doubt(now)
+            self.requests.lose(each)
 
     def _settle_base(self) -> Entry:
         """End the adoption, so that no later status changes the base; return the entry that has it."""

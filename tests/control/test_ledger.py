@@ -268,7 +268,22 @@ STORIES: dict[str, tuple[int, list[At]]] = {
         ],
     ),
     # A write that was lost with the link is in doubt until its echo, or as long as the window.
-    "an acknowledged write is not lost": (100, [At(1.0, writes(200), 1), At(1.0, link_lost, 1)]),
+    "an acknowledged write that has not shown is in doubt, too": (
+        100,
+        [
+            *(At(1.0, writes(200), 1), At(1.0, link_lost, 1, in_doubt=True)),
+            *(At(1.1, ours(100), 1, in_doubt=True), At(1.15, ours(200))),
+        ],
+    ),
+    "an acknowledged write that shows on no new link": (
+        100,
+        [
+            *(At(1.0, writes(200), 1), At(1.4, link_lost, 1, in_doubt=True)),
+            *(At(1.4, ours(100), 1, in_doubt=True), At(1.0 + WINDOW_S + EPSILON, ours(100))),
+            At(1.6, foreign(200)),
+        ],
+    ),
+    "an acknowledged force remains": (100, [At(1.0, writes(100, force=200), 1), At(1.0, link_lost, 1)]),
     "a lost write had arrived": (100, [*LOST, At(1.0 + WINDOW_S, ours(200))]),
     "a lost write arrives": (
         100,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -18,6 +18,7 @@ from robotiq_async import (
     Model,
     MoveSupersededError,
     ObjectStatus,
+    ReconnectPolicy,
     RobotiqHand,
     State,
 )
@@ -135,6 +136,50 @@ async def test_a_stream_that_is_taken_one_by_one_is_ours(spacing: float) -> None
             await asyncio.sleep(5 * spacing)
         await hand.halt()
         assert hand.statistics.foreign_commands == 0
+
+
+# -- a SET that is acknowledged and lost ---------------------------------------------------------------------
+
+DELAYS = [0.0, 0.05, 0.1, 0.3]
+"""Seconds before the link is opened again; control knows a write for half a second."""
+
+
+async def fails_by_a_lost_set(
+    server: UrcapSimulatorServer, hand: RobotiqHand, call: Awaitable[object]
+) -> None:
+    """The SET of a call is lost; it has failed, and the link is back."""
+    async with server.fault_injector.making(Trouble("lost-set")):
+        calling = asyncio.ensure_future(call)
+        await asyncio.sleep(0.1)
+    with pytest.raises(ConnectionLostError):
+        await calling
+    await hand.wait_for_state(State.RUNNING_IDLE)
+
+
+@pytest.mark.parametrize("delay", DELAYS)
+@pytest.mark.parametrize("call", ["set_speed", "set_force"])
+async def test_a_motion_that_was_lost_is_not_sent_again_with_a_speed_or_a_force(
+    call: str, delay: float
+) -> None:
+    async with at_a_ur(reconnect=ReconnectPolicy(first_delay=delay)) as (server, hand):
+        await hand.move(100)
+        await fails_by_a_lost_set(server, hand, hand.move(200))
+        await getattr(hand, call)(9)
+        await asyncio.sleep(1.0)
+        assert server.gripper.position(JAW) == pytest.approx(100, abs=2)
+
+
+@pytest.mark.parametrize("delay", DELAYS)
+@pytest.mark.parametrize("call", ["halt", "reset"])
+async def test_in_place_of_a_stop_that_was_lost_the_jaw_is_held(call: str, delay: float) -> None:
+    async with at_a_ur(reconnect=ReconnectPolicy(first_delay=delay)) as (server, hand):
+        hand.command(position=255, speed=0)
+        await until_moving(server, hand)
+        await fails_by_a_lost_set(server, hand, getattr(hand, call)())
+        await asyncio.sleep(0.1)
+        held_at = server.gripper.position(JAW)
+        await asyncio.sleep(0.5)
+        assert server.gripper.position(JAW) == held_at
 
 
 # -- other clients -------------------------------------------------------------------------------------------
