@@ -132,7 +132,7 @@ async def _start(
     try:
         await operator.hand.start(activate=False)
     except RobotiqError as error:
-        updates.problem = str(error)
+        updates.note_start(str(error))
         if alone:
             raise
         trying = asyncio.get_running_loop().create_task(_try_again(page, index, operator))
@@ -149,9 +149,9 @@ async def _try_again(page: PageServer, index: int, operator: Operator) -> None:
         try:
             await operator.hand.start(activate=False)
         except RobotiqError as error:
-            updates.problem = str(error)
+            updates.note_start(str(error))
         else:
-            updates.problem = ""
+            updates.note_start()
             updates.open()
 
 

@@ -43,6 +43,10 @@ class NonblockingDriver(LinuxDriver):
         """Whether the queue is empty."""
         return self._waiting.empty()
 
+    def paint_again(self) -> None:
+        """Note that the whole screen is painted again."""
+        self.is_behind = False
+
     def write(self, data: str) -> None:
         """Queue output for the terminal."""
         if not self._thread.is_alive() and self._thread.ident is None:

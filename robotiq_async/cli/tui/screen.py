@@ -130,7 +130,7 @@ class Monitor(App[None]):
         if isinstance(driver, NONBLOCKING) and driver.is_behind:
             if not driver.has_caught_up:
                 return
-            driver.is_behind = False
+            driver.paint_again()
             self.refresh(layout=True)
         self._look()
         for when, text, style in sorted(self._lines):

@@ -44,6 +44,12 @@ class _Goal:
         """Done when the gripper has acknowledged the hold of its axes: empty, or why it has not."""
         self.is_over = asyncio.Event()  # set when the next goal may use its axes
 
+    def begin(self, work: asyncio.Task[Sequence[MoveResult]]) -> None:
+        self.work = work
+
+    def hold_axes(self, hold: asyncio.Future[str]) -> None:
+        self.hold = hold
+
     def end(self, ending: GoalEnding, reason: str) -> None:
         # The first reason counts. Its task then holds the axes that still move.
         if self.ended is None and not self.is_over.is_set():
@@ -118,7 +124,8 @@ class GoalRunner:
         try:
             if goal.ended is not None:
                 return None
-            goal.work = work = asyncio.ensure_future(_move(self._hand, targets, speed, force))
+            work = asyncio.ensure_future(_move(self._hand, targets, speed, force))
+            goal.begin(work)
             try:
                 while not work.done():
                     await asyncio.wait({work}, timeout=FEEDBACK_S)
@@ -132,7 +139,7 @@ class GoalRunner:
                 return work.result()
             if goal.ended is not None and goal.ended[0] is GoalEnding.CANCELED:
                 # Now: a later hold would stop the axes of the next goal.
-                goal.hold = asyncio.ensure_future(self._hold_axes(goal, targets.axes))
+                goal.hold_axes(asyncio.ensure_future(self._hold_axes(goal, targets.axes)))
             return None
         finally:
             goal.is_over.set()

@@ -36,15 +36,19 @@ RECEIPT_LOOK_S: Final = 0.01  # seconds between two looks at that
 
 
 class _Server(ActionServer):  # type: ignore[misc]  # rclpy is not here
-    """Calls ``asked``, in the executor's thread, when a client has asked for the result of a goal."""
+    """Calls a function, in the executor's thread, when a client has asked for the result of a goal."""
 
-    asked: Callable[[bytes], object]
+    _asked: Callable[[bytes], object]
+
+    def when_asked(self, call: Callable[[bytes], object]) -> None:
+        """Say which function: it takes the key of the goal."""
+        self._asked = call
 
     async def execute(self, taken_data: dict[str, Any]) -> None:
         await super().execute(taken_data)
         if "result" in taken_data:
             _, request = taken_data["result"]
-            self.asked(bytes(request.goal_id.uuid))
+            self._asked(bytes(request.goal_id.uuid))
 
 
 class GripperAction:
@@ -79,7 +83,7 @@ class GripperAction:
             cancel_callback=self._cancel,
             callback_group=group,
         )
-        self._server.asked = lambda key: bridge.tell(unasked.asked, key)
+        self._server.when_asked(lambda key: bridge.tell(unasked.asked, key))
 
     async def results_asked(self) -> None:
         """Wait, in the loop, until clients have asked for the results of their goals, for seconds at most."""

@@ -144,7 +144,7 @@ class Physics:
         try:
             world.step(until)
         except Exception as error:
-            world.failure = error
+            world.fail(error)
             raise _standing_still(error) from error
         return True
 

@@ -79,7 +79,7 @@ class Stepper:
                 self._catch_up(due)
                 self.seen = world.look()
         except Exception as error:  # noqa: BLE001  # raised by the next call
-            self._world.failure = error
+            self._world.fail(error)
 
     def _catch_up(self, due: float) -> None:
         """Make steps that are due, but not so many that nobody would see what happens between them."""

@@ -109,6 +109,10 @@ class World:
         """Supports that hold a part: constraints that end when the gripper holds it."""
         self.step_s: float = self._model.opt.timestep
 
+    def fail(self, error: Exception) -> None:
+        """Note the error that has ended it."""
+        self.failure = error
+
     def step(self, until: float) -> None:
         """Let one step pass, or all that are due until a time while nothing moves."""
         motors, step_s = self._motors, self.step_s

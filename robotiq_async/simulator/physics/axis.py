@@ -224,7 +224,20 @@ class Axis:
         if self.high != before and self._goal is not None and not self._is_latched_against(self._goal):
             self._plan(time)
 
-    def look_again(self, time: float) -> None:
+    def obstruct(self, time: float, obstacle: Obstacle | None, *, opening: bool) -> None:
+        """Put an obstacle into one direction, or take it out of there."""
+        if opening:
+            self.in_opening = obstacle
+        else:
+            self.in_closing = obstacle
+        self._look_again(time)
+
+    def remove_obstacles(self, time: float) -> None:
+        """Take out the obstacles of both directions."""
+        self.in_closing = self.in_opening = None
+        self._look_again(time)
+
+    def _look_again(self, time: float) -> None:
         """Plan the motion again after obstacles have changed. An axis at rest does not: a contact latches."""
         if self.is_moving:
             self._plan(time)

@@ -206,6 +206,20 @@ class GripperController:
         self._resets_needed = 0
         self.reset(time)
 
+    # The world changes these; the gripper has caught up with its clock before.
+
+    def change_habits(self, habits: Habits) -> None:
+        self.habits = habits
+
+    def report_controller_fault(self, code: int) -> None:
+        self.controller_fault = code
+
+    def sleep(self, is_asleep: bool) -> None:
+        self.is_asleep = is_asleep
+
+    def let_activation_fail(self, fails: bool) -> None:
+        self.fail_activation = fails
+
     def strand(self, time: float, request: Request) -> None:
         """Lose the activation under a request with rACT: nothing moves until that is cleared."""
         self.reset(time)

@@ -250,11 +250,7 @@ class SimulatedGripper:
         met = Obstacle(check_byte("position", position), check_byte("soft", soft), fixed)
         obstacle = None if thin else met
         for axis in self._axes_in(self.model.mask(fingers)):
-            if opening:
-                axis.in_opening = obstacle
-            else:
-                axis.in_closing = obstacle
-            axis.look_again(self._time)
+            axis.obstruct(self._time, obstacle, opening=opening)
 
     def remove_object(self, fingers: Finger | int = Finger.ALL) -> None:
         """Remove the obstacles of some axes.
@@ -267,8 +263,7 @@ class SimulatedGripper:
             ValueError: fingers is not a mask of axes.
         """
         for axis in self._axes_in(self.model.mask(fingers)):
-            axis.in_closing = axis.in_opening = None
-            axis.look_again(self._time)
+            axis.remove_obstacles(self._time)
 
     def inject_fault(self, fault: Fault | int, duration: float | None = None) -> None:
         """Make a fault appear. A minor or major one stops the axes; interference, see :meth:`interfere`.
@@ -318,7 +313,7 @@ class SimulatedGripper:
         if self._controller.model.has_modes:
             raise ValueError(f"a {self._controller.model.title} has no controller fault (kFLT)")
         self._catch_up()
-        self._controller.controller_fault = check_int("controller_fault", code, 0, 15)
+        self._controller.report_controller_fault(check_int("controller_fault", code, 0, 15))
 
     def emergency_stop(self, resets: int = 1) -> None:
         """Press the emergency stop: an active gripper stops, reports fault 0x05, and stays at gIMC = 1.
@@ -351,7 +346,7 @@ class SimulatedGripper:
     @is_asleep.setter
     def is_asleep(self, value: bool) -> None:
         self._catch_up()
-        self._controller.is_asleep = value
+        self._controller.sleep(value)
 
     def clear_faults(self) -> None:
         """End the injected faults; a request with rGTO = 1 resumes."""
@@ -373,7 +368,7 @@ class SimulatedGripper:
     @fail_activation.setter
     def fail_activation(self, value: bool) -> None:
         self._catch_up()
-        self._controller.fail_activation = value
+        self._controller.let_activation_fail(value)
 
     # Bodies.
 
@@ -408,7 +403,7 @@ class SimulatedGripper:
     @habits.setter
     def habits(self, value: Habits) -> None:
         self._catch_up()
-        self._controller.habits = value
+        self._controller.change_habits(value)
 
     @property
     def device_cycle(self) -> float:

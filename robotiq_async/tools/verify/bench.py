@@ -80,10 +80,34 @@ class Bench:
         """Seconds between two reads in a watch."""
         return self.lengths.interval or POLL_INTERVAL_S
 
-    def watch(self, seconds: float) -> StageWatch:
+    def watch(self, seconds: float, *, allows_faults: bool = False) -> StageWatch:
         return StageWatch(
-            self.link, self.person, seconds=seconds, interval=self.interval, spacing=self.spacing
+            self.link,
+            self.person,
+            seconds=seconds,
+            interval=self.interval,
+            spacing=self.spacing,
+            allows_faults=allows_faults,
         )
+
+    # -- findings --------------------------------------------------------------------------------------------
+
+    def found_at(self, registers: RegisterMap | None) -> None:
+        """Note where the gripper answers, and make the link to it; None for a URCap's."""
+        self.registers = registers
+        self.link, self.is_found = self.another_link(), True
+
+    def first_seen(self, status: RobotiqStatus) -> None:
+        """Note the first status."""
+        self.found = status
+
+    def leave_between_writes(self, seconds: float) -> None:
+        """Leave more time from one write to the next."""
+        self.spacing = max(self.spacing, seconds)
+
+    def note_active(self, is_active: bool) -> None:
+        """Note whether the gripper is active at the end of a stage."""
+        self.is_active = is_active
 
     # -- results ---------------------------------------------------------------------------------------------
 

@@ -24,11 +24,9 @@ async def find(bench: Bench) -> None:
     findings: list[Finding] = []
     try:
         if bench.address.kind == URCAP:
-            link = await find_urcap(bench.address, None, findings.append)
+            link, registers = await find_urcap(bench.address, None, findings.append), None
         else:
-            link, bench.registers = await find_gripper(
-                bench.address, registers_of(bench.address), findings.append
-            )
+            link, registers = await find_gripper(bench.address, registers_of(bench.address), findings.append)
     except GiveUpError:
         last = findings[-1]
         end = "" if last.found.endswith("?") else "."
@@ -36,11 +34,11 @@ async def find(bench: Bench) -> None:
         why = "refused" if last.what == STRANGER else "link"
         raise EndError(why, f"{last.what}: {last.found}{end} {last.advice}") from None
     await link.close()
-    bench.link, bench.is_found = bench.another_link(), True
+    bench.found_at(registers)
     await asyncio.sleep(0.5)  # for a gateway that serves one client to see that the other has gone
     await bench.link.open()
     statuses = [await bench.link.read() for _ in range(LASTING)]
-    bench.found = statuses[-1]
+    bench.first_seen(statuses[-1])
     strange = [why for status in statuses if (why := why_no_gripper(status))]
     if strange:
         raise EndError("refused", f"what answers may be another device: {strange[0]}")

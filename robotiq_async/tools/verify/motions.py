@@ -56,7 +56,7 @@ def are_near(status: RobotiqStatus, targets: Mapping[Finger, int], counts: int) 
 
 async def reset(watch: StageWatch) -> None:
     """Clear rACT and wait for its echo. The fingers stay where they are."""
-    watch.needs_active = False
+    watch.need_active(False)
     await watch.write(Request(model=watch.model))
     if await watch.until(lambda status: not status.activation_echo and status.is_reset, 2.0) is None:
         raise EndError("inactive", "rACT = 0 was acknowledged, but the gripper does not show it")
@@ -64,13 +64,13 @@ async def reset(watch: StageWatch) -> None:
 
 async def activate(watch: StageWatch) -> float:
     """Reset and activate: all fingers move. Returns the seconds that the activation took."""
-    watch.envelope = ANYWHERE
+    watch.confine(ANYWHERE)
     await reset(watch)
     began = await watch.write(Request(activate=True, model=watch.model))
     if await watch.until(lambda status: status.is_activated, ACTIVATION_S) is None:
         shown = f": the gripper is {describe(watch.last)}" if watch.last else ""
         raise EndError("time", f"the activation did not finish within {ACTIVATION_S:g} s{shown}")
-    watch.needs_active = True
+    watch.need_active(True)
     return asyncio.get_running_loop().time() - began
 
 
@@ -79,7 +79,7 @@ async def go(
 ) -> RobotiqStatus | None:
     """Send axes to targets and wait until they rest there; None if they do not in time."""
     assert watch.last is not None
-    watch.envelope = motion_envelope(watch.last, targets)
+    watch.confine(motion_envelope(watch.last, targets))
     await watch.write(replace(image, go=True).with_positions(targets))
     return await watch.until(lambda status: are_near(status, targets, MARGIN), seconds) and (
         await watch.until_still(2.0)

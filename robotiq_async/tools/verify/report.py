@@ -36,6 +36,18 @@ class Report:
         """Whether a stage has written, and the rGTO = 0 at its end was not confirmed."""
         return self.last is None and any(number >= HARMLESS for number in self.entered)
 
+    def identify(self, registers: RegisterMap | None, found: RobotiqStatus | None) -> None:
+        """Note the gripper that was found, as far as it was."""
+        self.registers, self.found = registers, found
+
+    def stopped(self, status: RobotiqStatus | None) -> None:
+        """Note the status after the fingers were stopped; None if none came."""
+        self.last = status
+
+    def end(self, why: str, words: str) -> None:
+        """Note the ending of the run."""
+        self.why, self.words = why, words
+
     def complete(self) -> None:
         """Note as inconclusive the checks that a stage has not reached."""
         for name, assumption in checks_of(self.model, self.link).items():

@@ -107,13 +107,13 @@ class Runner:
         try:
             for stage in STAGES[self._plan.first : self._plan.last + 1]:
                 await self._do(stage)
-            report.why, report.words = "done", f"stages {self._plan.first} to {self._plan.last}"
+            report.end("done", f"stages {self._plan.first} to {self._plan.last}")
         except EndError as end:
-            report.why, report.words = end.why, end.words
+            report.end(end.why, end.words)
         except RobotiqConnectionError as error:
-            report.why, report.words = "link", str(error)
+            report.end("link", str(error))
         except asyncio.CancelledError:
-            report.why, report.words = "interrupted", "Ctrl-C, or a signal"
+            report.end("interrupted", "Ctrl-C, or a signal")
             raise
         finally:
             report.complete()
@@ -140,7 +140,7 @@ class Runner:
         if self.report.is_unstopped:
             raise EndError("unstopped", f"rGTO = 0 was not confirmed at the end of stage {stage.number}")
         self.report.stages.append(stage.number)
-        self._bench.is_active = stage.number > HARMLESS
+        self._bench.note_active(stage.number > HARMLESS)
         self._save_report()
         if self._person.has_stopped:
             raise EndError("stopped", "a key was pressed, or the terminal was closed")
@@ -189,8 +189,7 @@ class Runner:
         try:
             await find(self._bench)
         finally:
-            self.report.registers = self._bench.registers
-            self.report.found = self._bench.found
+            self.report.identify(self._bench.registers, self._bench.found)
         assert self._bench.found is not None
         self._bench.link.expect(self._bench.found.echo)
 
@@ -206,4 +205,4 @@ class Runner:
         try:
             await wait_shielded(stopping)
         finally:
-            self.report.last = stopping.result()
+            self.report.stopped(stopping.result())

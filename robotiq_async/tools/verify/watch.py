@@ -74,12 +74,22 @@ class StageWatch:
     """Reads and writes for one stage, and ends it when something is wrong."""
 
     def __init__(
-        self, link: RecordedLink, person: Person, *, seconds: float, interval: float, spacing: float
+        self,
+        link: RecordedLink,
+        person: Person,
+        *,
+        seconds: float,
+        interval: float,
+        spacing: float,
+        allows_faults: bool = False,
     ) -> None:
-        """Begin. The times are the seconds of the whole stage, between two reads, and between two writes."""
-        self.envelope = ANYWHERE  # of each axis; changed by the stage before each motion
-        self.needs_active = True  # whether the gripper must be active
-        self.allows_faults = False  # whether the stage expects faults
+        """Begin. The times are the seconds of the whole stage, between two reads, and between two writes.
+
+        ``allows_faults``: whether the stage expects faults.
+        """
+        self._envelope = ANYWHERE
+        self._needs_active = True
+        self._allows_faults = allows_faults
         self.last: RobotiqStatus | None = None  # the newest status
         self.model: Model = link.model  # of the gripper
         self._link = link
@@ -90,6 +100,14 @@ class StageWatch:
         self._loop = asyncio.get_running_loop()
         self._until = self._loop.time() + seconds
         self._not_ready = 0
+
+    def confine(self, envelope: Envelope) -> None:
+        """End the stage if an axis leaves its range; a stage says so before each motion."""
+        self._envelope = envelope
+
+    def need_active(self, needs: bool) -> None:
+        """End the stage if the gripper is not active; from the beginning it must be."""
+        self._needs_active = needs
 
     async def look(self) -> RobotiqStatus:
         """Read a status, and end the stage if anything is wrong."""
@@ -156,12 +174,12 @@ class StageWatch:
     # -- checks of a status ----------------------------------------------------------------------------------
 
     def _check(self, status: RobotiqStatus) -> None:
-        if not self.allows_faults:
+        if not self._allows_faults:
             self._check_fault(status)
-        if self.needs_active and not status.is_activated:
+        if self._needs_active and not status.is_activated:
             raise EndError("inactive", f"the gripper is no longer active: it is {describe(status)}")
         for axis in self.model.axes:
-            low, high = self.envelope.get(axis, (0, 255))
+            low, high = self._envelope.get(axis, (0, 255))
             if not low <= status.position(axis) <= high:
                 where = f"{axis.name} is at {status.position(axis)}, outside {low}..{high}"
                 raise EndError("envelope", where)

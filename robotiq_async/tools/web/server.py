@@ -65,6 +65,10 @@ class HandUpdates:
         self._peaks = [0] * len(hand.model.axes)
         self._counted_at = 0.0
 
+    def note_start(self, problem: str = "") -> None:
+        """Note why the hand could not be started; empty if it was."""
+        self.problem = problem
+
     def open(self) -> None:
         """Listen again after a stop of the hand."""
         self._timeline.open()

@@ -33,7 +33,7 @@ async def activation(bench: Bench) -> None:
     zeros = all(status.finger_status(axis) is ObjectStatus.IN_MOTION for axis in status.model.axes)
     follows = "No option is needed: a hand ignores gDT until it has commanded a position. Report this."
     bench.judge("activation.registers", zeros and not status.go_echo, words, follows)
-    bench.is_active = True
+    bench.note_active(True)
 
 
 STEP: Final = 30
@@ -123,11 +123,11 @@ async def _there_and_back(bench: Bench, axis: Finger, found: _Found) -> None:
 
 async def _one_way(watch: StageWatch, image: Request, axis: Finger, goal: int, found: _Found) -> None:
     start = await watch.look()
-    watch.envelope = motion_envelope(start, {axis: goal})
+    watch.confine(motion_envelope(start, {axis: goal}))
     await watch.write(replace(image, go=True).with_positions({axis: goal}))
     if start.go_echo and start.finger_status(axis) is ObjectStatus.AT_POSITION:
         lag = await _lag(watch, axis, goal)
-        found.lags += [] if lag is None else [lag]
+        found.lags.extend([] if lag is None else [lag])
     arrived = await watch.until(lambda status: _rests(status, axis, goal), STEP_S)
     if arrived is None:
         where = watch.last.position(axis) if watch.last else "?"

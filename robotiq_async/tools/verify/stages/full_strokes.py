@@ -51,7 +51,7 @@ async def _fingers_to(
     bench: Bench, watch: StageWatch, start: RobotiqStatus, goal: int, speed: int, force: int = 0
 ) -> tuple[RobotiqStatus, float]:
     """Move fingers; return the status at the end, and the seconds until the last was seen to move."""
-    watch.envelope = resting_envelope(start, bench.fingers)
+    watch.confine(resting_envelope(start, bench.fingers))
     image = in_place(start, speed=speed, force=force)
     image = replace(image, go=True).with_positions(dict.fromkeys(bench.fingers, goal))
     return await _stroke(watch, image, bench.fingers)
@@ -90,7 +90,7 @@ async def _scissor(bench: Bench, watch: StageWatch, home: int) -> None:
     readings: list[Figure] = []
     for goal in (0, 255, home):
         start = await watch.look()
-        watch.envelope = resting_envelope(start, (Finger.SCISSOR,))
+        watch.confine(resting_envelope(start, (Finger.SCISSOR,)))
         image = replace(in_place(start, speed=SCISSOR_SPEED), go=True).with_positions({Finger.SCISSOR: goal})
         status, _ = await _stroke(watch, image, (Finger.SCISSOR,))
         if goal != home:

@@ -60,7 +60,7 @@ async def _client(bench: Bench) -> None:
     image, home = in_place(start), {Finger.A: start.position(Finger.A)}
     far = {Finger.A: home[Finger.A] + (LOSS_STEP if home[Finger.A] < 128 else -LOSS_STEP)}
     await watch.write(image)
-    watch.envelope = motion_envelope(start, far)
+    watch.confine(motion_envelope(start, far))
     away = replace(image, go=True).with_positions(far)
     await watch.write(away)
     if await watch.until(lambda status: not are_near(status, home, MARGIN), 3.0) is None:
@@ -85,7 +85,7 @@ async def _first_motion(bench: Bench, watch: StageWatch, image: Request, home: d
     """Write a motion as the first image on a new connection."""
     assert watch.last is not None
     here = {Finger.A: watch.last.position(Finger.A)}
-    watch.envelope = motion_envelope(watch.last, home)
+    watch.confine(motion_envelope(watch.last, home))
     back = replace(image, go=True).with_positions(home)
     for number in range(2):
         # Another position, or a gripper that has taken it for its own does not see a change.
@@ -206,8 +206,7 @@ async def _activated_again(bench: Bench) -> bool:
     """Ask the person, reset and activate; return whether it is active then."""
     if not await bench.person.consents(RESET_AGAIN):
         raise EndError("declined", "the new activation was not confirmed")
-    watch = bench.watch(SECONDS)
-    watch.allows_faults = True
+    watch = bench.watch(SECONDS, allows_faults=True)
     try:
         await activate(watch)
     except EndError as end:

@@ -77,8 +77,8 @@ async def _command(bench: Bench) -> None:
     home = start.position(Finger.A)
     step = 1 if home < 128 else -1
     reached = [home - MARGIN, home + MARGIN, home + step * (SWING + MARGIN)]
-    watch.envelope = resting_envelope(start, (Finger.A,)) | {Finger.A: (min(reached), max(reached))}
-    envelope = watch.envelope
+    envelope = resting_envelope(start, (Finger.A,)) | {Finger.A: (min(reached), max(reached))}
+    watch.confine(envelope)
     achieved: list[Figure] = []
     for rate in SOAK_RATES:
         sent, seconds, ends = await _burst(bench, watch, image, home, step, rate)
@@ -91,7 +91,7 @@ async def _command(bench: Bench) -> None:
             return
     if await go(watch, image, {Finger.A: home}, 5.0) is None:
         raise EndError("time", f"{bench.first} did not come back within 5 s")
-    watch.envelope = envelope
+    watch.confine(envelope)
     bench.as_assumed("soak.commands", "followed to the last one at each rate", rates=achieved)
 
 

@@ -40,7 +40,7 @@ async def soft_part(bench: Bench) -> None:
     watch = bench.watch(SECONDS)
     start = await watch.look()
     home = {finger: start.position(finger) for finger in bench.fingers}
-    watch.envelope = resting_envelope(start, bench.fingers)
+    watch.confine(resting_envelope(start, bench.fingers))
     closing = await _close(bench, watch, start)
     held = closing.end
     _judge_contact(bench, held)
@@ -75,7 +75,7 @@ async def _at_speed(bench: Bench, home: dict[Finger, int], slowly: RobotiqStatus
         raise EndError("declined", "the question about the foam was not answered")
     watch = bench.watch(SECONDS)
     start = await watch.look()
-    watch.envelope = resting_envelope(start, bench.fingers)
+    watch.confine(resting_envelope(start, bench.fingers))
     held = (await _close(bench, watch, start, SPEED_MAX)).end
     if not await bench.person.consents(RELEASE):
         raise EndError("declined", "the jaw was not opened: it is still closed, with rGTO = 0")

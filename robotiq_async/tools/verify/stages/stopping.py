@@ -31,13 +31,13 @@ async def stopping(bench: Bench) -> None:
     image = in_place(start, speed=SPEED)
     await watch.write(image)
     far = {finger: home[finger] + STOPPING_COUNTS for finger in bench.fingers}
-    watch.envelope = motion_envelope(start, far)
+    watch.confine(motion_envelope(start, far))
     away = replace(image, go=True).with_positions(far)
     await _halt(bench, watch, away, home)
     await _resume(bench, watch, away, far)
     await _new_target(bench, watch, image, home)
     await _hold(bench, watch, image, home)
-    watch.envelope = motion_envelope(start, far)
+    watch.confine(motion_envelope(start, far))
     if await go(watch, image, home, LEG_S) is None:
         raise EndError("time", "the fingers did not return to where they began")
 

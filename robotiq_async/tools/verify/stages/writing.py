@@ -31,7 +31,7 @@ WRITE_LATE_S: Final = 0.0005  # a first image was late if it took LATE times the
 async def writing(bench: Bench) -> None:
     """Write the same image, then positions without rGTO, then pairs of images close together."""
     watch = bench.watch(SECONDS)
-    watch.needs_active = False
+    watch.need_active(False)
     before = await watch.look()
     image = as_found(before)
     await _same(bench, watch, image)
@@ -223,7 +223,7 @@ def _judge_spacing(bench: Bench, kept: list[Figure], enough: list[float]) -> Non
     follows = "No option is needed: a hand leaves enough time. Programs that write faster lose commands."
     if forgotten >= usual_write_spacing(bench.model):
         spacing = min(LONGEST_SPACING_S, 2 * forgotten)
-        bench.spacing = max(bench.spacing, spacing)
+        bench.leave_between_writes(spacing)
         options, follows = {"write_spacing": round(spacing, 3)}, "Leave more time between writes."
     bench.differs("write.spacing", found, follows, options, gap_pairs_acted=kept)
 
