@@ -26,6 +26,8 @@ from tests.docs.agents import ROOM, agent_of_the_pages
 from tests.docs.pages import DOCS, PAGES, ROOT, TUTORIAL, Block, blocks, named, read, requirements
 from tests.docs.test_cell import PAGE as CELL
 from tests.docs.test_cell import running
+from tests.docs.test_episodes import PAGE as EPISODES
+from tests.docs.test_episodes import RECORD
 from tests.docs.test_service import PAGE as SERVICE
 from tests.docs.test_tutorial import PROGRAM, TYPED, agree
 from tests.docs.test_web_service import PAGE as WEB_SERVICE
@@ -37,7 +39,7 @@ README = ROOT / "README.md"
 
 
 LEROBOT = DOCS / "how-to" / "lerobot.md"
-ELSEWHERE = (TUTORIAL, WEB_SERVICE, SERVICE, CELL, LEROBOT)
+ELSEWHERE = (TUTORIAL, WEB_SERVICE, SERVICE, CELL, EPISODES, LEROBOT)
 """Pages whose code is no matter of the prompt: each has tests of its own. For LeRobot, of 5.7 GB, they are
 ``make test-lerobot``."""
 CODE = {page: code for page in PAGES if page not in ELSEWHERE and (code := blocks(read(page), "python"))}
@@ -127,6 +129,13 @@ async def test_the_notebook(tmp_path: Path) -> None:
     command = (python, str(DOCS / "make_notebook.py"), "--check")
     # Jupyter keeps things at home.
     await run(*command, folder=tmp_path, variables={"HOME": str(tmp_path)})
+
+
+async def test_the_episodes(tmp_path: Path) -> None:
+    program = tmp_path / "record_episodes.py"
+    program.write_text(RECORD, encoding="utf-8")
+    printed = await run(environment(requirements(read(EPISODES))), str(program), "today", folder=tmp_path)
+    assert " polls, 0 missed" in printed
 
 
 async def test_the_readme(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 import pytest_asyncio
+from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from lerobot.robots import make_robot_from_config
 from lerobot.utils.errors import DeviceAlreadyConnectedError, DeviceNotConnectedError
 
@@ -23,7 +24,7 @@ from robotiq_async.dropins.lerobot.robot import RobotiqGripper, RobotiqGripperCo
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.simulator.troubles.trouble import Trouble
 from robotiq_async.values.request import Request
-from tests.docs.pages import ROOT
+from tests.docs.pages import DOCS, ROOT, blocks, read
 from tests.grippers import active_gripper, until
 from tests.lerobot.leader.lamp import LampConfig
 
@@ -50,11 +51,19 @@ class Commands:
         return await self.start(name, *robot, *arguments)
 
     async def start(self, name: str, *arguments: str) -> asyncio.subprocess.Process:
+        return await self._start(str(Path(sys.executable).with_name(name)), *arguments)
+
+    async def program(self, name: str, *arguments: str) -> asyncio.subprocess.Process:
+        """A program in the folder, at the gripper."""
+        return await self._start(sys.executable, name, *arguments)
+
+    async def _start(self, *words: str) -> asyncio.subprocess.Process:
         return await asyncio.create_subprocess_exec(
-            str(Path(sys.executable).with_name(name)),
-            *arguments,
+            *words,
+            cwd=self.folder,
             env={
                 **os.environ,
+                "GRIPPER": self.server.address,
                 "PYTHONPATH": str(ROOT / "tests" / "lerobot"),
                 "HF_HOME": str(self.folder),
                 "HF_HUB_OFFLINE": "1",
@@ -157,6 +166,37 @@ async def test_a_gripper_that_falls_silent_ends_the_demonstration(commands: Comm
     async with commands.server.fault_injector.making(Trouble("silence")):
         printed = await ended(process, fails=True)
     assert "ConnectionLostError" in printed
+
+
+# -- what was recorded otherwise ------------------------------------------------------------------------
+
+
+async def test_episodes_beside_a_camera_become_a_dataset(commands: Commands) -> None:
+    """The programs of their page. The camera sees the opening, so that each picture has its true state."""
+    folder, (recording, converting) = commands.folder, blocks(read(DOCS / "how-to" / "episodes.md"), "python")
+    commands.gripper.place_object(JAW, 120)
+    for name, block, arguments in (
+        ("record_episodes.py", recording, ("today",)),
+        ("to_lerobot.py", converting, ("today", "data")),
+    ):
+        (folder / name).write_text(block.text, encoding="utf-8")
+        words = await ended(await commands.program(name, *arguments))
+        assert "left out" not in words, words
+    dataset = LeRobotDataset("me/grip", root=folder / "data")
+    assert (dataset.num_episodes, dataset.fps) == (3, 30)
+    assert dataset.num_frames > 3 * 30
+    frames = [dataset[number] for number in range(dataset.num_frames)]
+    assert {frame["task"] for frame in frames} == {"grip the part"}
+    shown = np.array([float(frame["observation.images.front"].mean()) * 100 for frame in frames])
+    states = np.array([frame["observation.state"].numpy() for frame in frames])
+    # A picture arrives a moment after it was taken.
+    assert np.median(np.abs(shown - states[:, 0])) < 5
+    assert set(states[:, 2]) == {0, 1}, "contact"
+    before = len(commands.targets())
+    await commands.run("lerobot-replay", *DATASET, f"--dataset.root={folder / 'data'}", "--dataset.episode=0")
+    replayed = commands.targets()[before:]
+    assert min(replayed) < 10
+    assert max(replayed) > 240
 
 
 # -- what the data is for ------------------------------------------------------------------------------

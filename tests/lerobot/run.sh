@@ -34,7 +34,7 @@ if [ ! -f "$venv/.complete" ]; then
     "$found" -m venv --clear "$venv"
     # Constraints would hold numpy above what LeRobot takes.
     timeout 900 "$venv-uv/bin/uv" pip install --quiet --python "$python" "$LEROBOT" hypothesis pytest pytest-asyncio \
-        -e '.[serial]' ./packaging/lerobot_robot_robotiq ||
+        -e '.[record,serial]' ./packaging/lerobot_robot_robotiq ||
         skip "$LEROBOT cannot be installed (see above)"
     touch "$venv/.complete"
 fi

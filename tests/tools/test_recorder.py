@@ -13,6 +13,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from asyncio.subprocess import PIPE
 from itertools import groupby, pairwise
 from pathlib import Path
@@ -570,3 +571,15 @@ def test_a_recorder_stays_with_the_process_that_began_it(file: Path) -> None:
 
         assert in_the_child(check) == 0
         recorder.mark("grasp 1")
+
+
+async def test_a_wall_clock_that_steps_back_moves_nothing_within_a_recording(
+    hand: RobotiqHand, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with Recorder(hand, file):
+        await hand.move(60)
+        monkeypatch.setattr(time, "time", lambda at=time.time: at() - 3600)
+        await hand.move(0)
+    entries = [entry for entry in read_recording(file) if entry.is_json]
+    offsets = [entry.nanoseconds - round(entry.fields["timestamp"] * 1e9) for entry in entries]
+    assert max(offsets) - min(offsets) < 1000, "nanoseconds"
