@@ -165,12 +165,7 @@ class StateMachine:
 
         ``presses`` is False for a command that neither moves an axis nor makes it press more.
         """
-        if presses and trigger in MOVES:
-            self.check_permitted()
-        answer = TABLE[self.state][trigger]
-        if answer in _REFUSALS:
-            raise refusal(trigger, self.state, status, self.why_down)
-        return answer is not Verdict.IGNORED
+        return check(trigger, self.state, status, self.inhibited if presses else None, why_down=self.why_down)
 
     def inhibit(self, inhibit: Inhibit) -> None:
         """Refuse what may move or press from here on. The first reason stays."""
@@ -211,6 +206,25 @@ class StateMachine:
     def note_down(self, why: object) -> None:
         """The link is down, for the error of what is refused then."""
         self.why_down = why
+
+
+def check(
+    trigger: Trigger,
+    state: State,
+    status: RobotiqStatus | None = None,
+    inhibited: Inhibit | None = None,
+    why_down: object = None,
+) -> bool:
+    """Whether there is anything to do for a trigger. Raises the error if the table or an inhibit refuses it.
+
+    ``inhibited`` counts for what may move or press.
+    """
+    if inhibited is not None and trigger in MOVES:
+        raise MotionInhibitedError(inhibited)
+    answer = TABLE[state][trigger]
+    if answer in _REFUSALS:
+        raise refusal(trigger, state, status, why_down)
+    return answer is not Verdict.IGNORED
 
 
 def refusal(

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import Any, Final, Self
 
-from ..hands import Channel, Listeners, Stream
-from ..runtime import now, running_loop
-from ..values import Fault, ProtocolError, RobotiqError, State, model_of
+from ..hands import Channel, Stream
+from ..runtime import now
+from ..values import Fault, Inhibit, ProtocolError, RobotiqError, State, model_of
 from .errors import NotAllStoppedError
 from .limited_log import LimitedLog
 from .network.bus import Bus, Undo
@@ -22,7 +22,7 @@ from .remote.errand import NoAnswerError
 from .remote.mirror import AgentClock, Mirror
 from .remote.remote_hand import RemoteHand
 from .wire.names import ROOT, GripperName, check_name
-from .wire.values import read_inhibit, reading, words
+from .wire.values import reading, words
 
 LOOK_S: Final = 0.5  # seconds to wait for the tokens of agents
 LOOK_AGAIN_S: Final = 0.1  # seconds until the next look for agents, during a halt
@@ -95,7 +95,7 @@ class Fleet:
         self._tokens: dict[GripperName, set[str]] = {}
         self._summaries = Summaries()
         self._unreadable = LimitedLog()
-        self._changes: Channel[Member] = Channel(Listeners())
+        self._changes: Channel[Member] = Channel()
 
     async def __aenter__(self) -> Self:
         """Subscribe, and find the agents that are there already.
@@ -104,7 +104,7 @@ class Fleet:
             RuntimeError: not in a running asyncio event loop.
             RobotiqError: no session could be opened.
         """
-        loop = running_loop()
+        loop = asyncio.get_running_loop()
         self._changes.check_loop(loop)
         self._bus = bus = self._shared or await self._open()
         self._changes.reopen(loop)
@@ -270,8 +270,8 @@ async def halt(bus: Bus, name: GripperName, agents: int, inhibit: str = "") -> s
 
 
 def _inhibited(fields: Mapping[str, Any]) -> str:
-    inhibit = read_inhibit(fields.get("inhibited"))
-    return "" if inhibit is None else str(inhibit)
+    inhibit = fields.get("inhibited")
+    return "" if inhibit is None else str(Inhibit.from_dict(inhibit))
 
 
 @dataclass(slots=True)

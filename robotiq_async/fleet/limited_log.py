@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Callable
 from typing import Final
 
-from ..runtime import Log, log, now
+from ..runtime import Log, now
 
 EVERY_S: Final = 10.0  # seconds between two messages of one kind
 
 
 class LimitedLog:
-    """Messages of one kind, about one source: the first at once, then one in 10 s with the number of all."""
+    """Messages of one kind, about one source: the first at once, then one in 10 s with the number of all.
 
-    def __init__(self, log: Log = log) -> None:
-        self._log = log
+    Outside of an event loop it needs another clock.
+    """
+
+    def __init__(self, log: Log | None = None, clock: Callable[[], float] = now) -> None:
+        self._log = log or Log()
+        self._clock = clock
         self._next = -math.inf
         self._count = 0
 
@@ -24,11 +29,12 @@ class LimitedLog:
     ) -> bool:
         """Log a warning, or count it; returns whether it was logged."""
         self._count += 1
-        if now() < self._next:
+        at = self._clock()
+        if at < self._next:
             return False
         if self._count > 1:
             message += " (%d similar since the last report)"
             arguments += (self._count,)
-        self._next, self._count = now() + EVERY_S, 0
+        self._next, self._count = at + EVERY_S, 0
         self._log.log(level, message, *arguments, exc_info=exc_info)
         return True

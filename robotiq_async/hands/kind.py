@@ -10,7 +10,7 @@ from typing import Literal, TypeVar
 from ..calibration import Units
 from ..runtime.logger import Log
 from ..values.checks import check_flag
-from ..values.enums import Finger, State
+from ..values.enums import Finger, State, StopLevel
 from ..values.errors import ConnectionLostError, NotStartedError
 from ..values.inhibit import Inhibit
 from ..values.model import THREE_FINGER, Model
@@ -40,7 +40,7 @@ class HandKind(ABC):
         self._address = address
         self._given_name = name
         self._units = units
-        self._keep_grip = keep_grip
+        self._keep_grip = check_flag("keep_grip", keep_grip)
         self._model = model
         self._channels = Channels(Log(name or address))
         self._naming = NamesErrors(name)
@@ -115,6 +115,11 @@ class HandKind(ABC):
 
     def _keeps_grip(self, keep_grip: bool | None) -> bool:
         return self._keep_grip if keep_grip is None else check_flag("keep_grip", keep_grip)
+
+    def _stop_level(self, halt: bool, keep_grip: bool | None) -> StopLevel:
+        """The level for the arguments of a stop."""
+        check_flag("halt", halt)
+        return StopLevel.of(halt=halt, keep_grip=self._keeps_grip(keep_grip))
 
     def _check_running(self) -> None:
         if self._session is None:

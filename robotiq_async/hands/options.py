@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from enum import Flag, auto
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Annotated, Final, get_type_hints
 
@@ -388,6 +388,9 @@ def offered(place: Place) -> dict[str, Option]:
     return {name: option for name, option in OPTIONS.items() if place in option.places}
 
 
+FILE_OPTIONS: Final = tuple(offered(Place.FILE))  # the names of those that an agent's file has
+
+
 def units_of(
     calibration: object, force_calibration: object, model: Model = THREE_FINGER, stroke: object = None
 ) -> Units:
@@ -401,5 +404,24 @@ def units_of(
     return Units(
         replace(speeds, model=model) if speeds else SpeedCalibration.usual(model),
         forces or ForceCalibration.nominal(model),
-        model.stroke.measured(points) if points else model.stroke,
+        model.stroke.measured(points or ()),
     )
+
+
+class UnitsByModel:
+    """The units of a hand that learns the model and the measured points of its gripper later.
+
+    Raises:
+        TypeError, ValueError: of the calibrations.
+    """
+
+    def __init__(
+        self, calibration: SpeedCalibration | None, force_calibration: ForceCalibration | None
+    ) -> None:
+        self._of = cache(partial(units_of, calibration, force_calibration))  # loops ask in every cycle
+        named = [getattr(each, "model", None) for each in (calibration, force_calibration)]
+        self.model: Model = next(filter(None, named), THREE_FINGER)  # as long as the gripper has not said it
+        self._of(self.model)
+
+    def __call__(self, model: Model, points: Points = ()) -> Units:
+        return self._of(model, points or None)

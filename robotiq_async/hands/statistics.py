@@ -6,8 +6,8 @@ import math
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
-from typing import Any, Final
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any, Final, Self
 
 from ..values.errors import RobotiqError
 from ..values.frozen_mapping import FrozenMapping
@@ -66,6 +66,20 @@ class Statistics:
     def as_dict(self) -> dict[str, Any]:
         """The figures in types that JSON and pandas accept, each under the name of its attribute."""
         return {**asdict(self), "moves": dict(self.moves)}
+
+    @classmethod
+    def from_dict(cls, told: Mapping[str, Any]) -> Self:
+        """The figures with this :meth:`as_dict`, perhaps of an older or a newer version of the library.
+
+        Raises:
+            TypeError: one is missing that every version has.
+        """
+        return cls(**{each.name: told[each.name] for each in fields(cls) if each.name in told})
+
+    @classmethod
+    def none(cls) -> Self:
+        """The figures before the first poll."""
+        return cls(0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0, "", 0, {})
 
 
 def percentile(ordered: list[float], share: float) -> float:

@@ -296,8 +296,8 @@ class Listeners:
 class Channel(Generic[T]):
     """Gives every item to any number of streams, and to the listeners. A dropped stream is forgotten."""
 
-    def __init__(self, listeners: Listeners) -> None:
-        self._listeners = listeners
+    def __init__(self, listeners: Listeners | None = None) -> None:
+        self._listeners = listeners or Listeners()
         # A list of references and not a WeakSet, which takes several times as long, at every poll.
         self._intakes: list[weakref.ref[Intake[Any]]] = []
         self._has_dropped = False  # whether some of these were dropped by their readers

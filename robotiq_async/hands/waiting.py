@@ -13,7 +13,7 @@ from ..control.state_machine import RUNNING, StateMachine
 from ..runtime.logger import Log
 from ..values.checks import repr_of
 from ..values.enums import Severity, State
-from ..values.errors import RobotiqError
+from ..values.errors import RobotiqError, StateTimeoutError
 from ..values.registers import Registers
 from ..values.status import RobotiqStatus
 from .streams import Listeners
@@ -78,6 +78,12 @@ class StateWaiters:
                     future.set_exception(failing[state]())
 
         return wake
+
+    @staticmethod
+    def late(what: str, seconds: float | None, state: State) -> StateTimeoutError:
+        """The error of a wait that took longer than some seconds; ``state`` is the present one."""
+        assert seconds is not None, "a wait without a limit is never late"
+        return StateTimeoutError(f"{what} within {seconds:g} s (now {state.name})")
 
     def fail(self, failure: Callable[[], RobotiqError]) -> None:
         for _, _, future in self._waiters:

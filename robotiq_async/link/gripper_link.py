@@ -81,6 +81,18 @@ class GripperLink:
     model: Model = THREE_FINGER
     stroke: str | None = None
 
+    def why_not_beside(self, other: GripperLink) -> str:
+        """Why one process cannot have hands for both; empty if it can."""
+        own, theirs = self.gripper(), other.gripper()
+        if own.may_be(theirs):
+            return f"both may be one gripper{own.hint}"
+        if own.place != theirs.place:
+            return ""
+        if own.is_on_line is not theirs.is_on_line:
+            return "a socket has one protocol"
+        is_alike = parse_address(self.address).line == parse_address(other.address).line
+        return "" if is_alike else "a port has only one rate"
+
 
 def gripper_link(
     address: object, registers: Mapping[str, object], name: str = "", model: object = None

@@ -39,7 +39,7 @@ from ..hands.options import (
     NoAddress,
     ReconnectPolicy,
 )
-from ..hands.statistics import Counters, Statistics
+from ..hands.statistics import Statistics
 from ..hands.waiting import STALLED_S, StallWatch
 from ..link.tunnel.protocol import Tunnel
 from ..runtime.clock import now
@@ -446,7 +446,7 @@ class RobotiqHand(Hand):
     def statistics(self) -> Statistics:
         """Figures of the polling since the last start."""
         if self._session is None:
-            return Counters().snapshot(0)
+            return Statistics.none()
         controller = self._session.controller
         return self._session.counters.snapshot(controller.foreign_commands, controller.evidence.passed)
 

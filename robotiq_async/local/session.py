@@ -280,7 +280,7 @@ class Session:
             with Limit(timeout):
                 state = await reached
         if state is None:
-            raise StateTimeoutError(f"{what} within {timeout:g} s (now {self.machine.state.name})")
+            raise self._waiters.late(what, timeout, self.machine.state)
         return state
 
     async def activated(self, ask: Callable[[], None] | None = None) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Self
 
 from .enums import State, Trigger
+from .model import model_of
 from .request import Request
 
 
@@ -33,6 +35,12 @@ class Transition:
             "target": self.target.name,
             "trigger": self.trigger.name,
         }
+
+    @classmethod
+    def from_dict(cls, fields: Mapping[str, Any]) -> Self:
+        """The transition with this :meth:`as_dict`; KeyError or TypeError if it is that of none."""
+        source, target, trigger = fields["source"], fields["target"], fields["trigger"]
+        return cls(State[source], State[target], Trigger[trigger], fields["timestamp"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,3 +75,18 @@ class SentRequest:
             "individual_scissor": request.individual_scissor,
             **{str(axis.name): asdict(asked) for axis, asked in request.by_axis},
         }
+
+    def as_raw(self) -> dict[str, Any]:
+        """The fewest figures that :meth:`from_raw` needs, in types that JSON accepts."""
+        return {
+            "registers": self.request.registers,
+            "model": self.request.model.name,
+            "timestamp": self.timestamp,
+            "acknowledged": self.acknowledged,
+        }
+
+    @classmethod
+    def from_raw(cls, fields: Mapping[str, Any]) -> Self:
+        """The image with this :meth:`as_raw`; KeyError, TypeError or ValueError if it is that of none."""
+        request = Request.from_registers(fields["registers"], model_of(fields.get("model")))
+        return cls(request, fields["timestamp"], bool(fields["acknowledged"]))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, Final
+from typing import Any, Final, Self
 
 from .checks import as_float, repr_of
 
@@ -38,6 +39,11 @@ class Inhibit:
     def as_dict(self) -> dict[str, Any]:
         """The fields in types that JSON accepts."""
         return asdict(self)
+
+    @classmethod
+    def from_dict(cls, fields: Mapping[str, Any]) -> Self:
+        """The inhibit with this :meth:`as_dict`; KeyError, TypeError or ValueError if it is that of none."""
+        return cls(fields["reason"], fields["who"], fields["since"])
 
     def __str__(self) -> str:
         """``motion is inhibited: the guard is open (PLC)``."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 from .enums import JAW, Finger, ObjectStatus, names_of
 from .frozen_mapping import FrozenMapping
@@ -78,6 +78,27 @@ class MoveResult:
             },
             "status": self.status.as_dict(),
         }
+
+    @classmethod
+    def from_dict(cls, fields: Mapping[str, Any], status: RobotiqStatus) -> Self:
+        """The result with this :meth:`as_dict`, and the status in it.
+
+        Raises:
+            KeyError, TypeError, ValueError: it is that of none.
+        """
+        axes = {axis: fields[str(axis.name)] for axis in Finger.ALL if axis.name in fields}
+        return cls(
+            outcomes={axis: ObjectStatus[end["outcome"]] for axis, end in axes.items()},
+            positions={axis: int(end["position"]) for axis, end in axes.items()},
+            contacts=Finger(sum(Finger[name] for name in fields["contacts"])),
+            reached=Finger(sum(axis for axis, end in axes.items() if end["reached"])),
+            duration=float(fields["duration"]),
+            peak_current_ma={
+                axis: int(end["peak_current_ma"]) if "peak_current_ma" in end else None
+                for axis, end in axes.items()
+            },
+            status=status,
+        )
 
     def __repr__(self) -> str:
         axes = ", ".join(

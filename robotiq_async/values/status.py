@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 from . import registers as reg
 from .checks import check_flag, check_int, check_seconds
 from .enums import CONTROLLER_FAULTS, Fault, Finger, Initialization, Mode, ObjectStatus
-from .model import THREE_FINGER, TOLERANCE, Model
+from .model import THREE_FINGER, TOLERANCE, Model, model_of
 from .stroke import Stroke
 
 NO_REQUEST: Final = "NO_REQUEST"
@@ -392,6 +392,32 @@ class RobotiqStatus:
             "contacts": list(model.contact_names[words[0] >> model.object_shift & 0xFF]),
             **axes,
         }
+
+    def as_raw(self) -> dict[str, Any]:
+        """The fewest figures that :meth:`from_raw` needs, in types that JSON accepts."""
+        return {
+            "registers": self._registers,
+            "timestamp": self._timestamp,
+            "sequence": self._sequence,
+            "model": self._model.name,
+            "has_current": self._has_current,
+        }
+
+    @classmethod
+    def from_raw(cls, fields: Mapping[str, Any]) -> RobotiqStatus:
+        """The status with this :meth:`as_raw`, with nominal openings.
+
+        Raises:
+            KeyError: a figure is missing.
+            TypeError, ValueError: as :meth:`from_registers`, or no such model.
+        """
+        return cls.from_registers(
+            fields["registers"],
+            timestamp=fields["timestamp"],
+            sequence=fields["sequence"],
+            model=model_of(fields.get("model")),
+            has_current=fields.get("has_current", True),
+        )
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RobotiqStatus):

@@ -20,6 +20,7 @@ import operator
 from bisect import bisect_left
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import pairwise
 from math import cos
 from typing import Final
@@ -87,8 +88,11 @@ class Stroke:
         """The source of the openings, for people."""
         return "measured" if self.points else "nominal"
 
+    @lru_cache(maxsize=16)  # noqa: B019  # a remote hand asks at every status
     def measured(self, points: Points) -> Stroke:
-        """The stroke of one gripper, from points as :func:`check_points` returns them."""
+        """The stroke of one gripper, from points as :func:`check_points` returns them; itself without any."""
+        if not points:
+            return self
         (first, mm), (last, _) = points[0], points[-1]
         return Stroke(mm, first, last, self.arc, points)
 

@@ -19,7 +19,7 @@ from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 
-from robotiq_async import Finger, RobotiqHand, State
+from robotiq_async import Finger, RobotiqHand, RobotiqStatus, State
 from robotiq_async.fleet import Agent, Fleet, GripperName, RemoteHand, Route
 from robotiq_async.fleet.network.bus import Query, Urgency
 from robotiq_async.fleet.network.configuration import agent_configuration, client_configuration
@@ -246,18 +246,17 @@ async def generator(endpoint: str, count: str) -> None:
 
 
 def message(of: GripperName, sequence: int) -> bytes:
+    stamp = time.monotonic()
     return StatusMessage(
         mark=of.mark,
         epoch=1,
-        stamp=time.monotonic(),
+        stamp=stamp,
         state=State.RUNNING_IDLE,
         lease=0,
         is_held=False,
         events=0,
         is_moving=False,
-        sequence=sequence,
-        age=0.0,
-        registers=REGISTERS,
+        status=RobotiqStatus(REGISTERS, stamp, sequence),
     ).pack()
 
 

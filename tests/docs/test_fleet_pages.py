@@ -13,15 +13,15 @@ from robotiq_async import Finger, Inhibit, MoveResult, ObjectStatus, RobotiqHand
 from robotiq_async.fleet import GripperName
 from robotiq_async.fleet.agent.agent_file import AgentSettings, read_agent_file
 from robotiq_async.fleet.agent.publisher import AT_ONCE, KEPT, HandPublisher
-from robotiq_async.fleet.agent.records import NoRecords
-from robotiq_async.fleet.agent.served_hand import COMMANDS, ServedHand
+from robotiq_async.fleet.agent.records import Records
+from robotiq_async.fleet.agent.served_hand import ServedHand
 from robotiq_async.fleet.control.lease import Lease
 from robotiq_async.fleet.errors import ControlLostError
 from robotiq_async.fleet.wire import status_message
 from robotiq_async.fleet.wire.envelope import AgentAnswer, AgentCall, failure
 from robotiq_async.fleet.wire.names import ROOT
+from robotiq_async.fleet.wire.settings import COMMANDS
 from robotiq_async.fleet.wire.status_message import StatusMessage
-from robotiq_async.fleet.wire.values import request_fields, result_fields, transition_fields
 from robotiq_async.hands.options import Place, offered
 from robotiq_async.values.events import SentRequest
 from robotiq_async.values.request import AxisRequest, Request
@@ -47,9 +47,7 @@ MESSAGE: Final = StatusMessage(
     is_held=True,
     events=41,
     is_moving=False,
-    sequence=20114,
-    age=0.0009765625,
-    registers=REGISTERS,
+    status=RobotiqStatus(REGISTERS, 812.4375 - 0.0009765625, 20114),
 )
 RESULT: Final = MoveResult(
     outcomes={Finger.A: ObjectStatus.AT_POSITION},
@@ -79,13 +77,13 @@ INHIBIT: Final = Inhibit("the guard is open", "PLC, bob@desk:4711", 1790000000.5
 BEGUN: Final = Transition(State.RUNNING_IDLE, State.RUNNING_CC, Trigger.ASK_COMMAND, 811.5)
 MOVE: Final = call(7, position=100, fingers=1, speed=None, force=None, timeout=None)
 EXAMPLES: Final = [
-    parsed(event(38, transition_fields(BEGUN))),
-    event(39, request_fields(SentRequest(IMAGE, 811.53125, acknowledged=True))),
+    parsed(event(38, {"kind": "transition", **BEGUN.as_dict()})),
+    event(39, {"kind": "request", **SentRequest(IMAGE, 811.53125, acknowledged=True).as_raw()}),
     event(40, {"kind": "lease", "number": 3, "holder": LABEL, "reason": "granted"}),
     event(41, {"kind": "conflict", "key": NAME.key("alive", "77")}),
     event(42, {"kind": "inhibit", "stamp": 812.4375, "inhibited": INHIBIT.as_dict(), "inhibit_number": 2}),
     json.loads(MOVE.pack()),
-    json.loads(AgentAnswer(NAME.base, 7, EPOCH, result_fields(RESULT)).pack()),
+    json.loads(AgentAnswer(NAME.base, 7, EPOCH, RESULT.as_dict() | {"status": STATUS.as_raw()}).pack()),
     json.loads(
         failure(
             MOVE, EPOCH, ControlLostError("the lease has ended (taken), ...", "taken"), begun=True
@@ -151,14 +149,14 @@ async def test_an_event_is_published_as_documented() -> None:
 async def test_a_summary_and_an_info() -> None:
     hand, bus = RobotiqHand("sim://"), Network().bus("agent")
     summary = HandPublisher(NAME, hand, bus, EPOCH, Lease()).summary()
-    served = ServedHand(NAME, hand, bus, NoRecords(), epoch=EPOCH, window=1.0)
+    served = ServedHand(NAME, hand, bus, Records(), epoch=EPOCH, window=1.0)
     info = served._info(call(1))
     for name in {*summary, *info}:
         assert re.search(rf"^\| .*`{name}`", PROTOCOL, re.MULTILINE), name
 
 
 def test_every_command_and_key_is_there() -> None:
-    for name in (*COMMANDS, "command", "cancel"):
+    for name in (*COMMANDS, "cancel"):
         assert f"`{name}`" in PROTOCOL, name
     for key in ("feed", "summary", "info/WHO", "lease", "halt", "cmd/NAME", "alive/EPOCH"):
         assert f"| `{key}` |" in PROTOCOL, key

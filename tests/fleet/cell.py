@@ -17,8 +17,9 @@ from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.wire.envelope import AgentCall, unpack_answer
 from robotiq_async.values.model import THREE_FINGER
 from robotiq_async.values.request import Request
+from robotiq_async.values.status import RobotiqStatus
 from tests.docs.pages import read, table
-from tests.fleet.lab import LEFT, instantly
+from tests.fleet.lab import LEFT
 from tests.fleet.world import PROMPT_S, WINDOW_S, Client, World, motions
 
 Trouble = Callable[[World], Coroutine[Any, Any, None]]
@@ -480,7 +481,7 @@ async def ask(client: Client, verb: str, call: AgentCall, key: str = "") -> Robo
 
     answer = unpack_answer(await client.do(once()))
     try:
-        answer.outcome(instantly)
+        answer.outcome(RobotiqStatus.from_raw)
     except RobotiqError as error:
         return error
     return None

@@ -30,11 +30,6 @@ POLL_S = 0.02
 LEFT = GripperName("lab", "cell", "left")
 
 
-def instantly(stamp: float) -> float:
-    """The clock of an agent that is ours."""
-    return stamp
-
-
 @dataclass
 class Lab:
     """All there is in one test.

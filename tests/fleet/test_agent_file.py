@@ -128,7 +128,7 @@ def test_two_grippers_on_one_serial_line(tmp_path: Path) -> None:
         (
             "rtu:///dev/ttyUSB0",
             "rtu:///dev/ttyUSB0?baud=500000",
-            "rate of '.*USB0', as left's",
+            "left.s, .rtu.*USB0.: a port has only one rate",
         ),
         ("rtu:///dev/ttyUSB0?parity=E", "rtu:///dev/ttyUSB0", "a port has only one"),
         ("rtu+tcp://10.0.0.5:502", "tcp://10.0.0.5", "a socket has one protocol"),
@@ -200,7 +200,10 @@ def test_a_file_of_openings_says_its_model(tmp_path: Path) -> None:
         (GOOD + "[grippers.right]\nspeed = 3\n", ["line 5", "[grippers.right]", "address", "missing"]),
         (GOOD + "[grippers.right]\naddress = 3\n", ["line 6", "address", "3"]),
         (GOOD + '[grippers.right]\naddress = "ftp://x"\n', ["line 6", "address", "'ftp://x'", "rtu://"]),
-        (GOOD + '[grippers.right]\naddress = "zenoh://a/b/c"\n', ["line 6", "on this host", "zenoh://a/b/c"]),
+        (
+            GOOD + '[grippers.right]\naddress = "zenoh://a/b/c"\n',
+            ["line 6", "on another host", "zenoh://a/b/c"],
+        ),
         (GOOD + '[grippers."r/t"]\naddress = "sim://"\n', ["line 5", "'r/t'", "A-Z"]),
         (GOOD + '[grippers.right]\naddress = "192.168.1.11"\n', ["line 6", "left", "device_id"]),
         (GOOD + '[grippers]\nright = "sim://"\n', ["[grippers.right]", "'sim://'"]),

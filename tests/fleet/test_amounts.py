@@ -52,7 +52,7 @@ async def test_an_agent_takes_requests_in_counts_alone() -> None:
         writes = len(here.gripper.writes)
         for name, arguments in requests:
             with pytest.raises(TypeError, match="requests are in counts, got"):
-                await hand._ask(name, arguments, 1.0)
+                await hand._ask(name, **arguments)
         assert len(here.gripper.writes) == writes
 
 

@@ -15,7 +15,7 @@ import pytest
 from robotiq_async import Finger, State
 from robotiq_async.calibration.scales import SpeedCalibration
 from robotiq_async.fleet.agent import records
-from robotiq_async.fleet.agent.records import FileRecords, NoRecords, file_records
+from robotiq_async.fleet.agent.records import Records, file_records
 from robotiq_async.fleet.control.lease import Holder, Lease
 from robotiq_async.fleet.errors import AgentError, ControlLostError
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
@@ -394,41 +394,41 @@ def test_a_lease_remembers_a_bounded_number_of_runs() -> None:
 
 async def test_files_are_kept_for_their_owner_alone_and_the_newest_counts(tmp_path: Path) -> None:
     folder = tmp_path / "state" / "robotiq"
-    one = FileRecords(folder)
+    one = Records(folder)
     assert one.read(LEFT) is None
     for number in range(100):
         one.keep(LEFT, {"number": number})
     await one.kept()
-    assert FileRecords(folder).read(LEFT)["number"] == 99, "one that waited for the one before it counts, too"  # type: ignore[index]
+    assert Records(folder).read(LEFT)["number"] == 99, "one that waited for the one before it counts, too"  # type: ignore[index]
     (file,) = folder.iterdir()
     assert file.name == "lab+cell+left.json"
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
-    assert FileRecords(folder).read(GripperName("lab", "cell", "right")) is None
+    assert Records(folder).read(GripperName("lab", "cell", "right")) is None
 
 
 async def test_a_record_of_before_a_restart_of_the_machine_says_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    one = FileRecords(tmp_path)
+    one = Records(tmp_path)
     one.keep(LEFT, {"number": 3})
     await one.kept()
     boot = tmp_path / "boot"
     for said in ("another boot\n", ""):
         boot.write_text(said)
         monkeypatch.setattr(records, "_BOOT", boot)
-        assert FileRecords(tmp_path).read(LEFT) is None
+        assert Records(tmp_path).read(LEFT) is None
     monkeypatch.setattr(records, "_BOOT", tmp_path / "nowhere")
-    unknown = FileRecords(tmp_path)
+    unknown = Records(tmp_path)
     unknown.keep(LEFT, {"number": 3})
     await unknown.kept()
-    assert FileRecords(tmp_path).read(LEFT) is None, "what cannot be read is unknown"
+    assert Records(tmp_path).read(LEFT) is None, "what cannot be read is unknown"
 
 
 async def test_a_record_that_cannot_be_written_removes_the_old_one(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     """An old record would let back in who must not come."""
-    one = FileRecords(tmp_path)
+    one = Records(tmp_path)
     one.keep(LEFT, {"number": 3})
     await one.kept()
     (tmp_path / "lab+cell+left.new").mkdir()
@@ -443,14 +443,14 @@ async def test_a_record_that_cannot_be_written_removes_the_old_one(
 @pytest.mark.parametrize("content", [b"", b"[]", b"{", b'"x"', b"\xff", b"[" * 100_000])
 def test_files_that_are_no_records(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "lab+cell+left.json").write_bytes(content)
-    assert FileRecords(tmp_path).read(LEFT) is None
+    assert Records(tmp_path).read(LEFT) is None
 
 
 def test_where_the_files_are(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def folder() -> Path:
-        found = file_records()
-        assert isinstance(found, FileRecords)
-        return found._folder
+        found = file_records()._folder
+        assert found is not None
+        return found
 
     monkeypatch.setenv("STATE_DIRECTORY", f"{tmp_path}:/other")
     assert folder() == tmp_path
@@ -465,7 +465,7 @@ def test_where_the_files_are(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
         raise RuntimeError("no home")
 
     monkeypatch.setattr(Path, "home", classmethod(homeless))
-    assert isinstance(file_records(), NoRecords)
+    assert file_records()._folder is None
 
 
 @inside(world, records=None)

@@ -15,7 +15,7 @@ from robotiq_async import Finger, Inhibit, MotionInhibitedError, RobotiqError, R
 from robotiq_async.fleet.agent import records
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.agent.inhibits import inhibit_kept
-from robotiq_async.fleet.agent.records import FileRecords
+from robotiq_async.fleet.agent.records import Records
 from robotiq_async.fleet.errors import AgentError, ControlLostError, NotAllStoppedError
 from robotiq_async.fleet.fleet import Fleet, halt
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
@@ -179,20 +179,20 @@ async def test_its_record_counts_after_a_restart_of_the_machine(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The record of a lease does not: it may be outdated. An outdated inhibit only refuses."""
-    one, inhibit = FileRecords(tmp_path), Inhibit("the guard is open", "", 1.0)
+    one, inhibit = Records(tmp_path), Inhibit("the guard is open", "", 1.0)
     one.keep(LEFT, {"number": 3, "inhibited": inhibit.as_dict()})
     await one.kept()
     boot = tmp_path / "boot"
     boot.write_text("another")
     monkeypatch.setattr(records, "_BOOT", boot)
-    later = FileRecords(tmp_path)
+    later = Records(tmp_path)
     assert later.read(LEFT) is None
     assert later.read_inhibit(LEFT) == inhibit.as_dict()
 
 
 async def test_a_record_that_is_lost_in_part_counts_as_an_inhibit(tmp_path: Path) -> None:
     """A power cut may leave an empty file; a gripper without a file was never inhibited."""
-    one, file = FileRecords(tmp_path), tmp_path / "lab+cell+left.json"
+    one, file = Records(tmp_path), tmp_path / "lab+cell+left.json"
     assert one.read_inhibit(LEFT) is None
     one.keep(LEFT, {"number": 3, "inhibited": None})
     await one.kept()
@@ -207,7 +207,7 @@ async def test_a_record_that_is_lost_in_part_counts_as_an_inhibit(tmp_path: Path
 
 async def test_a_full_disk_loses_no_inhibit(tmp_path: Path) -> None:
     """Nor does it leave a record of the lease that is outdated."""
-    one, inhibit = FileRecords(tmp_path), Inhibit("the guard is open", "", 1.0)
+    one, inhibit = Records(tmp_path), Inhibit("the guard is open", "", 1.0)
     one.keep(LEFT, {"number": 3, "inhibited": inhibit.as_dict()})
     await one.kept()
     (tmp_path / "lab+cell+left.new").mkdir()  # as little room as on a full disk
@@ -223,7 +223,7 @@ async def test_a_full_disk_loses_no_inhibit(tmp_path: Path) -> None:
 async def test_an_inhibit_is_on_the_disk_before_it_replaces_the_record_of_before(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    one = FileRecords(tmp_path)
+    one = Records(tmp_path)
     steps: list[str] = []
 
     def noted(name: str, work: Callable[..., Any]) -> Callable[..., Any]:

@@ -9,10 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robotiq_async import State
+from robotiq_async import RobotiqStatus, State
 from robotiq_async.fleet.remote.mirror import DRIFT, AgentClock, Mirror
 from robotiq_async.fleet.wire.status_message import StatusMessage
-from robotiq_async.fleet.wire.values import transition_fields
 from robotiq_async.hands.streams import Channels
 from robotiq_async.values.enums import Trigger
 from robotiq_async.values.errors import ProtocolError
@@ -57,12 +56,13 @@ def message(
     age: float = 0.0,
 ) -> StatusMessage:
     registers = None if sequence is None else (0x3900, sequence & 0xFFFF, 0, 0, 0, 0, 0, 0)
-    return StatusMessage(MARK, epoch, stamp, state, 0, False, events, False, sequence or 0, age, registers)
+    status = None if registers is None else RobotiqStatus(registers, stamp - age, sequence or 0)
+    return StatusMessage(MARK, epoch, stamp, state, 0, False, events, False, status)
 
 
 def event(index: int, source: State, target: State, at: float = 0.0) -> dict[str, Any]:
-    fields = transition_fields(Transition(source, target, Trigger.ASK_COMMAND, at))
-    return {"index": index, **fields}
+    fields = Transition(source, target, Trigger.ASK_COMMAND, at).as_dict()
+    return {"index": index, "kind": "transition", **fields}
 
 
 # -- statuses ----------------------------------------------------------------------------------------------
@@ -133,9 +133,9 @@ def test_another_run_of_the_agent() -> None:
         (IDLE, State.DISCONNECTED),
         (State.DISCONNECTED, BUSY),
     ]
-    status = here.mirror.status
-    assert status is not None
-    assert here.mirror.renumbered(status).sequence == 71 + status.sequence
+    answered = RobotiqStatus((0,) * 8, 20.0, 7).as_raw()
+    assert here.mirror.read_status(answered).sequence == 71 + 7
+    assert here.mirror.read_status(answered).timestamp == here.mirror.clock(20.0)
 
 
 def test_another_run_of_this_hand() -> None:

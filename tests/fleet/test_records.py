@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger
-from robotiq_async.fleet.agent.records import KEPT_S, FileRecords
+from robotiq_async.fleet.agent.records import KEPT_S, Records
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.values.request import Request
 from tests.fleet.lab import LEFT, Lab, lab
@@ -58,19 +58,19 @@ def disk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Disk]:
 
 
 @pytest.fixture
-def records(tmp_path: Path, disk: Disk) -> FileRecords:  # lies below it
-    return FileRecords(tmp_path)
+def records(tmp_path: Path, disk: Disk) -> Records:  # lies below it
+    return Records(tmp_path)
 
 
 def force_of(folder: Path, client: RemoteHand) -> object:
     """The force of finger A that the next agent would know of a client."""
     assert client._session is not None
-    record = FileRecords(folder).read(LEFT)
+    record = Records(folder).read(LEFT)
     kept = {} if record is None else record["settings"]["clients"]
     return kept.get(client._session.dialog.client, {}).get("1", {}).get("force")
 
 
-async def written(records: FileRecords) -> None:
+async def written(records: Records) -> None:
     """Wait for the thread that writes, for which virtual time does not pass."""
     while records._writing:
         time.sleep(0.001)  # noqa: ASYNC251
@@ -79,7 +79,7 @@ async def written(records: FileRecords) -> None:
 
 @inside(lab, "records")
 async def test_a_slow_disk_delays_an_answer_by_a_tenth_of_a_second(
-    here: Lab, hand: RemoteHand, records: FileRecords, disk: Disk, tmp_path: Path
+    here: Lab, hand: RemoteHand, records: Records, disk: Disk, tmp_path: Path
 ) -> None:
     await hand.set_force(10, A)
     await written(records)
@@ -108,7 +108,7 @@ async def test_a_slow_disk_delays_an_answer_by_a_tenth_of_a_second(
 async def test_a_full_disk_is_said_once_and_the_next_agent_knows_nothing(
     here: Lab,
     hand: RemoteHand,
-    records: FileRecords,
+    records: Records,
     disk: Disk,
     tmp_path: Path,
     caplog: pytest.LogCaptureFixture,
@@ -122,7 +122,7 @@ async def test_a_full_disk_is_said_once_and_the_next_agent_knows_nothing(
     said = "FLEET.toml's speeds and forces count"
     assert caplog.text.count(said) == 1
     assert "No space left" in caplog.text
-    assert FileRecords(tmp_path).read(LEFT) is None, "rather none than an older one"
+    assert Records(tmp_path).read(LEFT) is None, "rather none than an older one"
     disk.is_full = False
     await hand.set_force(202, A)
     await written(records)
@@ -133,7 +133,7 @@ async def test_a_full_disk_is_said_once_and_the_next_agent_knows_nothing(
 async def test_without_a_thread_there_is_rather_no_record_than_an_older_one(
     here: Lab,
     hand: RemoteHand,
-    records: FileRecords,
+    records: Records,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
@@ -148,7 +148,7 @@ async def test_without_a_thread_there_is_rather_no_record_than_an_older_one(
     with monkeypatch.context() as short:
         short.setattr(threading.Thread, "start", start)
         await hand.set_force(200, A)
-    assert FileRecords(tmp_path).read(LEFT) is None
+    assert Records(tmp_path).read(LEFT) is None
     assert "can't start new thread" in caplog.text
     await hand.set_force(201, A)
     await written(records)

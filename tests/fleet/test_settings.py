@@ -15,7 +15,8 @@ from robotiq_async.fleet.wire.envelope import unpack_call
 from robotiq_async.fleet.wire.settings import Setting, asked_of, read_settings, settings_fields, settings_of
 from robotiq_async.fleet.wire.values import Fields
 from robotiq_async.values.request import Request
-from tests.fleet.lab import Lab, instantly, lab
+from robotiq_async.values.status import RobotiqStatus
+from tests.fleet.lab import Lab, lab
 from tests.fleet.world import World, world
 from tests.virtual import inside
 
@@ -286,7 +287,7 @@ async def test_a_lease_with_settings_that_are_none_is_refused(here: Lab, reader:
     await reader.acquire()
     call = reader._session.dialog.call({"what": "settings", "settings": {"1": {"speed": 999}}})
     with pytest.raises(ValueError, match="speed"):
-        (await here.answer("lease", call.pack())).outcome(instantly)
+        (await here.answer("lease", call.pack())).outcome(RobotiqStatus.from_raw)
 
 
 # -- restarted agents --------------------------------------------------------------------------------------

@@ -18,8 +18,9 @@ from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.fleet.wire.status_message import StatusMessage
 from robotiq_async.fleet.wire.values import read_error
 from robotiq_async.values.errors import ProtocolError, RobotiqError
+from robotiq_async.values.status import RobotiqStatus
 from tests.fleet.cell import ask, move_slowly
-from tests.fleet.lab import LEFT, Lab, instantly, lab
+from tests.fleet.lab import LEFT, Lab, lab
 from tests.fleet.world import World, world
 from tests.virtual import inside
 
@@ -44,7 +45,7 @@ STRANGE: list[tuple[str, Any]] = [
     ("lease", {}),
 ]
 NAME = "eve\nrobotiq-async: all is well\x1b[2J"
-OTHERS = StatusMessage(LEFT.mark + 1, 2, 3.0, State.RUNNING_IDLE, 4, False, 5, False, 6, 0.5, None)
+OTHERS = StatusMessage(LEFT.mark + 1, 2, 3.0, State.RUNNING_IDLE, 4, False, 5, False, None)
 
 
 # -- malformed requests ------------------------------------------------------------------------------------
@@ -59,7 +60,7 @@ async def test_from_the_holder_of_the_lease(here: Lab, hand: RemoteHand, verb: s
     answer = await here.answer(verb, call.pack())
     assert answer.number == call.number
     with pytest.raises((RobotiqError, TypeError, ValueError)):
-        answer.outcome(instantly)
+        answer.outcome(RobotiqStatus.from_raw)
     assert len(here.gripper.writes) == writes
     await hand.move(20, 1)
 
@@ -71,7 +72,7 @@ async def test_from_the_holder_of_the_lease(here: Lab, hand: RemoteHand, verb: s
 @pytest.mark.parametrize("verb", ["info/x", "lease", "halt", "cmd/move"])
 async def test_malformed_requests(here: Lab, hand: RemoteHand, verb: str, request_: bytes) -> None:
     with pytest.raises((ProtocolError, AgentError)):
-        (await here.answer(verb, request_)).outcome(instantly)
+        (await here.answer(verb, request_)).outcome(RobotiqStatus.from_raw)
     await hand.move(20, 1)
 
 
@@ -84,7 +85,7 @@ async def test_a_command_without_a_lease_or_for_another_run(
     call = AgentCall(LEFT.base, "stranger", here.agent.epoch + later, number=2, arguments={"fingers": 0})
     writes = len(here.gripper.writes)
     with pytest.raises(refusal):
-        (await here.answer("cmd/hold", call.pack())).outcome(instantly)
+        (await here.answer("cmd/hold", call.pack())).outcome(RobotiqStatus.from_raw)
     assert len(here.gripper.writes) == writes
 
 
@@ -150,7 +151,7 @@ async def test_a_client_whose_name_is_no_plain_text_gets_no_lease(
     acquire = {"what": "acquire", "label": "eve"}
     call = AgentCall(LEFT.base, name, number=1, seen=seen, arguments=acquire)
     with pytest.raises(ProtocolError, match="not a request"):
-        (await here.answer("lease", call.pack())).outcome(instantly)
+        (await here.answer("lease", call.pack())).outcome(RobotiqStatus.from_raw)
     await asyncio.wait_for(reader.take(), 1.0)
     assert reader.is_in_control
 
@@ -166,7 +167,7 @@ async def test_labels_of_clients_are_made_printable(
     seen = reader._session.mirror.stamp
     for verb, number in (("lease", 1), ("halt", 2), ("lease", 3)):
         call = AgentCall(LEFT.base, "eve", 0, 0, number, seen, {"what": "acquire", "label": NAME})
-        (await here.answer(verb, call.pack())).outcome(instantly)
+        (await here.answer(verb, call.pack())).outcome(RobotiqStatus.from_raw)
     info = await reader._session.dialog.ask("info", timeout=1.0)
     assert info["holder"].isprintable(), "who shows it elsewhere may not look at it first"
     with pytest.raises(ControlLostError) as refused:
@@ -180,7 +181,7 @@ async def test_labels_of_clients_are_made_printable(
 @pytest.mark.parametrize("kind", ["ControlLostError", "ConnectFailedError", "of the future\n", "ValueError"])
 def test_error_messages_of_an_agent_are_made_printable(kind: str) -> None:
     fields = {"kind": kind, "message": "a\nb\x1b", "reason": "\n", "address": "\r", "state": None}
-    error = read_error(fields, instantly)
+    error = read_error(fields, RobotiqStatus.from_raw)
     for words in (str(error), *map(str, vars(error).values())):
         assert words.isprintable()
     assert "a\\nb\\x1b" in str(error)
@@ -216,5 +217,5 @@ async def test_a_flood_of_messages_that_are_none_fills_no_log(
 
 
 def test_words_that_are_none_are_refused() -> None:
-    assert "cannot be read" in str(read_error({"kind": "AgentError", "message": 3}, instantly))
-    assert not isinstance(read_error({"kind": 3, "message": "?"}, instantly), AgentError)
+    assert "cannot be read" in str(read_error({"kind": "AgentError", "message": 3}, RobotiqStatus.from_raw))
+    assert not isinstance(read_error({"kind": 3, "message": "?"}, RobotiqStatus.from_raw), AgentError)

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 from robotiq_async import Finger, RobotiqError, RobotiqHand, RobotiqStatus, State
 from robotiq_async.fleet.agent.agent import Agent
+from robotiq_async.fleet.agent.records import Records
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.names import GripperName
 from robotiq_async.simulator import SimulatorServer
@@ -131,10 +132,11 @@ class World:
         assert not any(self.moved(axis, "right") for axis in THREE_FINGER.axes), "the wrong gripper moved"
 
 
-class MemoryRecords:
+class MemoryRecords(Records):
     """The records that agents of one world leave each other, as in their folder; it may be taken away."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.records: dict[GripperName, dict[str, Any]] = {}
 
     def read(self, name: GripperName) -> dict[str, Any] | None:

@@ -18,7 +18,7 @@ from ..network.bus import Bus, MessageKind, Query, Undo
 from ..wire.envelope import AgentCall, failure
 from ..wire.names import ROOT, GripperName
 from .questions import AgentQuestions
-from .records import NoRecords, Records
+from .records import Records
 from .served_hand import ServedHand
 
 SUMMARY_S: Final = 1.0  # seconds from one summary to the next
@@ -63,7 +63,7 @@ class Agent:
         self._suspended_s = self._suspended()
         self.epoch: int = secrets.randbits(EPOCH_BITS)
         self._bus = bus
-        self._records = records or NoRecords()
+        self._records = records or Records()
         self._window = window
         self._running: asyncio.Task[Any] | None = None
         self._invalid_tokens = LimitedLog()

@@ -13,10 +13,9 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any, Final
 
-from ...hands import HandOptions, Place, offered
-from ...link import is_remote, parse_address
+from ...hands import FILE_OPTIONS, HandOptions
 from ...local import RobotiqHand
-from ...values import check_seconds, model_of
+from ...values import check_seconds
 from ..control.lease import LEASE_WINDOW_S, WINDOW_MAX_S, WINDOW_MIN_S
 from ..keys.access import AccessList
 from ..keys.key_folder import ACCESS, check_key_folder
@@ -48,12 +47,11 @@ class AgentSettings:
     window: float = LEASE_WINDOW_S  # seconds for which a lease lasts without being renewed
 
 
-_OF_GRIPPER: Final = tuple(offered(Place.FILE))
 _OF_AGENT: Final = tuple(each.name for each in fields(AgentSettings))
 
 
 def make_hand(options: HandOptions) -> RobotiqHand:
-    return RobotiqHand(name=options.name, **{name: getattr(options, name) for name in _OF_GRIPPER})
+    return RobotiqHand(name=options.name, **{name: getattr(options, name) for name in FILE_OPTIONS})
 
 
 def machine_name() -> str:
@@ -136,7 +134,10 @@ class _Reader:
         grippers = {name: self._gripper(name, table) for name, table in tables.items()}
         for one, other in combinations(grippers, 2):
             with self._blaming(_GRIPPERS, other, "address"):
-                _check_both(one, grippers[one], grippers[other])
+                first, second = grippers[one], grippers[other]
+                if why := second.link.why_not_beside(first.link):
+                    why = why.replace("hands", "grippers")
+                    raise ValueError(f"address must go with {one}'s, {first.address!r}: {why}")
         return grippers
 
     def _gripper(self, name: str, table: object) -> HandOptions:
@@ -145,18 +146,14 @@ class _Reader:
             check_name("the name of a gripper", name)
             if not isinstance(table, dict):
                 raise TypeError(f"{name} must be a table with an address: [grippers.{name}], got {table!r}")
-        self._check_keys_of(table, path, _OF_GRIPPER, needed=("address",))
+        self._check_keys_of(table, path, FILE_OPTIONS, needed=("address",))
         if isinstance(table.get("stroke"), str):
             table = {**table, "stroke": self._path.parent / table["stroke"]}
-        address = table["address"]
+        address, model = table["address"], table.get("model")
         with self._blaming(*path, "model"):
-            model = None if "model" not in table else model_of(table["model"])
+            HandOptions(model=model)  # type: ignore[arg-type]  # None is that of the address
         with self._blaming(*path, "address"):
-            if not isinstance(address, str):
-                raise TypeError(f"address must be a string, got {address!r}")
-            if is_remote(address):
-                raise ValueError(f"address must be of a gripper on this host, got {address!r}")
-            HandOptions(address, model=model)  # type: ignore[arg-type]  # None is that of the address
+            HandOptions(address, model=model)  # type: ignore[arg-type]
         for key, value in table.items():  # one by one: the error names the line of the key
             with self._blaming(*path, key):
                 HandOptions(**{"address": address, "model": model, key: value})
@@ -202,20 +199,6 @@ class _Reader:
         if len(path) > 1:
             where += f", in [{path[0]}.{path[1]}]"
         return AgentFileError(f"{where}: {message}")
-
-
-def _check_both(name: str, one: HandOptions, other: HandOptions) -> None:
-    """Refuse two grippers that one agent cannot serve; ``name`` is the first one's."""
-    first, second = one.link.gripper(), other.link.gripper()
-    if first.may_be(second):
-        hint = second.hint.replace("hands", "grippers")
-        raise ValueError(f"address must be another than {name}'s, got {other.address!r}{hint}")
-    if first.place != second.place:
-        return
-    if first.is_on_line is not second.is_on_line:
-        raise ValueError(f"address must be {one.address!r}, as {name}'s: a socket has one protocol")
-    if parse_address(one.address).line != parse_address(other.address).line:
-        raise ValueError(f"address must have the rate of {one.address!r}, as {name}'s: a port has only one")
 
 
 def _check_bool(name: str, value: object) -> bool:

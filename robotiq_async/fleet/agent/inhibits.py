@@ -7,7 +7,7 @@ from typing import Final
 
 from ...values import LONGEST_REASON, Inhibit
 from ..wire.envelope import AgentCall
-from ..wire.values import read_inhibit, words
+from ..wire.values import words
 from .jobs import label_of
 
 
@@ -22,7 +22,7 @@ def inhibit_asked(call: AgentCall) -> Inhibit | None:
 def inhibit_kept(record: object) -> Inhibit:
     """An inhibit of the run before. One that cannot be read counts as well."""
     try:
-        return read_inhibit(record) or _UNREADABLE  # type: ignore[arg-type]
+        return Inhibit.from_dict(record)  # type: ignore[arg-type]
     except (AttributeError, KeyError, TypeError, ValueError):
         return _UNREADABLE
 

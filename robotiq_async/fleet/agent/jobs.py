@@ -8,12 +8,12 @@ from collections.abc import Callable, Coroutine
 from typing import Any, Final, TypeVar
 
 from ...runtime import Log, printable
-from ...values import Finger, MoveResult, Request, RobotiqError, SentRequest
+from ...values import Finger, MoveResult, RobotiqError, SentRequest
 from ..errors import AgentError, ControlLostError
 from ..network.bus import Query
 from ..wire.envelope import AgentAnswer, AgentCall, failure
 from ..wire.settings import Setting, asked_of, is_in, moved_by
-from ..wire.values import Fields, result_fields
+from ..wire.values import Fields
 from .publisher import HandPublisher
 
 JOBS_KEPT: Final = 512
@@ -68,9 +68,9 @@ class Job:
     def _look_whether_refused(self) -> None:
         self.was_refused = self.has_failed
 
-    def observe(self, request: Request) -> None:
+    def observe(self, sent: SentRequest) -> None:
         """An image was acknowledged."""
-        self.is_shown = self.is_shown or (bool(self.carries) and is_in(self.carries, request))
+        self.is_shown = self.is_shown or (bool(self.carries) and is_in(self.carries, sent))
 
     def reply(self, answer: bytes, status: bytes) -> None:
         """Answer it, and each of its repetitions."""
@@ -154,7 +154,7 @@ class Jobs:
     def observe(self, what: object) -> None:
         if isinstance(what, SentRequest) and what.acknowledged:
             for job in self._open.values():
-                job.observe(what.request)
+                job.observe(what)
 
     def spawn(self, work: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
         task = asyncio.get_running_loop().create_task(work)
@@ -185,7 +185,9 @@ class Jobs:
         if isinstance(error, Exception):
             answer = failure(call, self._epoch, error, begun)
         else:
-            value = {**(result_fields(task.result()) or {}), **job.says()}
+            result = task.result()
+            fields = {} if result is None else result.as_dict() | {"status": result.status.as_raw()}
+            value = {**fields, **job.says()}
             answer = AgentAnswer(call.to, call.number, self._epoch, value, begun=begun)
         if error is not None or is_done:
             self._ended(job, error is None)

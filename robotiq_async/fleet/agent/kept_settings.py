@@ -88,7 +88,7 @@ class KeptSettings:
             self._ordered.clear()  # the hand drops what was not acknowledged
         if not (isinstance(what, SentRequest) and what.acknowledged and what.request.activate):
             return
-        before, self._gripper = self._gripper, settings_in(what.request)
+        before, self._gripper = self._gripper, settings_in(what)
         self._keep({each: v for each, v in self._ordered.items() if self._gripper.get(each) == v})
         self._has |= {each for each, value in self._gripper.items() if self._own(*each) == value}
         if before != self._gripper:

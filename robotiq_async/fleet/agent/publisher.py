@@ -19,7 +19,7 @@ from ..control.lease import Lease
 from ..network.bus import Bus, Urgency
 from ..wire.names import GripperName
 from ..wire.status_message import StatusMessage
-from ..wire.values import Fields, inhibit_fields, request_fields, transition_fields
+from ..wire.values import Fields
 
 KEPT: Final = 2000
 """Events that are kept for clients that missed them: some seconds of a loop that commands at 200 Hz."""
@@ -56,9 +56,9 @@ class HandPublisher:
         if isinstance(what, RobotiqStatus):
             self.send_status()
         elif isinstance(what, Transition):
-            self.add(transition_fields(what))
+            self.add({"kind": "transition", **what.as_dict()})
         else:
-            self.add(request_fields(what))
+            self.add({"kind": "request", **what.as_raw()})
 
     def add(self, event: Fields) -> None:
         self._count += 1
@@ -79,7 +79,8 @@ class HandPublisher:
 
     def inhibited(self) -> Fields:
         """Whether motion is inhibited, the number that a permit of it names, and when that was so."""
-        inhibited = inhibit_fields(self._hand.inhibited)
+        inhibit = self._hand.inhibited
+        inhibited = None if inhibit is None else inhibit.as_dict()
         return {"stamp": now(), "inhibited": inhibited, "inhibit_number": self.inhibit_number}
 
     def events_since(self, index: int) -> list[Fields]:
@@ -96,21 +97,16 @@ class HandPublisher:
             self.send_status()
 
     def status_message(self) -> bytes:
-        stamp, status = now(), self._status()
         return StatusMessage(
             mark=self._mark,
             epoch=self._epoch,
-            stamp=stamp,
+            stamp=now(),
             state=self._hand.state,
             lease=self._lease.number,
             is_held=self._lease.holder is not None,
             events=self._count,
             is_moving=self._is_moving(),
-            sequence=0 if status is None else status.sequence,
-            age=0.0 if status is None else stamp - status.timestamp,
-            registers=None if status is None else status.registers,
-            model=self._hand.model,
-            has_current=status is None or status.has_current,
+            status=self._status(),
         ).pack()
 
     def send_summary(self) -> None:

@@ -6,8 +6,7 @@ import threading
 from collections.abc import Callable
 from typing import Final
 
-from ...runtime import log
-from ..limited_log import EVERY_S
+from ..limited_log import LimitedLog
 from ..network.bus import MessageKind
 
 EACH: Final = 100.0  # questions a second of one client; fetching missed events takes 50
@@ -25,8 +24,7 @@ class AgentQuestions:
         self._clock = clock
         self._lock = threading.Lock()
         self._left: dict[str, tuple[float, float]] = {}  # by client: how many, and when that was so
-        self._dropped = 0
-        self._report_due = 0.0
+        self._dropped = LimitedLog(clock=clock)
 
     def sort(self, key: str, _payload: bytes = b"") -> MessageKind | None:
         """Whether to read a question. Its key ends in the client's name: with keys, its certificate's."""
@@ -35,10 +33,7 @@ class AgentQuestions:
         with self._lock:
             if self._is_within_budget(client, now):
                 return MessageKind.QUESTION
-            self._dropped += 1
-            if now >= self._report_due:
-                dropped, self._dropped, self._report_due = self._dropped, 0, now + EVERY_S
-                log.warning("%d requests for information were dropped: a client sends too many", dropped)
+            self._dropped.warn("a request for information was dropped: a client sends too many")
             return None
 
     def _is_within_budget(self, client: str, now: float) -> bool:

@@ -16,9 +16,9 @@ import json
 import os
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
-from ...runtime import in_a_thread, log
+from ...runtime import Log, in_a_thread
 from ..wire.names import GripperName
 from ..wire.values import Fields
 
@@ -27,46 +27,14 @@ _UNREADABLE: Final = "cannot be read"  # no inhibit, and not None
 _BOOT: Final = Path("/proc/sys/kernel/random/boot_id")
 
 
-class Records(Protocol):
-    """Keeps what the next run of an agent must know."""
+class Records:
+    """Keeps a file for each gripper, for the next run of the agent; without a folder it keeps nothing.
 
-    def read(self, name: GripperName) -> Fields | None:
-        """The record of a gripper; None if it is not known for certain."""
-
-    def read_inhibit(self, name: GripperName) -> object:
-        """The inhibit in the record of a gripper, whenever it was written; None for none.
-
-        Of a record that cannot be read, something that is no inhibit.
-        """
-
-    def keep(self, name: GripperName, record: Fields) -> None:
-        """Replace the record of a gripper; never blocks."""
-
-    async def kept(self) -> None:
-        """Wait until all records are written, KEPT_S at most."""
-
-
-class NoRecords:
-    """Keeps nothing."""
-
-    def read(self, name: GripperName) -> Fields | None:  # noqa: ARG002
-        return None
-
-    def read_inhibit(self, name: GripperName) -> object: ...
-
-    def keep(self, name: GripperName, record: Fields) -> None: ...
-
-    async def kept(self) -> None: ...
-
-
-class FileRecords:
-    """Files in a folder, one for each gripper. The folder is created when it is needed.
-
-    They are valid until the machine restarts: the last write may not have reached the disk then, unless it
-    has an inhibit.
+    The folder is created when it is needed. A file is valid until the machine restarts: the last write may
+    not have reached the disk then, unless it has an inhibit.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path | None = None) -> None:
         self._folder = folder
         self._boot = _boot()
         self._newest: dict[GripperName, tuple[bytes, bool]] = {}
@@ -75,19 +43,24 @@ class FileRecords:
         self._has_failed = False
 
     def read(self, name: GripperName) -> Fields | None:
-        if not os.access(self._folder, os.W_OK):
+        """The record of a gripper; None if it is not known for certain."""
+        if self._folder is None or not os.access(self._folder, os.W_OK):
             return None  # may be outdated: the run before this one could not replace it
         record = self._stored(name)
         return record if record and self._boot and record.get("boot") == self._boot else None
 
     def read_inhibit(self, name: GripperName) -> object:
+        """The inhibit in the record of a gripper, whenever it was written; None for none.
+
+        Of a record that cannot be read, something that is no inhibit.
+        """
         record = self._stored(name)
         return _UNREADABLE if record is None else record.get("inhibited")
 
     def _stored(self, name: GripperName) -> Fields | None:
         # Empty if there is none, None if it cannot be read.
         try:
-            record = json.loads(self._path(name).read_bytes())
+            record = json.loads(self._path(name).read_bytes()) if self._folder else {}
         except (FileNotFoundError, NotADirectoryError):
             return {}
         except (OSError, ValueError, RecursionError):
@@ -95,12 +68,16 @@ class FileRecords:
         return record if isinstance(record, dict) else None
 
     def keep(self, name: GripperName, record: Fields) -> None:
+        """Replace the record of a gripper; never blocks."""
+        if self._folder is None:
+            return
         data = json.dumps({"boot": self._boot, **record}).encode()
         self._newest[name] = data, record.get("inhibited") is not None
         if name not in self._writing:
             self._begin(name)
 
     async def kept(self) -> None:
+        """Wait until all records are written, KEPT_S at most."""
         loop = asyncio.get_running_loop()
         until = loop.time() + KEPT_S
         while self._writing and (left := until - loop.time()) > 0:  # a write may wait for the one before it
@@ -121,7 +98,7 @@ class FileRecords:
                 self._drop(self._path(name), inhibits)
         if error is not None and not self._has_failed:
             self._has_failed = True
-            log.warning(
+            Log().warning(
                 "%s: after a restart no client reacquires the lease automatically, FLEET.toml's speeds and "
                 "forces count, and an inhibit has lost its reason, or is lost",
                 error,
@@ -136,7 +113,7 @@ class FileRecords:
             path.unlink(missing_ok=True)
 
     def _write(self, path: Path, data: bytes, *, sync: bool) -> None:
-        self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         new = path.with_suffix(".new")
         with suppress(FileNotFoundError):
             new.unlink()
@@ -148,9 +125,10 @@ class FileRecords:
                 os.fsync(opened.fileno())
         new.replace(path)
         if sync:
-            _sync_folder(self._folder)
+            _sync_folder(path.parent)
 
     def _path(self, name: GripperName) -> Path:
+        assert self._folder is not None, "nothing is kept without one"
         # Names cannot contain a plus.
         return self._folder / f"{name.site}+{name.host}+{name.gripper}.json"
 
@@ -159,13 +137,13 @@ def file_records() -> Records:
     """Records in systemd's ``StateDirectory=``, else in the user's state folder (XDG)."""
     folder = os.environ.get("STATE_DIRECTORY", "").split(":")[0]
     if folder:
-        return FileRecords(Path(folder))
+        return Records(Path(folder))
     state = os.environ.get("XDG_STATE_HOME")
     try:
-        return FileRecords((Path(state) if state else Path.home() / ".local" / "state") / "robotiq-async")
+        return Records((Path(state) if state else Path.home() / ".local" / "state") / "robotiq-async")
     except RuntimeError:  # a user without a home
-        log.warning("no folder for records: after a restart no client reacquires the lease automatically")
-        return NoRecords()
+        Log().warning("no folder for records: after a restart no client reacquires the lease automatically")
+        return Records()
 
 
 def _sync_folder(folder: Path) -> None:

@@ -24,10 +24,8 @@ from __future__ import annotations
 import asyncio
 import logging
 from dataclasses import replace
-from inspect import signature
 from typing import Final
 
-from ...calibration import UNITS
 from ...hands import RUNNING
 from ...local import RobotiqHand
 from ...runtime import Log, __version__, now
@@ -38,8 +36,8 @@ from ..errors import AgentError, ControlLostError
 from ..network.bus import Bus, Query
 from ..wire.envelope import AgentAnswer, AgentCall, failure, unpack_call
 from ..wire.names import GripperName
-from ..wire.settings import check_changes, moved_by, read_settings, settings_of
-from ..wire.values import Fields, inhibit_fields
+from ..wire.settings import COMMANDS, check_changes, moved_by, read_settings, settings_of
+from ..wire.values import Fields
 from .fingers import Fingers
 from .inhibits import inhibit_asked, inhibit_kept, signed
 from .jobs import Job, Jobs, Work, label_of
@@ -48,10 +46,6 @@ from .publisher import HandPublisher
 from .records import Records
 
 START_RETRY_S: Final = 1.0  # seconds between two attempts to reach the gripper
-COMMANDS: Final = frozenset(
-    {"set_position", "set_speed", "set_force", "move", "hold", "activate", "reset", "atr", "recover"}
-)
-"""Commands of a holder: the methods of a hand by that name. In addition there are command and cancel."""
 
 
 class ServedHand:
@@ -88,7 +82,8 @@ class ServedHand:
         self._keep_record()
 
     def _keep_record(self) -> None:
-        inhibited = inhibit_fields(self._hand.inhibited)
+        inhibit = self._hand.inhibited
+        inhibited = None if inhibit is None else inhibit.as_dict()
         record = {**self._lease.record, "settings": self._settings.record, "inhibited": inhibited}
         self._records.keep(self.name, record)
 
@@ -361,7 +356,7 @@ class ServedHand:
         if name == "cancel":
             self._cancel(call, query)
             return
-        if name != "command" and name not in COMMANDS:
+        if name not in COMMANDS:
             raise AgentError(f"unknown command {name!r}")
         self._admission.admit(call, now())
         job = Job(name, call, query)
@@ -376,16 +371,14 @@ class ServedHand:
 
     def _work(self, job: Job) -> Work:
         name, arguments = job.name, job.call.arguments
-        # Clients convert units: the agent restores the counts that it saw.
-        if own := sorted(UNITS & arguments.keys()):
-            raise TypeError(f"requests are in counts, got {', '.join(own)}")
-        if name == "command":
-            if not isinstance(arguments.get("axes"), dict):
-                raise TypeError("axes must be an object")
-            return self._set(job, **arguments)
         # Checked here: a coroutine raises for wrong arguments only when it is awaited.
-        signature(getattr(self._hand, name)).bind(**arguments)
-        return self._carry_out(job)
+        if wrong := arguments.keys() - COMMANDS[name]:
+            raise TypeError(f"requests are in counts, got {', '.join(sorted(wrong))}")
+        if name != "command":
+            return self._carry_out(job)
+        if not isinstance(arguments.get("axes"), dict):
+            raise TypeError("axes must be an object")
+        return self._set(job, **arguments)
 
     async def _carry_out(self, job: Job) -> MoveResult | None:
         self._settings.ask(job.carries)

@@ -11,8 +11,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Final
 
-from ...runtime import log
-from ..limited_log import EVERY_S, LimitedLog
+from ..limited_log import LimitedLog
 from .bus import MessageKind
 
 GATHER_S: Final = 0.001
@@ -58,9 +57,8 @@ class Mailbox:
         self._is_due = False
         self._gathering: asyncio.TimerHandle | None = None
         self._opened_at = 0.0
-        self._dropped = 0
-        self._report_due = 0.0
         self._failed = LimitedLog()
+        self._full = LimitedLog(clock=self._loop.time)
 
     def put(self, delivery: Callable[[], None], kind: MessageKind) -> bool:
         """Call a function in the loop; thread-safe. False if the mailbox is full: the call is dropped."""
@@ -69,7 +67,8 @@ class Mailbox:
             self._halts if kind is MessageKind.HALT else self._deliveries if last is None else last.deliveries
         )
         if kind is not MessageKind.ANSWER and len(deliveries) >= (MOST if last is None else MOST_QUESTIONS):
-            self._dropped += last is None
+            if last is None:
+                self._full.warn("a fleet message was dropped: queue full")
             return False
         deliveries.append(delivery)
         # Telemetry, and what comes last, wait for a timer that is already set. Anything else wakes the loop
@@ -86,7 +85,6 @@ class Mailbox:
             self._gathering.cancel()
         self._is_due, self._gathering = False, None
         before, self._opened_at = self._opened_at, self._loop.time()
-        self._report_dropped()
         count, until = 0, time.perf_counter() + TURN_S
         while self._halts or self._deliveries:
             self._deliver((self._halts or self._deliveries).popleft())
@@ -113,12 +111,6 @@ class Mailbox:
             delivery()
         except Exception:  # noqa: BLE001  # must not stop the deliveries after it
             self._failed.warn("handling a fleet message failed", exc_info=True)
-
-    def _report_dropped(self) -> None:
-        if self._dropped and self._loop.time() >= self._report_due:
-            dropped, self._dropped = self._dropped, 0
-            self._report_due = self._loop.time() + EVERY_S
-            log.warning("%d fleet messages dropped: queue full", dropped)
 
 
 class ReplySender:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import parse_qsl
 
-from ...link import malformed
 from ..wire.names import GripperName
 from .configuration import LOOPBACK_ENDPOINT, LOOPBACK_TLS, client_configuration
 
@@ -67,12 +66,16 @@ def parse_remote_address(address: object) -> tuple[GripperName, Route]:
         name = GripperName.parse(plain)
         pairs = parse_qsl(query, strict_parsing=True) if query else []
     except ValueError as error:
-        raise malformed(address, "", f"{ROUTE_FORM}; {error}") from None
+        raise _malformed(address, str(error)) from None
     unknown = [option for option, _ in pairs if option not in _OPTIONS]
     if unknown:
-        raise malformed(address, "", f"{ROUTE_FORM}; no option {unknown[0]!r}")
+        raise _malformed(address, f"no option {unknown[0]!r}")
     usual = default_route()
     connect = tuple(value for option, value in pairs if option == "connect")
     folders = [value for option, value in pairs if option == "keys"]
     insecure = any(option == "insecure" and value == "1" for option, value in pairs)
     return name, Route(connect or usual.connect, Path(folders[-1]) if folders else usual.keys, insecure)
+
+
+def _malformed(address: str, why: str) -> ValueError:
+    return ValueError(f"malformed address {address!r:.200}; accepted: {ROUTE_FORM}; {why:.100}")

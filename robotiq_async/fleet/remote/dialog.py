@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 from ...runtime import Log
-from ...values import Finger, MoveTimeoutError, NotStartedError, RobotiqError, StopLevel, check_seconds
+from ...values import Finger, NotStartedError, RobotiqError, StopLevel, check_seconds
 from ..control.lease import LEASE_WINDOW_S, WINDOW_MAX_S, WINDOW_MIN_S
 from ..errors import AgentError, ControlLostError, NotAllowedError
 from ..network.bus import Bus, Urgency
@@ -165,13 +165,11 @@ class Dialog:
         if errand.status:
             self._receive(errand.status, errand.asked_at)
         try:
-            return answer.outcome(self.mirror.clock)
+            return answer.outcome(self.mirror.read_status)
         except (TypeError, ValueError) as error:
             if errand.verb not in OWN:
                 raise
             raise AgentError(f"{self.name}: its agent does not understand {errand.verb}: {error}") from error
-        except MoveTimeoutError as error:
-            raise MoveTimeoutError(error.message, self.mirror.renumbered(error.status)) from None
         except ControlLostError as error:
             if errand.verb != "lease":
                 self.check_running()  # the lease was given back at the end of the run

@@ -8,11 +8,11 @@ from dataclasses import replace
 from typing import Any, Final
 
 from ...hands import Channels
-from ...runtime import Log, log
-from ...values import Inhibit, Model, Points, RobotiqStatus, State, Stroke, Transition, Trigger, check_points
+from ...runtime import Log
+from ...values import Inhibit, RobotiqStatus, SentRequest, State, Transition, Trigger, check_points
 from ..control.lease import LEASE_WINDOW_S
 from ..wire.status_message import StatusMessage
-from ..wire.values import Fields, read_inhibit, read_request, read_transition, reading
+from ..wire.values import Fields, reading
 
 _RUNS: Final = 16  # runs of an agent whose clocks are kept
 DRIFT: Final = 200e-6  # drift between two clocks at most, in seconds per second
@@ -82,10 +82,10 @@ class Mirror:
         channels: Channels | None = None,
         entered: Callable[[State], None] = lambda _: None,
         before: Mirror | None = None,
-        log: Log = log,
+        log: Log | None = None,
     ) -> None:
         """Call ``entered`` with each state. State and sequences continue from the mirror ``before``."""
-        self.log = log
+        self.log = log or Log()
         self.clock: AgentClock = AgentClock()
         self.newest: StatusMessage | None = None
         self.status: RobotiqStatus | None = None
@@ -94,12 +94,11 @@ class Mirror:
         self.events: int = 0
         self.misrouted: int = 0
         self.received_at: float = 0.0
-        self.points: Points = ()
+        self.points: tuple[tuple[int, float], ...] = ()
         self.inhibited: Inhibit | None = None
         self.inhibit_number: int | None = None
         self._inhibit_stamp = -math.inf
         """The agent's time of the newest word about it: a summary may be older than an answer."""
-        self._strokes: dict[Model, Stroke] = {}  # made of the points
         self._mark = mark
         self._channels = channels or Channels()
         self._entered = entered
@@ -207,30 +206,22 @@ class Mirror:
     def has_missed(self) -> bool:
         return self.newest is not None and self.newest.events > self.events
 
-    def renumbered(self, status: RobotiqStatus) -> RobotiqStatus:
-        """The status of an answer, with a sequence of ours."""
-        model, sequence = status.model, self._base + status.sequence
-        return RobotiqStatus(
-            status.registers, status.timestamp, sequence, model, self._stroke(model), status.has_current
-        )
+    def read_status(self, fields: Mapping[str, Any]) -> RobotiqStatus:
+        """The status in an answer, with a time and a sequence of ours."""
+        status = RobotiqStatus.from_raw(fields)
+        return self._as_ours(status, self.clock(status.timestamp))
 
     def receive_points(self, summary: Mapping[str, Any]) -> None:
         """Take over the points that were measured on the gripper; an older agent sends none."""
-        points = check_points("stroke", summary["stroke"]) if summary.get("stroke") else ()
-        if points != self.points:
-            self.points = points
-            self._strokes.clear()
+        self.points = check_points("stroke", summary["stroke"]) if summary.get("stroke") else ()
 
     def receive_inhibit(self, told: Mapping[str, Any]) -> None:
         """Take over whether motion is inhibited; an older agent does not say."""
         if "inhibited" in told and (stamp := float(told["stamp"])) >= self._inhibit_stamp:
-            self.inhibited, self._inhibit_stamp = read_inhibit(told["inhibited"]), stamp
+            inhibit = told["inhibited"]
+            self.inhibited = None if inhibit is None else Inhibit.from_dict(inhibit)
+            self._inhibit_stamp = stamp
             self.inhibit_number = told.get("inhibit_number")
-
-    def _stroke(self, model: Model) -> Stroke | None:
-        if self.points and model not in self._strokes:
-            self._strokes[model] = model.stroke.measured(self.points)
-        return self._strokes.get(model)
 
     def begin(self, at: float) -> None:
         self._report(State.DISCONNECTED, Trigger.ASK_START, at)
@@ -259,7 +250,8 @@ class Mirror:
         self._inhibit_stamp, self.inhibit_number = -math.inf, None
         self.events = message.events
         self._events_state = as_seen_from_here(message.state)
-        self._base = self.next_sequence if message.sequence < self.next_sequence else 0
+        first = 0 if message.status is None else message.status.sequence
+        self._base = self.next_sequence if first < self.next_sequence else 0
 
     def _set_state(self, state: State, arrival: float) -> None:
         if self._is_over:
@@ -273,36 +265,45 @@ class Mirror:
             self._entered(state)
 
     def _status(self, message: StatusMessage) -> RobotiqStatus | None:
-        if message.registers is None:
+        theirs, newest = message.status, self.status
+        if theirs is None:
             return None
-        newest, sequence = self.status, self._base + message.sequence
+        sequence = self._base + theirs.sequence
         if newest is not None and newest.sequence == sequence:
             return newest
         # The estimated clock difference falls and rises, but timestamps must rise with the sequence.
-        at = self.clock(message.stamp - message.age)
+        at = self.clock(theirs.timestamp)
         for other in (self._pushed, newest):
             if other is not None:
                 at = max(at, other.timestamp) if other.sequence < sequence else min(at, other.timestamp)
-        stroke = self._stroke(message.model)
-        return RobotiqStatus(message.registers, at, sequence, message.model, stroke, message.has_current)
+        return self._as_ours(theirs, at)
+
+    def _as_ours(self, status: RobotiqStatus, at: float) -> RobotiqStatus:
+        model = status.model
+        stroke = model.stroke.measured(self.points)
+        return RobotiqStatus(
+            status.registers, at, self._base + status.sequence, model, stroke, status.has_current
+        )
 
     def _hand_on(self, event: Fields) -> None:
         with reading("an event"):
             if event["kind"] == "transition":
-                self._apply(read_transition(event, self.clock))
+                self._apply(Transition.from_dict(event))
             elif event["kind"] == "inhibit":
                 self.receive_inhibit(event)
             elif event["kind"] == "request":
-                sent = read_request(event, self.clock)
-                self._channels.requests.push(replace(sent, timestamp=self._in_order(sent.timestamp)))
+                sent = SentRequest.from_raw(event)
+                at = self._in_order(self.clock(sent.timestamp))
+                self._channels.requests.push(replace(sent, timestamp=at))
 
     def _apply(self, transition: Transition) -> None:
         source, target = as_seen_from_here(transition.source), as_seen_from_here(transition.target)
+        at = self.clock(transition.timestamp)
         self._events_state = target
         if not (self.is_silent or self._is_over):
             # Transitions in between, if any, are lost: the agent keeps only the newest events.
-            self._report(source, _SEEN.get(source, Trigger.SEEN_BUSY), transition.timestamp)
-            self._report(target, transition.trigger, transition.timestamp)
+            self._report(source, _SEEN.get(source, Trigger.SEEN_BUSY), at)
+            self._report(target, transition.trigger, at)
 
     def _report(self, state: State, trigger: Trigger, at: float) -> None:
         source, self._reported = self._reported, state

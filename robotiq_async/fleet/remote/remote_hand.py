@@ -4,43 +4,36 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Collection
-from dataclasses import replace
-from functools import cache, partial
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 from ...calibration import ForceCalibration, SpeedCalibration
-from ...hands import RUNNING, Counters, Hand, Statistics, refusal, units_of
+from ...hands import Hand, StateWaiters, Statistics, UnitsByModel, check
 from ...runtime import Limit
 from ...values import (
-    THREE_FINGER,
     Finger,
     Inhibit,
     InvalidStateError,
-    MotionInhibitedError,
     MoveResult,
     NotStartedError,
-    Points,
     RobotiqConnectionError,
     RobotiqStatus,
     State,
-    StateTimeoutError,
-    StopLevel,
     Trigger,
-    check_flag,
     check_seconds,
 )
 from ..errors import AgentError
 from ..network.bus import Bus
 from ..network.route import parse_remote_address
-from ..wire.values import Fields, read_result, reading
+from ..wire.values import Fields, reading
 from .dialog import label
 from .errand import no_answer_as_lost_connection
 from .session import CONNECT_S, RemoteSession
 
 REMOTE_COMMAND_S: Final = 5.0  # seconds for commands that end with the acknowledgment of the gripper
 SEQUENCE_S: Final = 130.0
-"""Seconds for an activation, a reset or a release; the agent's own limits are shorter."""
-MOVE_S: Final = 100.0  # seconds for a move without a timeout; the agent's own limit is shorter
+MOVE_S: Final = 100.0  # without a timeout
+_SECONDS: Final = {"move": MOVE_S} | dict.fromkeys(("activate", "reset", "atr", "recover"), SEQUENCE_S)
+"""For the answer to a command; the agent's own limits are shorter."""
 SLACK_S: Final = 5.0  # seconds beyond a timeout that the agent applies
 
 
@@ -107,15 +100,12 @@ class RemoteHand(Hand):
         self._gripper, self._route = parse_remote_address(address)
         self._connect_timeout = check_seconds("connect_timeout", connect_timeout, 0.1, 60.0)
         self._control = control
-        units = cache(partial(units_of, calibration, force_calibration))  # loops ask in every cycle
-        named = [getattr(each, "model", None) for each in (calibration, force_calibration)]
-        model = next(filter(None, named), THREE_FINGER)  # until the agent says it
-        units(model)  # checks the calibrations
+        units = UnitsByModel(calibration, force_calibration)
         super().__init__(
             str(self._gripper),
             units=lambda model: units(model, self._points),
-            keep_grip=check_flag("keep_grip", keep_grip),
-            model=model,
+            keep_grip=keep_grip,
+            model=units.model,
         )
         if bus is None:
             self._route.configuration()  # a malformed or unprotected route fails here, not at the start
@@ -158,7 +148,7 @@ class RemoteHand(Hand):
         if session is not None and not session.dialog.has_ended:
             session.check_loop()
             session.dialog.clear("stopped")
-            await session.close(StopLevel.of(halt=halt, keep_grip=keep_grip))
+            await session.close(self._stop_level(halt, keep_grip))
 
     async def _open_bus(self) -> Bus:
         if self._shared_bus is not None:
@@ -213,8 +203,7 @@ class RemoteHand(Hand):
         Raises:
             RobotiqError: not started, the agent does not answer, or the fingers were not seen to stop.
         """
-        check_flag("halt", halt)
-        level = StopLevel.of(halt=halt, keep_grip=self._keeps_grip(keep_grip))
+        level = self._stop_level(halt, keep_grip)
         keeper = self._running_session().keeper
         keeper.release(level)
         with no_answer_as_lost_connection():
@@ -223,37 +212,27 @@ class RemoteHand(Hand):
     # -- commands --------------------------------------------------------------------------------------
 
     async def _set(self, what: Literal["position", "speed", "force"], value: int, axes: Finger) -> None:
-        await self._ask(f"set_{what}", {"value": value, "fingers": int(axes)}, REMOTE_COMMAND_S)
+        await self._ask(f"set_{what}", value=value, fingers=int(axes))
 
     def _command(self, axes: Finger, position: int | None, speed: int | None, force: int | None) -> None:
         session = self._running_session()
         session.check_control()
-        if (inhibit := self.inhibited) is not None and (position is not None or force is not None):
-            raise MotionInhibitedError(inhibit)
-        if self.state not in RUNNING:
-            raise refusal(Trigger.ASK_COMMAND, self.state, session.mirror.status)
+        presses = position is not None or force is not None
+        check(Trigger.ASK_COMMAND, self.state, session.mirror.status, self.inhibited if presses else None)
         changes = {"position": position, "speed": speed, "force": force}
         session.dialog.put(axes, {name: value for name, value in changes.items() if value is not None})
 
     async def _move(
         self, axes: Finger, target: int, speed: int | None, force: int | None, timeout: float | None
     ) -> MoveResult:
-        arguments: Fields = {
-            "position": target,
-            "fingers": int(axes),
-            "speed": speed,
-            "force": force,
-            "timeout": timeout,
-        }
-        value = await self._ask("move", arguments, MOVE_S if timeout is None else timeout + SLACK_S)
-        assert self._session is not None, "it has answered"
-        mirror = self._session.mirror
+        value = await self._ask(
+            "move", position=target, fingers=int(axes), speed=speed, force=force, timeout=timeout
+        )
         with reading("a result"):
-            result = read_result(value, mirror.clock)
-            return replace(result, status=mirror.renumbered(result.status))
+            return MoveResult.from_dict(value, self._running_session().mirror.read_status(value["status"]))
 
     async def _hold(self, axes: Finger) -> None:
-        await self._ask("hold", {"fingers": int(axes)}, REMOTE_COMMAND_S)
+        await self._ask("hold", fingers=int(axes))
 
     async def _inhibit(self, inhibit: Inhibit) -> None:
         arguments = {"inhibit": inhibit.reason, "who": inhibit.who}
@@ -298,19 +277,21 @@ class RemoteHand(Hand):
         return answer
 
     async def _activate(self) -> None:
-        await self._ask("activate", {}, SEQUENCE_S)
+        await self._ask("activate")
 
     async def _reset(self) -> None:
-        await self._ask("reset", {}, SEQUENCE_S)
+        await self._ask("reset")
 
     async def _atr(self) -> None:
-        await self._ask("atr", {}, SEQUENCE_S)
+        await self._ask("atr")
 
     async def _recover(self, timeout: float | None) -> None:
-        await self._ask("recover", {"timeout": timeout}, SEQUENCE_S if timeout is None else timeout + SLACK_S)
+        await self._ask("recover", timeout=timeout)
 
-    async def _ask(self, name: str, arguments: Fields, timeout: float) -> Fields:
+    async def _ask(self, name: str, **arguments: Any) -> Fields:  # noqa: ANN401  # what JSON holds
         """Have the agent carry out a command; if this call is cancelled, cancel the command there."""
+        timeout = arguments.get("timeout")
+        seconds = _SECONDS.get(name, REMOTE_COMMAND_S) if timeout is None else timeout + SLACK_S
         session = self._running_session()
         dialog = session.dialog
         if self._control is None and not dialog.lease.is_held and dialog.lease.lost is None:
@@ -322,7 +303,7 @@ class RemoteHand(Hand):
         call = dialog.call(arguments)
         try:
             with no_answer_as_lost_connection():
-                value: Fields = await dialog.send(call, f"cmd/{name}", timeout=timeout)
+                value: Fields = await dialog.send(call, f"cmd/{name}", timeout=seconds)
         except (asyncio.CancelledError, RobotiqConnectionError):
             # Also after an error that leaves open whether the request was carried out.
             dialog.cancel(name, call)
@@ -339,12 +320,12 @@ class RemoteHand(Hand):
     @property
     def statistics(self) -> Statistics:
         """Figures of the agent's polling, at most 1 s old."""
-        return Counters().snapshot(0) if self._session is None else self._session.statistics
+        return Statistics.none() if self._session is None else self._session.statistics
 
     @property
-    def _points(self) -> Points | None:
+    def _points(self) -> tuple[tuple[int, float], ...]:
         """The measured points of the agent's hand, which has the option ``stroke``."""
-        return None if self._session is None else self._session.mirror.points or None
+        return () if self._session is None else self._session.mirror.points
 
     @property
     def _newest_status(self) -> RobotiqStatus | None:
@@ -356,11 +337,10 @@ class RemoteHand(Hand):
         return self._session.dialog.is_moving or (newest is not None and newest.is_moving)
 
     async def _wait_for_state(self, states: Collection[State], timeout: float | None) -> State:
-        with self._running_session().waiters.watching(states, {}) as reached:
-            with Limit(timeout):
-                return await reached
-            names = " or ".join(state.name for state in states)
-            raise StateTimeoutError(f"{names} was not reached within {timeout:g} s (now {self.state.name})")
+        with self._running_session().waiters.watching(states, {}) as reached, Limit(timeout):
+            return await reached
+        names = " or ".join(state.name for state in states)
+        raise StateWaiters.late(f"{names} was not reached", timeout, self.state)
 
     def _running_session(self) -> RemoteSession:
         # Refuses before start(), after stop(), and from another loop.

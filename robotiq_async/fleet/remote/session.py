@@ -27,7 +27,7 @@ import json
 from collections.abc import Mapping
 from typing import Any, Final
 
-from ...hands import Channels, Counters, StateWaiters, Statistics
+from ...hands import Channels, StateWaiters, Statistics
 from ...runtime import Limit, Log, check_loop, now, wait_shielded
 from ...values import (
     ConnectFailedError,
@@ -43,7 +43,7 @@ from ..limited_log import LimitedLog
 from ..network.bus import Bus, Undo
 from ..wire.names import GripperName
 from ..wire.status_message import unpack
-from ..wire.values import read_statistics, reading
+from ..wire.values import reading
 from .agents import Agents
 from .dialog import Dialog
 from .errand import NoAnswerError
@@ -82,7 +82,7 @@ class RemoteSession:
         self.dialog: Dialog = Dialog(name, bus, self.mirror, before, receive=self._receive_answer)
         self.agents: Agents = Agents(name, bus, self.dialog.lease.doubt)
         self.keeper: LeaseKeeper = LeaseKeeper(self.dialog, self.agents)
-        self.statistics: Statistics = Counters().snapshot(0)
+        self.statistics: Statistics = Statistics.none()
         self._bus = bus
         self._channels = channels
         self._owns_bus = owns_bus
@@ -135,7 +135,7 @@ class RemoteSession:
             return False
         with reading("its figures"):
             self.dialog.set_window(info["window"])
-            self.statistics = read_statistics(info["statistics"])
+            self.statistics = Statistics.from_dict(info["statistics"])
             self.mirror.receive_points(info)
             self.mirror.receive_inhibit(info)
         return True
@@ -268,7 +268,7 @@ class RemoteSession:
         if self._is_about_another(fields["mark"]):
             return
         if "statistics" in fields:
-            self.statistics = read_statistics(fields["statistics"])
+            self.statistics = Statistics.from_dict(fields["statistics"])
             self.mirror.receive_points(fields)
             self.mirror.receive_inhibit(fields)
             return

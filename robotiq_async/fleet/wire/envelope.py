@@ -10,7 +10,7 @@ from typing import Any, Final
 from ...values import ProtocolError
 from ..errors import AgentError, ControlLostError
 from .names import VERSION, other_version
-from .values import Clock, Fields, error_fields, read_error
+from .values import Fields, ReadStatus, error_fields, read_error
 
 _LONGEST: Final = 64 * 1024
 _INTEGERS: Final = ("epoch", "lease", "number", "after")
@@ -102,10 +102,10 @@ class AgentAnswer:
     def pack(self) -> bytes:
         return _pack(self)
 
-    def outcome(self, clock: Clock) -> Any:  # noqa: ANN401  # what each request returns
+    def outcome(self, read_status: ReadStatus) -> Any:  # noqa: ANN401  # what each request returns
         """Return what the request returned, or raise what it raised."""
         if self.error is not None:
-            raise read_error(self.error, clock)
+            raise read_error(self.error, read_status)
         return self.value
 
 

@@ -1,13 +1,30 @@
-"""Values in commands: a position, a speed or a force of an axis. Speeds and forces are its settings."""
+"""The commands of a holder, and the values in them: a position, a speed or a force of an axis.
+
+Speeds and forces are the settings of an axis.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from ...values import Finger, Request, check_byte, check_mask
+from ...values import Finger, SentRequest, check_byte, check_mask
 from .values import Fields
 
+COMMANDS: Final[Mapping[str, frozenset[str]]] = {
+    "set_position": frozenset({"value", "fingers"}),
+    "set_speed": frozenset({"value", "fingers"}),
+    "set_force": frozenset({"value", "fingers"}),
+    "command": frozenset({"axes"}),
+    "move": frozenset({"position", "fingers", "speed", "force", "timeout"}),
+    "hold": frozenset({"fingers"}),
+    "activate": frozenset(),
+    "reset": frozenset(),
+    "atr": frozenset(),
+    "recover": frozenset({"timeout"}),
+}
+"""The methods of a hand that the holder of a lease may call, and ``command`` for several axes at once, with
+their arguments. Clients convert other amounts to counts: the agent restores the counts that it saw."""
 SETTINGS: Final = ("speed", "force")
 _ALL: Final = ("position", *SETTINGS)
 Setting = tuple[Finger, str]
@@ -45,13 +62,14 @@ def settings_of(asked: Mapping[Setting, int]) -> dict[Setting, int]:
     return {each: value for each, value in asked.items() if each[1] in SETTINGS}
 
 
-def settings_in(image: Request) -> dict[Setting, int]:
-    return {(axis, what): getattr(request, what) for axis, request in image.by_axis for what in SETTINGS}
+def settings_in(sent: SentRequest) -> dict[Setting, int]:
+    axes = sent.request.by_axis
+    return {(axis, what): getattr(asked, what) for axis, asked in axes for what in SETTINGS}
 
 
-def is_in(asked: Mapping[Setting, int], image: Request) -> bool:
+def is_in(asked: Mapping[Setting, int], sent: SentRequest) -> bool:
     """Whether a written image has all of it, for the axes that the gripper has."""
-    axes = dict(image.by_axis)
+    axes = dict(sent.request.by_axis)
     return all(
         axis not in axes or getattr(axes[axis], what) == value for (axis, what), value in asked.items()
     )

@@ -9,7 +9,7 @@ import struct
 from math import isfinite
 from typing import Final, NamedTuple
 
-from ...values import MODELS, THREE_FINGER, Model, ProtocolError, Registers, State
+from ...values import MODELS, ProtocolError, RobotiqStatus, State
 from ..errors import AgentError
 from .names import VERSION, other_version
 
@@ -19,7 +19,7 @@ _STATES: Final = tuple(State)
 _MODELS: Final = tuple(MODELS.values())
 _PLACES: Final = {state: place for place, state in enumerate(_STATES)}
 _READ, _MOVES, _HELD, _NO_CURRENT = 1, 2, 4, 8
-_NO_REGISTERS: Final = (0,) * 8
+_NO_REGISTERS: Final[tuple[int, ...]] = (0,) * 8
 
 
 class StatusMessage(NamedTuple):
@@ -34,11 +34,7 @@ class StatusMessage(NamedTuple):
         is_held: whether a client holds the lease.
         events: number of the newest event; a client that has received fewer has missed some.
         is_moving: whether an axis moves, or will move by a command that has no effect yet.
-        sequence: of the status, counted by the agent's hand; meaningless without registers.
-        age: seconds from the gripper's reply to ``stamp``.
-        registers: the status; None if none has been read yet.
-        model: of the gripper.
-        has_current: whether the registers carry the motor currents.
+        status: the newest, at the agent's time; None if none has been read yet.
     """
 
     mark: int
@@ -49,32 +45,19 @@ class StatusMessage(NamedTuple):
     is_held: bool
     events: int
     is_moving: bool
-    sequence: int
-    age: float
-    registers: Registers | None
-    model: Model = THREE_FINGER
-    has_current: bool = True
+    status: RobotiqStatus | None
 
     def pack(self) -> bytes:
-        (
-            *(mark, epoch, stamp, state, lease, is_held, events, is_moving, sequence, age, registers, model),
-            has_current,
-        ) = self
-        flags = _READ * (registers is not None) | _MOVES * is_moving | _HELD * is_held
-        flags |= _NO_CURRENT * (not has_current)
+        mark, epoch, stamp, state, lease, is_held, events, is_moving, status = self
+        flags = _MOVES * is_moving | _HELD * is_held
+        model, sequence, age, registers = 0, 0, 0.0, _NO_REGISTERS
+        if status is not None:
+            flags |= _READ | _NO_CURRENT * (not status.has_current)
+            model, registers = _MODELS.index(status.model), status.registers
+            sequence, age = status.sequence, stamp - status.timestamp
         return _LAYOUT.pack(
-            VERSION,
-            _PLACES[state],
-            flags,
-            _MODELS.index(model),
-            mark,
-            lease,
-            events,
-            epoch,
-            sequence,
-            stamp,
-            age,
-            *(registers or _NO_REGISTERS),
+            *(VERSION, _PLACES[state], flags, model),
+            *(mark, lease, events, epoch, sequence, stamp, age, *registers),
         )
 
 
@@ -100,6 +83,12 @@ def unpack(data: bytes) -> StatusMessage:
         # The client returns the newest stamp with every request and ignores older ones: an infinite stamp
         # would block all that follow.
         raise ProtocolError(f"a status with an impossible time: {stamp}, {age} s old")
+    status = None
+    if flags & _READ:
+        has_current = not flags & _NO_CURRENT
+        status = RobotiqStatus(
+            tuple(registers), stamp - age, sequence, _MODELS[model], has_current=has_current
+        )
     return StatusMessage(
         mark=mark,
         epoch=epoch,
@@ -109,9 +98,5 @@ def unpack(data: bytes) -> StatusMessage:
         is_held=bool(flags & _HELD),
         events=events,
         is_moving=bool(flags & _MOVES),
-        sequence=sequence,
-        age=age,
-        registers=tuple(registers) if flags & _READ else None,
-        model=_MODELS[model],
-        has_current=not flags & _NO_CURRENT,
+        status=status,
     )

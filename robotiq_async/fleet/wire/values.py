@@ -1,51 +1,18 @@
-"""Values as JSON on the network: the fields of ``as_dict()``, less those that the receiver works out.
-
-Enumerations are names, but a fault is its code, because a gripper may report one that has no name. A status
-or a request is its registers and its model.
-"""
+"""Text and errors on the network. The other values encode themselves: ``as_dict()``, ``as_raw()``."""
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Final
 
-from ... import values
-from ...hands import Statistics
 from ...runtime import printable
-from ...values import (
-    ConnectFailedError,
-    Fault,
-    Finger,
-    GripperFaultError,
-    Inhibit,
-    InvalidStateError,
-    MotionInhibitedError,
-    MoveResult,
-    MoveTimeoutError,
-    ObjectStatus,
-    ProtocolError,
-    Request,
-    RobotiqError,
-    RobotiqStatus,
-    SentRequest,
-    State,
-    Transition,
-    Trigger,
-    model_of,
-)
+from ...values import Fault, ProtocolError, RobotiqError, RobotiqStatus, State, errors
 from ..errors import AgentError, ControlLostError, NotAllowedError
 
 Fields = dict[str, Any]
-Clock = Callable[[float], float]  # converts a time of the agent to a time of this process
-
-_KINDS: Final[dict[str, type[Exception]]] = {
-    each.__name__: each
-    for each in (*vars(values).values(), AgentError, ControlLostError, NotAllowedError, TypeError, ValueError)
-    if isinstance(each, type) and issubclass(each, RobotiqError | TypeError | ValueError)
-}
-_PLAIN: Final = ("address", "reason", "who", "since")  # attributes of errors that JSON has as they are
+ReadStatus = Callable[[Mapping[str, Any]], RobotiqStatus]
+"""Reads a status that an answer has."""
 
 
 @contextmanager
@@ -64,163 +31,69 @@ def words(text: object) -> str:
     return printable(text)
 
 
-# -- statuses ----------------------------------------------------------------------------------------------
-
-
-def status_fields(status: RobotiqStatus) -> Fields:
-    return {
-        "registers": status.registers,
-        "timestamp": status.timestamp,
-        "sequence": status.sequence,
-        "model": status.model.name,
-        "has_current": status.has_current,
-    }
-
-
-def read_status(fields: Mapping[str, Any], clock: Clock) -> RobotiqStatus:
-    return RobotiqStatus.from_registers(
-        fields["registers"],
-        timestamp=clock(fields["timestamp"]),
-        sequence=fields["sequence"],
-        model=model_of(fields.get("model")),
-        has_current=fields.get("has_current", True),
-    )
-
-
 # -- errors ------------------------------------------------------------------------------------------------
+
+_KINDS: Final[Mapping[str, type[Exception]]] = {
+    kind.__name__: kind
+    for kind in (*vars(errors).values(), AgentError, ControlLostError, NotAllowedError, TypeError, ValueError)
+    if isinstance(kind, type) and issubclass(kind, RobotiqError | TypeError | ValueError)
+}
+_ATTRIBUTES: Final = {
+    "InvalidStateError": ("state", "allowed"),
+    "GripperFaultError": ("fault",),
+    "MoveTimeoutError": ("status",),
+    "ConnectFailedError": ("address",),
+    "ControlLostError": ("reason",),
+    "MotionInhibitedError": ("reason", "who", "since"),
+}
+"""Those that each kind of error has beside its message."""
+_WRITTEN: Final[Mapping[str, Callable[[Any], object]]] = {
+    "state": lambda state: state.name,
+    "allowed": lambda states: sorted(each.name for each in states),
+    "fault": lambda fault: fault.value,  # a gripper may report one that has no name
+    "status": lambda status: status.as_raw(),
+}
+_READ: Final[Mapping[str, Callable[[Any], object]]] = {
+    "state": lambda name: State[name],
+    "allowed": lambda names: frozenset(State[name] for name in names),
+    "fault": lambda code: Fault(tuple(code) if isinstance(code, list) else code),  # type: ignore[arg-type]
+    "since": float,
+}
 
 
 def error_fields(error: Exception) -> Fields:
     """Encode an error: kind, attributes, and the message without the name of the agent's hand."""
+    kind = type(error).__name__
     fields: Fields = {
-        "kind": type(error).__name__,
+        "kind": kind,
         "message": error.message if isinstance(error, RobotiqError) else str(error),
     }
-    state: State | None = getattr(error, "state", None)
-    fault: Fault | None = getattr(error, "fault", None)
-    status: RobotiqStatus | None = getattr(error, "status", None)
-    if state is not None:
-        allowed = getattr(error, "allowed", frozenset[State]())
-        fields |= {"state": state.name, "allowed": sorted(each.name for each in allowed)}
-    if fault is not None:
-        fields["fault"] = fault.value
-    if status is not None:
-        fields["status"] = status_fields(status)
-    for name in _PLAIN:
-        if hasattr(error, name):
-            fields[name] = getattr(error, name)
+    for name in _ATTRIBUTES.get(kind, ()):
+        value = getattr(error, name)
+        fields[name] = _WRITTEN[name](value) if name in _WRITTEN else value
     if isinstance(error, RobotiqError) and error.advice:
         fields["advice"] = error.advice
     return fields
 
 
-def read_error(fields: Fields, clock: Clock) -> Exception:
+def read_error(fields: Fields, read_status: ReadStatus) -> Exception:
     """Decode an error. An unknown kind becomes AgentError, malformed data ProtocolError."""
     try:
         with reading("an error"):
-            return _error(fields, clock)
+            return _error(fields, read_status)
     except ProtocolError as unreadable:
         return unreadable
 
 
-def inhibit_fields(inhibit: Inhibit | None) -> Fields | None:
-    return None if inhibit is None else inhibit.as_dict()
-
-
-def read_inhibit(fields: Mapping[str, Any] | None) -> Inhibit | None:
-    """Decode an inhibit, or the lack of one."""
-    if fields is None:
-        return None
-    return Inhibit(words(fields["reason"]), words(fields["who"]), float(fields["since"]))
-
-
-def _error(fields: Fields, clock: Clock) -> Exception:
+def _error(fields: Fields, read_status: ReadStatus) -> Exception:
     kind, message = _KINDS.get(fields["kind"]), words(fields["message"])
     if kind is None:
         return AgentError(f"{words(fields['kind'])}: {message}")
     error: Exception = kind.__new__(kind)
     error.args = (message,)
-    known: dict[str, object] = {}
-    if issubclass(kind, InvalidStateError):
-        known["state"] = State[fields["state"]]
-        known["allowed"] = frozenset(State[name] for name in fields["allowed"])
-    if issubclass(kind, GripperFaultError):
-        value = fields["fault"]
-        known["fault"] = Fault(tuple(value) if isinstance(value, list) else value)  # type: ignore[arg-type]
-    if issubclass(kind, MoveTimeoutError):
-        known["status"] = read_status(fields["status"], clock)
-    if issubclass(kind, ConnectFailedError):
-        known["address"] = words(fields["address"])
-    if issubclass(kind, ControlLostError):
-        known["reason"] = words(fields["reason"])
-    if issubclass(kind, MotionInhibitedError):
-        known |= {name: words(fields[name]) for name in ("reason", "who")} | {"since": float(fields["since"])}
+    names = [*_ATTRIBUTES.get(fields["kind"], ())]
     if issubclass(kind, RobotiqError) and "advice" in fields:
-        known["advice"] = words(fields["advice"])
-    vars(error).update(known)
+        names.append("advice")
+    read = {**_READ, "status": read_status}
+    vars(error).update({name: read.get(name, words)(fields[name]) for name in names})
     return error
-
-
-# -- results -----------------------------------------------------------------------------------------------
-
-
-def result_fields(result: MoveResult | None) -> Fields | None:
-    return None if result is None else {**result.as_dict(), "status": status_fields(result.status)}
-
-
-def read_result(fields: Mapping[str, Any], clock: Clock) -> MoveResult:
-    axes = {axis: fields[str(axis.name)] for axis in Finger.ALL if axis.name in fields}
-    return MoveResult(
-        outcomes={axis: ObjectStatus[end["outcome"]] for axis, end in axes.items()},
-        positions={axis: int(end["position"]) for axis, end in axes.items()},
-        contacts=Finger(sum(Finger[name] for name in fields["contacts"])),
-        reached=Finger(sum(axis for axis, end in axes.items() if end["reached"])),
-        duration=float(fields["duration"]),
-        peak_current_ma={
-            axis: int(end["peak_current_ma"]) if "peak_current_ma" in end else None
-            for axis, end in axes.items()
-        },
-        status=read_status(fields["status"], clock),
-    )
-
-
-# -- events ------------------------------------------------------------------------------------------------
-
-
-def transition_fields(transition: Transition) -> Fields:
-    return {"kind": "transition", **transition.as_dict()}
-
-
-def read_transition(fields: Mapping[str, Any], clock: Clock) -> Transition:
-    return Transition(
-        source=State[fields["source"]],
-        target=State[fields["target"]],
-        trigger=Trigger[fields["trigger"]],
-        timestamp=clock(fields["timestamp"]),
-    )
-
-
-def request_fields(sent: SentRequest) -> Fields:
-    return {
-        "kind": "request",
-        "registers": sent.request.registers,
-        "model": sent.request.model.name,
-        "timestamp": sent.timestamp,
-        "acknowledged": sent.acknowledged,
-    }
-
-
-def read_request(fields: Mapping[str, Any], clock: Clock) -> SentRequest:
-    return SentRequest(
-        request=Request.from_registers(fields["registers"], model_of(fields.get("model"))),
-        timestamp=clock(fields["timestamp"]),
-        acknowledged=bool(fields["acknowledged"]),
-    )
-
-
-def read_statistics(fields: Mapping[str, Any]) -> Statistics:
-    # An older agent lacks the figures that have a default; those of a newer one that are unknown here are
-    # ignored.
-    figures = dataclasses.fields(Statistics)
-    told = [each.name for each in figures if each.name in fields or each.default is dataclasses.MISSING]
-    return Statistics(**{name: fields[name] for name in told})

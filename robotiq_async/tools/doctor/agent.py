@@ -74,7 +74,7 @@ class _Asker:
         answer = unpack_answer(reply.payload)
         if answer.to != self._name.base or answer.number not in (0, call.number):
             raise AgentError("the answer to info belongs to another request")
-        info = answer.outcome(lambda stamp: stamp)
+        info = answer.outcome(RobotiqStatus.from_raw)
         if not isinstance(info, dict) or not info.keys() >= _READ:
             raise AgentError(f"the agent's description of the gripper has another format: {info!r:.200}")
         return info
@@ -172,7 +172,7 @@ def _report_statuses(listener: _Listener, seconds: float, info: Fields, report: 
         advice = "Answers arrive, statuses do not: is the client in the agent's access list, in one role?"
         report(Finding(Level.BAD, "statuses", f"none within {seconds:.1f} s", advice))
         return
-    sequences = {each.sequence for each in listener.statuses if each.registers is not None}
+    sequences = {each.status.sequence for each in listener.statuses if each.status is not None}
     if len(sequences) < 2:
         return  # the gripper is not polled; the state reports that
     lost = 1 - len(sequences) / (max(sequences) - min(sequences) + 1)
@@ -197,5 +197,5 @@ def _report_gripper(listener: _Listener, info: Fields, report: ReportFinding) ->
         return
     report(Finding(Level.GOOD, "gripper", f"{info['address']} in {state}"))
     newest = listener.statuses[-1] if listener.statuses else None
-    if newest is not None and newest.registers is not None:
-        report_state(RobotiqStatus.from_registers(newest.registers, model=newest.model), report)
+    if newest is not None and newest.status is not None:
+        report_state(newest.status, report)
