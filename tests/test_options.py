@@ -12,8 +12,8 @@ import pytest
 
 from docs import make_tables
 from robotiq_async import RobotiqHand, sync
+from robotiq_async.cli.agent_file import AgentFileError, read_agent_file
 from robotiq_async.cli.arguments import USUAL_LINK, LinkOptions
-from robotiq_async.fleet.agent.agent_file import AgentFileError, read_agent_file
 from robotiq_async.hands.options import OPTIONS, HandOptions, Option, Place, offered
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_parameter, check_settings
 from robotiq_async.values.model import Model

@@ -53,7 +53,7 @@ from robotiq_async.control.motion import Move
 from robotiq_async.fleet import ControlLostError, GripperName, Member, NotAllStoppedError, Route
 from robotiq_async.fleet.control.lease import Holder
 from robotiq_async.fleet.keys.access import AccessList
-from robotiq_async.fleet.keys.certificates import Credentials
+from robotiq_async.fleet.keys.credentials import Credentials
 from robotiq_async.fleet.network.endpoints import Endpoint
 from robotiq_async.fleet.remote.errand import NoAnswerError
 from robotiq_async.hands.statistics import Counters

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from ..hands import POLL_INTERVAL_S, Hand
+from ..hands import POLL_INTERVAL_S, Hand, HandOptions
 from ..link import is_remote
 from ..local import RobotiqHand
 from ..tools.actions import Operator
@@ -37,6 +37,11 @@ def make_hand(
             return RemoteHand(address, control=control)
     with usage():
         return RobotiqHand(address, **link.options(), poll_interval=poll_interval, speed=speed, force=force)
+
+
+def make_served(options: HandOptions) -> RobotiqHand:
+    """A hand for an agent, from its table in FLEET.toml."""
+    return RobotiqHand(name=options.name, **{name: getattr(options, name) for name in HandOptions.in_files()})
 
 
 def make_operator(address: str, link: LinkOptions, who: str, *, speed: int, force: int) -> Operator:

@@ -1,4 +1,15 @@
-"""Errors of hands on other hosts, beside those that every hand raises."""
+"""Errors of hands on other hosts, beside those of every hand.
+
+::
+
+    RobotiqStateError
+    +-- ControlLostError        this hand does not hold the lease
+    +-- NotAllowedError         the fleet's access rules forbid it
+    RobotiqConnectionError
+    +-- AgentError              the agent did not carry it out
+    RobotiqError
+    +-- NotAllStoppedError      the halt of a fleet; .outcomes, .unreached
+"""
 
 from __future__ import annotations
 

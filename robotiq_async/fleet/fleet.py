@@ -12,7 +12,7 @@ from typing import Any, Final, Self
 
 from ..hands import Channel, Stream
 from ..runtime import now
-from ..values import Fault, Inhibit, ProtocolError, RobotiqError, State, model_of
+from ..values import MODELS, Fault, Inhibit, ProtocolError, RobotiqError, State
 from .errors import NotAllStoppedError
 from .limited_log import LimitedLog
 from .network.bus import Bus, Undo
@@ -306,7 +306,7 @@ class Summaries:
                 raise ValueError(f"not a time: {stamp}, {age}")
             what = {
                 "state": State[fields["state"]],
-                "fault": None if fault is None else model_of(fields.get("model")).fault(fault),
+                "fault": None if fault is None else MODELS[fields["model"]].fault(fault),
                 "is_moving": bool(fields["is_moving"]),
                 "holder": None if fields["holder"] is None else words(fields["holder"]),
                 "inhibited": _inhibited(fields),

@@ -1,10 +1,9 @@
 """Parts of any hand: its calls and their checks, options, streams, waits, statistics."""
 
-from ..control.state_machine import MOVES, RUNNING, TABLE, Verdict, check, refusal
+from ..control.state_machine import MOVES, RUNNING, TABLE, Verdict, refusal
 from .base import Hand
 from .options import (
     ACTIVATION_TIMEOUT_S,
-    FILE_OPTIONS,
     LATE_POLLS,
     LONGEST_RESPONSE_S,
     LONGEST_SPACING_S,
@@ -14,7 +13,6 @@ from .options import (
     Option,
     Place,
     ReconnectPolicy,
-    UnitsByModel,
     offered,
     units_of,
     usual_write_spacing,
@@ -23,11 +21,11 @@ from .statistics import Counters, Statistics, percentile
 from .streams import Channel, Channels, Listeners, Stream
 from .waiting import StateWaiters
 
-__all__ = ["MOVES", "RUNNING", "TABLE", "Verdict", "check", "refusal"]
+__all__ = ["MOVES", "RUNNING", "TABLE", "Verdict", "refusal"]
 __all__ += ["Hand"]
 __all__ += ["ACTIVATION_TIMEOUT_S", "LATE_POLLS", "LONGEST_RESPONSE_S", "LONGEST_SPACING_S"]
 __all__ += ["POLL_INTERVAL_S", "RESPONSE_TIMEOUT_S", "HandOptions", "Option", "Place"]
-__all__ += ["FILE_OPTIONS", "ReconnectPolicy", "UnitsByModel", "offered", "units_of", "usual_write_spacing"]
+__all__ += ["ReconnectPolicy", "offered", "units_of", "usual_write_spacing"]
 __all__ += ["Counters", "Statistics", "percentile"]
 __all__ += ["Channel", "Channels", "Listeners", "Stream"]
 __all__ += ["StateWaiters"]

@@ -57,9 +57,11 @@ class Hand(HandKind):
     Args:
         address: of the gripper; no two hands of a process have the same one.
         name: of the hand in the log, errors and metrics; empty for its address.
-        units: converts positions, speeds and forces of the model.
+        units: converts positions, speeds and forces of the model; by default by these calibrations.
         keep_grip: whether :meth:`stop` keeps a grip by default.
-        model: of the gripper.
+        model: of the gripper; None for that of a calibration, and a 3-Finger.
+        calibration: the speeds of the gripper; None for the thesis's gripper.
+        force_calibration: the forces of the gripper; None for the manual's figures.
     """
 
     # -- lifetime --------------------------------------------------------------------------------------
@@ -517,11 +519,6 @@ class Hand(HandKind):
         """
         self._current_status()
         return self._is_moving()
-
-    @property
-    @abstractmethod
-    def inhibited(self) -> Inhibit | None:
-        """Why motion is refused, since when, and by whom; None while it is permitted."""
 
     @property
     @abstractmethod

@@ -7,15 +7,19 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection
 from typing import Literal, TypeVar
 
-from ..calibration import Units
+from ..calibration import ForceCalibration, SpeedCalibration, Units
+from ..control.state_machine import check
+from ..runtime.concurrency import check_loop
 from ..runtime.logger import Log
 from ..values.checks import check_flag
-from ..values.enums import Finger, State, StopLevel
-from ..values.errors import ConnectionLostError, NotStartedError
+from ..values.enums import Finger, State, StopLevel, Trigger
+from ..values.errors import ConnectionLostError, InvalidStateError, NotStartedError
 from ..values.inhibit import Inhibit
 from ..values.model import THREE_FINGER, Model
 from ..values.move_result import MoveResult
 from ..values.status import RobotiqStatus
+from ..values.stroke import Points
+from .options import UnitsByModel
 from .present_run import NamesErrors, PresentRun, refuse_copy
 from .streams import Channel, Channels, Stream
 
@@ -32,16 +36,21 @@ class HandKind(ABC):
         self,
         address: str,
         *,
-        units: Callable[[Model], Units],
+        units: Callable[[Model], Units] | None = None,
         name: str = "",
         keep_grip: bool = False,
-        model: Model = THREE_FINGER,
+        model: Model | None = None,
+        calibration: SpeedCalibration | None = None,
+        force_calibration: ForceCalibration | None = None,
     ) -> None:
         self._address = address
         self._given_name = name
+        if units is None:
+            by_model = UnitsByModel(calibration, force_calibration)
+            units, model = lambda model: by_model(model, self._points), model or by_model.model
         self._units = units
         self._keep_grip = check_flag("keep_grip", keep_grip)
-        self._model = model
+        self._model = model or THREE_FINGER
         self._channels = Channels(Log(name or address))
         self._naming = NamesErrors(name)
 
@@ -57,6 +66,11 @@ class HandKind(ABC):
     @abstractmethod
     def state(self) -> State:
         """The state of the hand."""
+
+    @property
+    @abstractmethod
+    def inhibited(self) -> Inhibit | None:
+        """Why motion is refused, since when, and by whom; None while it is permitted."""
 
     @property
     @abstractmethod
@@ -111,6 +125,11 @@ class HandKind(ABC):
     @abstractmethod
     async def _wait_for_state(self, states: Collection[State], timeout: float | None) -> State: ...
 
+    @property
+    def _points(self) -> Points:
+        """Of the stroke that was measured on the gripper; none for nominal openings."""
+        return ()
+
     # -- what the calls above share ----------------------------------------------------------------------
 
     def _keeps_grip(self, keep_grip: bool | None) -> bool:
@@ -126,10 +145,24 @@ class HandKind(ABC):
             raise NotStartedError("the hand is not started", advice="use 'async with' or start()")
         self._session.check_running()
 
+    @property
+    def _is_started(self) -> bool:
+        """Whether a run has begun, and neither ended nor begun to end."""
+        return self._session is not None and not self._session.is_over
+
     def _check_may_start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Refuse another loop than that of a run, also one that was closed under it, and of readers."""
+        """Refuse a second start, another loop than that of a run that was closed under it, and of readers."""
         self._check_loop("hand.start()")
         self._channels.check_loop(loop)
+        if self._is_started:
+            allowed = {State.DISCONNECTED, State.SHUTDOWN}
+            raise InvalidStateError(
+                "this hand is started already", self.state, allowed, advice="stop() it first"
+            )
+
+    def _check_allowed(self, trigger: Trigger, *, presses: bool = True) -> None:
+        """Refuse a call that the state, or an inhibit of what moves or ``presses``, does not allow."""
+        check(trigger, self.state, self._newest_status, self.inhibited if presses else None)
 
     def _current_status(self) -> RobotiqStatus:
         with self._naming:
@@ -146,7 +179,12 @@ class HandKind(ABC):
 
     def _check_loop(self, what: str) -> None:
         if self._session is not None and not self._session.is_over:
-            self._session.check_loop(what)
+            self._check_called_in_loop(what)
+
+    def _check_called_in_loop(self, what: str = "the hand") -> None:
+        """Raise RuntimeError if called outside the event loop of the run, or after that was closed."""
+        assert self._session is not None, "it has one"
+        check_loop(self._session.loop, what)
 
     def _opened(self, channel: Channel[T], buffer: int | None, limit: float | None = None) -> Stream[T]:
         self._check_may_listen()

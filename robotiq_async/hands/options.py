@@ -366,6 +366,11 @@ class HandOptions:
             return self.reconnect
         return ReconnectPolicy() if self.reconnect else None
 
+    @staticmethod
+    def in_files() -> tuple[str, ...]:
+        """The names of the options that the file of an agent has."""
+        return tuple(offered(Place.FILE))
+
     def make_transport(self) -> Link:
         """A transport for one start of the hand."""
         return self.link.make(connect_timeout=self.connect_timeout, response_timeout=self.response_timeout)
@@ -386,9 +391,6 @@ OPTIONS: Final = _table()  # the table: every option by name, in the order of th
 def offered(place: Place) -> dict[str, Option]:
     """The options that a place offers."""
     return {name: option for name, option in OPTIONS.items() if place in option.places}
-
-
-FILE_OPTIONS: Final = tuple(offered(Place.FILE))  # the names of those that an agent's file has
 
 
 def units_of(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import NoReturn, Protocol
 
 from ..values.errors import RobotiqError
@@ -17,8 +18,9 @@ class PresentRun(Protocol):
     def check_running(self) -> None:
         """Raise NotStartedError, or the error that ended the link, if the run has ended."""
 
-    def check_loop(self, what: str) -> None:
-        """Raise RuntimeError if called outside the event loop of the run, or after that was closed."""
+    @property
+    def loop(self) -> asyncio.AbstractEventLoop:
+        """The event loop that it runs in."""
 
 
 class NamesErrors:

@@ -85,6 +85,9 @@ class Session:
     Making one claims the gripper and begins to connect. This needs a running event loop. The machine and the
     channels outlive it.
 
+    Attributes:
+        loop: in which it runs.
+
     Raises:
         InvalidStateError: another hand of this process owns the gripper.
     """
@@ -104,10 +107,10 @@ class Session:
         self.options = options
         self.machine = machine
         left = self._claim()
-        self._loop = asyncio.get_running_loop()
+        self.loop: asyncio.AbstractEventLoop = asyncio.get_running_loop()
         self._channels = channels
         self._waiters = StateWaiters()
-        self._progress = ActivationProgress(self._loop, options.log)
+        self._progress = ActivationProgress(self.loop, options.log)
         self.counters: Counters = Counters()
         self.unreached: UnreachedNews = UnreachedNews(options.log)
         self._publisher = Publisher(channels, machine)
@@ -129,11 +132,11 @@ class Session:
             raise
         parts = RunParts(link, self.controller, self.counters, self._publisher, options)
         self.run: Run = Run(parts, self._end)
-        channels.reopen(self._loop)
+        channels.reopen(self.loop)
         machine.begin(self._on_transition)
         machine.show(State.DISCONNECTED, Trigger.ASK_START)
         self._publisher.publish_changes()
-        self._task = self._loop.create_task(self.run.run(wait), name="robotiq_async poller")
+        self._task = self.loop.create_task(self.run.run(wait), name="robotiq_async poller")
         self._task.add_done_callback(self._end_with)
 
     # -- its end ---------------------------------------------------------------------------------------
@@ -189,7 +192,7 @@ class Session:
 
     def check_loop(self, what: str) -> None:
         """Raise RuntimeError for a call from another thread or event loop."""
-        check_loop(self._loop, what)
+        check_loop(self.loop, what)
 
     def check_running(self) -> None:
         """Raise NotStartedError, or ConnectionLostError if the link was given up, unless the hand runs."""
@@ -197,7 +200,7 @@ class Session:
             if isinstance(self.run.failure, RobotiqConnectionError):
                 raise self.link_lost()
             raise NotStartedError("the hand is not started", advice="use 'async with' or start()")
-        if self._loop.is_closed():
+        if self.loop.is_closed():
             raise NotStartedError("the event loop that the hand ran in was closed", advice="make a new hand")
 
     def check_takes_requests(self) -> None:
@@ -215,7 +218,7 @@ class Session:
         await self.run.connected
 
     def waiter(self) -> asyncio.Future[Any]:
-        return self._loop.create_future()
+        return self.loop.create_future()
 
     def ask(self, request: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         """Make a request of the controller; who must hear of it does so after it, or after its write."""

@@ -21,8 +21,8 @@ from tests.cli.conftest import PATIENCE, Beside, Call, Shell
 pytest.importorskip("zenoh")
 import zenoh
 
+from robotiq_async.cli.keys.issuing import issue, make_authority
 from robotiq_async.fleet.keys.access import Role
-from robotiq_async.fleet.keys.certificates import issue, make_authority
 from robotiq_async.fleet.network.configuration import session_configuration
 from tests.fleet.sessions import free_port
 from tests.grippers import until

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from robotiq_async import JAW
-from robotiq_async.fleet.agent.agent_file import make_hand, read_agent_file
+from robotiq_async.cli.agent_file import read_agent_file
+from robotiq_async.cli.connect import make_served
 from robotiq_async.ros2.gripper.connection import make_hand as make_hand_of_node
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_settings
 from robotiq_async.sync import RobotiqHand
@@ -53,6 +54,6 @@ def test_fleet_ros_and_the_blocking_hand(address: str, tmp_path: Path) -> None:
     (options,) = read_agent_file(file).grippers.values()
     usual = {name: parameter.default for name, parameter in PARAMETERS.items()}
     of_node = make_hand_of_node(check_settings({**usual, "address": address}))
-    assert make_hand(options).address == of_node.address == address
+    assert make_served(options).address == of_node.address == address
     with RobotiqHand(address) as hand:
         assert hand.move(60).positions[JAW] == pytest.approx(60, abs=2)

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from robotiq_async import Finger, Inhibit, MoveResult, ObjectStatus, RobotiqHand, State, Transition, Trigger
+from robotiq_async.cli.agent_file import AgentSettings, read_agent_file
 from robotiq_async.fleet import GripperName
-from robotiq_async.fleet.agent.agent_file import AgentSettings, read_agent_file
+from robotiq_async.fleet.agent.inhibits import Inhibits
 from robotiq_async.fleet.agent.publisher import AT_ONCE, KEPT, HandPublisher
 from robotiq_async.fleet.agent.records import Records
 from robotiq_async.fleet.agent.served_hand import ServedHand
@@ -135,7 +136,8 @@ async def test_an_event_is_published_as_documented() -> None:
     network = Network()
     heard: list[bytes] = []
     network.bus("client").subscribe(NAME.key("*"), lambda _, payload: heard.append(payload))
-    news = HandPublisher(NAME, RobotiqHand("sim://"), network.bus("agent"), EPOCH, Lease())
+    hand = RobotiqHand("sim://")
+    news = HandPublisher(NAME, hand, network.bus("agent"), EPOCH, Lease(), Inhibits(hand))
     news.add({"kind": "conflict", "key": NAME.key("alive", "77")})
     await until(lambda: bool(heard))
     (first,) = [json.loads(each) for each in heard]
@@ -148,7 +150,7 @@ async def test_an_event_is_published_as_documented() -> None:
 
 async def test_a_summary_and_an_info() -> None:
     hand, bus = RobotiqHand("sim://"), Network().bus("agent")
-    summary = HandPublisher(NAME, hand, bus, EPOCH, Lease()).summary()
+    summary = HandPublisher(NAME, hand, bus, EPOCH, Lease(), Inhibits(hand)).summary()
     served = ServedHand(NAME, hand, bus, Records(), epoch=EPOCH, window=1.0)
     info = served._info(call(1))
     for name in {*summary, *info}:

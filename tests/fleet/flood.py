@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from robotiq_async import Finger, RobotiqError, RobotiqHand
+from robotiq_async.cli.keys.issuing import issue, make_authority
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.agent.records import file_records
 from robotiq_async.fleet.keys.access import Role
-from robotiq_async.fleet.keys.certificates import issue, make_authority
 from robotiq_async.fleet.network.bus import Urgency
 from robotiq_async.fleet.network.configuration import agent_configuration, client_configuration
 from robotiq_async.fleet.network.zenoh_bus import open_bus

@@ -182,7 +182,7 @@ class Spoiling(Between):
             await asyncio.sleep(timeout)
             return None
         await asyncio.sleep(0.1 * self._sends)
-        return Answered(self._answer)
+        return BusReply(self._answer)
 
 
 class Garbling(Between):
@@ -201,11 +201,4 @@ class Garbling(Between):
         reply = await asking
         if reply is None:
             return None
-        return Answered(replace(unpack_answer(reply.payload), **self._others).pack())
-
-
-class Answered:
-    attachment = b""
-
-    def __init__(self, payload: bytes) -> None:
-        self.payload = payload
+        return BusReply(replace(unpack_answer(reply.payload), **self._others).pack())

@@ -211,30 +211,24 @@ class _Query:
             self.source.loop.call_soon(self.take, name, None)
 
 
-class _Received:
+class _Received(Query):
     def __init__(self, key: str, payload: bytes, reply: Callable[[BusReply | None], None]) -> None:
-        self.key, self.payload, self._reply = key, payload, reply
+        super().__init__(key, payload, reply)
         self._is_answered = False
 
     def reply(self, payload: bytes, attachment: bytes = b"") -> None:
         self._is_answered = True
-        self._reply(_Reply(payload, attachment))
+        super().reply(payload, attachment)
 
     def __del__(self) -> None:
         """A dropped query is reported to its client."""
         if not self._is_answered:
-            self._reply(None)
+            self._answer(None)  # type: ignore[arg-type]
 
 
 def _entered(entries: list[T], entry: T) -> Undo:
     entries.append(entry)
     return lambda: entries.remove(entry) if entry in entries else None
-
-
-@dataclass(frozen=True)
-class _Reply:
-    payload: bytes
-    attachment: bytes
 
 
 class MemoryBus:

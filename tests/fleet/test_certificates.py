@@ -14,8 +14,8 @@ import pytest
 from cryptography import x509
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
+from robotiq_async.cli.keys.issuing import access_lists, issue, make_authority
 from robotiq_async.fleet.keys.access import AccessList, Role
-from robotiq_async.fleet.keys.certificates import access_lists, issue, make_authority
 from robotiq_async.fleet.keys.key_folder import check_key_folder
 
 

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger, State
+from robotiq_async.cli.keys.issuing import issue, make_authority
 from robotiq_async.fleet.keys.access import Role
-from robotiq_async.fleet.keys.certificates import issue, make_authority
 from robotiq_async.fleet.network.bus import Query, Urgency
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import AgentAnswer

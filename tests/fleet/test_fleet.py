@@ -28,6 +28,7 @@ def summary(stamp: float, age: object = 0.0, **fields: Any) -> bytes:
         "age": age,
         "state": "RUNNING_IDLE",
         "fault": 0,
+        "model": "3f",
         "is_moving": False,
         "holder": None,
         "problem": "",

@@ -14,7 +14,7 @@ import pytest
 from robotiq_async import Finger, Inhibit, MotionInhibitedError, RobotiqError, RobotiqHand
 from robotiq_async.fleet.agent import records
 from robotiq_async.fleet.agent.agent import Agent
-from robotiq_async.fleet.agent.inhibits import inhibit_kept
+from robotiq_async.fleet.agent.inhibits import Inhibits
 from robotiq_async.fleet.agent.records import Records
 from robotiq_async.fleet.errors import AgentError, ControlLostError, NotAllStoppedError
 from robotiq_async.fleet.fleet import Fleet, halt
@@ -202,7 +202,10 @@ async def test_a_record_that_is_lost_in_part_counts_as_an_inhibit(tmp_path: Path
         file.write_bytes(left)
         found = one.read_inhibit(LEFT)
         assert found is not None
-        assert inhibit_kept(found).reason == "the record of an inhibit cannot be read"
+        hand = RobotiqHand("sim://")
+        Inhibits(hand).resume(found)
+        assert hand.inhibited is not None
+        assert hand.inhibited.reason == "the record of an inhibit cannot be read"
 
 
 async def test_a_full_disk_loses_no_inhibit(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from robotiq_async.hands.streams import Channels
 from robotiq_async.values.enums import Trigger
 from robotiq_async.values.errors import ProtocolError
 from robotiq_async.values.events import Transition
+from tests.virtual import virtual
 
 MARK = 5
 AHEAD = 1000.0
@@ -109,7 +110,8 @@ def test_before_the_gripper_was_read_there_is_no_status() -> None:
     assert here.sequences() == []
 
 
-def test_about_another_gripper() -> None:
+@virtual
+async def test_about_another_gripper() -> None:
     here = Bench()
     assert not here.mirror.is_about_another(MARK)
     for mark in (MARK + 1, 0, "5", None):

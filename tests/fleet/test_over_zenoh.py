@@ -13,11 +13,12 @@ from pathlib import Path
 import pytest
 
 from robotiq_async import Finger, RobotiqHand
-from robotiq_async.fleet.errors import NotAllowedError
+from robotiq_async.cli.keys.authority import Authority, Pair
+from robotiq_async.cli.keys.issuing import LOOPBACK_NAMES, issue, make_authority
+from robotiq_async.fleet.agent.agent import Agent
+from robotiq_async.fleet.errors import AgentError, NotAllowedError
 from robotiq_async.fleet.fleet import Fleet
 from robotiq_async.fleet.keys.access import CLIENTS, AccessList, Role, access_control, rights
-from robotiq_async.fleet.keys.authority import Authority, Pair
-from robotiq_async.fleet.keys.certificates import LOOPBACK_NAMES, issue, make_authority
 from robotiq_async.fleet.keys.key_folder import ACCESS
 from robotiq_async.fleet.network import zenoh_bus
 from robotiq_async.fleet.network.bus import Urgency
@@ -374,6 +375,21 @@ async def test_behind_a_router_an_agent_speaks_for_its_own_host_alone(keys: Path
         await own.wait()
         assert not heard.is_set()
         assert not seen.is_set()
+
+
+async def test_behind_a_router_an_agent_sees_another_one_of_its_host_and_of_no_other(keys: Path) -> None:
+    """The second one began to serve, beside the first."""
+    async with line(patience=3 * PATIENCE) as here:
+        hosts = ["cell", "other"]
+        await here.open(router_configuration("lab", hosts, [here.endpoint], keys / "agent-gate"))
+        await trusting(here, keys, "cell", "cell")
+        second, stranger = await trusting(here, keys, "cell"), await trusting(here, keys, "other")
+        token = LEFT.key("alive", "77")
+        while await second.announced("robotiq/v1/lab/cell/*/alive/*", timeout=0.5) != [token]:
+            pass
+        assert await stranger.announced("robotiq/v1/lab/cell/*/alive/*", timeout=0.5) == []
+        with pytest.raises(AgentError, match="another agent serves zenoh://lab/cell/left already"):
+            await Agent("lab", "cell", {"left": RobotiqHand("sim://")}, second).run()
 
 
 # -- without keys ------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from robotiq_async import Finger, MoveTimeoutError, State
-from robotiq_async.fleet.remote.own_settings import OwnSettings
+from robotiq_async.fleet.remote.lease_state import OwnSettings
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import unpack_call
 from robotiq_async.fleet.wire.settings import Setting, asked_of, read_settings, settings_fields, settings_of

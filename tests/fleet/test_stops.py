@@ -15,6 +15,7 @@ import pytest
 from robotiq_async import ConnectionLostError, Finger, NotStartedError, RobotiqError, State
 from robotiq_async.fleet.agent.jobs import Job, Jobs
 from robotiq_async.fleet.errors import ControlLostError
+from robotiq_async.fleet.network.bus import Query
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import AgentCall, unpack_answer
 from robotiq_async.runtime.logger import Log
@@ -259,15 +260,12 @@ async def test_a_release_that_is_lost_is_said_again(here: Lab, hand: RemoteHand)
     assert here.network.loop.time() - begun < 0.5
 
 
-class Asked:
+class Asked(Query):
     """A request that arrives at the agent."""
 
     def __init__(self, verb: str, call: AgentCall) -> None:
-        self.key, self.payload = LEFT.key(verb), call.pack()
         self.answers: list[bytes] = []
-
-    def reply(self, payload: bytes, attachment: bytes = b"") -> None:  # noqa: ARG002
-        self.answers.append(payload)
+        super().__init__(LEFT.key(verb), call.pack(), lambda reply: self.answers.append(reply.payload))
 
 
 def every_motion(hand: RemoteHand) -> Iterator[Asked]:
@@ -354,6 +352,6 @@ async def test_a_request_that_outlasts_the_agent_is_cancelled_and_answered() -> 
     asked = Asked("cmd/move", AgentCall(LEFT.base, "client", number=1))
     publisher = SimpleNamespace(status_message=lambda: b"")
     requests = Jobs(cast("Any", publisher), 1, Log("left"), lambda *_: None)
-    requests.start(Job("move", AgentCall(LEFT.base, "client", number=1), asked), asyncio.sleep(60))
+    requests.start(Job("move", AgentCall(LEFT.base, "client", number=1), asked), asyncio.sleep(60, {}))
     await requests.end()
     assert asked.answers

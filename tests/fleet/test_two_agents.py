@@ -13,11 +13,11 @@ from robotiq_async import ConnectionLostError, Finger, RobotiqHand, State
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.errors import AgentError, ControlLostError, NotAllStoppedError
 from robotiq_async.fleet.fleet import Fleet
-from robotiq_async.fleet.network.bus import PendingQuery, Urgency
+from robotiq_async.fleet.network.bus import BusReply, PendingQuery, Urgency
 from robotiq_async.fleet.remote.errand import Errand, of_its_run
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import AgentAnswer, AgentCall, failure
-from tests.fleet.lab import LEFT, Answered, Lab, lab, serving
+from tests.fleet.lab import LEFT, Lab, lab, serving
 from tests.fleet.world import ServingAgent, World, world
 from tests.virtual import inside, until
 
@@ -186,9 +186,9 @@ async def test_which_reply_decides(reply: bytes, counts: bool, refuses: bool) ->
     def decides(verb: str, urgency: Urgency) -> bool:
         errand = Errand(LEFT, CALL, verb, 1.0, urgency, 1, lambda _: None, lambda: None)
         errand.end()
-        return errand.decides(Answered(reply))
+        return errand.decides(BusReply(reply))
 
-    assert of_its_run(CALL)(Answered(reply)) is counts
+    assert of_its_run(CALL)(BusReply(reply)) is counts
     assert decides("cmd/move", Urgency.COMMAND) is counts
     assert decides("halt", Urgency.STOP) is refuses
 
@@ -202,7 +202,7 @@ async def test_without_one_that_decides_it_is_the_last(
 ) -> None:
     asking = PendingQuery(lambda _: decides)
     for reply in replies:
-        asking.take(Answered(reply))
+        asking.take(BusReply(reply))
         assert asking.answered.done() is decides
     asking.end()
     last = await asking.answered
@@ -246,7 +246,7 @@ async def test_another_agent_that_comes_and_goes_does_not_fill_log_and_events(
             here.agent._report_conflict(key, is_there=False)
         assert here.agent.hands["left"].publisher._count == events + 1
         for number in range(500):
-            client_agents = client._session.agents  # type: ignore[union-attr]
+            client_agents = client._session.keeper  # type: ignore[union-attr]
             client_agents._update_token(f"{key}{number}", is_there=True)
             client_agents._update_token(f"{key}{number}", is_there=False)
     assert len(caplog.records) <= 2

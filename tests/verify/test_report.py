@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from robotiq_async import THREE_FINGER, TWO_FINGER_85, Model, RobotiqHand
-from robotiq_async.fleet.agent.agent_file import read_agent_file
+from robotiq_async.cli.agent_file import read_agent_file
 from robotiq_async.link.address import Address, parse_address
 from robotiq_async.ros2.translation.settings import PARAMETERS, check_parameter
 from robotiq_async.simulator import SimulatorServer, Trouble

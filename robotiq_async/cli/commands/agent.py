@@ -17,8 +17,8 @@ from ..output.messages import forget, forwarded_warnings, tell
 
 if TYPE_CHECKING:
     from ...fleet.agent.agent import Agent
-    from ...fleet.agent.agent_file import AgentSettings
     from ...fleet.network.zenoh_bus import ZenohBus
+    from ..agent_file import AgentSettings
 
 WAITING_S = 2.0
 """Seconds until it reports that it waits for a router; else opening a session takes a tenth of that."""
@@ -67,7 +67,7 @@ async def agent(
 
 
 def _settings(file: Path) -> AgentSettings:
-    from ...fleet.agent.agent_file import AgentFileError, read_agent_file
+    from ..agent_file import AgentFileError, read_agent_file
 
     try:
         return read_agent_file(file)
@@ -77,9 +77,9 @@ def _settings(file: Path) -> AgentSettings:
 
 async def _serve(settings: AgentSettings) -> None:
     from ...fleet.agent.agent import Agent
-    from ...fleet.agent.agent_file import make_hand
     from ...fleet.agent.records import file_records
     from ...fleet.network.configuration import agent_configuration
+    from ..connect import make_served
 
     site, host = settings.site, settings.host
     configuration = agent_configuration(
@@ -95,7 +95,7 @@ async def _serve(settings: AgentSettings) -> None:
         tell("anyone who reaches this host can command its grippers: there are no keys")
     if settings.keys is not None and settings.connect and not settings.trusts_router:
         tell("clients that come through a router are refused: FLEET.toml has no trusts_router = true")
-    hands = {name: make_hand(options) for name, options in settings.grippers.items()}
+    hands = {name: make_served(options) for name, options in settings.grippers.items()}
     try:
         bus = await _open(configuration, ", ".join(settings.listen or settings.connect))
         try:

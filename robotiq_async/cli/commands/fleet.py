@@ -205,7 +205,7 @@ def keys(
     """
     need("cryptography", "fleet")
     from ...fleet.keys.access import Role
-    from ...fleet.keys.key_folder import DAYS
+    from ..keys.issuing import DAYS
 
     days = DAYS if days is None else days
     clients = {Role.READ: read, Role.HALT: halt, Role.OPERATE: operate}
@@ -237,8 +237,8 @@ def _agent(text: str) -> Subject:
 def _check(folder: Path, subjects: list[Subject], days: int) -> None:
     """Check everything before anything is written."""
     from ...fleet.keys.access import check_subject
-    from ...fleet.keys.authority import DAYS_MAX, check_host
-    from ...fleet.keys.certificates import subject_folder
+    from ..keys.authority import DAYS_MAX, check_host
+    from ..keys.issuing import subject_folder
 
     if not 1 <= days <= DAYS_MAX:
         raise UsageError(f"--days must be an integer in 1..{DAYS_MAX}, got {days}")
@@ -257,7 +257,7 @@ def _check(folder: Path, subjects: list[Subject], days: int) -> None:
 def _make(folder: Path, subjects: list[Subject], days: int) -> None:
     """Make the missing files, and print the destination of each folder."""
     from ...fleet.keys.access import Role
-    from ...fleet.keys.certificates import AUTHORITY_KEY, access_lists, has_authority, issue, make_authority
+    from ..keys.issuing import AUTHORITY_KEY, access_lists, has_authority, issue, make_authority
 
     if not has_authority(folder):
         print(f"{make_authority(folder)}: the authority. {AUTHORITY_KEY} beside it never leaves this folder.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import secrets
 import time
 from collections.abc import Callable, Mapping
@@ -95,12 +96,16 @@ class Agent:
             AgentError: another agent serves one of the grippers, or has the same site and host.
         """
         undo: list[Undo] = []
+        hands = self.hands.values()
         self._running, loop = asyncio.current_task(), asyncio.get_running_loop()
         try:
-            await self._refuse_if_served()
-            undo += [self._bus.announce(each.name.key("alive", str(self.epoch))) for each in self._all]
-            await self._refuse_if_another_began()
-            for each in self._all:
+            await self._refuse_beside_others()
+            undo += [self._bus.announce(each.name.key("alive", str(self.epoch))) for each in hands]
+            # Of several agents that start at the same moment the one with the lowest epoch remains. One that
+            # is there at the second look started before this one, and its token came late.
+            if await self._refuse_beside_others(before=self.epoch):
+                await self._refuse_beside_others()
+            for each in hands:
                 each.resume()
             undo.append(self._bus.watch(f"{self._prefix}/*/alive/*", self._report_conflict))
             questions = AgentQuestions(loop.time)
@@ -118,7 +123,7 @@ class Agent:
             ]
             ready()
             async with asyncio.TaskGroup() as group:
-                for each in self._all:
+                for each in hands:
                     group.create_task(each.run())
                 group.create_task(self._report())
         finally:
@@ -127,26 +132,14 @@ class Agent:
             if not loop.is_closed():
                 await self._records.kept()
 
-    @property
-    def _all(self) -> list[ServedHand]:
-        return list(self.hands.values())
-
-    async def _refuse_if_served(self) -> None:
+    async def _refuse_beside_others(self, *, before: float = math.inf) -> bool:
+        """Refuse to serve beside an agent with an epoch ``before`` one; returns whether there is another."""
         await asyncio.sleep(AGENT_LOOK_S)
-        for _, name in await self._others():
-            raise AgentError(f"{self._conflict_with(name)}: nothing was done")
-
-    async def _refuse_if_another_began(self) -> None:
-        # Of several agents that start at the same moment the one with the lowest epoch remains.
-        for is_last in (False, True):
-            await asyncio.sleep(AGENT_LOOK_S)
-            others = await self._others()
-            for epoch, name in others:
-                # Still there at the second look: it started before this one, and its token came late.
-                if is_last or epoch < self.epoch:
-                    raise AgentError(f"{self._conflict_with(name)}: nothing was done")
-            if not others:
-                return
+        others = await self._others()
+        for epoch, name in others:
+            if epoch < before:
+                raise AgentError(f"{self._conflict_with(name)}: nothing was done")
+        return bool(others)
 
     def _conflict_with(self, name: GripperName) -> str:
         if name.gripper in self.hands:
@@ -189,7 +182,7 @@ class Agent:
         self._look_at_clocks()
         if self._running is not None and self._running.cancelling():
             # Cancelled, but the tasks of the hands have not run since.
-            for each in self._all:
+            for each in self.hands.values():
                 each.refuse_requests()
         try:
             name = GripperName.of_key(query.key)
@@ -205,11 +198,11 @@ class Agent:
         interval = self._window / BEATS
         summary_due = now()
         while True:
-            for each in self._all:
+            for each in self.hands.values():
                 each.publisher.beat(interval)
             if now() >= summary_due:
                 summary_due += SUMMARY_S
-                for each in self._all:
+                for each in self.hands.values():
                     each.publisher.send_summary()
             self._look_at_clocks()
             await asyncio.sleep(interval)
@@ -219,7 +212,7 @@ class Agent:
         suspended = self._suspended()
         if suspended - self._suspended_s > self._window / BEATS:
             self._suspended_s = suspended
-            for each in self._all:
+            for each in self.hands.values():
                 each.wake()
 
 

@@ -7,8 +7,8 @@ import math
 from collections.abc import Callable, Coroutine
 from typing import Any, Final, TypeVar
 
-from ...runtime import Log, printable
-from ...values import Finger, MoveResult, RobotiqError, SentRequest
+from ...runtime import Log
+from ...values import Finger, RobotiqError, SentRequest
 from ..errors import AgentError, ControlLostError
 from ..network.bus import Query
 from ..wire.envelope import AgentAnswer, AgentCall, failure
@@ -20,9 +20,9 @@ JOBS_KEPT: Final = 512
 """Jobs that are kept for repetitions, also after the end of their lease: 2.5 s of a loop at 200 Hz."""
 JOBS_END_S: Final = 0.5
 """Seconds for jobs to end after the hand has been stopped, before they are cancelled."""
-LABEL_MAX: Final = 200  # characters of a label that are shown
 T = TypeVar("T")
-Work = Coroutine[Any, Any, MoveResult | None]
+Work = Coroutine[Any, Any, Fields]
+"""Carries out a request, and returns the value of its answer."""
 Key = tuple[str, int, int]  # client, lease, number
 
 
@@ -34,20 +34,18 @@ class Job:
         carries: its positions, speeds and forces.
         is_shown: whether the gripper has acknowledged an image with all of them.
         was_refused: whether the hand raised at once, before anything could be written.
-        says: makes what its answer has besides the result.
     """
 
-    def __init__(self, name: str, call: AgentCall, query: Query, says: Callable[[], Fields] = dict) -> None:
+    def __init__(self, name: str, call: AgentCall, query: Query) -> None:
         self.name = name
         self.call = call
         self.queries: list[Query] = [query]
         self.answer: bytes | None = None
-        self.task: asyncio.Task[MoveResult | None] | None = None
+        self.task: asyncio.Task[Fields] | None = None
         self.reason: str = ""
         self.carries: dict[Setting, int] = asked_of(name, call.arguments)
         self.is_shown: bool = False
         self.was_refused: bool = False
-        self.says: Callable[[], Fields] = says
 
     @property
     def key(self) -> Key:
@@ -59,7 +57,7 @@ class Job:
         task = self.task
         return task is not None and task.done() and not task.cancelled() and task.exception() is not None
 
-    def run(self, task: asyncio.Task[MoveResult | None]) -> None:
+    def run(self, task: asyncio.Task[Fields]) -> None:
         """Its task has begun."""
         self.task = task
         # Right after the first step of the task, before anything can be written.
@@ -170,7 +168,7 @@ class Jobs:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
-    def _finish(self, job: Job, task: asyncio.Task[MoveResult | None]) -> None:
+    def _finish(self, job: Job, task: asyncio.Task[Fields]) -> None:
         if self._open.get(job.key) is job:  # not a halt with the number of a move
             del self._open[job.key]
         call, error = job.call, None if task.cancelled() else task.exception()
@@ -185,10 +183,7 @@ class Jobs:
         if isinstance(error, Exception):
             answer = failure(call, self._epoch, error, begun)
         else:
-            result = task.result()
-            fields = {} if result is None else result.as_dict() | {"status": result.status.as_raw()}
-            value = {**fields, **job.says()}
-            answer = AgentAnswer(call.to, call.number, self._epoch, value, begun=begun)
+            answer = AgentAnswer(call.to, call.number, self._epoch, task.result(), begun=begun)
         if error is not None or is_done:
             self._ended(job, error is None)
         job.reply(answer.pack(), self._publisher.status_message())
@@ -200,8 +195,3 @@ class Jobs:
                 self._forgotten = max(self._forgotten, job.call.seen)
                 del self._kept[key]
                 return
-
-
-def label_of(call: AgentCall) -> str:
-    """The label a client gives itself, made printable."""
-    return printable(str(call.arguments.get("label", "unknown client"))[:LABEL_MAX])

@@ -20,6 +20,7 @@ from ..network.bus import Bus, Urgency
 from ..wire.names import GripperName
 from ..wire.status_message import StatusMessage
 from ..wire.values import Fields
+from .inhibits import Inhibits
 
 KEPT: Final = 2000
 """Events that are kept for clients that missed them: some seconds of a loop that commands at 200 Hz."""
@@ -31,17 +32,18 @@ class HandPublisher:
 
     Attributes:
         problem: why the gripper cannot be reached; empty if it can.
-        inhibit_number: of the newest halt that has inhibited motion, in this run of the agent.
     """
 
-    def __init__(self, name: GripperName, hand: RobotiqHand, bus: Bus, epoch: int, lease: Lease) -> None:
+    def __init__(
+        self, name: GripperName, hand: RobotiqHand, bus: Bus, epoch: int, lease: Lease, inhibits: Inhibits
+    ) -> None:
         self.problem: str = ""
-        self.inhibit_number: int = 0
         self._name = name
         self._mark = name.mark
         self._hand = hand
         self._epoch = epoch
         self._lease = lease
+        self._inhibits = inhibits
         self._send = bus.publisher(name.key("feed"), Urgency.TELEMETRY)
         self._send_summary = bus.publisher(name.key("summary"), Urgency.TELEMETRY)
         self._events: deque[Fields] = deque(maxlen=KEPT)
@@ -68,20 +70,6 @@ class HandPublisher:
         status = self.status_message().hex()
         self._sent_at = now()
         self._send(json.dumps({**self._head(), "events": [event], "status": status}).encode())
-
-    def count_inhibit(self) -> None:
-        """A halt inhibits motion, perhaps once more: a permit of an earlier one does not lift it."""
-        self.inhibit_number += 1
-
-    def add_inhibit(self) -> None:
-        """Tell whether motion is inhibited now."""
-        self.add({"kind": "inhibit", **self.inhibited()})
-
-    def inhibited(self) -> Fields:
-        """Whether motion is inhibited, the number that a permit of it names, and when that was so."""
-        inhibit = self._hand.inhibited
-        inhibited = None if inhibit is None else inhibit.as_dict()
-        return {"stamp": now(), "inhibited": inhibited, "inhibit_number": self.inhibit_number}
 
     def events_since(self, index: int) -> list[Fields]:
         """The next events after a number, as many as are kept and fit into an answer."""
@@ -117,7 +105,7 @@ class HandPublisher:
         return {
             **self._head(),
             "to": self._name.base,
-            **self.inhibited(),
+            **self._inhibits.told(),
             "stamp": stamp,
             "age": None if status is None else stamp - status.timestamp,
             "address": self._hand.address,

@@ -26,9 +26,10 @@ import logging
 from dataclasses import replace
 from typing import Final
 
+from ... import __version__
 from ...hands import RUNNING
 from ...local import RobotiqHand
-from ...runtime import Log, __version__, now
+from ...runtime import Log, now
 from ...values import Inhibit, MoveResult, RobotiqError
 from ..control.admission import Admission
 from ..control.lease import Lease
@@ -39,8 +40,8 @@ from ..wire.names import GripperName
 from ..wire.settings import COMMANDS, check_changes, moved_by, read_settings, settings_of
 from ..wire.values import Fields
 from .fingers import Fingers
-from .inhibits import inhibit_asked, inhibit_kept, signed
-from .jobs import Job, Jobs, Work, label_of
+from .inhibits import Inhibits
+from .jobs import Job, Jobs, Work
 from .kept_settings import KeptSettings
 from .publisher import HandPublisher
 from .records import Records
@@ -62,7 +63,8 @@ class ServedHand:
         self._lease = Lease(window, epoch, self._keep_record)
         self._settings = KeptSettings(hand, self._keep_record)
         self._admission = Admission(name.base, epoch, self._lease)
-        self.publisher: HandPublisher = HandPublisher(name, hand, bus, epoch, self._lease)
+        self._inhibits = Inhibits(hand)
+        self.publisher: HandPublisher = HandPublisher(name, hand, bus, epoch, self._lease, self._inhibits)
         self._jobs = Jobs(self.publisher, epoch, self._log, self._job_ended)
         self._fingers = Fingers(hand, self._log)
         self._expiry: asyncio.TimerHandle | None = None
@@ -78,14 +80,12 @@ class ServedHand:
             except (AttributeError, KeyError, TypeError, ValueError) as error:
                 self._log.warning("the record of the gripper cannot be read: %r", error)
         if (kept := self._records.read_inhibit(self.name)) is not None:
-            self._hand.resume_inhibit(inhibit_kept(kept))
+            self._inhibits.resume(kept)
         self._keep_record()
 
     def _keep_record(self) -> None:
-        inhibit = self._hand.inhibited
-        inhibited = None if inhibit is None else inhibit.as_dict()
-        record = {**self._lease.record, "settings": self._settings.record, "inhibited": inhibited}
-        self._records.keep(self.name, record)
+        own = {"settings": self._settings.record, "inhibited": self._inhibits.record}
+        self._records.keep(self.name, {**self._lease.record, **own})
 
     async def run(self) -> None:
         """Keep the hand running, with or without its gripper, until cancelled; then stop the fingers."""
@@ -198,11 +198,10 @@ class ServedHand:
 
     def _change_lease(self, call: AgentCall, query: Query) -> Fields | None:
         what = call.arguments.get("what")
-        if what == "renew":
+        if what in ("renew", "settings"):
             self._admission.renew(call, now())
-        elif what == "settings":
-            self._admission.renew(call, now())
-            self._settings.receive(read_settings(call.arguments.get("settings")))
+            if what == "settings":
+                self._settings.receive(read_settings(call.arguments.get("settings")))
         elif what in ("acquire", "take"):
             self._admission.check_fresh(call, now())
             self._grant(call, take=what == "take")
@@ -211,7 +210,7 @@ class ServedHand:
             return None
         elif what == "permit":
             self._admission.check_fresh(call, now())
-            self._begin_to_permit(call, query)
+            self._jobs.begin(Job("permit", call, query), self._permit(call))
             return None
         else:
             raise AgentError(f"unknown lease request {what!r}")
@@ -225,17 +224,16 @@ class ServedHand:
         if self._admission.is_repeated(call):
             return
         holder = self._lease.holder
-        label = label_of(call)
         if take:
             self._lease.intervene(call.client, "taken")
         if holder is not None and holder.client == call.client:
             # The holder itself acquires again: it lost track, so its earlier requests must not continue.
             self.end_lease("expired")
         elif take:
-            self.end_lease("taken", label)
-        number = self._admission.acquire(call, label)
-        self._log.info("%s commands the gripper", label)
-        self.publisher.add({"kind": "lease", "number": number, "holder": label, "reason": "granted"})
+            self.end_lease("taken", call.label)
+        number = self._admission.acquire(call, call.label)
+        self._log.info("%s commands the gripper", call.label)
+        self.publisher.add({"kind": "lease", "number": number, "holder": call.label, "reason": "granted"})
         self._watch_expiry()
         self._settings.grant(call.client)
         self._keep_record()
@@ -250,11 +248,12 @@ class ServedHand:
             self._fingers.forget()
         self.end_lease("released", leaves=leaves)
 
-        async def release() -> None:
+        async def release() -> Fields:
             # What does not come to rest is halted, unless a client has acquired the lease since.
-            if leaves or (keeps and (await self._fingers.come_to_rest() or self._lease.holder is not None)):
-                return
-            await self._hand.halt()
+            rests = keeps and (await self._fingers.come_to_rest() or self._lease.holder is not None)
+            if not (leaves or rests):
+                await self._hand.halt()
+            return {}
 
         self._jobs.begin(Job("release", call, query), release())
 
@@ -303,54 +302,41 @@ class ServedHand:
 
     def _halt(self, call: AgentCall, query: Query) -> None:
         # Accepted from any client, in any state, and never treated as a repetition.
-        inhibit = inhibit_asked(call)
-        if inhibit is not None:
-            self._hand.resume_inhibit(inhibit)  # in this turn: what is admitted from here on is refused
-            self.publisher.count_inhibit()
+        inhibit = self._inhibits.halted(call)
         self._lease.intervene(call.client, "halted")
         if self._admission.is_of_holder(call):
             self._admission.bar(call)
         else:
             # Otherwise a control loop of the holder would move the fingers again within 10 ms.
-            self.end_lease("halted", label_of(call))
-        job = Job("halt", call, query, dict if inhibit is None else self.publisher.inhibited)
+            self.end_lease("halted", call.label)
         if inhibit is not None:
             self._inhibit_changed()
-        self._jobs.start(job, self._stop_now(inhibit))
+        self._jobs.start(Job("halt", call, query), self._stop_now(inhibit))
 
     def _inhibit_changed(self) -> None:
         self._keep_record()
-        self.publisher.add_inhibit()
+        self.publisher.add({"kind": "inhibit", **self._inhibits.told()})
 
-    def _begin_to_permit(self, call: AgentCall, query: Query) -> None:
-        who, number = signed(call), call.arguments.get("inhibit_number")
+    async def _permit(self, call: AgentCall) -> Fields:
+        await self._inhibits.permit(call)
+        self._inhibit_changed()
+        await self._records.kept()
+        return self._inhibits.told()
 
-        async def permit() -> None:
-            if type(number) is not int or number != self.publisher.inhibit_number:
-                raise AgentError(
-                    "a halt has inhibited motion that this permit does not name: look at the gripper, then "
-                    "permit it again"
-                )
-            await self._hand.permit(who=who)  # in the turn of the check: no halt comes between
-            self._inhibit_changed()
-            await self._records.kept()
-
-        self._jobs.begin(Job("permit", call, query, self.publisher.inhibited), permit())
-
-    async def _stop_now(self, inhibit: Inhibit | None) -> None:
+    async def _stop_now(self, inhibit: Inhibit | None) -> Fields:
         # While the agent ends, the hand is being stopped anyway: wait for that stop and check its outcome.
-        if not self._is_ending:
+        if self._is_ending:
+            await self._hand.stop(keep_grip=False)
+            if self._hand.status.go_echo:
+                raise AgentError("the agent ended, and the fingers were not seen to stop")
+        else:
             try:
-                # Of several reasons the first one stays.
                 await (self._hand.halt() if inhibit is None else self._hand.inhibit(inhibit.reason))
             finally:
                 if inhibit is not None:
                     self._keep_record()
                 await self._records.kept()
-            return
-        await self._hand.stop(keep_grip=False)
-        if self._hand.status.go_echo:
-            raise AgentError("the agent ended, and the fingers were not seen to stop")
+        return {} if inhibit is None else self._inhibits.told()
 
     def _command(self, name: str, call: AgentCall, query: Query) -> None:
         if name == "cancel":
@@ -380,14 +366,14 @@ class ServedHand:
             raise TypeError("axes must be an object")
         return self._set(job, **arguments)
 
-    async def _carry_out(self, job: Job) -> MoveResult | None:
+    async def _carry_out(self, job: Job) -> Fields:
         self._settings.ask(job.carries)
         result: MoveResult | None = await getattr(self._hand, job.name)(**job.call.arguments)
         if settings_of(job.carries):
             await self._records.kept()
-        return result
+        return {} if result is None else result.as_dict() | {"status": result.status.as_raw()}
 
-    async def _set(self, job: Job, axes: Fields) -> None:
+    async def _set(self, job: Job, axes: Fields) -> Fields:
         """Like :meth:`RobotiqHand.command`, for several axes at once."""
         mask = self._hand.model.mask  # all are checked before the first takes effect
         asked = {mask(int(each)): check_changes(changes) for each, changes in axes.items()}
@@ -395,10 +381,11 @@ class ServedHand:
         for fingers, changes in asked.items():
             self._hand.command(fingers, **changes)
         self._fingers.are_commanded(moved_by(job.carries))
+        return {}
 
     def _cancel(self, call: AgentCall, query: Query) -> None:
         self._admission.renew(call, now())
-        number = call.arguments.get("number", -1)
+        number = call.arguments.get("number", 0)
         job, left = self._jobs.find(call, number), self._jobs.left_of(number)
         if left:  # the move has failed, and its client left before it could see that
             self._jobs.spawn(self._fingers.hold(left))
@@ -406,5 +393,5 @@ class ServedHand:
             job.cancel()
         else:
             # The cancellation may have overtaken the command: refuse it when it arrives.
-            self._admission.bar(AgentCall(call.to, call.client, number=int(call.arguments.get("number", 0))))
+            self._admission.bar(replace(call, number=int(number)))
         self._reply(query, AgentAnswer(call.to, call.number, self._epoch, {}))

@@ -21,7 +21,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
-from typing import Final, Self
+from typing import Final, NamedTuple, Self
 
 from ..wire.names import ROOT, check_name
 
@@ -47,22 +47,42 @@ class Role(Enum):
 
 
 CLIENTS: Final = (Role.READ, Role.HALT, Role.OPERATE)
-_IN: Final = ("ingress",)  # from the client to the agent
-_OUT: Final = ("egress",)  # from the agent to the client
-_RIGHTS: Final = {
-    Role.READ: (
-        "watch",
-        "published",
-        "presence",
-        "present",
-        "answer info",
-        "ask old info",
-        "answer old info",
-    ),
-    Role.HALT: ("ask halt", "answer halt"),
-    Role.OPERATE: ("ask lease", "answer lease", "ask cmd", "answer cmd"),
-}
-"""The rules that each role has in addition to those of the roles before it."""
+_IN: Final = "ingress"  # from the client to the agent
+_OUT: Final = "egress"  # from the agent to the client
+_SEE: Final = ("declare_liveliness_subscriber", "liveliness_query")
+_ASK: Final = ("query",)
+_ANSWER: Final = ("declare_queryable", "reply")
+"""The client's side sends a request only if it knows of the queryable."""
+
+
+class Right(NamedTuple):
+    """A rule that a role has, and so have the roles after it."""
+
+    name: str
+    role: Role
+    messages: tuple[str, ...]
+    flow: str
+    keys: tuple[str, ...]  # below that of each gripper
+    everywhere: tuple[str, ...] = ()  # of a whole fleet
+
+
+_RIGHTS: Final = (
+    Right("watch", Role.READ, ("declare_subscriber",), _IN, ("*",), (f"{ROOT}/*/*/*/summary",)),
+    Right("published", Role.READ, ("put",), _OUT, ("feed", "summary")),
+    # Peers receive tokens without a query; zenoh clients and routers query them.
+    Right("presence", Role.READ, _SEE, _IN, (), (f"{ROOT}/*/*/*/alive/*",)),
+    Right("present", Role.READ, ("liveliness_token",), _OUT, ("alive/*",)),
+    Right("answer info", Role.READ, _ANSWER, _OUT, ("info/*",)),
+    # Clients of version 1 ask there, and get to know that this is another one.
+    Right("ask old info", Role.READ, _ASK, _IN, ("info",)),
+    Right("answer old info", Role.READ, _ANSWER, _OUT, ("info",)),
+    Right("ask halt", Role.HALT, _ASK, _IN, ("halt",)),
+    Right("answer halt", Role.HALT, _ANSWER, _OUT, ("halt",)),
+    Right("ask lease", Role.OPERATE, _ASK, _IN, ("lease",)),
+    Right("answer lease", Role.OPERATE, _ANSWER, _OUT, ("lease",)),
+    Right("ask cmd", Role.OPERATE, _ASK, _IN, ("cmd/*",)),
+    Right("answer cmd", Role.OPERATE, _ANSWER, _OUT, ("cmd/*",)),
+)
 
 Rule = dict[str, object]
 
@@ -125,16 +145,15 @@ def access_control(
     the keys of its own host alone.
     """
     names = [role.common_name(each) for role in CLIENTS for each in clients.of(role)]
-    rules = _rules([_base(site, host) for host in hosts], names)
+    rules = [_rule(right, [_base(site, host) for host in hosts]) for right in _rights_of(names)]
     agents = {
-        Role.AGENT.common_name(host): [_other_side(rule, host) for rule in _rules([_base(site, host)], names)]
+        Role.AGENT.common_name(host): _rules_of_agent(host, _base(site, host), names)
         for host in (hosts if is_router else ())
     }
     return {
         "enabled": True,
         "default_permission": "deny",
         "rules": [*rules, *(rule for own in agents.values() for rule in own)],
-        # Each client asks under its own name alone: that is what its budget of questions is counted by.
         "subjects": [{"id": name, "cert_common_names": [name]} for name in (*names, *agents)],
         "policies": [
             # Roles without clients are left out: zenoh treats an empty list like a missing one.
@@ -158,61 +177,33 @@ def _base(site: str, host: str) -> str:
 
 def rights(role: Role) -> tuple[str, ...]:
     roles = CLIENTS[: CLIENTS.index(role) + 1]
-    return tuple(rule for each in roles for rule in _RIGHTS[each])
+    return tuple(right.name for right in _RIGHTS if right.role in roles)
 
 
-def _rules(own: Sequence[str], names: Sequence[str]) -> list[Rule]:
-    return [
-        *_reading(own),
-        *(_rule(f"ask info {name}", ("query",), _IN, _below(own, f"info/{name}")) for name in names),
-        *_asking("halt", own, "halt"),
-        *_asking("lease", own, "lease"),
-        *_asking("cmd", own, "cmd/*"),
+def _rights_of(names: Sequence[str]) -> list[Right]:
+    # Each client asks under its own name alone: that is what its budget of questions is counted by.
+    asking = [Right(f"ask info {name}", Role.READ, _ASK, _IN, (f"info/{name}",)) for name in names]
+    return [*_RIGHTS, *asking]
+
+
+def _rules_of_agent(host: str, own: str, names: Sequence[str]) -> list[Rule]:
+    """The rules of a router for the link of an agent: the other side of each right of the clients.
+
+    The agent also sees who else serves its grippers: of two agents of one host the second does not start.
+    """
+    rights = [right._replace(flow=_OUT if right.flow is _IN else _IN) for right in _rights_of(names)]
+    rights += [
+        Right("see others", Role.AGENT, _SEE, _IN, ("alive/*",)),
+        Right("others", Role.AGENT, ("liveliness_token",), _OUT, ("alive/*",)),
     ]
+    return [_rule(right._replace(name=f"agent {host}: {right.name}"), [own]) for right in rights]
 
 
-def _reading(own: Sequence[str]) -> list[Rule]:
-    return [
-        # The topics of one gripper, and the summaries of a whole fleet.
-        _rule("watch", ("declare_subscriber",), _IN, (*_below(own, "*"), f"{ROOT}/*/*/*/summary")),
-        _rule("published", ("put",), _OUT, _below(own, "feed", "summary")),
-        # Peers receive tokens without a query; zenoh clients and routers query them.
-        _rule(
-            "presence",
-            ("declare_liveliness_subscriber", "liveliness_query"),
-            _IN,
-            (f"{ROOT}/*/*/*/alive/*",),
-        ),
-        _rule("present", ("liveliness_token",), _OUT, _below(own, "alive/*")),
-        _asking("info", own, "info/*")[1],
-        # Clients of version 1 ask there, and get to know that this is another one.
-        *_asking("old info", own, "info"),
-    ]
-
-
-def _asking(name: str, own: Sequence[str], key: str) -> list[Rule]:
-    # A request and its answer. The client's side sends a request only if it knows of the queryable.
-    return [
-        _rule(f"ask {name}", ("query",), _IN, _below(own, key)),
-        _rule(f"answer {name}", ("declare_queryable", "reply"), _OUT, _below(own, key)),
-    ]
-
-
-def _below(own: Sequence[str], *keys: str) -> list[str]:
-    return [f"{base}/{key}" for base in own for key in keys]
-
-
-def _other_side(rule: Rule, host: str) -> Rule:
-    # What comes from the clients goes to the agent, and what comes from there goes to them.
-    flows = list(_OUT if rule["flows"] == list(_IN) else _IN)
-    return {**rule, "id": f"agent {host}: {rule['id']}", "flows": flows}
-
-
-def _rule(name: str, messages: Sequence[str], flows: Sequence[str], keys: Sequence[str]) -> Rule:
+def _rule(right: Right, own: Sequence[str]) -> Rule:
     return {
-        "id": name,
+        "id": right.name,
         "permission": "allow",
-        "messages": list(messages),
-        "flows": list(flows),
-        "key_exprs": list(keys),
+        "messages": [*right.messages],
+        "flows": [right.flow],
+        "key_exprs": [*(f"{base}/{key}" for base in own for key in right.keys), *right.everywhere],
     }

@@ -9,7 +9,6 @@ AUTHORITY: Final = "ca.pem"  # the authority's certificate, which both sides tru
 CERTIFICATE: Final = "cert.pem"
 KEY: Final = "key.pem"  # secret: proves that its owner is the one named in the certificate
 ACCESS: Final = "access.toml"  # the access list; only agents have it
-DAYS: Final = 825  # default validity of a certificate; some systems reject longer ones
 
 
 def check_key_folder(folder: Path) -> Path:

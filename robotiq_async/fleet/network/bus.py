@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
@@ -22,31 +23,31 @@ class Urgency(Enum):
     TELEMETRY = "telemetry"  # statuses, events, summaries: dropped when the link is full
 
 
-class Query(Protocol):
-    """A request that has arrived. Answer it once."""
+@dataclass(frozen=True, slots=True)
+class BusReply:
+    """An answer to a request, and what was sent with it."""
 
-    @property
-    def key(self) -> str:
-        """The key that it arrived under; may be a wrong one."""
+    payload: bytes
+    attachment: bytes = b""
 
-    @property
-    def payload(self) -> bytes:
-        """The request."""
+
+class Query:
+    """A request that has arrived.
+
+    Attributes:
+        key: that it arrived under; may be a wrong one.
+        payload: the request.
+    """
+
+    def __init__(self, key: str, payload: bytes, answer: Callable[[BusReply], object]) -> None:
+        """``answer`` sends a reply without waiting for the network."""
+        self.key = key
+        self.payload = payload
+        self._answer = answer
 
     def reply(self, payload: bytes, attachment: bytes = b"") -> None:
-        """Answer without waiting for the network. No effect once the client has stopped waiting."""
-
-
-class BusReply(Protocol):
-    """An answer to a request."""
-
-    @property
-    def payload(self) -> bytes:
-        """The answer."""
-
-    @property
-    def attachment(self) -> bytes:
-        """Data sent with the answer; may be empty."""
+        """Answer it, once. No effect when the client no longer waits."""
+        self._answer(BusReply(payload, attachment))
 
 
 def is_any(_reply: BusReply) -> bool:

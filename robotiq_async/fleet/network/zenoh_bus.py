@@ -27,7 +27,7 @@ except ModuleNotFoundError as error:
 
 from ...runtime import in_a_thread
 from ...values import ConnectFailedError
-from ..keys.certificates import common_name
+from ..keys.credentials import common_name
 from .bus import BusReply, MessageKind, PendingQuery, Query, Undo, Urgency, is_any, is_request
 from .mailbox import Mailbox, ReplySender
 
@@ -75,27 +75,14 @@ def _drop(query: zenoh.Query) -> None:
         query.drop()  # type: ignore[no-untyped-call]
 
 
-class _Query:
-    def __init__(self, query: zenoh.Query, key: str, payload: bytes, reply_sender: ReplySender) -> None:
-        self.key = key
-        self.payload = payload
-        self._query = query
-        self._reply_sender = reply_sender
-
-    def reply(self, payload: bytes, attachment: bytes = b"") -> None:
-        query, key = self._query, self.key
-
-        def send() -> None:
-            with contextlib.suppress(zenoh.ZError), query:  # the client is gone
-                query.reply(key, payload, attachment=attachment)
-
-        self._reply_sender.put(send, functools.partial(_drop, query))
+def _reply(query: zenoh.Query, reply: BusReply) -> None:
+    with contextlib.suppress(zenoh.ZError), query:  # the client is gone
+        query.reply(str(query.key_expr), reply.payload, attachment=reply.attachment)
 
 
-class _Reply:
-    def __init__(self, sample: zenoh.Sample) -> None:
-        self.payload = sample.payload.to_bytes()
-        self.attachment = b"" if sample.attachment is None else sample.attachment.to_bytes()
+def _read(sample: zenoh.Sample) -> BusReply:
+    attachment = b"" if sample.attachment is None else sample.attachment.to_bytes()
+    return BusReply(sample.payload.to_bytes(), attachment)
 
 
 class ZenohBus:
@@ -149,14 +136,18 @@ class ZenohBus:
         def deliver(query: zenoh.Query) -> None:
             payload = b"" if query.payload is None else query.payload.to_bytes()
             key = str(query.key_expr)
+            drop = functools.partial(_drop, query)
             kind = sort(key, payload) if len(payload) <= LONGEST_REQUEST else None
-            if kind is not None and self._mailbox.put(
-                lambda: handler(_Query(query, key, payload, self._repliers[kind])), kind
-            ):
-                return
+            if kind is not None:
+                sender = self._repliers[kind]
+                received = Query(
+                    key, payload, lambda reply: sender.put(functools.partial(_reply, query, reply), drop)
+                )
+                if self._mailbox.put(lambda: handler(received), kind):
+                    return
             # Dropping notifies the client, and blocks while that does not read, until its link is closed.
             # In this thread it would keep zenoh from receiving anything else.
-            self._dropping.put(drop := functools.partial(_drop, query), drop)
+            self._dropping.put(drop, drop)
 
         return self._undo(self._session.declare_queryable(expression, _direct(deliver)))
 
@@ -174,7 +165,7 @@ class ZenohBus:
         def arrive(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
                 sample = reply.ok
-                self._mailbox.put(lambda: asking.take(_Reply(sample)), MessageKind.ANSWER)
+                self._mailbox.put(lambda: asking.take(_read(sample)), MessageKind.ANSWER)
 
         def end() -> None:
             self._mailbox.put(asking.end, MessageKind.ANSWER)

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import getpass
 import os
 import secrets
-import socket
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from dataclasses import replace
@@ -22,9 +20,8 @@ from ..wire.names import GripperName
 from ..wire.settings import moved_by
 from ..wire.values import Fields
 from .errand import HALT_S, Errand, NoAnswerError
-from .lease_state import ClientLease
+from .lease_state import ClientLease, OwnSettings, own_label
 from .mirror import Mirror
-from .own_settings import OwnSettings
 
 OWN: Final = ("info", "lease", "halt", "cmd/cancel")
 """Requests whose arguments come from this library: a TypeError in the answer is not the user's."""
@@ -82,19 +79,16 @@ class Dialog:
         self._bus = bus
         self._receive = receive
         self._tasks: set[asyncio.Task[Any]] = set()
-        self._silence: asyncio.Future[None] = self.loop.create_future()
         self._received: asyncio.Future[None] = self.loop.create_future()
         """Done with the next message of the agent."""
-        self._closed: asyncio.Future[None] = self.loop.create_future()
         self._pending: set[Errand] = set()
         self._halts: set[asyncio.Task[Any]] = set()
         self._cancels: set[asyncio.Task[Any]] = set()  # of MOTIONS
         self._commands: dict[int, Errand] = {}  # commands without an answer, in their order
         self._resending: asyncio.TimerHandle | None = None
         self._waiting: dict[Finger, dict[str, int]] = {}  # commands of a loop that were not sent yet
-        self._oldest: AgentCall | None = (
-            None  # the lease, and the newest stamp, at the time of the oldest of these
-        )
+        self._oldest: AgentCall | None = None
+        """The lease, and the newest stamp, at the time of the oldest of these."""
         self._under_way = 0
 
     # -- requests --------------------------------------------------------------------------------------
@@ -181,9 +175,9 @@ class Dialog:
 
     def halt(self, agents: int = 1, arguments: Fields | None = None) -> asyncio.Task[Any]:
         """Halt the gripper, until so many agents have confirmed it; the request is sent within this call."""
-        call = self.call({"label": label(), **(arguments or {})})
+        call = self.call({"label": own_label(), **(arguments or {})})
         errand = self.post(call, "halt", timeout=HALT_S, urgency=Urgency.STOP, agents=agents)
-        return self._noted(self._halts, self.spawn(self.answer(errand)))
+        return self.spawn(self.answer(errand), self._halts)
 
     async def halted(self) -> None:
         """Wait until the present halts have ended, successfully or not."""
@@ -192,9 +186,7 @@ class Dialog:
     def cancel(self, name: str, call: AgentCall) -> None:
         """The call of a command was cancelled: hold what it set in motion."""
         if self.lease.is_held and not self.is_over:
-            cancelling = self.spawn(self._cancel(call))
-            if name in MOTIONS:
-                self._noted(self._cancels, cancelling)
+            self.spawn(self._cancel(call), *([self._cancels] if name in MOTIONS else []))
 
     async def _cancel(self, call: AgentCall) -> None:
         try:
@@ -203,11 +195,6 @@ class Dialog:
             if getattr(error, "reason", "late") == "late":
                 # Without renewals the lease ends, and the agent holds what moves.
                 self.lose_lease("expired", "a command could not be cancelled")
-
-    def _noted(self, those: set[asyncio.Task[Any]], task: asyncio.Task[Any]) -> asyncio.Task[Any]:
-        those.add(task)
-        task.add_done_callback(those.discard)
-        return task
 
     @property
     def needed_level(self) -> StopLevel:
@@ -285,9 +272,10 @@ class Dialog:
             self._received.set_result(None)
 
     def fall_silent(self) -> None:
-        # Ends the waits of all requests until now.
-        silence, self._silence = self._silence, self.loop.create_future()
-        silence.set_result(None)
+        """End the waits of all requests until now, except those that end motion."""
+        for errand in self._pending:
+            if not errand.is_allowed_after_stop:
+                errand.fail(NoAnswerError(self.name, errand.verb, "the agent fell silent"))
 
     def lose_lease(self, reason: str, why: str) -> None:
         """The lease has ended: no command under it will be answered."""
@@ -321,7 +309,7 @@ class Dialog:
         """End the requests and tasks that :meth:`end` has left."""
         for task in self._tasks:
             task.cancel()
-        self._closed.set_result(None)
+        self._received.cancel()
         pending = list(self._pending)
         for errand in pending:
             errand.end()
@@ -340,10 +328,11 @@ class Dialog:
         if self.loop.is_closed():
             raise NotStartedError("the event loop that the hand ran in was closed: make a new hand")
 
-    def spawn(self, work: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
+    def spawn(self, work: Coroutine[Any, Any, Any], *noted_in: set[asyncio.Task[Any]]) -> asyncio.Task[Any]:
         task = self.loop.create_task(work)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        for those in (self._tasks, *noted_in):
+            those.add(task)
+            task.add_done_callback(those.discard)
         return task
 
     # -- copies and replies ----------------------------------------------------------------------------
@@ -383,14 +372,13 @@ class Dialog:
         errand.end()
 
     async def _reply(self, errand: Errand) -> AgentAnswer:
-        ends = [self._closed] if errand.is_allowed_after_stop else [self._closed, self._silence]
-        answer = await errand.wait(*ends)
+        answer = await errand.wait()
         if answer is None and errand.was_empty and not errand.is_halt and await self._is_agent_present():
             # Just after a link has come up, zenoh may not know the agent yet. The second request is carried
             # out once at most: its number and its stamp are the same.
             errand.begin()
             self._resend(errand)
-            answer = await errand.wait(*ends)
+            answer = await errand.wait()
         if answer is not None:
             return answer
         # The access rules let nobody have a lease who may not command (keys/access.py).
@@ -405,14 +393,5 @@ class Dialog:
         if self._received.done():
             self._received = self.loop.create_future()
         sign = self._received
-        await asyncio.wait({sign, self._closed}, timeout=RECENT_S, return_when=asyncio.FIRST_COMPLETED)
-        return sign.done()
-
-
-def label() -> str:
-    """The name of this client for people: user, host, process."""
-    try:
-        user = getpass.getuser()
-    except (OSError, KeyError):
-        user = "unknown"
-    return f"{user}@{socket.gethostname()}:{os.getpid()}"
+        await asyncio.wait({sign}, timeout=RECENT_S)
+        return sign.done() and not sign.cancelled()

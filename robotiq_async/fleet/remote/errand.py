@@ -10,7 +10,7 @@ import asyncio
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 from ...runtime import Limit, now
 from ...values import ConnectionLostError, RobotiqError
@@ -161,14 +161,13 @@ class Errand:
         """The request as bytes; ``after`` is the number of the unanswered command before it, or 0."""
         return (replace(self.call, after=after) if after else self.call).pack()
 
-    async def wait(self, *ends: asyncio.Future[None]) -> AgentAnswer | None:
-        """Wait for the answer; None if there is none. NoAnswerError: one of the others is done before."""
+    async def wait(self) -> AgentAnswer | None:
+        """Wait for the answer; None if there is none. NoAnswerError: the wait was ended."""
         with self._limit as limit:
-            awaited: set[asyncio.Future[Any]] = {self.answered, *ends}
-            await asyncio.wait(awaited, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait({self.answered})
         if limit.is_over:
             self.fail(self._in_doubt)
-        if not self.answered.done() or self.answered.cancelled():
+        if self.answered.cancelled():
             raise NoAnswerError(self._name, self.verb, "the agent fell silent")
         said = self.answered.result()
         if isinstance(said, RobotiqError):

@@ -7,19 +7,23 @@ gripper in the meantime, which must not be overruled. The agent decides that, by
 from __future__ import annotations
 
 import asyncio
+import logging
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Final
 
 from ...runtime import Limit
 from ...values import RobotiqError, StopLevel
-from ..errors import ControlLostError
+from ..errors import AgentError, ControlLostError
+from ..limited_log import LimitedLog
+from ..network.bus import Bus, Undo
 from ..wire.values import Fields, reading
-from .agents import Agents
-from .dialog import Dialog, label
+from .dialog import Dialog
 from .errand import NoAnswerError
-from .lease_state import OVERRULING
+from .lease_state import OVERRULING, own_label
 
+LOOK_S: Final = 0.5  # seconds to look for the tokens of agents
+TWO_AGENTS: Final = "two agents serve it, perhaps different grippers under one name: stop one of them"
 RENEWALS: Final = 5  # renewals, and checks for silence, per window
 ANSWER_S: Final = 0.5  # seconds for an answer that the agent gives at once; callers with more time ask again
 RELEASE_S: Final = 2.0
@@ -27,12 +31,18 @@ RELEASE_S: Final = 2.0
 
 
 class LeaseKeeper:
-    """The requests about the lease of one run."""
+    """The requests about the lease of one run.
 
-    def __init__(self, dialog: Dialog, agents: Agents) -> None:
+    With two agents for one gripper, only a person can say which one is the mistake.
+    """
+
+    def __init__(self, dialog: Dialog, bus: Bus) -> None:
         self._dialog = dialog
         self._lease = dialog.lease
-        self._agents = agents
+        self._bus = bus
+        self._tokens: set[str] = set()  # of the agents that announce themselves for the gripper
+        self._two_agents = LimitedLog(dialog.log)
+        self.end_watch: Undo = bus.watch(dialog.name.key("alive", "*"), self._update_token)
         self._acquiring = asyncio.Lock()
         self._releases = 0
         self._reacquiring: asyncio.Task[Any] | None = None
@@ -130,8 +140,8 @@ class LeaseKeeper:
 
     async def _acquire(self, what: Fields) -> tuple[int, int]:
         # Returns the number of the lease, and the run of the agent that gave it.
-        await self._agents.check_one()
-        call = self._dialog.call({**what, "label": label()})
+        await self._check_one_agent()
+        call = self._dialog.call({**what, "label": own_label()})
         value = await self._dialog.send(call, "lease", timeout=ANSWER_S)
         with reading("a lease"):
             number, is_kept = int(value["lease"]), bool(value["settings"])
@@ -158,7 +168,21 @@ class LeaseKeeper:
 
     def _take_over(self, number: int, run: int) -> None:
         self._lease.grant(number, run)
-        if self._agents.are_several:  # the second has come since the request
+        if len(self._tokens) > 1:  # the second has come since the request
+            self._lease.doubt()
+
+    async def _check_one_agent(self) -> None:
+        name = self._dialog.name
+        if len(self._tokens) > 1:  # one may be gone, and its sign-off lost
+            self._tokens = set(await self._bus.announced(name.key("alive", "*"), timeout=LOOK_S))
+        if len(self._tokens) > 1:
+            raise AgentError(f"{name}: {TWO_AGENTS}; nothing was done")
+
+    def _update_token(self, token: str, is_there: bool) -> None:
+        before = len(self._tokens)
+        (self._tokens.add if is_there else self._tokens.discard)(token)
+        if before < 2 <= len(self._tokens):
+            self._two_agents.warn("%s", TWO_AGENTS, level=logging.ERROR)
             self._lease.doubt()
 
     async def _give_back(self, number: int, run: int) -> None:

@@ -1,10 +1,16 @@
-"""ClientLease: the client's view of the lease, which may be late, for the agent decides who holds it."""
+"""The client's view of the lease, and of its settings. It may be late: the agent is the keeper of both."""
 
 from __future__ import annotations
 
+import getpass
+import os
+import socket
+from collections.abc import Mapping
 from typing import Final
 
 from ..errors import ControlLostError
+from ..wire.settings import Setting, settings_fields, settings_of
+from ..wire.values import Fields
 
 OVERRULING: Final = ("taken", "halted", "held", "restarted")
 """Reasons after which people decide which client commands: only an explicit acquire() gets the lease."""
@@ -84,3 +90,32 @@ class ClientLease:
             if self.lost is None:
                 raise ControlLostError("this hand only reads: acquire() the lease first", "released")
             raise ControlLostError(str(self.lost), self.lost.reason)
+
+
+class OwnSettings:
+    """The speeds and forces that were carried out, for an agent that has lost its record of them.
+
+    The agent is their keeper. What may have been carried out is left out, and so is what it replaced.
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[Setting, tuple[int, int | None]] = {}
+        """By setting: the number of the newest request that was begun, and the value if that is certain."""
+
+    def note(self, number: int, asked: Mapping[Setting, int], begun: bool | None) -> None:
+        for setting, value in settings_of(asked).items():
+            if begun is not False and number > self._known.get(setting, (0, 0))[0]:
+                self._known[setting] = number, value if begun else None
+
+    @property
+    def fields(self) -> Fields:
+        return settings_fields({each: value for each, (_, value) in self._known.items() if value is not None})
+
+
+def own_label() -> str:
+    """The name of this client for people: user, host, process."""
+    try:
+        user = getpass.getuser()
+    except (OSError, KeyError):
+        user = "unknown"
+    return f"{user}@{socket.gethostname()}:{os.getpid()}"

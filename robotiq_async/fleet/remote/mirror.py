@@ -11,6 +11,7 @@ from ...hands import Channels
 from ...runtime import Log
 from ...values import Inhibit, RobotiqStatus, SentRequest, State, Transition, Trigger, check_points
 from ..control.lease import LEASE_WINDOW_S
+from ..limited_log import LimitedLog
 from ..wire.status_message import StatusMessage
 from ..wire.values import Fields, reading
 
@@ -93,6 +94,7 @@ class Mirror:
         self.is_silent: bool = True
         self.events: int = 0
         self.misrouted: int = 0
+        self._misrouted = LimitedLog(self.log)
         self.received_at: float = 0.0
         self.points: tuple[tuple[int, float], ...] = ()
         self.inhibited: Inhibit | None = None
@@ -133,6 +135,7 @@ class Mirror:
         if mark == self._mark:
             return False
         self.misrouted += 1
+        self._misrouted.warn("a message about another gripper was dropped")
         return True
 
     def is_of_another_run(

@@ -7,12 +7,11 @@ from collections.abc import Collection
 from typing import Any, Final, Literal
 
 from ...calibration import ForceCalibration, SpeedCalibration
-from ...hands import Hand, StateWaiters, Statistics, UnitsByModel, check
+from ...hands import Hand, StateWaiters, Statistics
 from ...runtime import Limit
 from ...values import (
     Finger,
     Inhibit,
-    InvalidStateError,
     MoveResult,
     NotStartedError,
     RobotiqConnectionError,
@@ -25,8 +24,8 @@ from ..errors import AgentError
 from ..network.bus import Bus
 from ..network.route import parse_remote_address
 from ..wire.values import Fields, reading
-from .dialog import label
 from .errand import no_answer_as_lost_connection
+from .lease_state import own_label
 from .session import CONNECT_S, RemoteSession
 
 REMOTE_COMMAND_S: Final = 5.0  # seconds for commands that end with the acknowledgment of the gripper
@@ -100,12 +99,11 @@ class RemoteHand(Hand):
         self._gripper, self._route = parse_remote_address(address)
         self._connect_timeout = check_seconds("connect_timeout", connect_timeout, 0.1, 60.0)
         self._control = control
-        units = UnitsByModel(calibration, force_calibration)
         super().__init__(
             str(self._gripper),
-            units=lambda model: units(model, self._points),
             keep_grip=keep_grip,
-            model=units.model,
+            calibration=calibration,
+            force_calibration=force_calibration,
         )
         if bus is None:
             self._route.configuration()  # a malformed or unprotected route fails here, not at the start
@@ -115,14 +113,12 @@ class RemoteHand(Hand):
 
     # -- lifetime --------------------------------------------------------------------------------------
 
+    @property
+    def _is_started(self) -> bool:
+        return self._opening is not None or (self._session is not None and not self._session.dialog.has_ended)
+
     async def _start(self, activate: bool, wait: float) -> None:
         before = self._session
-        if self._opening is not None or (before is not None and not before.dialog.has_ended):
-            raise InvalidStateError(
-                "this hand is started already: stop() it first",
-                self.state,
-                {State.DISCONNECTED, State.SHUTDOWN},
-            )
         bus = await self._open_bus()
         self._session = session = RemoteSession(
             self._gripper,
@@ -146,7 +142,7 @@ class RemoteHand(Hand):
         self._opening = None
         session = self._session
         if session is not None and not session.dialog.has_ended:
-            session.check_loop()
+            self._check_called_in_loop()
             session.dialog.clear("stopped")
             await session.close(self._stop_level(halt, keep_grip))
 
@@ -217,8 +213,7 @@ class RemoteHand(Hand):
     def _command(self, axes: Finger, position: int | None, speed: int | None, force: int | None) -> None:
         session = self._running_session()
         session.check_control()
-        presses = position is not None or force is not None
-        check(Trigger.ASK_COMMAND, self.state, session.mirror.status, self.inhibited if presses else None)
+        self._check_allowed(Trigger.ASK_COMMAND, presses=position is not None or force is not None)
         changes = {"position": position, "speed": speed, "force": force}
         session.dialog.put(axes, {name: value for name, value in changes.items() if value is not None})
 
@@ -241,7 +236,7 @@ class RemoteHand(Hand):
     async def _permit(self, who: str) -> None:
         session = self._running_session()
         seen = session.mirror.inhibit_number  # a later halt, which this permit may overtake, stays
-        arguments = {"what": "permit", "label": label(), "who": who, "inhibit_number": seen}
+        arguments = {"what": "permit", "label": own_label(), "who": who, "inhibit_number": seen}
         with no_answer_as_lost_connection():
             self._take_over_inhibit(await session.dialog.ask("lease", arguments, timeout=REMOTE_COMMAND_S))
 
@@ -346,5 +341,5 @@ class RemoteHand(Hand):
         # Refuses before start(), after stop(), and from another loop.
         self._check_running()
         assert self._session is not None, "it runs"
-        self._session.check_loop()
+        self._check_called_in_loop()
         return self._session

@@ -28,7 +28,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from ...hands import Channels, StateWaiters, Statistics
-from ...runtime import Limit, Log, check_loop, now, wait_shielded
+from ...runtime import Limit, Log, now, wait_shielded
 from ...values import (
     ConnectFailedError,
     ConnectionLostError,
@@ -44,7 +44,6 @@ from ..network.bus import Bus, Undo
 from ..wire.names import GripperName
 from ..wire.status_message import unpack
 from ..wire.values import reading
-from .agents import Agents
 from .dialog import Dialog
 from .errand import NoAnswerError
 from .lease_keeper import ANSWER_S, RENEWALS, LeaseKeeper
@@ -80,8 +79,7 @@ class RemoteSession:
         mirror = None if before is None else before.mirror
         self.mirror: Mirror = Mirror(name.mark, channels, self.waiters.reached, mirror, Log(str(name)))
         self.dialog: Dialog = Dialog(name, bus, self.mirror, before, receive=self._receive_answer)
-        self.agents: Agents = Agents(name, bus, self.dialog.lease.doubt)
-        self.keeper: LeaseKeeper = LeaseKeeper(self.dialog, self.agents)
+        self.keeper: LeaseKeeper = LeaseKeeper(self.dialog, bus)
         self.statistics: Statistics = Statistics.none()
         self._bus = bus
         self._channels = channels
@@ -93,7 +91,7 @@ class RemoteSession:
         self._querying: asyncio.Task[Any] | None = None
         channels.reopen(self.dialog.loop)
         self.mirror.begin(now())
-        self._unreadable, self._misrouted = LimitedLog(self.mirror.log), LimitedLog(self.mirror.log)
+        self._unreadable = LimitedLog(self.mirror.log)
         # One wildcard, not a subscription for each key: with those, zenoh has delivered samples under wrong
         # keys (docs/decisions/fleet.md). So every payload identifies its gripper, too.
         self._undo: Undo = bus.subscribe(name.key("*"), self._receive)
@@ -135,9 +133,7 @@ class RemoteSession:
             return False
         with reading("its figures"):
             self.dialog.set_window(info["window"])
-            self.statistics = Statistics.from_dict(info["statistics"])
-            self.mirror.receive_points(info)
-            self.mirror.receive_inhibit(info)
+            self._receive_summary(info)
         return True
 
     async def _give_up(self) -> None:
@@ -178,7 +174,7 @@ class RemoteSession:
             )
         finally:
             self._undo()
-            self.agents.end()
+            self.keeper.end_watch()
             await self.dialog.close()
             if self._owns_bus:
                 await self._bus.close()
@@ -198,8 +194,10 @@ class RemoteSession:
     def check_running(self) -> None:
         self.dialog.check_running()
 
-    def check_loop(self, what: str = "the hand") -> None:
-        check_loop(self.dialog.loop, what)
+    @property
+    def loop(self) -> asyncio.AbstractEventLoop:
+        """The event loop that it runs in."""
+        return self.dialog.loop
 
     # -- messages -------------------------------------------------------------------------------------
 
@@ -234,19 +232,13 @@ class RemoteSession:
         finally:
             self._is_fetching = False
 
-    def _is_about_another(self, mark: object) -> bool:
-        if not self.mirror.is_about_another(mark):
-            return False
-        self._misrouted.warn("a message about another gripper was dropped")
-        return True
-
     def _receive_answer(self, payload: bytes, asked: float) -> None:
         self._receive_status(payload, in_turn=False, asked=asked)
 
     def _receive_status(self, payload: bytes, *, in_turn: bool, asked: float | None = None) -> bool:
         # Returns whether it is about this gripper.
         message, arrival = unpack(payload), now()
-        if self._is_about_another(message.mark):
+        if self.mirror.is_about_another(message.mark):
             return False
         if self.mirror.is_of_another_run(message, arrival, self.dialog.window):
             return False
@@ -265,15 +257,17 @@ class RemoteSession:
         return True
 
     def _receive_fields(self, fields: Mapping[str, Any]) -> None:
-        if self._is_about_another(fields["mark"]):
+        if self.mirror.is_about_another(fields["mark"]):
             return
         if "statistics" in fields:
-            self.statistics = Statistics.from_dict(fields["statistics"])
-            self.mirror.receive_points(fields)
-            self.mirror.receive_inhibit(fields)
-            return
-        if self._receive_status(bytes.fromhex(fields["status"]), in_turn=True):
+            self._receive_summary(fields)
+        elif self._receive_status(bytes.fromhex(fields["status"]), in_turn=True):
             self.mirror.receive_events(fields["events"])
+
+    def _receive_summary(self, fields: Mapping[str, Any]) -> None:
+        self.statistics = Statistics.from_dict(fields["statistics"])
+        self.mirror.receive_points(fields)
+        self.mirror.receive_inhibit(fields)
 
     async def _supervise(self) -> None:
         interval = self.dialog.window / RENEWALS

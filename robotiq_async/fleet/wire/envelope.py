@@ -10,7 +10,7 @@ from typing import Any, Final
 from ...values import ProtocolError
 from ..errors import AgentError, ControlLostError
 from .names import VERSION, other_version
-from .values import Fields, ReadStatus, error_fields, read_error
+from .values import Fields, ReadStatus, error_fields, label_of, read_error
 
 _LONGEST: Final = 64 * 1024
 _INTEGERS: Final = ("epoch", "lease", "number", "after")
@@ -44,6 +44,11 @@ class AgentCall:
 
     def pack(self) -> bytes:
         return _pack(self)
+
+    @property
+    def label(self) -> str:
+        """The client for people, as it calls itself."""
+        return label_of(self.arguments.get("label", "unknown client"))
 
 
 def unpack_call(data: bytes) -> AgentCall:

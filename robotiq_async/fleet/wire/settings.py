@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from ...values import Finger, SentRequest, check_byte, check_mask
+from ...values import Finger, SentRequest, check_byte
 from .values import Fields
 
 COMMANDS: Final[Mapping[str, frozenset[str]]] = {
@@ -77,7 +77,9 @@ def is_in(asked: Mapping[Setting, int], sent: SentRequest) -> bool:
 
 def _by_axis(changed: Mapping[str, Any], which: tuple[str, ...]) -> Iterator[tuple[Setting, int]]:
     for mask, changes in changed.items():
-        fingers = check_mask(int(mask))
+        if not 0 < int(mask) <= Finger.ALL:
+            raise ValueError(f"a mask must be 1..15, got {mask!r:.100}")
+        fingers = Finger(int(mask))
         for what in which:
             if changes.get(what) is not None:
                 value = check_byte(what, changes[what])

@@ -7,9 +7,10 @@ from contextlib import contextmanager
 from typing import Any, Final
 
 from ...runtime import printable
-from ...values import Fault, ProtocolError, RobotiqError, RobotiqStatus, State, errors
-from ..errors import AgentError, ControlLostError, NotAllowedError
+from ...values import Fault, ProtocolError, RobotiqError, RobotiqStatus, State
+from ..errors import AgentError, NotAllStoppedError
 
+LABEL_MAX: Final = 200  # characters of a label that are shown
 Fields = dict[str, Any]
 ReadStatus = Callable[[Mapping[str, Any]], RobotiqStatus]
 """Reads a status that an answer has."""
@@ -31,12 +32,25 @@ def words(text: object) -> str:
     return printable(text)
 
 
+def label_of(text: object) -> str:
+    """The name that a client gives itself, or its words, cut to the length that is shown."""
+    return printable(str(text))[:LABEL_MAX]
+
+
 # -- errors ------------------------------------------------------------------------------------------------
 
+
+def _kinds(kind: type[RobotiqError]) -> Iterator[type[RobotiqError]]:
+    if kind.__module__ in (RobotiqError.__module__, AgentError.__module__) and kind is not NotAllStoppedError:
+        yield kind
+    for each in kind.__subclasses__():
+        yield from _kinds(each)
+
+
 _KINDS: Final[Mapping[str, type[Exception]]] = {
-    kind.__name__: kind
-    for kind in (*vars(errors).values(), AgentError, ControlLostError, NotAllowedError, TypeError, ValueError)
-    if isinstance(kind, type) and issubclass(kind, RobotiqError | TypeError | ValueError)
+    **{each.__name__: each for each in _kinds(RobotiqError)},
+    "TypeError": TypeError,
+    "ValueError": ValueError,
 }
 _ATTRIBUTES: Final = {
     "InvalidStateError": ("state", "allowed"),

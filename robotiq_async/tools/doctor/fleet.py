@@ -118,7 +118,7 @@ _NEW: Final = "The owner of the authority can make a new one: robotiq-async flee
 def examine_keys(folder: Path, report: ReportFinding, *, now: datetime) -> None:
     """Examine a client's folder of keys."""
     # Needs the extra fleet. The folder of keys may come from another machine.
-    from ...fleet.keys.certificates import read_credentials  # noqa: PLC0415
+    from ...fleet.keys.credentials import read_credentials  # noqa: PLC0415
 
     try:
         found = read_credentials(check_key_folder(folder))

@@ -13,15 +13,14 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any, Final
 
-from ...hands import FILE_OPTIONS, HandOptions
-from ...local import RobotiqHand
-from ...values import check_seconds
-from ..control.lease import LEASE_WINDOW_S, WINDOW_MAX_S, WINDOW_MIN_S
-from ..keys.access import AccessList
-from ..keys.key_folder import ACCESS, check_key_folder
-from ..network.configuration import LOOPBACK_ENDPOINT, LOOPBACK_TLS, check_trust
-from ..network.endpoints import check_endpoints
-from ..wire.names import check_name
+from ..fleet.control.lease import LEASE_WINDOW_S, WINDOW_MAX_S, WINDOW_MIN_S
+from ..fleet.keys.access import AccessList
+from ..fleet.keys.key_folder import ACCESS, check_key_folder
+from ..fleet.network.configuration import LOOPBACK_ENDPOINT, LOOPBACK_TLS, check_trust
+from ..fleet.network.endpoints import check_endpoints
+from ..fleet.wire.names import check_name
+from ..hands import HandOptions
+from ..values import check_seconds
 
 _GRIPPERS: Final = "grippers"
 Names = tuple[str, ...]
@@ -48,10 +47,6 @@ class AgentSettings:
 
 
 _OF_AGENT: Final = tuple(each.name for each in fields(AgentSettings))
-
-
-def make_hand(options: HandOptions) -> RobotiqHand:
-    return RobotiqHand(name=options.name, **{name: getattr(options, name) for name in FILE_OPTIONS})
 
 
 def machine_name() -> str:
@@ -146,7 +141,7 @@ class _Reader:
             check_name("the name of a gripper", name)
             if not isinstance(table, dict):
                 raise TypeError(f"{name} must be a table with an address: [grippers.{name}], got {table!r}")
-        self._check_keys_of(table, path, FILE_OPTIONS, needed=("address",))
+        self._check_keys_of(table, path, HandOptions.in_files(), needed=("address",))
         if isinstance(table.get("stroke"), str):
             table = {**table, "stroke": self._path.parent / table["stroke"]}
         address, model = table["address"], table.get("model")

@@ -8,13 +8,13 @@ import pytest
 
 from robotiq_async import TWO_FINGER_85
 from robotiq_async.calibration.csv_tables import write_stroke
-from robotiq_async.fleet.agent.agent_file import (
+from robotiq_async.cli.agent_file import (
     AgentFileError,
     AgentSettings,
     machine_name,
-    make_hand,
     read_agent_file,
 )
+from robotiq_async.cli.connect import make_served
 from robotiq_async.fleet.network.configuration import LOOPBACK_ENDPOINT, LOOPBACK_TLS, agent_configuration
 from robotiq_async.fleet.wire.names import check_name
 
@@ -72,7 +72,7 @@ def test_everything(tmp_path: Path) -> None:
     assert settings.grippers["left"].speed == 255
     assert settings.grippers["right"].status_address == 2000
     assert [each.keep_grip for each in settings.grippers.values()] == [False, True]
-    hand = make_hand(settings.grippers["left"])
+    hand = make_served(settings.grippers["left"])
     assert (hand.name, hand.address) == ("left", "tcp://192.168.1.11:502")
 
 
