@@ -32,7 +32,7 @@ from .exchange import Exchange, Timing
 from .frames import read_request, registers_in, write_and_read_request, write_request
 from .in_force import image_in_force, shows
 from .line import Dialogue, Line, Step
-from .outcome import Answer, Noise, Outcome, Refused, Silent, check
+from .outcome import PASSING, UNKNOWN_FUNCTION, Answer, Noise, Outcome, Refused, Silent, check
 from .serial.patience import USUAL_RESPONSE_S
 
 REPEAT_S: Final = 0.15
@@ -165,13 +165,13 @@ class Dialogues:
         if isinstance(came_to, bytes):
             status = self._status_in(came_to) if uses_23 else (yield from self.read())
             return transport.WriteAnswer(status, None)
-        if uses_23 and isinstance(came_to, Refused) and came_to.is_unknown_function:
+        if uses_23 and isinstance(came_to, Refused) and came_to.code == UNKNOWN_FUNCTION:
             if not (yield from self.write(decide)):
                 return None
             yield Step.TURN
             return transport.WriteAnswer((yield from self.read()), None)
-        again = self._second if isinstance(came_to, Refused) else self._again
-        return transport.WriteAnswer(self._status_in((yield from again(came_to))), came_to.error)
+        status = self._status_in((yield from self._again(came_to, was_write=True)))
+        return transport.WriteAnswer(status, came_to.error)
 
     def stop_or_read(self, decide: Decide) -> Dialogue[Registers | None]:
         """Write what ``decide`` returns when the turn has come; read the status if that is nothing.
@@ -214,21 +214,18 @@ class Dialogues:
             self._keep_long_silence(came_to.error)
         return came_to
 
-    def _again(self, first: Outcome) -> Dialogue[bytes]:
-        """Read once more, if that can help."""
-        if not self._can_repeat(first):
-            raise first.error
-        return (yield from self._second(first))
-
-    def _second(self, first: Outcome) -> Dialogue[bytes]:
+    def _again(self, first: Outcome, *, was_write: bool = False) -> Dialogue[bytes]:
         """Read once more on a line that lost or damaged a byte, as USB adapters occasionally do.
 
         Where others use the line a question is short. A gripper is asked there until its time is over: the
-        answer may come when it is no longer waited for, and meet the next question as noise.
+        answer may come when it is no longer waited for, and meet the next question as noise. A write that was
+        refused does not prevent a read.
 
         Raises:
             RobotiqConnectionError: that of the first request, if there is again no clean answer.
         """
+        if not (self._can_repeat(first) or (was_write and isinstance(first, Refused))):
+            raise first.error
         until = self.line.now() + self._usual.seconds
         while True:
             yield Step.TURN
@@ -304,7 +301,7 @@ class Dialogues:
     def _can_repeat(self, outcome: Outcome) -> bool:
         """Whether a read can be asked again after this."""
         if isinstance(outcome, Refused):
-            return outcome.is_passing
+            return outcome.code in PASSING
         return self.line.forgives and isinstance(outcome, Noise | Silent)
 
     def _repeated(self, *, is_long: bool = False) -> Timing:

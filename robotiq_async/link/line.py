@@ -359,13 +359,10 @@ class Line:
         if self._in_flight is not None:
             if (answer := self._in_flight[0].feed(data)) is not None:
                 self._end(answer)
-        elif self._expects_nothing and (news := self._stray(data)) is not None:
+        elif self.state is HUSHING or (self.state is DISTURBED and self.forgives):
+            pass  # the rest of something earlier
+        elif (news := self._stray(data)) is not None:
             self._note(news)
-
-    @property
-    def _expects_nothing(self) -> bool:
-        """Whether bytes without a request mean something new."""
-        return self.state in (OPENING, IN_STEP) or (self.state is DISTURBED and not self.forgives)
 
     def _note(self, outcome: Outcome) -> None:
         """Take news that are no bytes, or that no exchange waits for, or the end of the wire."""

@@ -62,7 +62,6 @@ class ModbusTransport:
         are in seconds; on a serial line a read may be repeated after ``response_timeout``. With
         ``shares_line``, others of the event loop may use the serial line, too, for grippers with other ids.
         """
-        self._address: Final = address
         self._connect_timeout: Final = connect_timeout
         self._shares_line: Final = shares_line
         if tunnel is None and address.scheme:
@@ -120,7 +119,7 @@ class ModbusTransport:
         """
         self._dialogues.line.leave(self)
         if self._shares_line:
-            self._dialogues.move_to(Line.shared(self._address, self, self._log))
+            self._dialogues.move_to(Line.shared(self._dialogues.line.address, self, self._log))
         await self._dialogues.line.open(self, self._connect_timeout)
         await self._dialogues.line.talk(self, self._dialogues.opening())
 

@@ -18,9 +18,10 @@ from typing import Final
 
 from ..values.errors import RobotiqConnectionError
 
-_PASSING: Final = (5, 6, 11)
+PASSING: Final = (5, 6, 11)
 """The exceptions of a device that may answer the next time: it works, is busy, or was not reached in time."""
-_ILLEGAL_FUNCTION: Final = 1
+UNKNOWN_FUNCTION: Final = 1
+"""The exception of a device that does not serve the function: nothing was carried out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,16 +36,6 @@ class Refused(Outcome):
     """A whole reply that refuses the request, with its exception code."""
 
     code: int
-
-    @property
-    def is_passing(self) -> bool:
-        """Whether the same request may be answered the next time."""
-        return self.code in _PASSING
-
-    @property
-    def is_unknown_function(self) -> bool:
-        """Whether the device does not serve the function: nothing was carried out."""
-        return self.code == _ILLEGAL_FUNCTION
 
 
 class Noise(Outcome):

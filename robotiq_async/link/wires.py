@@ -19,9 +19,9 @@ import contextlib
 import os
 import socket
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any, Final, Protocol
 
-from pymodbus import FramerType
 from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
 
 from ..runtime.extras import install
@@ -38,14 +38,12 @@ AsyncioTransport = Any
 Send = Callable[[bytes], None]
 OnData = Callable[[bytes], None]
 OnEnd = Callable[[Outcome], None]
-OnConnection = Callable[[bool], None]
 
 LARGEST_READ: Final = 4096  # bytes read at a time; the longest Modbus frame has 260
 KEEPALIVE: Final = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 5}
 """TCP keepalive: seconds of silence before the first probe, seconds between probes, probes without an answer.
 A polling hand is never that silent. But while its program is suspended (a debugger, a sleeping machine),
 nothing else shows either end that the other is gone."""
-CLIENT_OPTIONS: Final[dict[str, Any]] = {"retries": 0, "reconnect_delay": 0}
 
 ErrorTable = Mapping[type[Exception], Callable[[Any], str]]
 """The reason to show for each kind of error that a call may raise; the first kind that fits counts."""
@@ -123,31 +121,30 @@ class _ClientWire:
     def _lost(self) -> Lost:
         return Lost(ConnectionLostError(f"{self._address}{self._ending}"))
 
-    async def _connect(
-        self, make: Callable[[OnConnection], ModbusClient], on_data: OnData, on_end: OnEnd
-    ) -> AsyncioTransport:
-        """Connect a client; return its asyncio transport."""
-        made = asyncio.get_running_loop().create_future()
+    async def _connect(self, make: Callable[..., ModbusClient], on_data: OnData, on_end: OnEnd) -> Send:
+        """Connect a client, whose settings ``make`` has."""
+        is_made = asyncio.Event()
 
         def on_connection(is_connected: bool) -> None:
-            if not is_connected:
+            if is_connected:
+                is_made.set()
+            else:
                 on_end(self._lost())
-            elif not made.done():
-                made.set_result(None)
 
-        self._client = client = make(on_connection)
+        self._client = client = make(trace_connect=on_connection, retries=0, reconnect_delay=0)
         client.ctx.data_received = on_data  # type: ignore[method-assign, assignment]
         try:
             transport, _ = await client.ctx.call_create()
             client.ctx.transport = transport
-            self._set_up(transport, on_data, on_end)
-            await made  # a serial port is watched from the next turn of the loop on
+            send = self._set_up(transport, on_data, on_end)
+            await is_made.wait()  # a serial port is watched from the next turn of the loop on
         except BaseException:
             self.close()
             raise
-        return transport
+        return send
 
-    def _set_up(self, transport: AsyncioTransport, on_data: OnData, on_end: OnEnd) -> None:
+    def _set_up(self, transport: AsyncioTransport, on_data: OnData, on_end: OnEnd) -> Send:
+        """Tune a connection that was just made; return what sends a frame on it."""
         raise NotImplementedError
 
 
@@ -162,27 +159,18 @@ class SocketWire(_ClientWire):
         Each address but the last gets an equal part of the time: one that does not answer leaves some for the
         others.
         """
-        address = self._address
-        framer = FramerType.RTU if address.is_rtu else FramerType.SOCKET
-        with failing_as(RESOLVING, address):
-            *others, last = await addresses_of(address.host, address.port)
+        place = self._address
+        with failing_as(RESOLVING, place):
+            hosts = await addresses_of(place.host, place.port)
+        *others, last = (partial(AsyncModbusTcpClient, host, port=place.port) for host in hosts)
+        with failing_as(CONNECTING, place):
+            for make in others:
+                with contextlib.suppress(OSError), Limit(seconds / len(hosts)):
+                    return await self._connect(make, on_data, on_end)
+            return await self._connect(last, on_data, on_end)
 
-        async def connected(host: str) -> Send:
-            def make(on_connection: OnConnection) -> ModbusClient:
-                options = {**CLIENT_OPTIONS, "port": address.port, "trace_connect": on_connection}
-                return AsyncModbusTcpClient(host, framer=framer, **options)
-
-            send: Send = (await self._connect(make, on_data, on_end)).write
-            return send
-
-        with failing_as(CONNECTING, address):
-            for host in others:
-                with contextlib.suppress(OSError), Limit(seconds / (len(others) + 1)):
-                    return await connected(host)
-            return await connected(last)
-
-    def _set_up(self, transport: AsyncioTransport, on_data: OnData, on_end: OnEnd) -> None:  # noqa: ARG002
-        """Tune the connection for quick replies and for noticing a dead peer. Nothing depends on it."""
+    def _set_up(self, transport: AsyncioTransport, on_data: OnData, on_end: OnEnd) -> Send:  # noqa: ARG002
+        """For quick replies, and for noticing a dead peer. Nothing depends on it."""
         # asyncio reads into a buffer of 256 KiB, whose allocation costs several times the handling of a
         # reply. The attribute is undocumented: without it nothing is lost but time.
         with contextlib.suppress(AttributeError):
@@ -193,6 +181,8 @@ class SocketWire(_ClientWire):
             for name, value in KEEPALIVE.items():
                 if hasattr(socket, name):
                     line.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
+        send: Send = transport.write
+        return send
 
     def close(self) -> None:
         """Close the connection for every process that has it.
@@ -216,23 +206,19 @@ class SerialWire(_ClientWire):
 
     async def open(self, on_data: OnData, on_end: OnEnd, seconds: float) -> Send:  # noqa: ARG002
         """Open the port with the settings of the address."""
-        address, line = self._address, self._address.line
-
-        def make(on_connection: OnConnection) -> ModbusClient:
-            form: dict[str, Any] = {"baudrate": line.baud, "parity": line.parity, "stopbits": line.stopbits}
-            options = {**CLIENT_OPTIONS, **form, "bytesize": 8, "trace_connect": on_connection}
-            return AsyncModbusSerialClient(address.host, framer=FramerType.RTU, **options)
-
-        with failing_as(OPENING_ERRORS, address):
+        line = self._address.line
+        form: dict[str, Any] = {"baudrate": line.baud, "parity": line.parity, "stopbits": line.stopbits}
+        with failing_as(OPENING_ERRORS, self._address):
             import serial  # noqa: F401, PLC0415
 
-            transport = await self._connect(make, on_data, on_end)
-        port = transport.sync_serial
-        if not hasattr(port, "fd"):
-            send: Send = transport.write
-            return send
+            make = partial(AsyncModbusSerialClient, self._address.host, **form)
+            return await self._connect(make, on_data, on_end)
 
-        def write(frame: bytes) -> None:
+    def _set_up(self, transport: AsyncioTransport, on_data: OnData, on_end: OnEnd) -> Send:
+        port = transport.sync_serial
+        hasten(port)
+
+        def send(frame: bytes) -> None:
             try:
                 written = os.write(port.fd, frame)
             except BlockingIOError:
@@ -240,20 +226,13 @@ class SerialWire(_ClientWire):
             if written < len(frame):
                 transport.write(frame[written:])
 
-        return write
-
-    def _set_up(self, transport: AsyncioTransport, on_data: OnData, on_end: OnEnd) -> None:
-        port = transport.sync_serial
-        hasten(port)
-
         def read() -> None:
-            data = b""
             try:
                 data = os.read(port.fd, LARGEST_READ)
             except (BlockingIOError, InterruptedError):
                 return
             except OSError:
-                pass  # as the end of the port, which is no bytes
+                data = b""  # as at the end of the port
             if data:
                 on_data(data)
             else:
@@ -261,3 +240,6 @@ class SerialWire(_ClientWire):
 
         if hasattr(port, "fd"):
             transport.intern_read_ready = read
+            return send
+        plain: Send = transport.write
+        return plain

@@ -375,7 +375,7 @@ def resolved(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 
 def to_the_host(transport: ModbusTransport) -> ModbusTransport:
     """A transport to the same port, by a name."""
-    address = f"gripper.example:{transport._address.port}"
+    address = f"gripper.example:{transport._dialogues.line.address.port}"
     return ModbusTransport(parse_address(address), TCP_REGISTERS, connect_timeout=1.0, response_timeout=0.1)
 
 
@@ -396,7 +396,7 @@ async def test_an_address_that_does_not_answer_leaves_time_for_others(resolved: 
     async with linked() as (transport, _):
         with contextlib.ExitStack() as sockets:
             silent = sockets.enter_context(socket.socket())
-            silent.bind(("127.0.0.2", transport._address.port))
+            silent.bind(("127.0.0.2", transport._dialogues.line.address.port))
             silent.listen(0)
             for _ in range(3):
                 waiting = sockets.enter_context(socket.socket())
