@@ -312,11 +312,11 @@ def test_pandas_takes_it(grasp: Path, call: Call) -> None:
 
 @pytest.mark.usefixtures("undrawn")
 def test_the_name_of_a_picture_may_have_its_suffix(grasp: Path, call: Call) -> None:
-    call("plot", str(grasp), str(grasp.with_name("there.png"))).assert_succeeded()
+    call("plot", str(grasp), "--picture", str(grasp.with_name("there.png"))).assert_succeeded()
     assert grasp.with_name("there.png").exists()
     assert grasp.with_name("there.svg").exists()
     nowhere = str(grasp.parent / "nowhere" / "it")
-    call("plot", str(grasp), nowhere).assert_failed(1, "No such file or directory")
+    call("plot", str(grasp), "--picture", nowhere).assert_failed(1, "No such file or directory")
 
 
 def test_recover_makes_a_broken_one_whole(grasp: Path, call: Call) -> None:
@@ -334,9 +334,29 @@ def test_a_part_of_a_recording_is_drawn(grasp: Path, call: Call) -> None:
     outcome = call("plot", str(grasp), "--from", "0", "--to", "1e6")
     outcome.assert_succeeded()
     assert outcome.out.splitlines() == [str(grasp.with_suffix(suffix)) for suffix in (".png", ".svg")]
-    picture = str(grasp.with_name("part"))
-    call("plot", str(grasp), picture, "--from", "1e6").assert_failed(1, "between --from and --to")
-    call("plot", str(grasp), picture, "--from", "2", "--to", "1").assert_failed(2, "less than --to")
+    picture = ("--picture", str(grasp.with_name("part")))
+    call("plot", str(grasp), *picture, "--from", "1e6").assert_failed(1, "between --from and --to")
+    call("plot", str(grasp), *picture, "--from", "2", "--to", "1").assert_failed(2, "less than --to")
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_several_recordings_are_one_picture(grasp: Path, call: Call) -> None:
+    other = grasp.with_name("other.mcap")
+    other.write_bytes(grasp.read_bytes())
+    outcome = call("plot", str(grasp), str(other), str(grasp))
+    outcome.assert_succeeded()
+    pictures = [str(grasp.with_name(f"{grasp.stem}+2{suffix}")) for suffix in (".png", ".svg")]
+    assert outcome.out.splitlines() == pictures
+    nothing = grasp.with_name("nothing.mcap")
+    call("plot", str(grasp), str(nothing)).assert_failed(1, "nothing.mcap: No such file")
+    with nothing.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        writer.finish()  # type: ignore[no-untyped-call]
+    call("plot", str(grasp), str(nothing)).assert_failed(1, "nothing.mcap: it contains no status")
+    for count in (0, 7):
+        outcome = call("plot", *[str(grasp)] * count)
+        outcome.assert_failed(2, f"name 1 to 6 recordings for a picture, got {count}")
 
 
 @pytest.mark.usefixtures("undrawn")

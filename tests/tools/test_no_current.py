@@ -13,7 +13,8 @@ from robotiq_async import JAW, TWO_FINGER_85, RobotiqHand, RobotiqStatus
 from robotiq_async.cli.output.tables import print_outcomes, print_status
 from robotiq_async.ros2.translation.diagnosis import diagnose
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
-from robotiq_async.tools.measure.plots import plot_recording
+from robotiq_async.tools.measure.recording_plot import PANELS
+from robotiq_async.tools.recording.curves import read_curves
 from robotiq_async.tools.recording.payloads import efforts
 from robotiq_async.tools.recording.recorder import Recorder
 from robotiq_async.tools.recording.recordings import read_recording
@@ -66,7 +67,9 @@ async def test_there_is_no_current_and_not_a_current_of_0(
             rows.append(table.row("status", entry.nanoseconds, entry.fields))
     named = dict(zip(COLUMNS["status"], rows[-1] or [], strict=True))
     assert (named["A.current_ma"], named["A.position"]) == (None, status.position(JAW))
-    assert plot_recording(tmp_path / "picture", read_recording(path))
+    curves = read_curves("it", read_recording(path))
+    assert curves is not None
+    assert [bool(panel.axes_of(curves)) for panel in PANELS if panel.what == "current"] == [False]
 
 
 async def test_a_remote_hand_has_none_either() -> None:

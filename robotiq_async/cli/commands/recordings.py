@@ -176,44 +176,59 @@ def _keep(*files: Path, overwrite: bool) -> None:
 
 
 def plot(
-    file: Path,
-    picture: Path | None = None,
-    /,
-    *,
+    *files: Path,
+    picture: Annotated[Path | None, Parameter(metavar="NAME", show_default=False)] = None,
     begin: Annotated[float, Parameter(name="--from", metavar="SECONDS", show_default=False)] = 0.0,
     end: Annotated[float, Parameter(name="--to", metavar="SECONDS", show_default=False)] = math.inf,
     overwrite: Overwrite = False,
 ) -> None:
-    """Draw positions, currents, events and marks of a recording over time, as PNG and SVG.
+    """Draw openings, currents, events and marks of recordings over time, as PNG and SVG.
+
+    Several stand side by side in the same scales, at most six. Contacts, faults and lost links
+    are shaded. Where there are more polls than the picture has columns, a current is drawn as
+    its range and its mean in each.
 
     For example:
 
         robotiq-async plot grasp.mcap
-        robotiq-async plot grasp.mcap first --from 2 --to 7.5
+        robotiq-async plot grasp.mcap --picture first --from 2 --to 7.5
+        robotiq-async plot cup.mcap ball.mcap
 
     Args:
-        file: The recording.
-        picture: Name of the plot without suffix (default: that of the recording).
+        files: The recordings.
+        picture: Name of the plot without suffix (default: that of the first recording, as cup+1
+            where there is one more).
         begin: Draw from this time on; the time axis begins with the recording.
         end: Draw up to this time.
     """
     if not 0 <= begin < end:
         raise UsageError(f"--from must be 0 or more and less than --to, got {begin:g} and {end:g}")
-    entries = _entries(file)
+    need("mcap", "record")
     need("matplotlib", "plot")
-    from ...tools.measure.plots import plot_recording
+    from ...tools.measure.recording_plot import MOST_BESIDE, plot_recordings
+    from ...tools.recording.curves import read_curves
+    from ...tools.recording.recordings import read_recording
 
-    target = picture or file
+    if not 1 <= len(files) <= MOST_BESIDE:
+        raise UsageError(f"name 1 to {MOST_BESIDE} recordings for a picture, got {len(files)}")
+    target = picture or files[0]
     if target.suffix in (".mcap", ".png", ".svg"):
         target = target.with_suffix("")
+    if len(files) > 1 and picture is None:
+        target = target.with_name(f"{target.name}+{len(files) - 1}")
     _keep(*(target.with_name(f"{target.name}.{suffix}") for suffix in ("png", "svg")), overwrite=overwrite)
+    recordings = []
+    for each in files:
+        curves = read_curves(each.name, read_recording(each), begin=begin, end=end)
+        if curves is None:
+            is_part = begin > 0 or end < math.inf
+            raise CommandError(
+                f"{each}: it contains no status{' between --from and --to' if is_part else ''}"
+            )
+        recordings.append(curves)
     with file_errors(target):
-        pictures = plot_recording(target, entries, begin=begin, end=end)
-    if not pictures:
-        is_part = begin > 0 or end < math.inf
-        raise CommandError(f"{file}: it contains no status{' between --from and --to' if is_part else ''}")
-    for written in pictures:
-        print(written)
+        for written in plot_recordings(target, recordings):
+            print(written)
 
 
 def recover(file: Path, target: Path | None = None, /) -> None:

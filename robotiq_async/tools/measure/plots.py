@@ -1,13 +1,11 @@
-"""Plots of measurements and recordings, as PNG and SVG. Needs the extra ``plot`` (matplotlib)."""
+"""Plots of measurements, as PNG and SVG. Needs the extra ``plot`` (matplotlib)."""
 
 from __future__ import annotations
 
-import math
-from array import array
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 try:
     import matplotlib as mpl
@@ -21,30 +19,16 @@ except ModuleNotFoundError as error:
 from ...calibration import ForceCalibration, RunsTable, SpeedCalibration, mean, newton
 from ...runtime import printable
 from ..description.palette import AXIS_COLORS
-from ..recording.payloads import is_command
-from ..recording.table import CURRENT_COLUMN
-from ..wording import JAW_NAME
 from .campaigns import Currents, peak_currents
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..recording.recordings import RecordedMessage
-
 OURS_COLOR: Final = "#0b6ea8"
 THEIRS: Final = "#d1731f"
 COLOURS: Final = tuple(AXIS_COLORS.values())
 """Colours of the fingers A, B and C, and of the scissor."""
-LINE_WIDTHS: Final = {"A": 4.2, "B": 2.6, "C": 1.1, "SCISSOR": 1.4}  # line widths in the plot of a recording
-DRAWN: Final = ("position", "requested_position", CURRENT_COLUMN)
-LABEL_SIZE: Final = 0.012  # width of a label, as a share of the picture's
-LONGEST_LABEL: Final = 40  # characters of a label
-LETTER_SIZE: Final = 0.0092  # width of a character of a label, as a share of the picture's
-ROW: Final = 0.17  # height of a row of labels, where that of the positions is 3
-PLOT_ROWS: Final = 6  # of labels, at most; where they do not suffice, labels are cut
 SHOWN_FORCES: Final = (0, 125, 250)  # force values whose currents are drawn over time, or the nearest to them
-
-Event = tuple[float, str, bool]  # time, text, and whether it is about a fault
 
 
 def plot_speed(path: Path, table: RunsTable, label: str) -> list[Path]:
@@ -140,165 +124,6 @@ def plot_current_over_time(path: Path, by_surface: Mapping[str, Currents], label
     return files
 
 
-def plot_recording(
-    path: Path, entries: Iterable[RecordedMessage], *, begin: float = 0.0, end: float = math.inf
-) -> list[Path]:
-    """Plot positions, currents, events and marks of a recording, its JSON messages, over time.
-
-    Only the plotted values are kept in memory. Writes no files when there is no status to draw.
-
-    Args:
-        path: of the pictures, without suffix.
-        entries: of the recording.
-        begin: seconds from the first message on; earlier ones are not drawn.
-        end: in the same seconds.
-    """
-    seconds = array("d")
-    first: int | None = None
-    events: list[Event] = []
-    drawn = {axis: {what: array("f") for what in DRAWN} for axis in LINE_WIDTHS}
-    openings = array("d")  # of a jaw
-
-    def take(status: dict[str, Any]) -> None:
-        for axis, columns in drawn.items():
-            if axis != "A" and axis not in status:
-                continue  # of a sibling of the 3-Finger, which has the one
-            for what, column in columns.items():
-                column.append(
-                    status[axis].get(what, math.nan) if what == CURRENT_COLUMN else status[axis][what]
-                )
-        if "B" not in status and "opening_mm" in status["A"]:
-            openings.append(status["A"]["opening_mm"])
-
-    for entry in entries:
-        first = entry.nanoseconds if first is None else first
-        at = (entry.nanoseconds - first) / 1e9
-        if not begin <= at <= end:
-            continue
-        if entry.topic == "/gripper/event" and (event := entry.read(_event)):
-            events.append((at, *event))
-        if entry.topic == "/gripper/status":
-            entry.read(take)
-            seconds.append(at)
-    if not seconds:
-        return []
-    labels = list(_labels(events, apart=LABEL_SIZE * (seconds[-1] - seconds[0])))
-    placed = _placed(labels, seconds[0], seconds[-1])
-    height = ROW * max((each.row for each in placed), default=0) + ROW
-    panels = 3 if len(openings) == len(seconds) else 2
-    with _figure(path, path.name, rows=1 + panels, ratios=(height, *[3] * panels)) as (axes, files):
-        strip, positions, *others, currents = axes
-        for panel in others:
-            panel.plot(seconds, openings, color=COLOURS[0], lw=1.6)
-            panel.set_ylabel("opening, mm")
-            panel.set_ylim(bottom=0)
-        is_jaw = not drawn["B"]["position"]
-        # Fingers that move together overlap: the first curve is the widest and shows at the sides.
-        for (name, width), colour in zip(LINE_WIDTHS.items(), COLOURS, strict=True):
-            line: Any = {"color": colour, "lw": width}
-            dotted: Any = {"color": colour, "lw": 0.8, "ls": ":", "drawstyle": "steps"}
-            if not drawn[name]["position"]:
-                continue
-            positions.plot(seconds, drawn[name]["position"], label=JAW_NAME if is_jaw else name, **line)
-            positions.plot(seconds, drawn[name]["requested_position"], **dotted)
-            currents.plot(seconds, drawn[name]["current_ma"], **line)
-        positions.set_ylabel("position, counts\n(dotted: requested)")
-        positions.set_ylim(-5, 260)
-        positions.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
-        currents.set_ylabel("current, mA")
-        currents.set_ylim(bottom=0)
-        currents.set_xlabel("time, s")
-        _write_labels(strip, placed, seconds[0], seconds[-1])
-        for when, _, is_fault in labels:
-            for each in (positions, *others, currents):
-                each.axvline(when, color=_colour(is_fault), lw=0.8, zorder=0)
-    return files
-
-
-class Label(NamedTuple):
-    """A label in the strip above the curves.
-
-    Attributes:
-        at: its time in seconds.
-        left: the beginning of the words, as a share of the width.
-        row: from the bottom, from 0.
-    """
-
-    at: float
-    left: float
-    row: int
-    words: str
-    is_fault: bool
-
-
-def _placed(labels: Iterable[Event], begin: float, end: float) -> list[Label]:
-    """Each label in the lowest row where it has room. Without any, the one before it in a row is cut."""
-    placed: list[Label] = []
-    last: dict[int, Label] = {}  # of each row
-    for at, words, is_fault in labels:
-        share = (at - begin) / (end - begin) if end > begin else 0.0
-        left = max(0.0, min(share, 1 - LETTER_SIZE * len(words)))
-        row = next((n for n in range(PLOT_ROWS) if n not in last or _right(last[n]) <= left), None)
-        if row is None:
-            row = min(last, key=lambda n: last[n].left)
-            cut = last[row]
-            room = max(1, int((left - cut.left) / LETTER_SIZE) - 1)
-            placed[placed.index(cut)] = cut._replace(words=cut.words[:room].rstrip(", ") + "…")
-        last[row] = Label(at, left, row, words, is_fault)
-        placed.append(last[row])
-    return placed
-
-
-def _right(label: Label) -> float:
-    return label.left + LETTER_SIZE * (len(label.words) + 1)
-
-
-def _write_labels(strip: Axes, labels: Iterable[Label], begin: float, end: float) -> None:
-    strip.set_axis_off()
-    top = max((each.row for each in labels), default=0) + 1
-    strip.set_ylim(0, top)
-    style: Any = {"fontsize": 7, "va": "bottom", "ha": "left", "parse_math": False}
-    style["in_layout"] = False  # labels do not make the curves smaller
-    for each in labels:
-        colour = _colour(each.is_fault)
-        strip.plot([each.at, each.at], [0, each.row + 0.1], color=colour, lw=0.8)
-        where = begin + each.left * (end - begin)
-        strip.annotate(each.words, (where, each.row + 0.1), color=colour, **style)
-
-
-def _colour(is_fault: bool) -> str:
-    return "crimson" if is_fault else "0.4"
-
-
-def _event(fields: dict[str, Any]) -> tuple[str, bool] | None:
-    if is_command(fields):
-        return None
-    is_fault = fields["kind"] == "fault"
-    if fields["kind"] == "mark":
-        return (_short(printable(fields["label"])) or "end of mark"), False
-    if fields["kind"] == "inhibit":
-        return ("inhibited" if fields["inhibited"] else "permitted"), fields["inhibited"]
-    name = _short(printable(fields["fault"] if is_fault else fields["target"]))
-    return "fault cleared" if name == "NONE" else name, is_fault
-
-
-def _labels(events: Iterable[Event], apart: float) -> Iterator[Event]:
-    began, words, is_fault = 0.0, "", False
-    for at, name, of_a_fault in events:
-        if words and at - began > apart:
-            yield began, _short(words), is_fault
-            words, is_fault = "", False
-        began = began if words else at
-        words += (", " if words else "") + name
-        is_fault = is_fault or of_a_fault
-    if words:
-        yield began, _short(words), is_fault
-
-
-def _short(words: str) -> str:
-    return words if len(words) <= LONGEST_LABEL else f"{words[: LONGEST_LABEL - 3]}..."
-
-
 def _shown(currents: Currents) -> list[int]:
     nearest = {min(currents, key=lambda force: abs(force - usual)) for usual in SHOWN_FORCES}
     return sorted(nearest)
@@ -310,8 +135,7 @@ def _figure(
 ) -> Iterator[tuple[list[Axes], list[Path]]]:
     """A figure with stacked axes, written at the end; the same data give the same bytes."""
     height = 4.6 if rows == 1 else 6.4 + 1.0 * (rows > 2) + 1.6 * (rows > 3)
-    figure = Figure(figsize=(8, height), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(8, height)
     grid = figure.subplots(rows, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": ratios})
     axes: list[Axes] = list(grid[:, 0])
     figure.suptitle(printable(title), parse_math=False)
@@ -319,9 +143,23 @@ def _figure(
         each.grid(alpha=0.3)
     files: list[Path] = []
     yield axes, files
+    files.extend(write_figure(figure, path))
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure that is laid out when it is drawn; in inches."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def write_figure(figure: Figure, path: Path) -> list[Path]:
+    """Write a figure as PNG and SVG, and return these; the same data give the same bytes."""
+    files: list[Path] = []
     for suffix, options in (("png", {"dpi": 120}), ("svg", {"metadata": {"Date": None}})):
         target = path.with_name(f"{path.name}.{suffix}")
         with mpl.rc_context({"svg.hashsalt": "robotiq_async"}):
             figure.savefig(target, **options)
         figure.set_layout_engine("none")  # the next one is laid out alike
         files.append(target)
+    return files
