@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Final
 
 from robotiq_async import ReconnectPolicy, RobotiqHand
-from robotiq_async.control.state_machine import MOVES, SEQUENCES, TABLE, Verdict
 from robotiq_async.values import registers
 from robotiq_async.values.enums import (
     Fault,
@@ -29,6 +28,7 @@ from robotiq_async.values.enums import (
 )
 from robotiq_async.values.model import MODELS
 from robotiq_async.values.registers import RTU_REGISTERS, TCP_REGISTERS, Field
+from robotiq_async.values.states import MOVES, SEQUENCES, TABLE, Verdict
 
 ROOT: Final = Path(__file__).parents[1]
 DOCS: Final = ROOT / "docs"

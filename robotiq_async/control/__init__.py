@@ -59,7 +59,7 @@
 # before the write, and what acts may have been undone by another client.
 #
 # The state of the hand is a view of all this: _view() works out which of the fourteen holds, and
-# state_machine.py has what each answers to a call.
+# values/states.py has what each answers to a call.
 #
 # Evidence stands beside each rule: [manual] and [thesis] are printed, [seen] is from real grippers, [vendor]
 # from the maker's examples, [follows] from Modbus and two clients alone, [conceivable] from nothing but care.

@@ -27,6 +27,7 @@ from ..values.errors import (
 from ..values.inhibit import Inhibit
 from ..values.model import THREE_FINGER, Model
 from ..values.request import Request
+from ..values.states import RUNNING, SEEN
 from ..values.status import RobotiqStatus
 from .entry import Entry
 from .evidence import FOLLOWS, Evidence, classify, is_activating, is_interrupted
@@ -35,7 +36,7 @@ from .ledger import NEVER, Ledger
 from .motion import Move
 from .pending import NONE_PENDING, Command, OpenRequests, Pending
 from .procedures import Begun, Procedure, activation, automatic_release, reset_and_activation
-from .state_machine import RUNNING, SEEN, StateMachine
+from .state_machine import StateMachine
 from .stops import Duty, Ended, Keeping, Stop
 from .waiters import AnswerCallers, Waiter, fail
 
@@ -162,7 +163,7 @@ class Controller:
             self._begin_reset(trigger, MoveSupersededError(f"a {who} took over"))
 
     def inhibit(self, inhibit: Inhibit) -> None:
-        """Refuse what may move, and end what was asked of that. A halt comes next, if the link is up."""
+        """Refuse motion, and end the requests for it. A halt comes next, if the link is up."""
         self.machine.inhibit(inhibit)
         ended = MotionInhibitedError(self.machine.inhibited or inhibit)  # the first reason stays
         self._ended(self._requests.drop(holds=False), ended)
@@ -330,7 +331,7 @@ class Controller:
             if isinstance(duty, Stop):
                 self._advance(duty)
             if not duty.is_halt or self.is_busy:
-                return  # what shows then is its business
+                return  # a status counts for the duty alone
         if condition is None:
             return
         if condition is not before or ledger.match is None:
@@ -381,7 +382,7 @@ class Controller:
             requests.hold_only(NO_AXES)
 
     def _note_condition(self, before: Trigger | None, condition: Trigger, status: RobotiqStatus) -> None:
-        """Show a new condition; begin what it calls for as the link is back."""
+        """Show a new condition; on a new link, begin the activation or the reset that is due."""
         is_found, is_inhibited = before is None, self.machine.inhibited is not None
         is_reset = condition in (Trigger.SEEN_RESET, Trigger.SEEN_STRANDED)
         if is_found and is_reset and self.activates and not is_inhibited:
@@ -547,8 +548,8 @@ class Controller:
         error = ConnectionLostError(f"the link went down before this was done: {why}")
         error.__cause__ = why
         duty, self._duty = self._duty, None
-        # A halt and a reset are not sent again: once the link is back, what we move is held instead, and what
-        # drives the fingers is reset.
+        # A halt and a reset are not sent again: on return the axes that we move are held instead, and a
+        # sequence that goes on is reset.
         if isinstance(duty, Stop) and duty.level in (StopLevel.HALT, StopLevel.RESET):
             self._requests.merge_hold(Finger.ALL, "a stop was lost with the link: once it is back")
             self._owes_reset = self.is_driven

@@ -17,7 +17,7 @@ before it counts. Keeping is the exception to all this.
 # Procedure   activate(), atr()                 rACT or rATR = 1     it has ended or failed, see there
 #
 # A hand has one duty or none: then the pending changes are written. A new duty replaces the one before, and a
-# lost link ends it. A halt takes a device cycle, and what a status shows counts meanwhile; in all others it
+# lost link ends it. A halt takes a device cycle, and a status counts meanwhile as ever; in all others it
 # counts for the duty alone, and the condition counts again afterwards. A duty is asked twice in a cycle: in
 # see() after the read, and in next_image() in the turn of the loop in which the link writes.
 
@@ -63,7 +63,7 @@ class Duty:
     """A stop or a procedure, until its end. A hand does one at a time; a new one replaces it."""
 
     activates = releases = False  # whether its images may raise rACT, and rATR
-    is_halt = False  # in all others what a status shows is the matter of the duty alone
+    is_halt = False  # in all others a status counts for the duty alone
 
     def __init__(self) -> None:
         self.writes: Final[list[Write]] = []

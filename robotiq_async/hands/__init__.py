@@ -1,6 +1,6 @@
 """Parts of any hand: its calls and their checks, options, streams, waits, statistics."""
 
-from ..control.state_machine import MOVES, RUNNING, TABLE, Verdict, refusal
+from ..values.states import MOVES, RUNNING, TABLE, Verdict, refusal
 from .base import Hand
 from .options import (
     ACTIVATION_TIMEOUT_S,

@@ -8,7 +8,6 @@ from collections.abc import Callable, Collection
 from typing import Literal, TypeVar
 
 from ..calibration import ForceCalibration, SpeedCalibration, Units
-from ..control.state_machine import check
 from ..runtime.concurrency import check_loop
 from ..runtime.logger import Log
 from ..values.checks import check_flag
@@ -17,6 +16,7 @@ from ..values.errors import ConnectionLostError, InvalidStateError, NotStartedEr
 from ..values.inhibit import Inhibit
 from ..values.model import THREE_FINGER, Model
 from ..values.move_result import MoveResult
+from ..values.states import check
 from ..values.status import RobotiqStatus
 from ..values.stroke import Points
 from .options import UnitsByModel

@@ -9,12 +9,13 @@ from typing import Final, Self
 
 import anyio
 
-from ..control.state_machine import RUNNING, StateMachine
+from ..control.state_machine import StateMachine
 from ..runtime.logger import Log
 from ..values.checks import repr_of
 from ..values.enums import Severity, State
 from ..values.errors import RobotiqError, StateTimeoutError
 from ..values.registers import Registers
+from ..values.states import RUNNING
 from ..values.status import RobotiqStatus
 from .streams import Listeners
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from typing import Final
 
-from ..control.state_machine import RUNNING, StateMachine
+from ..control.state_machine import StateMachine
 from ..runtime.logger import Log
 from ..values.enums import Fault, Finger, ObjectStatus, Severity, State
 from ..values.events import Transition
 from ..values.move_result import MoveResult
+from ..values.states import RUNNING
 from ..values.status import RobotiqStatus
 
 BITS: Final = 0xFF00  # of the second register: gFLT, and kFLT of the controller before a jaw

@@ -26,7 +26,7 @@ from typing import Final, Literal
 
 from ..calibration import ForceCalibration, SpeedCalibration
 from ..control.pending import Command
-from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
+from ..control.state_machine import StateMachine
 from ..hands.base import Hand
 from ..hands.options import (
     ACTIVATION_TIMEOUT_S,
@@ -58,6 +58,7 @@ from ..values.events import SentRequest, Transition
 from ..values.inhibit import Inhibit
 from ..values.model import Model
 from ..values.move_result import MoveResult
+from ..values.states import RUNNING, SEQUENCES
 from ..values.status import RobotiqStatus
 from .session import Session
 

@@ -24,7 +24,7 @@ from typing import Any, ClassVar, Final, ParamSpec, TypeVar
 
 from ..control.controller import Controller, Left
 from ..control.motion import Move
-from ..control.state_machine import RUNNING, SEQUENCES, StateMachine
+from ..control.state_machine import StateMachine
 from ..control.waiters import Waiter
 from ..hands.options import HandOptions
 from ..hands.statistics import Counters
@@ -47,6 +47,7 @@ from ..values.errors import (
 )
 from ..values.events import Transition
 from ..values.move_result import MoveResult
+from ..values.states import RUNNING, SEQUENCES
 from ..values.status import RobotiqStatus
 from .news import UnreachedNews
 from .poller import RunParts

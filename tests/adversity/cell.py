@@ -11,12 +11,12 @@ from itertools import groupby, pairwise
 from typing import NamedTuple, Self
 
 from robotiq_async import Finger, RobotiqError, State
-from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.hands.waiting import STALLED_S
 from robotiq_async.link.urcap.transport import LOST_S
 from robotiq_async.simulator import parse_troubles
 from robotiq_async.simulator.troubles.trouble import KINDS
 from robotiq_async.values.registers import Registers
+from robotiq_async.values.states import RUNNING
 from tests.adversity.phases import PHASES, TARGET, Call, Phase
 from tests.adversity.world import HABITS, UrcapServer, World
 from tests.docs.pages import read, table

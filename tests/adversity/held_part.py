@@ -17,11 +17,11 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from robotiq_async import Finger, RobotiqError, RobotiqHand, State
-from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.simulator import Habits, Physics, SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.simulator.troubles.corruption import unchanged
 from robotiq_async.values.model import HAND_E, THREE_FINGER, TWO_FINGER_85, TWO_FINGER_140, Model, model_of
 from robotiq_async.values.request import Request
+from robotiq_async.values.states import RUNNING
 from tests.virtual import run
 
 MODELS: Final = (TWO_FINGER_85, TWO_FINGER_140, HAND_E)

@@ -28,12 +28,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from robotiq_async import JAW, Finger, Model, MoveResult, RobotiqError, RobotiqHand, State, Tunnel
-from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.link.line import LONGEST_HUSH_S
 from robotiq_async.link.serial.patience import QUESTION_S
 from robotiq_async.simulator import KINDS, Trouble
 from robotiq_async.values.model import MODELS, THREE_FINGER, model_of
 from robotiq_async.values.registers import RTU_REGISTERS
+from robotiq_async.values.states import RUNNING
 from tests.adversity.fuzz import resident
 from tests.adversity.watch import LoopWatch, WriteWatch, check
 from tests.adversity.world import (

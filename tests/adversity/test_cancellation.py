@@ -22,8 +22,8 @@ from robotiq_async import (
     State,
     StateTimeoutError,
 )
-from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.simulator import Trouble
+from robotiq_async.values.states import RUNNING
 from tests.adversity.world import World, started, world
 from tests.virtual import inside, run
 

@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from robotiq_async import JAW, Fault, Finger, MoveResult, ObjectStatus, RobotiqError, State
-from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.simulator import Trouble
 from robotiq_async.values.enums import NO_AXES
 from robotiq_async.values.model import TWO_FINGER_85, Model
 from robotiq_async.values.request import Request
+from robotiq_async.values.states import RUNNING
 from tests.adversity.world import MODEL, World, world
 from tests.register_words import only_holds
 from tests.virtual import VirtualLoop

@@ -25,12 +25,12 @@ from robotiq_async import (
 from robotiq_async.cli.tui.asking import NO, Question, TargetQuestion
 from robotiq_async.cli.tui.screen import Monitor
 from robotiq_async.cli.tui.widgets import HINTS, Axes, position_bar, sparkline
-from robotiq_async.control.state_machine import refusal
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import Operator
 from robotiq_async.tools.wording import refusal_words
 from robotiq_async.values.enums import Trigger
 from robotiq_async.values.model import THREE_FINGER, TWO_FINGER_85
+from robotiq_async.values.states import refusal
 from tests.grippers import active_gripper, shows, until
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from robotiq_async import Finger, MoveResult, RobotiqStatus, State
 from robotiq_async.control.controller import Controller
 from robotiq_async.control.motion import Move
 from robotiq_async.control.pending import Command
-from robotiq_async.control.state_machine import TABLE, StateMachine
+from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.control.waiters import Waiter, fail
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.enums import StopLevel, Trigger
@@ -18,6 +18,7 @@ from robotiq_async.values.errors import RobotiqError
 from robotiq_async.values.model import THREE_FINGER, Model
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
+from robotiq_async.values.states import TABLE
 from tests.register_words import with_object_status
 
 POLL_S = 0.005

@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 from robotiq_async import Finger, Inhibit, State
 from robotiq_async.control.ledger import WINDOW_S
 from robotiq_async.control.motion import Move
-from robotiq_async.control.state_machine import RUNNING, SEQUENCES
 from robotiq_async.values.enums import NO_AXES, Trigger
 from robotiq_async.values.errors import RobotiqError
 from robotiq_async.values.model import THREE_FINGER, TOLERANCE
 from robotiq_async.values.request import Request
+from robotiq_async.values.states import RUNNING, SEQUENCES
 from tests.control.held_parts import JudgedScan
 from tests.control.other_client import image
 from tests.control.scan import Outcome

@@ -9,8 +9,8 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 
 from robotiq_async import JAW, Finger, Inhibit, MotionInhibitedError, MoveResult, ObjectStatus, State
 from robotiq_async.control.motion import Move
-from robotiq_async.control.state_machine import RUNNING
 from robotiq_async.values.model import THREE_FINGER, TOLERANCE, TWO_FINGER_85, Model
+from robotiq_async.values.states import RUNNING
 from tests.control.held_parts import JudgedScan
 from tests.control.other_client import image
 from tests.control.scan import Outcome, Scan

@@ -8,15 +8,7 @@ import logging
 import pytest
 
 from robotiq_async.control.evidence import classify
-from robotiq_async.control.state_machine import (
-    RUNNING,
-    SEQUENCES,
-    TABLE,
-    StateMachine,
-    Verdict,
-    refusal,
-    states_allowing,
-)
+from robotiq_async.control.state_machine import StateMachine
 from robotiq_async.values.enums import Fault, State, Trigger
 from robotiq_async.values.errors import (
     ConnectionLostError,
@@ -26,6 +18,7 @@ from robotiq_async.values.errors import (
     NotStartedError,
     RobotiqError,
 )
+from robotiq_async.values.states import RUNNING, SEQUENCES, TABLE, Verdict, refusal, states_allowing
 from tests.register_words import status_of
 
 

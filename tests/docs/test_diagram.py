@@ -8,8 +8,8 @@ import pytest
 
 from docs import make_tables
 from robotiq_async import State
-from robotiq_async.control.state_machine import TABLE
 from robotiq_async.values.enums import Trigger
+from robotiq_async.values.states import TABLE
 
 LINE = re.compile(r"^ +(\w+) --> (\w+)(?:: (.+))?$", re.MULTILINE)
 

@@ -15,12 +15,12 @@ from robotiq_async import (
     RobotiqHand,
     State,
 )
-from robotiq_async.control.state_machine import SEQUENCES
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.values.enums import Trigger
 from robotiq_async.values.model import MODELS
 from robotiq_async.values.registers import Registers
 from robotiq_async.values.request import Request
+from robotiq_async.values.states import SEQUENCES
 from tests.conftest import Clock
 from tests.fake_transport import Wire
 from tests.grippers import lose_link

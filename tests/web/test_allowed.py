@@ -7,7 +7,6 @@ import pytest
 pytest.importorskip("nicegui", reason="the page needs the extra web")
 
 from robotiq_async import Finger, Inhibit, State
-from robotiq_async.control.state_machine import MOVES, TABLE
 from robotiq_async.tools.actions import ACTIONS
 from robotiq_async.tools.description.palette import AXIS_COLORS
 from robotiq_async.tools.web.page.mirror import HandMirror
@@ -22,6 +21,7 @@ from robotiq_async.tools.web.page.widgets.allowed import (
 )
 from robotiq_async.tools.web.page.widgets.words import banner_words, state_words
 from robotiq_async.values.model import TWO_FINGER_85
+from robotiq_async.values.states import MOVES, TABLE
 from robotiq_async.values.status import RobotiqStatus
 
 MOTIONS = ["open", "close", "move", "force"]

@@ -20,7 +20,6 @@ from tests.extras import needs
 needs("nicegui", "the page needs the extra web")
 
 from robotiq_async import CLOSED, HAND_E, Fault, Finger, RobotiqHand, RobotiqStatus, State
-from robotiq_async.control.state_machine import TABLE, Verdict, refusal
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from robotiq_async.tools.actions import Operator
 from robotiq_async.tools.web.commands import BUTTONS, COMMAND_AGE_S, MAX_COMMANDS, PageCommands
@@ -31,6 +30,7 @@ from robotiq_async.tools.web.server import HandUpdates, PageServer
 from robotiq_async.tools.web.settings import PageSettings
 from robotiq_async.tools.wording import refusal_words
 from robotiq_async.values.enums import Trigger
+from robotiq_async.values.states import TABLE, Verdict, refusal
 from tests.fake_hand import FakeHand
 from tests.forked import PAGE, forking
 from tests.grippers import active_gripper, shows, until
