@@ -322,8 +322,8 @@ class Controller:
         asked = status.timestamp if asked is None else asked
         ledger, duty, before = self._ledger, self._duty, self.evidence.condition
         self.status = status
-        ledger.update(status, asked)
         condition = self.evidence.update(status, asked)
+        ledger.update(status, asked, is_ready=condition is before is Trigger.SEEN_READY)
         # This runs at every poll, so it works out only what is waited for.
         if self._activation is not None and self._activation.is_over(ledger, status):
             self._activation = None
@@ -342,8 +342,9 @@ class Controller:
                 self._note_condition(before, condition, status)
             if self.is_busy:
                 return
+            if condition is Trigger.SEEN_READY:
+                ledger.update_rest(status)
         if condition is Trigger.SEEN_READY:
-            ledger.update_rest(status)
             if self._requests.moves:
                 self._requests.end_arrived(status, ledger)
         elif condition is Trigger.SEEN_BUSY:

@@ -130,16 +130,6 @@ class Ledger:
         return is_known and not self.has_recent_doubt
 
     @property
-    def unrested(self) -> Finger:
-        """The axes that are not known to rest under their last request."""
-        return self.requests.unrested
-
-    @property
-    def resting(self) -> Finger:
-        """All other axes, and those that the model lacks."""
-        return Finger.ALL & ~self.requests.unrested
-
-    @property
     def unsettled(self) -> tuple[Entry, ...]:
         """The entries that do not act yet: those ahead but for the first ones, which act by their time."""
         ahead, shown, is_equal, is_alike = self.ahead, self._past[-1], True, True
@@ -190,7 +180,7 @@ class Ledger:
     @property
     def may_begin_to_move(self) -> bool:
         """Whether an image that does not act yet, or does not show in gDT yet, may start an axis."""
-        return self.may_set_go or (bool(self.unrested) and self.shown.image.go)
+        return self.may_set_go or (bool(self.requests.unrested) and self.shown.image.go)
 
     def gripping(self, status: RobotiqStatus) -> Finger:
         """The axes that are known to press on a part, or did when rGTO was cleared."""
@@ -208,7 +198,8 @@ class Ledger:
         """The axes of these that a hold must stop, and where it finds each; ``age`` is that of the status."""
         if not axes or not (base := self.base).go:
             return {}
-        may_move, axes = self.may_move(status), axes & ~self._pressing_again(status)
+        may_move = self.requests.may_move(status, self.now)
+        axes &= ~self._pressing_again(status)
         acts_in = age + self._delay  # the time until a write that leaves now acts
         return {
             axis: self.requests.course.after(axis, base.position(axis), status, self.now.time, acts_in)
@@ -219,10 +210,6 @@ class Ledger:
     def _pressing_again(self, status: RobotiqStatus) -> Finger:
         # To hold one that presses would end its grip.
         return self.contacts.pressing(status, self.base) & status.moving
-
-    def may_move(self, status: RobotiqStatus) -> Finger:
-        """The axes that may move, or be about to, although the status shows them at rest."""
-        return self.requests.may_move(status, self.now)
 
     def _age(self, entry: Entry) -> float:
         """Seconds from its acknowledgement, or from its latest sending, to the newest status."""
@@ -242,8 +229,10 @@ class Ledger:
         """Add an image that is about to be sent, with new positions for ``axes``."""
         before = self._settle_base()
         entry = Entry(image, image.echo, is_ours=True, sent=now)
-        self.limits.forget(axes)
-        self.contacts.ask(axes)
+        if self.limits.limited:
+            self.limits.forget(axes)
+        if self.contacts.shown:
+            self.contacts.ask(axes)
         # With rGTO clear gDT has no meaning, so no axis was proven to rest under what was asked before.
         self.requests.ask(entry, before, is_at_rest=before.image.go)
         self.ours |= axes
@@ -273,8 +262,8 @@ class Ledger:
 
     # -- what is read ----------------------------------------------------------------------------------
 
-    def update(self, status: RobotiqStatus, asked: float) -> None:
-        """Take in a status: from then on the questions are about it."""
+    def update(self, status: RobotiqStatus, asked: float, *, is_ready: bool = False) -> None:
+        """Take in a status: from then on the questions are about it. Unless it is news, axes rest by it."""
         before, past, shown = self.now, self._past, self._past[-1]
         self.now = Moment(asked, before.reads + 1)
         while len(past) > 1 and self._is_over(past[1]):
@@ -283,12 +272,14 @@ class Ledger:
         is_same = not self.ahead and shown.echo == status.echo
         self.match = shown if is_same else self._find(status)
         newest = past[-1]
-        # An image with the echo of the one before has joined it by its time: that tells no delay.
+        # One with the echo of the image before shows only once that is forgotten: that tells no delay.
         if newest is not shown and newest.is_ours and newest.echo != shown.echo:
             self._delay = max(0.0, before.time - newest.sent)
         # A moving axis of another client shows its direction with time, an axis at rest its true gDT.
         if self._adoption is not None and self.match is self.last:
             self._adoption = self._adoption.after(status, self.now)
+        if is_ready and self.match is not None:
+            self.update_rest(status)
 
     def _find(self, status: RobotiqStatus) -> Entry | None:
         """The entry that a status shows, perhaps with software limits in place of its requests."""
@@ -315,7 +306,8 @@ class Ledger:
         for each in ahead:
             if (not is_same and each.echo == echo) or (has_limits and self._shows_limit(each, echo)):
                 self._show(each)
-                self.limits.settle(each, self.last, echo)
+                if has_limits:
+                    self.limits.settle(each, self.last, echo)
                 return each
         if is_replaced:
             return None
@@ -339,8 +331,8 @@ class Ledger:
                     before = each
         # Those in doubt before it never will act.
         count = self.ahead.index(entry) + 1
-        acting, self.ahead = self.ahead[:count], self.ahead[count:]
-        self._past.extend(each for each in acting if not each.is_doubtful)
+        self._past.extend([each for each in self.ahead[:count] if not each.is_doubtful])
+        self.ahead = self.ahead[count:]
 
     def adopt(self, status: RobotiqStatus, *, is_found: bool = False) -> None:
         """Make the image that a status shows the only certain entry; those ahead may act after it."""
@@ -387,5 +379,5 @@ class Ledger:
                 self.limits.note_rest(axis, status)
         if status.go_echo and ((contacts := status.contacts) or self.contacts.shown):
             if contacts & self.requests.unrested:
-                contacts &= ~self.may_move(status)
+                contacts &= ~self.requests.may_move(status, self.now)
             self.contacts.see(status, contacts)

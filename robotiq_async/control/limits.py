@@ -47,8 +47,7 @@ class Limits:
 
     def forget(self, axes: Finger) -> None:
         """These axes are asked for another position."""
-        if self.limited:
-            self.limited = {axis: at for axis, at in self.limited.items() if axis not in axes}
+        self.limited = {axis: at for axis, at in self.limited.items() if axis not in axes}
 
     def shows(self, entry: Entry, echo: Echo) -> bool:
         """Whether an echo shows an entry with limits in place of its requests."""

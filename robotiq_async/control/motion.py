@@ -27,12 +27,13 @@ class Move(Call):
             status.requested_position(axis) == limited.get(axis, self.position) for axis in self.axes
         )
 
-    def see(self, status: RobotiqStatus, resting: Finger, limited: Mapping[Finger, int]) -> bool:
-        """Take in a status; whether it shows the move ended. ``resting`` are the axes known to rest."""
+    def see(self, status: RobotiqStatus, unrested: Finger, limited: Mapping[Finger, int]) -> bool:
+        """Take in a status; whether it shows the move ended, unless its axes are ``unrested``."""
         for axis, peak in self._peak.items():
             self._peak[axis] = max(peak, status.current_ma(axis) or 0)
         # An axis may be known to rest by its position, and move by its gDT, which is then from before.
-        return self.axes in resting and not status.moving & self.axes and self.is_under(status, limited)
+        may_move = self.axes & unrested or self.axes & status.moving
+        return not may_move and self.is_under(status, limited)
 
     def end(self, status: RobotiqStatus) -> None:
         if self.waiter.done():

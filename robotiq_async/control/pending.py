@@ -215,10 +215,10 @@ class OpenRequests:
 
     def end_arrived(self, status: RobotiqStatus, ledger: Ledger) -> None:
         """End the moves that a status shows to have arrived."""
-        resting, limited = ledger.resting, ledger.limits.limited
+        unrested, limited = ledger.requests.unrested, ledger.limits.limited
         for move in self._written_moves:
             assert move.entry is not None
-            if move.see(status, resting, limited) and ledger.acts(move.entry):
+            if move.see(status, unrested, limited) and ledger.acts(move.entry):
                 self.leave(move)
                 move.end(status)
 

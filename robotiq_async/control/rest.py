@@ -310,8 +310,7 @@ class Contacts:
 
     def ask(self, axes: Finger) -> None:
         """Axes are asked for a position, perhaps the same: what they do next is open."""
-        if self.shown:
-            self.open |= axes
+        self.open |= axes
 
     def forget(self) -> None:
         """A reset and an activation end every grip."""

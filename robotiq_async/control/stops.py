@@ -203,7 +203,7 @@ class Keeping(Stop):
 
     def _rests(self, ledger: Ledger, status: RobotiqStatus) -> bool:
         """Whether every axis is known to rest under its last request; also true while rGTO is clear."""
-        return not status.moving and not ledger.unrested and ledger.is_certain and ledger.is_settled
+        return not status.moving and not ledger.requests.unrested and ledger.is_certain and ledger.is_settled
 
     def first_image(self, ledger: Ledger, status: RobotiqStatus) -> Request | None:
         """The image that holds every axis that moves or is about to; None if no axis does."""

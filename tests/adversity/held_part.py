@@ -24,8 +24,11 @@ from robotiq_async.values.request import Request
 from robotiq_async.values.states import RUNNING
 from tests.virtual import run
 
-MODELS: Final = (TWO_FINGER_85, TWO_FINGER_140, HAND_E)
-"""The grippers that take turns. Fingers B and C of a 3-Finger push a part to A: by more than pads yield."""
+MODELS: Final = (TWO_FINGER_85, TWO_FINGER_140, HAND_E, THREE_FINGER)
+"""The grippers that take turns."""
+STEADY: Final = range(60, 91)
+"""Forces of a 3-Finger. With more, the simulated fingers B and C push A back for ever, and the part creeps
+down 15 mm in ten seconds; with less it slips as they press again. Both happen whatever a hand does."""
 IN_A_JAW: Final = "box:30x40x60,0.3"
 IN_A_HAND: Final = "box:60x60x60,0.3"
 LIFTED_MM: Final = 60
@@ -117,7 +120,8 @@ async def _lived(seed: int, steps: int, model: Model | None) -> Life:
 async def _happen(what: str, hand: RobotiqHand, server: SimulatorServer, chance: random.Random) -> None:
     """One thing that happens; none of them lets go."""
     fingers = hand.model.mask(Finger.ABC)
-    force, while_s = chance.randrange(30, 256), chance.choice(PAUSES_S)
+    forces = STEADY if hand.model is THREE_FINGER else range(30, 256)
+    force, while_s = chance.choice(forces), chance.choice(PAUSES_S)
     if what in ("halt", "fault", "keep"):
         await _until_gripped(hand, server.gripper, fingers)
     match what:

@@ -443,7 +443,7 @@ def found(status: RobotiqStatus) -> Ledger:
 def test_the_first_image_shown_is_not_ours_but_settled(status: RobotiqStatus) -> None:
     ledger = found(status)
     assert ledger.ours == NO_AXES
-    assert ledger.resting == Finger.ALL
+    assert ledger.requests.unrested == NO_AXES
     assert not ledger.may_begin_to_move
     assert ledger.is_settled
     assert ledger.is_certain
@@ -480,7 +480,7 @@ def test_a_late_contact_of_another_clients_request_is_no_rest_under_ours() -> No
     assert ledger.base.position(A) == 200
     ledger.update_rest(shown(200, 92, ObjectStatus.IN_MOTION, 0.515))
     ledger.update_rest(shown(200, 90, ObjectStatus.CONTACT_OPENING, 0.52))
-    assert A not in ledger.resting
+    assert A in ledger.requests.unrested
     assert ledger.may_begin_to_move
 
 
@@ -491,7 +491,7 @@ def test_a_motion_by_another_client_is_no_start_of_our_write_in_doubt() -> None:
     ledger.update_rest(moving)
     ledger.update_rest(shown(200, 92, ObjectStatus.IN_MOTION, 0.51))
     ledger.update_rest(shown(200, 90, ObjectStatus.CONTACT_OPENING, 0.515))
-    assert A not in ledger.resting
+    assert A in ledger.requests.unrested
     assert ledger.may_begin_to_move
 
 
@@ -500,13 +500,13 @@ def test_a_motion_before_our_write_shows_proves_nothing_once_another_client_has_
     ledger.update_rest(shown(100, 102, ObjectStatus.IN_MOTION, 0.505))
     ledger.adopt(shown(60, 104, ObjectStatus.IN_MOTION, 0.51))
     ledger.update_rest(shown(60, 104, ObjectStatus.CONTACT_CLOSING, 0.515))
-    assert A not in ledger.resting
+    assert A in ledger.requests.unrested
 
 
 def test_an_axis_rests_although_a_write_was_lost_that_never_arrives() -> None:
     ledger, shown = sent_from_rest(is_lost=True)
     ledger.update_rest(shown(100, 100, ObjectStatus.AT_POSITION, 0.505))
-    assert A in ledger.resting
+    assert A not in ledger.requests.unrested
     assert ledger.may_begin_to_move, "the write may act"
     shown(100, 100, ObjectStatus.AT_POSITION, 0.51 + WINDOW_S)
     assert not ledger.may_begin_to_move
@@ -520,7 +520,7 @@ def test_a_motion_after_a_lost_write_may_be_the_one_of_that() -> None:
     ledger.acknowledge(0.8)
     ledger.update_rest(shown(200, 92, ObjectStatus.IN_MOTION, 0.805))
     ledger.update_rest(shown(200, 90, ObjectStatus.CONTACT_OPENING, 0.81))
-    assert A not in ledger.resting
+    assert A in ledger.requests.unrested
 
 
 def test_a_lost_write_that_shows_late_acts_before_what_was_written_since() -> None:
@@ -533,7 +533,7 @@ def test_a_lost_write_that_shows_late_acts_before_what_was_written_since() -> No
     assert not ledger.is_settled
     ledger.update_rest(shown(150, 150, ObjectStatus.AT_POSITION, 0.9))
     assert ledger.is_settled
-    assert A in ledger.resting
+    assert A not in ledger.requests.unrested
 
 
 def test_a_lost_write_does_not_show_once_a_later_one_acts() -> None:
@@ -550,12 +550,12 @@ def test_a_write_that_never_shows_delays_no_axis_longer_than_it_may_show() -> No
     ledger, shown = sent_from_rest()
     for n in range(LAG_READS):
         ledger.update_rest(shown(100, 100, ObjectStatus.AT_POSITION, 0.5 + n / 100))
-    assert A not in ledger.resting
+    assert A in ledger.requests.unrested
     status = shown(100, 100, ObjectStatus.AT_POSITION, 0.5 + WINDOW_S)
     assert ledger.match is None
     ledger.adopt(status)
     ledger.update_rest(status)
-    assert A in ledger.resting
+    assert A not in ledger.requests.unrested
 
 
 def test_a_moving_gripper_that_is_found_is_not_certain_before_it_has_shown_its_direction() -> None:
@@ -667,7 +667,7 @@ def test_an_axis_of_a_gripper_whose_rgto_another_client_has_set_is_not_doubted()
     history.look(shows(100, 1.1, go=False))
     history.restart(history.latest)
     history.adopt(shows(200, 1.2))
-    assert history.may_move(shows(200, 1.2)) == NO_AXES
+    assert history.requests.may_move(shows(200, 1.2), history.now) == NO_AXES
 
 
 def test_a_client_that_keeps_writing_does_not_delay_us_anew() -> None:
@@ -734,12 +734,11 @@ def test_a_grip_by_a_request_no_longer_in_force_does_not_count(later: History) -
 
 
 def test_an_axis_has_arrived_when_it_was_seen_at_rest_under_what_it_was_asked_last(later: History) -> None:
-    assert later.resting & Finger.ALL == Finger.ALL & ~later.unrested
-    assert later.unrested == A | B | C | S
+    assert later.requests.unrested == A | B | C | S
     later.update_rest(status_of(0x39, 0b11_11_10_00, echo=200, position=(100, 150, 199, 200)))
-    assert later.unrested == A
+    assert later.requests.unrested == A
     later.deliver(image(200).with_positions({B: 190}), 9.0, B)
-    assert later.unrested == A | B
+    assert later.requests.unrested == A | B
 
 
 def test_no_axis_arrives_under_what_does_not_act_yet_nor_while_rgto_is_clear() -> None:
@@ -747,11 +746,11 @@ def test_no_axis_arrives_under_what_does_not_act_yet_nor_while_rgto_is_clear() -
     history.deliver(image(200).with_positions({A: 30}), 1.1, A)
     history.look(shows(200, 1.2))
     history.update_rest(history.latest)
-    assert history.unrested == A
+    assert history.requests.unrested == A
     history.deliver(image(200, go=False).with_positions({A: 30}), 1.2)
     history.look(status_of(0x31, 0xFF, echo=(30, 200, 200, 200), position=30, at=1.3))
     history.update_rest(history.latest)
-    assert history.unrested == A
+    assert history.requests.unrested == A
 
 
 def test_a_short_move_before_another_client_wrote_does_not_end_the_next_one() -> None:
@@ -770,7 +769,7 @@ def test_a_short_move_before_another_client_wrote_does_not_end_the_next_one() ->
     history.deliver(image(100).with_positions({A: 200, B: 101}), 1.03, A)
     shown(200, 101, 1.04, what=0b11_11_11_00)
     shown(200, 101, 1.05)
-    assert history.unrested & A
+    assert history.requests.unrested & A
 
 
 def test_a_write_that_shows_after_another_client_s_image_acts_from_then_on() -> None:
@@ -785,7 +784,7 @@ def test_a_write_that_shows_after_another_client_s_image_acts_from_then_on() -> 
     late = status_of(0x39, 0b11_11_11_10, echo=(200, 100, 100, 100), position=(150, 100, 100, 100), at=at)
     assert history.look(late) is entry
     history.update_rest(late)
-    assert history.unrested & A
+    assert history.requests.unrested & A
 
 
 def test_a_contact_that_shows_as_rgto_rises_may_be_from_before() -> None:
@@ -799,7 +798,7 @@ def test_a_contact_that_shows_as_rgto_rises_may_be_from_before() -> None:
         status_of(0x39, 0b11_11_11_10, echo=(200, 100, 100, 100), position=(150, 100, 100, 100), at=1.11)
     )
     history.update_rest(history.latest)
-    assert history.unrested & A
+    assert history.requests.unrested & A
 
 
 def test_a_motion_that_shows_as_rgto_rises_may_be_from_before() -> None:
@@ -817,7 +816,7 @@ def test_a_motion_that_shows_as_rgto_rises_may_be_from_before() -> None:
             )
         )
         history.update_rest(history.latest)
-    assert history.unrested & A
+    assert history.requests.unrested & A
 
 
 # -- any sequence ------------------------------------------------------------------------------------------

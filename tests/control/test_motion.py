@@ -64,7 +64,8 @@ def test_a_move_has_arrived_when_every_addressed_axis_rests_under_its_request(
     """Wherever it rests: open stops at 6-7 for a request of 0, closed at 240 or above."""
     (each, _), status = move(255, axes), status_of(byte_0, byte_1, echo=echo, position=241)
     assert each.is_under(status, {}) is is_under
-    assert each.see(status, Finger.ALL, {}) is has_arrived
+    assert each.see(status, NO_AXES, {}) is has_arrived
+    assert not each.see(status, A, {}), "one is not known to rest"
 
 
 # -- the outcome is handed over once -----------------------------------------------------------------------
@@ -108,12 +109,12 @@ def test_it_is_known_which_axes_still_follow_a_move() -> None:
 def test_a_result_tells_of_each_addressed_axis_and_of_no_other() -> None:
     """A and B hold something, C is closed, the scissor touches something too."""
     each, outcome = move(255, ABC, now=10.0)
-    each.see(status_of(0x39, 0xC0, echo=255, current=(15, 5, 0, 200)), NO_AXES, {})
-    each.see(status_of(0x39, 0xC0, echo=255, current=(3, 40, 1, 0)), NO_AXES, {})
+    each.see(status_of(0x39, 0xC0, echo=255, current=(15, 5, 0, 200)), Finger.ALL, {})
+    each.see(status_of(0x39, 0xC0, echo=255, current=(3, 40, 1, 0)), Finger.ALL, {})
     last = status_of(
         0x79, 0b10_11_10_10, echo=255, position=(150, 151, 241, 99), current=(9, 9, 9, 9), at=12.5
     )
-    each.see(last, NO_AXES, {})
+    each.see(last, Finger.ALL, {})
     result = ended((each, outcome), last)
     assert dict(result.outcomes) == {
         A: ObjectStatus.CONTACT_CLOSING,
@@ -152,7 +153,7 @@ def test_a_result_cannot_be_changed() -> None:
 def test_a_result_does_not_change_with_what_is_seen_later() -> None:
     each, outcome = move(255, A)
     result = ended((each, outcome), status_of(0xF9, 0xFF))
-    each.see(status_of(0xF9, 0xFF, current=255), NO_AXES, {})
+    each.see(status_of(0xF9, 0xFF, current=255), Finger.ALL, {})
     assert dict(result.peak_current_ma) == {A: 0}
 
 

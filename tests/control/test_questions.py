@@ -86,11 +86,11 @@ def known_to_rest(*, is_asked: bool) -> Finger:
         ledger.update(shows(200, at), at)
         if is_asked:
             for _ in range(2):
-                ledger.may_move(shows(200, at))
+                ledger.requests.may_move(shows(200, at), ledger.now)
     ledger.update(status := shows(150, at), at)
     ledger.update_rest(status)
     ledger.update_rest(status)
-    return ledger.resting & Finger.ABC
+    return Finger.ABC & ~ledger.requests.unrested
 
 
 def test_whether_an_axis_rests_does_not_depend_on_who_has_asked() -> None:

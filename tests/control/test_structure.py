@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import ast
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
 
 import pytest
 
-from robotiq_async import control
-from tests.control.scan import Scan
+from robotiq_async import Finger, control
+from tests.control.scan import POLL_S, Scan
 
 ROOM = Path(control.__file__).parent
 
@@ -41,9 +41,26 @@ def way_of_a_status(scan: Scan) -> list[str]:
     return way[1:]
 
 
-def test_a_status_of_an_idle_gripper_passes_few_modules_and_comes_back_seldom(scan: Scan) -> None:
+def idle(_: Scan) -> None:
+    pass
+
+
+def moving(scan: Scan) -> None:
+    scan.move(255, speed=0)
+
+
+def holding(scan: Scan) -> None:
+    scan.gripper.place_object(Finger.ABC, 100)
+    scan.moved(255)
+
+
+@pytest.mark.parametrize("begin", [idle, moving, holding])
+def test_a_status_passes_few_modules_and_comes_back_seldom(scan: Scan, begin: Callable[[Scan], None]) -> None:
+    begin(scan)
     scan.run(1.0)
+    scan.now += POLL_S
     way = way_of_a_status(scan)
+    assert scan.latest.is_moving is (begin is moving)
     assert len(set(way)) <= 6, way
     assert len(way) - len(set(way)) <= 6, way
 
