@@ -117,7 +117,7 @@ class Address:
         host: host name or IP address (tcp, rtu+tcp, urcap, tunnel), device of the serial port (rtu), empty
             (sim), name of a tunnel that is an object.
         port: TCP port; 0 for the others, and for a tunnel without one.
-        simulation: what the gripper is like (sim); nothing special for the others.
+        simulation: the properties of the gripper (sim); nothing special for the others.
         line: how the serial port sends (rtu); the usual for the others.
         model: of the gripper; None if the address does not name it.
         stroke: absolute path of a file with measured openings, which is read when a hand is made; None for
@@ -240,7 +240,7 @@ def entry_of(scheme: str) -> EntryPoint | None:
 
 
 def _through_a_tunnel(scheme: str, rest: str, model: Model | None, stroke: str | None) -> Address:
-    """An address of a package; only this one knows what its options mean."""
+    """An address of a package; only this one knows its options."""
     if entry_of(scheme) is None:
         raise ValueError(f"no package here has {scheme}://; accepted: {FORMS}")
     place, _, query = rest.partition("?")

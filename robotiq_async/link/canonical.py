@@ -20,8 +20,8 @@ def canonical_address(address: Address) -> str:
     """One spelling of an address: equal strings for equal places.
 
     Every spelling of this machine becomes localhost. A symbolic link to a serial port becomes that port. A
-    socket is the same place whatever protocol it carries. What the options of a tunnel mean is not known:
-    with others it is another place.
+    socket is the same place with any protocol. The meaning of a tunnel's options is not known: with others it
+    is another place.
     """
     host = _serial_port(address.host) if address.kind == "rtu" else _host(address.host)
     scheme = "tcp" if address.is_socket else address.scheme or address.kind

@@ -1,10 +1,10 @@
 """Dialogues with a gripper over Modbus: one generator for each thing that a hand wants of its link.
 
-A dialogue yields steps (line.py) and gets what they come to. It returns what was read or written. Where it
-raises, it gives the line up, and the next one begins with an opening. No I/O and no event loop: a line
-carries it out, and a test can, too.
+A dialogue yields steps (line.py) and gets the answer to each. It returns a status, or whether it has written.
+Where it raises, it gives the line up, and the next one begins with an opening. No I/O and no event loop: a
+line carries it out, and a test can, too.
 
-* **A read is asked once more** where its answer can be missing or damaged without harm. The second answer
+* **A read is repeated** where its answer can be missing or damaged without harm. The second answer
   must not be the first one that was only late: so first silence, then a read of another length. If the first
   answer arrives now, it has the wrong length and ends the connection. Only then the status is read.
 * **A write is never repeated.** Whether it was carried out is unknown, and the status that is read next
@@ -77,8 +77,8 @@ class Dialogues:
         self._make: Final = make
         self._usual: Final = Timing(response_timeout)
         self._whole: Final = self._usual._replace(is_whole=True)
-        """For a write of which no status tells what became: a late acknowledgement would cost the link, and a
-        stop that has arrived would count as lost."""
+        """For a write whose outcome no status shows: a late acknowledgement would cost the link, and a stop
+        that has arrived would count as lost."""
         self._repeat_s: Final = response_timeout if response_timeout > USUAL_RESPONSE_S else REPEAT_S
         self._log: Final = log
         self._poll: Final = read_request(registers, registers.count)
@@ -134,7 +134,7 @@ class Dialogues:
         return self._status_in(came_to)
 
     def write(self, decide: Decide) -> Dialogue[bool]:
-        """Write what ``decide`` returns, with function 16; return whether there was anything."""
+        """Write the image that ``decide`` returns, with function 16; return whether there was one."""
         yield from self._ready()
         if (image := decide()) is None:
             return False
@@ -142,13 +142,13 @@ class Dialogues:
         return True
 
     def write_and_read(self, decide: Decide) -> Dialogue[transport.WriteAnswer | None]:
-        """Write what ``decide`` returns, and read the status; None if nothing new was written.
+        """Write the image that ``decide`` returns, and read the status; None if nothing new was written.
 
         After a reply that is missing or damaged the write is in doubt, and the status that is read tells. A
-        device that refuses function 23, or does not answer it at first, gets function 16 from then on. Only
-        what was refused, and so not carried out, is written with it at once: what ``decide`` returns then,
-        for a stop may have come since. After a trial of the function ``decide`` is not called: the status on
-        which it would decide is too old.
+        device that refuses function 23, or does not answer it at first, gets function 16 from then on. Only a
+        refused request, which was not carried out, is written with it at once: ``decide`` is called again for
+        that, because a stop may have come since. After a trial of the function ``decide`` is not called: the
+        status on which it would decide is too old.
         """
         yield from self._ready()
         uses_23 = self._map.is_sure if self.serves_23 is None else self.serves_23
@@ -174,7 +174,7 @@ class Dialogues:
         return transport.WriteAnswer(status, came_to.error)
 
     def stop_or_read(self, decide: Decide) -> Dialogue[Registers | None]:
-        """Write what ``decide`` returns when the turn has come; read the status if that is nothing.
+        """Write the image that ``decide`` returns when the turn has come; read the status if there is none.
 
         After a disturbance it reads, which brings the line in step before a write.
         """
@@ -187,12 +187,13 @@ class Dialogues:
     # -- parts of them -------------------------------------------------------------------------------------
 
     def _ready(self) -> Dialogue[None]:
-        """Make sure that a write leaves at once: it must not meet what is left of a disturbance."""
+        """Make sure that a write leaves at once: it must not meet the rest of a disturbance."""
         obstacle = yield Step.READY
-        if isinstance(obstacle, Outcome) and self._can_repeat(obstacle):
-            check((yield from self._in_step()))
-            obstacle = yield Step.READY  # once: some lines add a byte to every reply
-        check(obstacle)
+        if isinstance(obstacle, Outcome):
+            if self._can_repeat(obstacle):
+                check((yield from self._in_step()))
+                obstacle = yield Step.READY  # once: some lines add a byte to every reply
+            check(obstacle)
 
     def _written(self, image: Sequence[int], timing: Timing, *, reads: bool = False) -> Dialogue[Answer]:
         """Write an image: with function 16, or with 23 if it also reads; learn whether that is served."""
@@ -209,17 +210,17 @@ class Dialogues:
             self._log.warning(what, self.line.address, came_to.error)
         elif isinstance(came_to, Silent) and not self.line.is_shared:
             # A stop that comes again must be heard. The trial at the next opening would cost another response
-            # timeout, in which fingers go on. On a line that others use it takes a short question, and they
+            # timeout, in which fingers move on. On a line that others use it takes a short question, and they
             # would pay for a gripper that is dead.
             self._keep_long_silence(came_to.error)
         return came_to
 
     def _again(self, first: Outcome, *, was_write: bool = False) -> Dialogue[bytes]:
-        """Read once more on a line that lost or damaged a byte, as USB adapters occasionally do.
+        """Read again on a line that lost or damaged a byte, as USB adapters occasionally do.
 
         Where others use the line a question is short. A gripper is asked there until its time is over: the
-        answer may come when it is no longer waited for, and meet the next question as noise. A write that was
-        refused does not prevent a read.
+        answer may come when nothing waits for it, and meet the next question as noise. A refused write does
+        not prevent a read.
 
         Raises:
             RobotiqConnectionError: that of the first request, if there is again no clean answer.
@@ -252,7 +253,7 @@ class Dialogues:
         id of the next request. So this reads fewer registers than a poll, another number each time. A late
         answer to a poll has another length. The gripper answers in order. The answer may be that to an
         earlier one of these reads with the same number: a jaw has two numbers only. So this reads on until
-        no status has been asked for since the oldest read that the answer may belong to.
+        no poll has left since the oldest read that the answer may belong to.
 
         The first one of all asks a jaw for eight registers, which show a wrong model.
         """
@@ -292,7 +293,7 @@ class Dialogues:
             check((yield from self._in_step()))
             return
 
-    # -- requests, and what outcomes mean ------------------------------------------------------------------
+    # -- requests, and the meaning of outcomes ---------------------------------------------------------------
 
     def _ask(self, request: bytes, timing: Timing | None = None) -> Exchange:
         self._outstanding.append(request[1:6])

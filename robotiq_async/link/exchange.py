@@ -1,10 +1,10 @@
-"""One request and what has arrived of its reply: bytes in, an answer or an outcome out.
+"""One request and the bytes of its reply so far: bytes in, an answer or an outcome out.
 
-No I/O, no clock and no event loop. A line sends :attr:`Exchange.frame` and feeds what arrives; the first
-thing that comes out is the last. An answer is its body from the function code on; of other protocols, its
-text.
+No I/O, no clock and no event loop. A line sends :attr:`Exchange.frame` and feeds the bytes that arrive; the
+first thing that comes out is the last. An answer is its body from the function code on; of other protocols,
+its text.
 
-A line that echoes what is sent (a half-duplex adapter that receives its own bytes) is recognised by the first
+A line that echoes each request (a half-duplex adapter that receives its own bytes) is recognised by the first
 read of a connection. It needs no option: a reply to a read does not begin with the whole request, checksum
 included. From then on each request must come back whole before its reply, so that the echo of a write is
 never taken for its acknowledgement, which begins with the same six bytes.
@@ -38,7 +38,7 @@ class Timing(NamedTuple):
 
 
 class Exchange(ABC):
-    """A request and its reply, whatever the protocol.
+    """A request and its reply, in any protocol.
 
     Attributes:
         frame: the bytes to send.
@@ -98,19 +98,19 @@ class EchoFilter:
     """The echo of a line, as far as it is known.
 
     Attributes:
-        is_on: whether the line brings back what is sent; None until the first exchange of a connection.
+        is_on: whether the line brings back each request; None until the first exchange of a connection.
     """
 
     def __init__(self) -> None:
         self.is_on: bool | None = False
 
     def learn(self, *, is_on: bool | None) -> None:
-        """Take what an exchange has shown; None for a new connection that may echo."""
+        """Note it as an exchange has shown it; None for a new connection that may echo."""
         self.is_on = is_on
 
 
 class SerialExchange(Exchange):
-    """A request on a serial line; it notes in ``echo`` what it learns.
+    """A request on a serial line; it notes in ``echo`` whether the line echoes.
 
     Where others use the line, too, whole frames of other units are dropped: answers that came too late for
     their questions.

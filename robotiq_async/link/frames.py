@@ -81,7 +81,7 @@ def serial_frame(request: bytes) -> bytes:
 
 
 def registers_in(body: bytes) -> Registers:
-    """The registers in the body of a reply to a read; those that it did not ask for are 0."""
+    """The registers in the body of a reply to a read; all others are 0."""
     if body[1] == _BLOCK.size:
         return _BLOCK.unpack_from(body, 2)  # the usual case
     return _BLOCK.unpack(body[2 : 2 + body[1]].ljust(_BLOCK.size, b"\0"))
@@ -96,7 +96,7 @@ class Expected(NamedTuple):
     """The one reply that answers a request.
 
     Attributes:
-        start: the first bytes of the good reply: header, function code and what must follow it.
+        start: the first bytes of the good reply: header, function code and the bytes that must follow it.
         size: bytes of the good reply.
         refusal: the first bytes of an exception reply: header and function code.
         refusal_size: bytes of an exception reply.

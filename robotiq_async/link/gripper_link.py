@@ -137,7 +137,7 @@ def _over_modbus(address: Address, registers: RegisterMap, names_unit: bool, nam
         shown = named(simulated, address)
         make = partial(SimulatedTransport, simulated, registers)
         return GripperLink(shown, partial(Gripper, shown), make, model=model, stroke=address.stroke)
-    # On a gateway each hand has a connection of its own. On a serial line, where replies carry no number, the
+    # On a gateway each hand has its own connection. On a serial line, where replies carry no number, the
     # hands of an event loop share one.
     unit = registers.device_id if names_unit else None
     hint = _LINE if address.is_rtu else _GATEWAY  # for users who meant two grippers
@@ -193,7 +193,7 @@ class _Claim(Generic[T]):
 class Claims(Generic[T, L]):
     """Grippers with their owners, and the legacy of the last owner of each for the next. Thread-safe.
 
-    What is left is kept for the last :data:`MOST_LEFT` grippers.
+    The legacy of the last :data:`MOST_LEFT` grippers is kept.
     """
 
     def __init__(self) -> None:

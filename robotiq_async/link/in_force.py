@@ -4,7 +4,7 @@ A link tries function 23 with it (dialogue.py). It is the last image that this l
 it, and is stopped or has come to its target. A contact does not do: gOBJ may come some reads behind the echo,
 so it may still be that from before the motion. The position tells whether gOBJ 3 is.
 
-Before the first image it is made of what the jaw shows. Then the jaw must be within 2 counts of its target
+Before the first image it is made of the status. Then the jaw must be within 2 counts of its target
 without a contact: it holds nothing, so speed and force do not matter until a command.
 """
 

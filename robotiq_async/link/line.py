@@ -1,6 +1,6 @@
 """A line to grippers: its state, the turns of those who use it, and one exchange at a time.
 
-What is said on a line is a dialogue (dialogue.py): a generator that yields steps and gets what they come to.
+A dialogue (dialogue.py) is a generator that yields steps and gets the answer to each.
 :meth:`Line.talk` carries one out, in a turn of its user. **A dialogue that returns leaves its user on the
 line. One that raises has given up the line for its user**, and so has one that is cancelled.
 
@@ -12,14 +12,15 @@ line. One that raises has given up the line for its user**, and so has one that 
       |           |           v                       |
       '-----------'        DISTURBED -----------------'
 
-DISTURBED follows all that leaves a reply on its way: noise, silence, a user that left in mid-exchange. CLOSED
-follows the end of the wire, the leaving of the last user, and strays where nothing forgives them: where every
-byte belongs to a frame with a number (TCP) or to an answer with a name (URCap), a stray means a wrong peer.
+DISTURBED follows everything that leaves a reply on its way: noise, silence, a user that left in mid-exchange.
+CLOSED follows the end of the wire, the leaving of the last user, and strays where nothing forgives them:
+where every byte belongs to a frame with a number (TCP) or to an answer with a name (URCap), a stray means a
+wrong peer.
 
-A line may have several users, because grippers with different unit ids can hang on it. The first one opens
-it and the last one closes it. Users take turns, in the order in which they ask for them, so each waits for
-one turn of each other at most. What another one has left on its way must not meet a request: the turn begins
-with waiting for silence then. A gripper that does not answer takes a short turn, and only once in a while
+A line may have several users, because grippers with different unit ids can hang on it. The first one opens it
+and the last one closes it. Users take turns, first come, first served, so each waits for one turn of each
+other at most. A reply that another one has left on its way must not meet a request: then the turn begins with
+waiting for silence. A gripper that does not answer takes a short turn, and only once in a while
 (serial/patience.py). When the wire ends, it ends for all users.
 """
 
@@ -63,20 +64,20 @@ class LineState(Enum):
     """The state of a line, by the bytes that may arrive on it."""
 
     CLOSED = "nothing: there is no wire"
-    OPENING = "what is left over from an earlier connection; only the end of the opening leads on"
+    OPENING = "bytes left over from an earlier connection; only the end of the opening leads on"
     IN_STEP = "nothing but the reply to the next request, or to the one in flight"
     DISTURBED = "a reply to an earlier request, or more noise: nothing is sent before the line was silent"
     HUSHING = "the same, which is dropped until the line is silent"
 
 
-# Python 3.11 finds a member of an Enum by a detour that costs as much as a call: each poll asks for several.
+# Python 3.11 finds a member of an Enum by a detour that costs as much as a call: each poll needs several.
 CLOSED, OPENING, IN_STEP, DISTURBED, HUSHING = LineState
 
 
 class Step(Enum):
     """A wish of a dialogue other than an exchange."""
 
-    READY = "all that a request waits for; comes to what prevents one, if anything does"
+    READY = "everything that a request waits for; comes to the obstacle to one, if there is any"
     HUSH = "silence; comes to noise if there is none"
     TURN = "that others have their turn"
 
@@ -95,12 +96,12 @@ class Line:
     """A line with its users.
 
     Attributes:
-        state: what may arrive; changed by :meth:`_become` alone.
-        why: what has disturbed the line, or ended it; None if a user did by leaving.
+        state: the kind of bytes that may arrive; changed by :meth:`_become` alone.
+        why: the outcome that has disturbed the line, or ended it; None if it was closed by its users.
         forgives: whether a lost or damaged byte is no reason to give up the line.
         keeps_silence: whether this end keeps the silence between frames; a serial server keeps its own.
         silence: that silence.
-        echo: whether the line brings back what is sent.
+        echo: whether the line brings back each request.
         asked_at: the time of the last request, by the loop's own clock.
     """
 
@@ -115,7 +116,7 @@ class Line:
     ) -> None:
         """Keep the settings; opens nothing.
 
-        ``stray`` says what bytes without a request mean. ``wire`` is that to the address unless given. With
+        ``stray`` judges bytes without a request. ``wire`` is the usual one to the address unless given. With
         ``shares`` the line may have several users at a time. ``log`` is that of its only user.
         """
         self.state, self.why = CLOSED, None
@@ -137,7 +138,7 @@ class Line:
         self._speaker: object = None
         """Who had the last turn, and has not left since."""
         self._in_flight: tuple[Exchange, asyncio.Future[Answer], float] | None = None
-        """The exchange in flight, what it comes to, and the longest time for that in seconds."""
+        """The exchange in flight, the future of its answer, and the longest time for that in seconds."""
         self._send: Send
         self._watchdog: Watchdog
 
@@ -222,7 +223,7 @@ class Line:
             raise
         self._become(IN_STEP if self.why is None else DISTURBED, self.why)
         _opened[id(self)] = self
-        self.silence.hear(self._watchdog.clock())  # whatever the line carried for the last connection
+        self.silence.hear(self._watchdog.clock())  # for frames of the last connection
 
     def release(self, user: object) -> None:
         """End the use of the line for good."""
@@ -260,7 +261,7 @@ class Line:
     # -- a dialogue --------------------------------------------------------------------------------------
 
     async def talk(self, user: object, dialogue: Dialogue[T]) -> T:
-        """Carry out a dialogue, in a turn of this user; return what it returns.
+        """Carry out a dialogue, in a turn of this user; return its result.
 
         Raises:
             RobotiqConnectionError: the dialogue has raised it; the user has left the line.
@@ -270,7 +271,7 @@ class Line:
                 must_hush = self._shares and await self._take_turn(user)
             except BaseException:
                 # Before the first turn the user has nothing on its way, and stays. Between two turns it may
-                # have, and another one has the line: that exchange goes on.
+                # have, and another one has the line, whose exchange must not end.
                 if inspect.getgeneratorstate(dialogue) != inspect.GEN_CREATED:
                     self.leave(user)
                 raise
@@ -331,7 +332,7 @@ class Line:
         return answer
 
     async def _hush(self) -> Answer:
-        """Drop what arrives until the line is silent."""
+        """Drop all bytes until the line is silent."""
         # Closed, the next request has the reason. Another user may have brought the line in step since.
         if self.state is CLOSED or (self.state is IN_STEP and self.is_shared):
             return DONE
@@ -350,10 +351,10 @@ class Line:
             self._become(IN_STEP)
         return DONE
 
-    # -- what the wire and the watchdog call -------------------------------------------------------------
+    # -- called by the wire and the watchdog -------------------------------------------------------------
 
     def _heard(self, data: bytes) -> None:
-        """Take what has arrived; the last byte of the reply ends the exchange, or the first wrong one."""
+        """Take bytes; the last one of the reply ends the exchange, or the first wrong one."""
         if self.forgives or self.state is HUSHING:
             self.silence.hear(self._watchdog.clock())
         if self._in_flight is not None:
@@ -365,7 +366,7 @@ class Line:
             self._note(news)
 
     def _note(self, outcome: Outcome) -> None:
-        """Take news that are no bytes, or that no exchange waits for, or the end of the wire."""
+        """Take news without bytes, bytes for no exchange, or the end of the wire."""
         if self.state is OPENING:
             self._become(OPENING, outcome)
         elif isinstance(outcome, Lost) or not self.forgives:
@@ -379,7 +380,7 @@ class Line:
         self._end(exchange.late(self.address, seconds))
 
     def _end(self, answer: Answer) -> None:
-        """End the exchange in flight, if there is one; after all but an answer more may come."""
+        """End the exchange in flight, if there is one; without a whole reply, more may come."""
         if isinstance(answer, Outcome) and not isinstance(answer, Refused) and self.state is not CLOSED:
             self._become(DISTURBED, answer)
         if self._in_flight is None:

@@ -1,8 +1,8 @@
 """The link to one gripper over Modbus: TCP, a serial line, or a serial line behind a socket.
 
 pymodbus's asynchronous client opens and closes the connection (wires.py). The exchanges on it are made here,
-because a client that may retry, reconnect or accept a doubtful reply could send a motion twice: what is said
-is in dialogue.py, when in line.py, and what counts as an answer in exchange.py and frames.py.
+because a client that may retry, reconnect or accept a doubtful reply could send a motion twice: dialogue.py
+has the requests, line.py their time, and exchange.py and frames.py judge the replies.
 
 * Transaction ids start at random and continue over connections, so that a reply left over from an earlier
   connection is recognised. They repeat after 65,535 requests.
@@ -101,7 +101,7 @@ class ModbusTransport:
 
     @property
     def echoes(self) -> bool:
-        """Whether the line was seen to echo what is sent; the echo is dropped."""
+        """Whether the line was seen to echo requests; the echo is dropped."""
         return bool(self._dialogues.line.echo.is_on)
 
     @property
@@ -129,7 +129,7 @@ class ModbusTransport:
         return self._dialogues.line.talk(self, self._dialogues.read())
 
     def send(self, decide: Decide) -> Coroutine[Any, Any, bool]:
-        """Write what ``decide`` returns, if anything; on a serial line after the silence between frames.
+        """Write the image that ``decide`` returns, if any; on a serial line after the silence between frames.
 
         Raises:
             RobotiqConnectionError: no clean acknowledgement in time; the transport is closed.
@@ -137,7 +137,7 @@ class ModbusTransport:
         return self._dialogues.line.talk(self, self._dialogues.write(decide))
 
     def send_and_read(self, decide: Decide) -> Coroutine[Any, Any, WriteAnswer | None]:
-        """Write what ``decide`` returns, if anything, and read the status, with function 23.
+        """Write the image that ``decide`` returns, if any, and read the status, with function 23.
 
         Raises:
             RobotiqConnectionError: no clean answer in time, and no status after it; the transport is closed.
@@ -145,7 +145,7 @@ class ModbusTransport:
         return self._dialogues.line.talk(self, self._dialogues.write_and_read(decide))
 
     def stop_or_read(self, decide: Decide) -> Coroutine[Any, Any, Registers | None]:
-        """Write what ``decide`` returns when the turn comes, if anything; else read the status.
+        """Write the image that ``decide`` returns when the turn comes, if any; else read the status.
 
         Raises:
             RobotiqConnectionError: no clean answer in time; the transport is closed.

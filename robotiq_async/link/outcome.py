@@ -1,7 +1,7 @@
 """Outcomes of requests without an answer. A dialogue decides by the kind, and by nothing else.
 
 ======== ============================================ ===================================
-outcome  what happened                                what may still come
+outcome  meaning                                      may still come
 ======== ============================================ ===================================
 Refused  a whole exception reply                      nothing
 Noise    bytes that cannot become the answer          the rest of them, or the answer
@@ -26,7 +26,7 @@ UNKNOWN_FUNCTION: Final = 1
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """An end without an answer; ``error`` is what users see of it."""
+    """An end without an answer; users see its ``error``."""
 
     error: RobotiqConnectionError
 
@@ -55,7 +55,7 @@ class Lost(Outcome):
 
 
 Answer = bytes | Outcome
-"""The answer to a request, or what came in place of one."""
+"""The answer to a request, or its outcome without one."""
 
 
 def check(answer: Answer) -> bytes:

@@ -32,7 +32,7 @@ def new_gripper(simulation: Simulation, model: Model = THREE_FINGER) -> Simulate
     from ..simulator import Physics, SimulatedGripper  # noqa: PLC0415
 
     scene = simulation.physics
-    # A thread of its own steps it: the loop must not wait.
+    # Another thread steps it: the loop must not wait.
     physics = None if scene is None else Physics(scene, threaded=True)
     gripper = SimulatedGripper(speedup=simulation.speedup, model=model, physics=physics)
     if physics is not None:
@@ -43,7 +43,7 @@ def new_gripper(simulation: Simulation, model: Model = THREE_FINGER) -> Simulate
 
 
 def named(gripper: SimulatedGripper, address: Address) -> str:
-    """The address of the hand that has this gripper: every ``sim://`` is a gripper of its own."""
+    """The address of the hand that has this gripper: every ``sim://`` is another gripper."""
     name = f"{address}#{id(gripper):x}"
     _GRIPPERS[name] = gripper
     return name

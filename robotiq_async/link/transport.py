@@ -37,7 +37,7 @@ class Link(Protocol):
 
     @property
     def asked_at(self) -> float:
-        """When the status that was read last was asked for: a read may be repeated, or wait for its turn."""
+        """When the read of the last status left: it may have been repeated, or have waited for its turn."""
 
     async def open(self) -> None:
         """Connect.
@@ -54,7 +54,7 @@ class Link(Protocol):
         """
 
     async def send(self, decide: Callable[[], Sequence[int] | None]) -> bool:
-        """Write what ``decide`` returns, exactly once, if it returns anything.
+        """Write the image that ``decide`` returns, exactly once, if it returns one.
 
         A write may have to wait for the silence between the frames of a serial line, or for its turn on one
         that others use. A request that stops the hand in that time must still count, so ``decide`` is called
@@ -83,7 +83,7 @@ class CyclicLink(Link, Protocol):
         """As :meth:`send`, and read the status in the same exchange; None if nothing new was written.
 
         ``decide`` is called again if the gripper refuses such an exchange, before another one is tried. It is
-        not called if the last image was written once more, to try such an exchange.
+        not called if the last image was written again, to try such an exchange.
 
         Raises:
             RobotiqConnectionError: no clean answer in time, and no status after it; the link is closed.
@@ -99,7 +99,7 @@ class SharedLink(Link, Protocol):
         """Whether others use the line now."""
 
     async def stop_or_read(self, decide: Callable[[], Sequence[int] | None]) -> Registers | None:
-        """Write what ``decide`` returns, exactly once, if it returns anything; else read the status.
+        """Write the image that ``decide`` returns, exactly once; read the status if it returns none.
 
         ``decide`` is called when the turn has come: a stop from the time of waiting leaves in this turn, and
         not after one more of every other user.

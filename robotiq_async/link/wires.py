@@ -1,15 +1,15 @@
-"""Wires: what carries the bytes of a line. Sockets and serial ports, which pymodbus's clients open and close.
+"""Wires carry the bytes of a line: sockets and serial ports, which pymodbus's clients open and close.
 
 All that this package knows of the inside of a pymodbus client is here. A client is made for each connection,
 without retries and without reconnecting. Its receiver is replaced before the first byte can arrive: its
-buffer silently drops what does not fit, and its framer accepts replies that frames.py refuses. Its connect()
-only logs why it fails; the call inside it raises that.
+buffer silently drops bytes that do not fit, and its framer accepts replies that frames.py refuses. Its
+connect() only logs why it fails; the call inside it raises that.
 
 Serial ports are read and written by descriptor. pyserial's read() waits with select(), which refuses
 descriptors of 1024 and above, and its write() tries again in a busy loop while the port takes no more. Ports
 without a descriptor, as on Windows, are left to pymodbus.
 
-What others raise becomes an error of ours by a table for each call.
+Exceptions of others become a ConnectFailedError by a table for each call.
 """
 
 from __future__ import annotations
@@ -67,18 +67,20 @@ class Wire(Protocol):
 
     @property
     def may_echo(self) -> bool:
-        """Whether what is sent may come back before the reply."""
+        """Whether a request may come back before its reply."""
 
     async def open(self, on_data: OnData, on_end: OnEnd, seconds: float) -> Send:
-        """Connect; return what sends a frame, which never blocks and raises OSError when the wire has ended.
+        """Connect; return a function that sends a frame.
+
+        That never blocks, and raises OSError when the wire has ended.
 
         Args:
-            on_data: gets what arrives, from the first byte on.
+            on_data: gets all bytes, from the first one on.
             on_end: gets the reason when the wire has ended by itself, or a request on it without an answer.
             seconds: for how long the caller waits; it cancels the call then.
 
         Raises:
-            ConnectFailedError: it cannot be opened, for whatever reason.
+            ConnectFailedError: it cannot be opened, for any reason.
         """
 
     def close(self) -> None:
@@ -92,7 +94,7 @@ def wire_to(address: Address) -> Wire:
 
 @contextlib.contextmanager
 def failing_as(table: ErrorTable, address: Address) -> Iterator[None]:
-    """Turn what a call raises into a ConnectFailedError."""
+    """Turn the exceptions of a call into a ConnectFailedError."""
     try:
         yield
     except RobotiqConnectionError:
@@ -144,7 +146,7 @@ class _ClientWire:
         return send
 
     def _set_up(self, transport: AsyncioTransport, on_data: OnData, on_end: OnEnd) -> Send:
-        """Tune a connection that was just made; return what sends a frame on it."""
+        """Tune a connection that was just made; return a function that sends frames on it."""
         raise NotImplementedError
 
 

@@ -6,12 +6,12 @@ for 60 ms again, for a gripper that answers slowly. The silence after it takes a
 misses a user rests for a second between two questions, so a silent gripper costs the others 5 % of their
 rate, and 80 ms at a time.
 
-A write of which no status tells what became has the whole response timeout, because a late acknowledgement
+A write whose outcome no status shows has the whole response timeout, because a late acknowledgement
 would cost the link. So a gripper that falls silent on it, on its own stop for example, keeps the others
 waiting for that time, once: a link that is lost is opened again with questions.
 
 A response timeout that is longer than the usual one means a slow line, and lengthens the questions alike. So
-do answers that have just taken long, of whichever gripper: the adapter, a server or a busy machine is slow.
+do answers that have just taken long, of any gripper: the adapter, a server or a busy machine is slow.
 """
 
 # Misses in a row    The next question waits for    and comes, after the last one,
@@ -69,7 +69,7 @@ class LinePatience:
         )
 
     def note(self, user: object, answer: Answer, asked: float, now: float) -> None:
-        """Take what a question of the time ``asked`` has come to."""
+        """Note the answer to a question that left at ``asked``."""
         if isinstance(answer, Silent):
             misses = 1 + (self._silent[user].misses if user in self._silent else 0)
             rest = 0.0 if misses == 1 else TURN_SOON_S if misses <= SOON else LINE_REST_S

@@ -33,7 +33,7 @@ class Silence:
     """
 
     def __init__(self, character_s: float) -> None:
-        """Begin with the short silence; ``character_s`` is what a character takes on the line, in seconds."""
+        """Begin with the short silence; a character takes ``character_s`` seconds on the line."""
         self.short_s: Final = SHORT_CHARACTERS * character_s
         self.heard: float = -math.inf
         self.is_long: bool = False

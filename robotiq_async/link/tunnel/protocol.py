@@ -1,7 +1,7 @@
 """The contract of a tunnel, and how the address of one leads to it.
 
-An arm carries the serial line at its tool in a protocol of its own. Who knows that protocol writes a class of
-three methods; all that a link does is built on it, as on a serial line.
+An arm carries the serial line at its tool in its own protocol. Who knows that protocol writes a class of
+three methods, and a link uses it as a serial line.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ class Tunnel(Protocol):
             pdu: a request of function 3, 4, 16 or 23, of 26 bytes at most.
 
         Raises:
-            TimeoutError: the gripper does not answer, and the tunnel stays open; a read is asked once more.
-            ProtocolError: what has come is not the answer; as above.
+            TimeoutError: the gripper does not answer, and the tunnel stays open; a read is repeated.
+            ProtocolError: the reply is not the answer; as above.
             Exception: the tunnel is lost: the hand closes it and opens it again.
         """
 

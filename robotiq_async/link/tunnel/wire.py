@@ -3,8 +3,7 @@
 Each frame is one call of :meth:`Tunnel.exchange`, in a task that makes all calls. A call whose answer is no
 longer waited for is cancelled when the next request leaves, and that request waits for its end. So a tunnel
 never carries two requests at a time, and a request that it still keeps has left it before the next one does.
-What it brings back late is dropped, and a write without an answer stays in doubt until the gripper shows what
-became of it (dialogue.py).
+A late reply is dropped, and a write without an answer stays in doubt until a status tells (dialogue.py).
 """
 
 from __future__ import annotations
@@ -55,7 +54,7 @@ class TunnelWire:
         self._on_end: OnEnd
 
     async def open(self, on_data: OnData, on_end: OnEnd, seconds: float) -> Send:
-        """Open the tunnel, after whatever it still does for an earlier connection."""
+        """Open the tunnel, after its last call for an earlier connection."""
         self._on_data, self._on_end = on_data, on_end
         self._loop = asyncio.get_running_loop()
         with failing_as(TUNNEL_ERRORS, self._address):
@@ -67,7 +66,7 @@ class TunnelWire:
         self._call = call = self._worker.begin(lambda: self._tunnel.exchange(pdu), lambda: self._take(call))
 
     def _take(self, call: TunnelCall) -> None:
-        """Pass on what a call came to, if it is still waited for."""
+        """Pass on the result of a call, if the line still waits for it."""
         if call is not self._call:
             return
         self._call = None

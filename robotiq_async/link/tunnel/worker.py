@@ -29,16 +29,16 @@ class Worker:
         self._task: asyncio.Task[None] | None = None
         self._calls: _Calls
 
-    async def call(self, what: Callable[[], Awaitable[T]], seconds: float) -> T:
-        """Make a call and wait for its result; ``what`` may raise before it returns an awaitable.
+    async def call(self, work: Callable[[], Awaitable[T]], seconds: float) -> T:
+        """Make a call and wait for its result; ``work`` may raise before it returns an awaitable.
 
         Raises:
             LateError: the time limit expired.
-            Exception: raised by the call; a CancelledError of its own becomes a RuntimeError.
+            Exception: raised by the call; a CancelledError that it raises becomes a RuntimeError.
         """
         loop = asyncio.get_running_loop()
         ended = loop.create_future()
-        call = self._put(what, lambda: ended.set_result(None))
+        call = self._put(work, lambda: ended.set_result(None))
         due = loop.time() + seconds
         try:
             await asyncio.wait({ended}, timeout=seconds)
@@ -57,13 +57,13 @@ class Worker:
             raise call.error
         raise RuntimeError(f"it ended with {call.error!r}") from call.error
 
-    def begin(self, what: Callable[[], Awaitable[Any]], on_end: Callable[[], None]) -> TunnelCall:
+    def begin(self, work: Callable[[], Awaitable[Any]], on_end: Callable[[], None]) -> TunnelCall:
         """Begin a call, after those before it; ``on_end`` is called as soon as it has ended."""
-        return self._put(what, on_end)
+        return self._put(work, on_end)
 
-    def end(self, what: Callable[[], Awaitable[None]]) -> None:
+    def end(self, work: Callable[[], Awaitable[None]]) -> None:
         """Make a last call, which must limit its own time and not fail, then end the task. Does not wait."""
-        self._put(what, lambda: None, is_last=True)
+        self._put(work, lambda: None, is_last=True)
 
     async def ended(self, seconds: float) -> bool:
         """Wait for the end of the task; returns whether it has ended."""
@@ -72,10 +72,10 @@ class Worker:
         return self._task is None or self._task.done()
 
     def _put(
-        self, what: Callable[[], Awaitable[Any]], on_end: Callable[[], None], *, is_last: bool = False
+        self, work: Callable[[], Awaitable[Any]], on_end: Callable[[], None], *, is_last: bool = False
     ) -> TunnelCall:
         loop = asyncio.get_running_loop()
-        call = TunnelCall(what, on_end, is_last)
+        call = TunnelCall(work, on_end, is_last)
         if self._task is None or self._task.done() or self._task.get_loop() is not loop:
             self._calls = _Calls()
             self._start(loop)
@@ -133,8 +133,8 @@ class TunnelCall:
         error: the exception that it raised.
     """
 
-    def __init__(self, what: Callable[[], Awaitable[Any]], on_end: Callable[[], None], is_last: bool) -> None:
-        self._what: Final = what
+    def __init__(self, work: Callable[[], Awaitable[Any]], on_end: Callable[[], None], is_last: bool) -> None:
+        self._work: Final = work
         self._on_end: Final = on_end
         self.is_last: Final = is_last
         self.is_given_up: bool = False
@@ -143,11 +143,11 @@ class TunnelCall:
         self.error: BaseException | None = None
 
     async def make(self) -> None:
-        """Run the call; raises only what ends the task."""
+        """Run the call; raises only an exception that ends the task."""
         self.task = task = asyncio.current_task()
         assert task is not None
         try:
-            self.result = await self._what()
+            self.result = await self._work()
         except BaseException as error:
             self.error = error
             if not (isinstance(error, Exception) or self.is_given_up):
