@@ -28,10 +28,10 @@ from ..runtime.logger import Log
 from ..values.errors import ResponseTimeoutError, RobotiqConnectionError
 from ..values.registers import REGISTER_COUNT, RegisterMap, Registers
 from . import transport
-from .exchange import Exchange, Timing
+from .exchange import Dialogue, Exchange, Step, Timing
 from .frames import read_request, registers_in, write_and_read_request, write_request
 from .in_force import image_in_force, shows
-from .line import Dialogue, Line, Step
+from .line import Line
 from .outcome import PASSING, UNKNOWN_FUNCTION, Answer, Noise, Outcome, Refused, Silent, check
 from .serial.patience import USUAL_RESPONSE_S
 

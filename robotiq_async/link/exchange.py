@@ -1,4 +1,4 @@
-"""One request and the bytes of its reply so far: bytes in, an answer or an outcome out.
+"""One request and the bytes of its reply so far: bytes in, an answer or an outcome out. Other steps.
 
 No I/O, no clock and no event loop. A line sends :attr:`Exchange.frame` and feeds the bytes that arrive; the
 first thing that comes out is the last. An answer is its body from the function code on; of other protocols,
@@ -14,11 +14,15 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import Final, NamedTuple
+from collections.abc import Generator
+from enum import Enum
+from typing import Final, NamedTuple, TypeVar
 
 from ..values.errors import ResponseTimeoutError
 from . import frames
 from .outcome import Answer, Noise, Silent, Stray
+
+T = TypeVar("T")
 
 
 class Timing(NamedTuple):
@@ -94,6 +98,24 @@ class PduExchange(Exchange):
         return self._expected.verdict(received) or frames.noise(f"half an answer: {frames.show(received)}")
 
 
+class Step(Enum):
+    """A step of a dialogue other than an exchange."""
+
+    READY = "everything that a request waits for; comes to the obstacle to one, if there is any"
+    HUSH = "silence; comes to noise if there is none"
+    TURN = "that others have their turn"
+
+
+READY: Final = Step.READY
+HUSH: Final = Step.HUSH
+TURN: Final = Step.TURN
+DONE: Final = b""
+"""A wish that was fulfilled comes to this."""
+
+Dialogue = Generator[Exchange | Step, Answer, T]
+"""Yields steps and gets what each comes to: an answer, or the outcome that prevents it."""
+
+
 class EchoFilter:
     """The echo of a line, as far as it is known.
 
@@ -102,10 +124,10 @@ class EchoFilter:
     """
 
     def __init__(self) -> None:
-        self.is_on: bool | None = False
+        self.is_on: bool | None = None
 
     def learn(self, *, is_on: bool | None) -> None:
-        """Note it as an exchange has shown it; None for a new connection that may echo."""
+        """Note it as an exchange has shown it; None for a new connection."""
         self.is_on = is_on
 
 

@@ -31,7 +31,7 @@ import contextlib
 import inspect
 import logging
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from enum import Enum
 from typing import Final, TypeVar
 from weakref import WeakKeyDictionary, WeakValueDictionary
@@ -41,7 +41,7 @@ from ..runtime.logger import Log, log
 from ..values.errors import ConnectFailedError, ConnectionLostError, ProtocolError, RobotiqConnectionError
 from .address import Address
 from .canonical import canonical_address
-from .exchange import EchoFilter, Exchange
+from .exchange import DONE, HUSH, READY, TURN, Dialogue, EchoFilter, Exchange
 from .frames import stray
 from .outcome import Answer, Lost, Noise, Outcome, Refused, Stray, check
 from .serial.patience import LinePatience
@@ -72,24 +72,6 @@ class LineState(Enum):
 
 # Python 3.11 finds a member of an Enum by a detour that costs as much as a call: each poll needs several.
 CLOSED, OPENING, IN_STEP, DISTURBED, HUSHING = LineState
-
-
-class Step(Enum):
-    """A wish of a dialogue other than an exchange."""
-
-    READY = "everything that a request waits for; comes to the obstacle to one, if there is any"
-    HUSH = "silence; comes to noise if there is none"
-    TURN = "that others have their turn"
-
-
-READY: Final = Step.READY
-HUSH: Final = Step.HUSH
-TURN: Final = Step.TURN
-DONE: Final = b""
-"""A wish that was fulfilled comes to this."""
-
-Dialogue = Generator[Exchange | Step, Answer, T]
-"""Yields steps and gets what each comes to: an answer, or the outcome that prevents it."""
 
 
 class Line:
@@ -203,7 +185,7 @@ class Line:
     async def _connect(self, seconds: float) -> None:
         _close_left()
         self._watchdog = Watchdog(lambda: self._in_flight is not None, self._on_timeout)
-        self.echo.learn(is_on=None if self._wire.may_echo else False)
+        self.echo.learn(is_on=None)
         self._become(OPENING)
         try:
             with Limit(seconds) as limit:

@@ -46,28 +46,23 @@ A polling hand is never that silent. But while its program is suspended (a debug
 nothing else shows either end that the other is gone."""
 
 ErrorTable = Mapping[type[Exception], Callable[[Any], str]]
-"""The reason to show for each kind of error that a call may raise; the first kind that fits counts."""
+"""The reason to show for each kind of error that a call may raise; the first kind that fits counts. All others
+show themselves."""
 RESOLVING: Final[ErrorTable] = {
     OSError: lambda error: f"the name cannot be resolved: {error.strerror or error}",
     Exception: lambda error: f"the name cannot be resolved: {error}",  # no host name, or no thread for it
 }
 CONNECTING: Final[ErrorTable] = {
     OSError: lambda error: why_no_socket() or why_unreachable(error),
-    Exception: lambda error: str(error) or repr(error),
 }
 OPENING_ERRORS: Final[ErrorTable] = {
     ImportError: lambda _: f"serial ports need pyserial: {install('serial')}",
     OSError: why_no_port,
-    Exception: lambda error: str(error) or repr(error),
 }
 
 
 class Wire(Protocol):
     """The carrier of a line's frames. It may be opened again after it was closed."""
-
-    @property
-    def may_echo(self) -> bool:
-        """Whether a request may come back before its reply."""
 
     async def open(self, on_data: OnData, on_end: OnEnd, seconds: float) -> Send:
         """Connect; return a function that sends a frame.
@@ -100,8 +95,8 @@ def failing_as(table: ErrorTable, address: Address) -> Iterator[None]:
     except RobotiqConnectionError:
         raise
     except Exception as error:
-        why = next(reason for kind, reason in table.items() if isinstance(error, kind))
-        raise ConnectFailedError(str(address), why(error)) from error
+        known = (reason(error) for kind, reason in table.items() if isinstance(error, kind))
+        raise ConnectFailedError(str(address), next(known, str(error) or repr(error))) from error
 
 
 class _ClientWire:
@@ -113,7 +108,6 @@ class _ClientWire:
 
     def __init__(self, address: Address) -> None:
         self._address = address
-        self.may_echo: bool = address.is_rtu
 
     def close(self) -> None:
         client, self._client = self._client, None

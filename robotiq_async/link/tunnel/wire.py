@@ -38,8 +38,6 @@ TUNNEL_ERRORS: Final[ErrorTable] = {
 class TunnelWire:
     """A tunnel as a wire, over all its connections."""
 
-    may_echo = False
-
     def __init__(self, tunnel: Tunnel, address: Address, log: Log = log) -> None:
         """Keep the tunnel; opens nothing."""
         self._tunnel: Final = tunnel

@@ -42,8 +42,8 @@ from ...values import registers as reg
 from ...values.errors import ConnectFailedError, ConnectionLostError, ProtocolError, ResponseTimeoutError
 from ...values.registers import Echo, Registers
 from ..address import Address
-from ..exchange import Exchange, Timing
-from ..line import Dialogue, Line, Step
+from ..exchange import Dialogue, Exchange, Step, Timing
+from ..line import Line
 from ..outcome import Answer, Noise, Outcome, Silent
 from . import lines
 
