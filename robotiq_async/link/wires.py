@@ -46,8 +46,8 @@ A polling hand is never that silent. But while its program is suspended (a debug
 nothing else shows either end that the other is gone."""
 
 ErrorTable = Mapping[type[Exception], Callable[[Any], str]]
-"""The reason to show for each kind of error that a call may raise; the first kind that fits counts. All others
-show themselves."""
+"""The reason to show for each kind of error that a call may raise; the first kind that fits counts. An error
+that is not in the table is its own reason."""
 RESOLVING: Final[ErrorTable] = {
     OSError: lambda error: f"the name cannot be resolved: {error.strerror or error}",
     Exception: lambda error: f"the name cannot be resolved: {error}",  # no host name, or no thread for it
