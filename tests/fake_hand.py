@@ -96,11 +96,12 @@ class FakeHand(Hand):
         self._write(go=False)
 
     async def _inhibit(self, inhibit: Inhibit) -> None:
-        self._inhibited = self._inhibited or inhibit
+        self._inhibited = inhibit if self._inhibited is None else self._inhibited.again()
         await self._halt()
 
-    async def _permit(self, who: str) -> None:
-        self._inhibited = None
+    async def _permit(self, who: str, seen: Inhibit | None) -> None:
+        if seen in (None, self._inhibited):
+            self._inhibited = None
 
     @property
     def inhibited(self) -> Inhibit | None:

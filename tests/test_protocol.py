@@ -50,7 +50,7 @@ def test_every_hand_has_the_public_members_of_hand() -> None:
     """Except for members of the process that owns the link, and those that need a lease."""
     shared = members(Hand).keys()
     assert members(RobotiqHand).keys() - shared == {
-        *("add_listener", "assume", "drop_requests", "options", "resume_inhibit")
+        *("add_listener", "assume", "drop_requests", "halt_inhibited", "options", "resume_inhibit")
     }
     assert members(RemoteHand).keys() - shared == {"acquire", "take", "release", "is_in_control"}
 

@@ -33,13 +33,25 @@ def consent(address: str, what: str, *, yes: bool) -> None:
     gripper = full_address(address)
     if yes or is_simulated(address):
         return
-    screen = _screen()
-    if screen is None:
-        raise UsageError(f"this moves the gripper at {gripper}; without a terminal to ask at it needs --yes")
+    screen = screen_to_ask_at(address)
     forget_keys()
     print(f"{gripper}: {what}\n{NEVER_RUN_NOTE}\nContinue? [y/N] ", end="", file=screen, flush=True)
     if read_line().strip().lower() not in ("y", "yes"):
         raise CommandError(f"nothing was sent to the gripper at {gripper}: the answer was not yes")
+
+
+def screen_to_ask_at(address: str) -> TextIO:
+    """The screen for the question before a gripper moves.
+
+    Raises:
+        UsageError: there is no terminal to ask at, or the address is malformed.
+    """
+    screen = _screen()
+    if screen is None:
+        raise UsageError(
+            f"this moves the gripper at {full_address(address)}; without a terminal to ask at it needs --yes"
+        )
+    return screen
 
 
 def forget_keys() -> None:

@@ -18,13 +18,11 @@ from ..values.enums import NO_AXES, Fault, Finger, Initialization, State, StopLe
 from ..values.errors import (
     ConnectionLostError,
     GripperFaultError,
-    MotionInhibitedError,
     MoveSupersededError,
     NotActivatedError,
     NotStartedError,
     RobotiqError,
 )
-from ..values.inhibit import Inhibit
 from ..values.model import THREE_FINGER, Model
 from ..values.request import Request
 from ..values.states import RUNNING, SEEN
@@ -162,10 +160,9 @@ class Controller:
             who = "reset" if trigger is Trigger.ASK_RESET else "halt"
             self._begin_reset(trigger, MoveSupersededError(f"a {who} took over"))
 
-    def inhibit(self, inhibit: Inhibit) -> None:
-        """Refuse motion, and end the requests for it. A halt comes next, if the link is up."""
-        self.machine.inhibit(inhibit)
-        ended = MotionInhibitedError(self.machine.inhibited or inhibit)  # the first reason stays
+    def end_inhibited(self) -> None:
+        """End the requests for motion, which is refused now. A halt comes next, if the link is up."""
+        ended = self.machine.taken_over(MoveSupersededError("a halt took over"))
         self._ended(self._requests.drop(holds=False), ended)
         if self.machine.state is State.DISCONNECTED:
             self._requests.merge_hold(Finger.ALL, "motion was inhibited while the link was down")

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 from ..runtime.logger import Log, log
 from ..values.enums import State, Trigger
-from ..values.errors import MotionInhibitedError, RobotiqError
+from ..values.errors import MotionInhibitedError, RobotiqError, RobotiqStateError
 from ..values.inhibit import Inhibit
 from ..values.states import RUNNING, check
 from ..values.status import RobotiqStatus
@@ -39,17 +39,29 @@ class StateMachine:
         return check(trigger, self.state, status, self.inhibited if presses else None, why_down=self.why_down)
 
     def inhibit(self, inhibit: Inhibit) -> None:
-        """Refuse what may move or press from here on. The first reason stays."""
-        if self.inhibited is None:
-            self.inhibited = inhibit
-            self.log.warning("%s; a person permits it again", inhibit)
+        """Refuse what may move or press from here on. The first reason stays, and each halt counts."""
+        if self.inhibited is not None:
+            self.inhibited = self.inhibited.again()
+            return
+        self.inhibited = inhibit
+        self.log.warning("%s; a person permits it again", inhibit)
 
-    def permit(self, who: str) -> None:
-        """Refuse nothing more. What was refused is forgotten."""
-        inhibit, self.inhibited = self.inhibited, None
-        if inhibit is not None:
-            by = f" by {who}" if who else ""
-            self.log.warning("motion is permitted again%s; it was inhibited: %s", by, inhibit.reason)
+    def permit(self, who: str, seen: Inhibit | None = None) -> None:
+        """Refuse nothing more. What was refused is forgotten.
+
+        Raises RobotiqStateError if a person saw another inhibit than the one in force.
+        """
+        inhibit = self.inhibited
+        if inhibit is None:
+            return
+        if seen is not None and seen != inhibit:
+            raise RobotiqStateError(
+                f"{inhibit}; not permitted, as a halt came after the one that was seen: look at the gripper, "
+                "then permit it again"
+            )
+        self.inhibited = None
+        by = f" by {who}" if who else ""
+        self.log.warning("motion is permitted again%s; it was inhibited: %s", by, inhibit.reason)
 
     def check_permitted(self) -> None:
         """Raise MotionInhibitedError while a person has it inhibited."""

@@ -41,6 +41,8 @@ ARGUMENTS: Final = {
     "keep_grip": "whether a grip stays in force; None for the hand's own ``keep_grip``.",
     "reason": "for people, 1..200 printable characters.",
     "whose": "who or what has asked, for the log; 0..200 printable characters.",
+    "seen": "``hand.inhibited`` as the person was shown it, None for what it is at the call: a halt that "
+    "came later stays, also where the reason is the same.",
     "recovery": "seconds above 0 for all of it, while the event loop runs; None for 90.",
     "buffer": "items that are kept for a slow reader, 1..1000000.",
     "requests": "items that are kept for a slow reader, 1..1000000; None loses none.",

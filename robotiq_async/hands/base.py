@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Self
 from ..calibration import Units
 from ..calibration.amounts import LABELS, OPENINGS, RATES, force_of, needed, position_of, speed_of
 from ..runtime.concurrency import running_loop
-from ..values.checks import check_flag, check_optional_byte, check_seconds, check_timeout
+from ..values.checks import check_flag, check_optional_byte, check_seconds, check_timeout, repr_of
 from ..values.enums import CLOSED, OPEN, Finger, State
 from ..values.errors import NotStartedError
 from ..values.events import SentRequest, Transition
@@ -388,14 +388,19 @@ class Hand(HandKind):
             await self._inhibit(Inhibit(reason, who, time.time()))
 
     @describes_arguments(who="whose")
-    async def permit(self, *, who: str = "") -> None:
+    async def permit(self, *, who: str = "", seen: Inhibit | None = None) -> None:
         """Permit motion after :meth:`inhibit`; nothing moves. For a person, and not for a program's loop.
 
-        A hand on another host raises RobotiqError without an answer.
+        Raises:
+            TypeError, ValueError: of the arguments.
+            RobotiqStateError: a halt came after the one that was seen: nothing is permitted.
+            RobotiqError: a hand on another host has got no answer.
         """
         Inhibit("permitted", who, 0.0)  # checks it
+        if not isinstance(seen, Inhibit | None):
+            raise TypeError(f"seen must be an Inhibit or None, got {repr_of(seen)}")
         with self._naming:
-            await self._permit(who)
+            await self._permit(who, seen)
 
     # -- activation, faults ----------------------------------------------------------------------------
 

@@ -259,21 +259,17 @@ class RobotiqHand(Hand):
         await session.answered(lambda waiter: session.controller.hold(axes, waiter))
 
     async def _inhibit(self, inhibit: Inhibit) -> None:
-        session = self._session
-        if session is None:
-            self._machine.inhibit(inhibit)  # it counts from the first start on; nothing was moved
-            return
-        if not session.is_over:
-            session.check_loop("the hand")
-        session.controller.inhibit(inhibit)
-        if self.state is State.DO_SHUTDOWN:
-            await session.stop(halt=True)  # it may be one that leaves the fingers moving
-        await self._halt()  # raises if the hand runs no more: the fingers may still move
+        self._check_running_loop()
+        self._machine.inhibit(inhibit)
+        await self.halt_inhibited()
 
-    async def _permit(self, who: str) -> None:
+    async def _permit(self, who: str, seen: Inhibit | None) -> None:
+        self._check_running_loop()
+        self._machine.permit(who, seen)
+
+    def _check_running_loop(self) -> None:
         if self._session is not None and not self._session.is_over:
             self._session.check_loop("the hand")
-        self._machine.permit(who)
 
     @property
     def inhibited(self) -> Inhibit | None:
@@ -281,12 +277,26 @@ class RobotiqHand(Hand):
         return self._machine.inhibited
 
     def resume_inhibit(self, inhibit: Inhibit) -> None:
-        """Continue an inhibit of an earlier process, before the start. Sends nothing; the first one stays.
+        """Inhibit motion as :meth:`inhibit` does, but send nothing: for an inhibit of an earlier process.
 
         Args:
-            inhibit: its reason, who asked, and when.
+            inhibit: its reason, who asked, and when. One that there is already stays, and has one more halt.
         """
         self._machine.inhibit(inhibit)
+
+    async def halt_inhibited(self) -> None:
+        """Halt as :meth:`inhibit` does, after :meth:`resume_inhibit` of a hand that runs.
+
+        Raises:
+            RobotiqError: as :meth:`inhibit`; the fingers MAY STILL MOVE.
+        """
+        session = self._session
+        if session is None:
+            return  # it counts from the first start on; nothing was moved
+        session.controller.end_inhibited()
+        if self.state is State.DO_SHUTDOWN:
+            await session.stop(halt=True)  # it may be one that leaves the fingers moving
+        await self._halt()  # raises if the hand runs no more: the fingers may still move
 
     async def _halt(self) -> None:
         session = self._admitted()

@@ -352,8 +352,8 @@ class RobotiqHand:
     def inhibit(self, reason: str, *, who: str = "") -> None:
         self._caller.wait(lambda: self._inner.inhibit(reason, who=who))
 
-    def permit(self, *, who: str = "") -> None:
-        self._caller.wait(lambda: self._inner.permit(who=who))
+    def permit(self, *, who: str = "", seen: Inhibit | None = None) -> None:
+        self._caller.wait(lambda: self._inner.permit(who=who, seen=seen))
 
     # -- activation, faults ----------------------------------------------------------------------------
 
@@ -417,6 +417,9 @@ class RobotiqHand:
 
     def resume_inhibit(self, inhibit: Inhibit) -> None:
         self._inner.resume_inhibit(inhibit)
+
+    def halt_inhibited(self) -> None:
+        self._caller.wait(lambda: self._inner.halt_inhibited())
 
     @property
     def statistics(self) -> Statistics:

@@ -21,6 +21,7 @@ from ..values import (
     WIDTH_WIDE,
     Fault,
     Finger,
+    Inhibit,
     Initialization,
     MoveResult,
     MoveSupersededError,
@@ -131,6 +132,20 @@ class Operator:
         """
         with self._counted():
             return describe(await self.hand.move(position, fingers, speed=speed, force=force))
+
+    async def permit(self, seen: Inhibit | None) -> str:
+        """Permit motion after the halt that this person saw as the question was put; returns the outcome.
+
+        Args:
+            seen: the inhibit at that time; None permits nothing.
+
+        Raises:
+            RobotiqError: as :meth:`Hand.permit`: a halt came later.
+        """
+        if seen is None:
+            return "motion was not inhibited"
+        await self.hand.permit(who=self.who, seen=seen)
+        return "motion is permitted again"
 
     async def leave(self) -> str:
         """Stop the hand, and the fingers if this person has moved them; returns how the fingers ended.
@@ -256,8 +271,7 @@ async def _halt(operator: Operator) -> str:
 
 
 async def _permit(operator: Operator) -> str:
-    await operator.hand.permit(who=operator.who)
-    return "motion is permitted again"
+    return await operator.permit(operator.hand.inhibited)
 
 
 _ALL: Final = (

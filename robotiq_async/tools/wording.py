@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from datetime import datetime
 from typing import Any, Final
 
 from ..values import (
     NO_REQUEST,
     Finger,
     GripperFaultError,
+    Inhibit,
     InvalidStateError,
     Model,
     MotionInhibitedError,
@@ -70,6 +72,12 @@ def holding_words(status: RobotiqStatus) -> str:
     if part is None:
         return ""
     return "holding" if part.width_mm is None else f"holding {part.width_mm:.0f} mm"
+
+
+def inhibit_shown(inhibit: Inhibit) -> str:
+    """An inhibit that is in force, and since when, for a person who may permit motion."""
+    since = f"{datetime.fromtimestamp(inhibit.since).astimezone():%H:%M:%S}"
+    return f"{inhibit}, since {since}" + (f", {inhibit.halts} halts" if inhibit.halts > 1 else "")
 
 
 def inhibit_words(fields: Mapping[str, Any]) -> str:

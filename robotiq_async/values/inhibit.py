@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final, Self
 
 from .checks import as_float, repr_of
@@ -19,15 +19,18 @@ class Inhibit:
         reason: for people, 1..200 printable characters.
         who: who or what has asked for it, 0..200 printable characters; empty if that was not said.
         since: seconds since 1970, as it may outlive a process.
+        halts: how many halts of persons it stands for, from 1; the reason is that of the first. A permit of
+            what a person saw lifts no halt that came later.
 
     Raises:
-        TypeError: reason or who is not a str, or since no number.
-        ValueError: one of them is too short, too long or not printable.
+        TypeError: reason or who is not a str, since no number, or halts not an int.
+        ValueError: one of them is too short, too long or not printable, or halts is less than 1.
     """
 
     reason: str
     who: str
     since: float
+    halts: int = 1
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -35,6 +38,14 @@ class Inhibit:
         _check("who", self.who, 0)
         if as_float(self.since) is None:
             raise TypeError(f"since must be seconds since 1970, got {repr_of(self.since)}")
+        if type(self.halts) is not int:
+            raise TypeError(f"halts must be an int, got {repr_of(self.halts)}")
+        if self.halts < 1:
+            raise ValueError(f"halts must be 1 or more, got {self.halts}")
+
+    def again(self) -> Inhibit:
+        """The same after one more halt."""
+        return replace(self, halts=self.halts + 1)
 
     def as_dict(self) -> dict[str, Any]:
         """The fields in types that JSON accepts."""
@@ -43,7 +54,7 @@ class Inhibit:
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:
         """The inhibit with this :meth:`as_dict`; KeyError, TypeError or ValueError if it is that of none."""
-        return cls(fields["reason"], fields["who"], fields["since"])
+        return cls(fields["reason"], fields["who"], fields["since"], fields.get("halts", 1))
 
     def __str__(self) -> str:
         """``motion is inhibited: the guard is open (PLC)``."""

@@ -262,6 +262,11 @@ async def test_dangerous_keys_ask_first(active: Operator, gripper: SimulatedGrip
 
 async def confirmed(pilot: Screen, key: str) -> None:
     await pilot.press(key)
+    await answered(pilot)
+
+
+async def answered(pilot: Screen) -> None:
+    """Say yes, once the question could be read."""
     await until(lambda: (question := asked(pilot)) is not None and question.is_open)
     await pilot.press("y")
 
@@ -272,6 +277,24 @@ async def test_a_yes_resets_and_activates(active: Operator) -> None:
         await until(lambda: active.hand.state is State.RESET)
         await confirmed(pilot, "a")
         await sees(pilot, "#log", "activate: the gripper is active")
+
+
+async def test_a_yes_permits_motion_after_the_halt_that_the_question_showed(active: Operator) -> None:
+    hand = active.hand
+    async with shown(active) as pilot:
+        await pilot.press("m")
+        await sees(pilot, "#log", "permit: motion is not inhibited")
+        assert asked(pilot) is None
+        await hand.inhibit("the guard is open", who="PLC")
+        await pilot.press("m")
+        assert "motion is inhibited: the guard is open (PLC), since" in text(pilot, "#question")
+        await hand.inhibit("a hand is in the gripper")
+        await answered(pilot)
+        await until(lambda: "as a halt came after the one that was seen" in " ".join(log(pilot).split()))
+        assert hand.inhibited is not None
+        await confirmed(pilot, "m")
+        await sees(pilot, "#log", "permit: motion is permitted again")
+        assert hand.inhibited is None
 
 
 async def test_a_question_lies_on_the_same_screen(operator: Operator) -> None:

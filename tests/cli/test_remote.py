@@ -17,6 +17,7 @@ import pytest
 from robotiq_async import Finger
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer
 from tests.cli.conftest import PATIENCE, Beside, Call, Shell
+from tests.cli.terminal import Terminal
 
 pytest.importorskip("zenoh")
 import zenoh
@@ -182,6 +183,31 @@ async def test_a_list_and_a_halt(shell: Shell, agent: Process, gripper: Served) 
     permitted = await shell.run("fleet", "permit", "--yes", ADDRESS)
     permitted.assert_succeeded()
     assert permitted.out.startswith(f"{ADDRESS}  permitted; motion is inhibited: fleet halt")
+
+
+async def test_a_yes_permits_the_gripper_and_the_halt_that_the_question_shows(
+    shell: Shell, agent: Process
+) -> None:
+    """One gripper after another: the first was permitted, by the halt of then, once all were answered."""
+    (await shell.run("fleet", "halt", "lab")).assert_succeeded()
+    asking = Terminal("-m", "robotiq_async", "fleet", "permit", ADDRESS, ADDRESS)
+    await asking.shows(b"motion is inhibited: fleet halt")
+    await asking.shows(b"Continue? [y/N]")
+    (await shell.run("fleet", "halt", "lab")).assert_succeeded()
+    asking.press("y\n")
+    await asking.shows(b"not permitted, as a halt came after the one that was seen")
+    await asking.shows(b", 2 halts")
+    asking.press("n\n")
+    assert await asking.end() == 1
+    assert b"motion is not permitted: 2 of 2" in asking.out
+    (await shell.run("move", "9", "--yes", ADDRESS)).assert_failed(1, "motion is inhibited")
+    again = Terminal("-m", "robotiq_async", "fleet", "permit", ADDRESS, ADDRESS)
+    await again.shows(b"Continue? [y/N]")
+    again.press("y\n")
+    assert await again.end() == 0
+    assert b"permitted; motion is inhibited: fleet halt" in again.out
+    assert b"was not inhibited" in again.out
+    (await shell.run("move", "9", "--yes", ADDRESS)).assert_succeeded()
 
 
 def test_a_halt_that_reaches_no_gripper_fails(call: Call, endpoint: str) -> None:

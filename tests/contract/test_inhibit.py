@@ -15,6 +15,7 @@ from robotiq_async import (
     NotStartedError,
     RobotiqError,
     RobotiqHand,
+    RobotiqStateError,
     State,
 )
 from robotiq_async.hands import Hand
@@ -81,6 +82,27 @@ async def test_what_may_move_or_press_is_refused_and_the_rest_passes(here: Bench
     assert hand.inhibited is None
     await hand.activate()
     assert (await hand.move(100, A)).reached == A
+
+
+@contract
+async def test_a_permit_lifts_the_halt_that_was_seen_and_no_later_one(here: Bench, hand: Hand) -> None:
+    """The later one may have the same words: it was lifted by a yes to the question of the one before."""
+    await hand.inhibit(REASON, who=WHO)
+    seen = hand.inhibited
+    await hand.inhibit(REASON, who=WHO)
+    for _ in range(2):
+        with pytest.raises(RobotiqStateError, match="look at the gripper, then permit it again"):
+            await hand.permit(seen=seen)
+        await refused(hand.move(200))
+    await hand.permit(seen=hand.inhibited)
+    await hand.move(100, A)
+    await hand.permit(seen=seen)  # there is nothing to permit
+    await hand.inhibit(REASON, who=WHO)
+    with pytest.raises(RobotiqStateError, match="look at the gripper"):
+        await hand.permit(seen=seen)
+    await refused(hand.move(200))
+    with pytest.raises(TypeError, match="seen must be an Inhibit"):
+        await hand.permit(seen=REASON)  # type: ignore[arg-type]
 
 
 @contract

@@ -53,7 +53,7 @@ def test_an_activation_that_runs_as_the_link_is_back_is_reset_while_inhibited(fa
     scan = activating()
     scan.controller.lost(None, scan.now)
     scan.machine.inhibit(INHIBIT)
-    scan.controller.inhibit(INHIBIT)
+    scan.controller.end_inhibited()
     if fault is not None:
         scan.gripper.inject_fault(fault, 0.5)
     scan.come_back(0.05)

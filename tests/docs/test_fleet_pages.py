@@ -82,7 +82,7 @@ EXAMPLES: Final = [
     event(39, {"kind": "request", **SentRequest(IMAGE, 811.53125, acknowledged=True).as_raw()}),
     event(40, {"kind": "lease", "number": 3, "holder": LABEL, "reason": "granted"}),
     event(41, {"kind": "conflict", "key": NAME.key("alive", "77")}),
-    event(42, {"kind": "inhibit", "stamp": 812.4375, "inhibited": INHIBIT.as_dict(), "inhibit_number": 2}),
+    event(42, {"kind": "inhibit", "stamp": 812.4375, "inhibited": INHIBIT.as_dict()}),
     json.loads(MOVE.pack()),
     json.loads(AgentAnswer(NAME.base, 7, EPOCH, RESULT.as_dict() | {"status": STATUS.as_raw()}).pack()),
     json.loads(

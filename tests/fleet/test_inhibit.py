@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from robotiq_async import Finger, Inhibit, MotionInhibitedError, RobotiqError, RobotiqHand
+from robotiq_async import Finger, Inhibit, MotionInhibitedError, RobotiqError, RobotiqHand, RobotiqStateError
 from robotiq_async.fleet.agent import records
 from robotiq_async.fleet.agent.agent import Agent
 from robotiq_async.fleet.agent.inhibits import Inhibits
@@ -123,13 +123,14 @@ async def test_a_permit_lifts_the_inhibit_that_its_person_saw_and_no_later_one(h
         permitting = asyncio.create_task(one.permit(who="one"))
         await asyncio.sleep(0.1)
         await other.inhibit("a hand is in the gripper")
-        with pytest.raises(AgentError, match="look at the gripper"):
+        with pytest.raises(RobotiqStateError, match="look at the gripper"):
             await permitting
         assert here.local.inhibited is not None
+        for named in ({}, {"inhibited": 3}, {"inhibited": {"reason": "", "who": "", "since": 1}}):
+            with pytest.raises(RobotiqStateError, match="look at the gripper"):
+                await other._session.dialog.ask("lease", {"what": "permit", **named}, timeout=1)  # type: ignore[union-attr]
         await other.permit()
         assert here.local.inhibited is None
-        with pytest.raises(AgentError, match="look at the gripper"):  # it names none
-            await other._session.dialog.ask("lease", {"what": "permit"}, timeout=1)
 
 
 @pytest.mark.parametrize("is_halt_first", [True, False])

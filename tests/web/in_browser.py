@@ -351,6 +351,26 @@ async def permit(browser: Browser, hand: RobotiqHand) -> None:
     await browser.until(insist)
 
 
+async def test_a_yes_is_for_the_halt_that_its_question_showed(browser: Browser, stage: Stage) -> None:
+    """It lifted the newest one, also where that came after the question."""
+    hand = stage.hand
+    await hand.inhibit("the guard is open", who="PLC")
+    await browser.says("banner", "the guard is open (PLC)")
+    await browser.click("helps")
+    await browser.says("about-permit", "motion is inhibited: the guard is open (PLC), since")
+    await hand.inhibit("a hand is in the gripper")
+    await browser.says("banner", "2 halts")
+
+    def insist() -> bool:  # a yes does not count before it can have been read
+        with contextlib.suppress(WebDriverException):
+            browser.find("yes-permit").click()
+        return "a halt came after the one that was seen" in browser.find("outcome").text
+
+    await browser.until(insist)
+    assert hand.inhibited is not None
+    await permit(browser, hand)
+
+
 async def test_the_loop_of_a_service_moves_nothing_after_an_operators_halt(
     window: Browser, stage: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:

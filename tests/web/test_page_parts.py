@@ -122,6 +122,28 @@ def test_no_refusal_has_a_method_or_a_state_of_the_library(trigger: Trigger, sta
         assert not [each.name for each in State if "_" in each.name and each.name in words]
 
 
+async def test_a_permit_is_of_the_halt_that_the_page_showed() -> None:
+    hand = RobotiqHand("sim://")
+    pages = Pages(hand)
+
+    async def permit(seen: object) -> str:
+        pages.do("permit", confirm=True, seen=seen)
+        return str((await pages.answer())["words"])
+
+    await hand.inhibit("HALT was pressed", who="the page")
+    assert hand.inhibited is not None
+    seen = json.loads(json.dumps(hand.inhibited.as_dict()))
+    await hand.inhibit("HALT was pressed", who="the page")
+    assert "a halt came after the one that was seen: look at the gripper" in await permit(seen)
+    assert "seen must be the inhibit that was shown" in await permit(None)
+    assert "unexpected keyword" in await permit({**seen, "more": 1})
+    pages.do("permit", confirm=True)
+    assert "permit takes confirm, seen" in (await pages.answer())["words"]
+    assert hand.inhibited is not None
+    assert await permit(hand.inhibited.as_dict()) == "motion is permitted again"
+    assert hand.inhibited is None
+
+
 async def test_without_operators_nothing_is_carried_out() -> None:
     """Whatever the process of the page sends: looking only is decided in the process of the hand."""
     pages = Pages()

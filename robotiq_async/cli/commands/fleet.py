@@ -12,14 +12,18 @@ from typing import TYPE_CHECKING, Annotated, Final
 from cyclopts import Parameter
 
 from ...runtime import now, printable
+from ...tools.wording import inhibit_shown
+from ...values import RobotiqError
 from ..arguments import Flag, Yes, need
-from ..consent import consent
+from ..consent import consent, screen_to_ask_at
 from ..failures import CommandError, UsageError, normal_end, usage
 
 if TYPE_CHECKING:
     from ...fleet.fleet import Fleet, Member
     from ...fleet.keys.access import Role
+    from ...hands import Hand
 
+PERMIT_WARNING = "If motion is permitted again, a program may MOVE its fingers at once."
 DISCOVERY_S = 1.5
 """Seconds to collect: agents publish a summary of each gripper once a second."""
 _ROW = "{:<27} {:<13} {:<6} {:<17} {}"  # 80 columns, unless a name is long
@@ -103,8 +107,9 @@ async def halt(site: Site = None, /) -> None:
 async def permit(*addresses: str, yes: Yes = False) -> None:
     """Permit motion again after a halt, of the grippers that are named. Look at them first.
 
-    Nothing moves by it, but a program may move the fingers at once: it asks, and without a
-    terminal needs --yes.
+    Nothing moves by it, but a program may move the fingers at once. It shows the halt of one
+    gripper after another and asks, and without a terminal needs --yes. A halt that comes after
+    the question stays. Exits with 1 unless motion of all of them is permitted.
 
     For example:
 
@@ -121,13 +126,29 @@ async def permit(*addresses: str, yes: Yes = False) -> None:
     if not addresses or not all(map(is_remote, addresses)):
         raise UsageError("name grippers of agents: robotiq-async fleet permit zenoh://SITE/HOST/GRIPPER")
     hands = [make_hand(address, control=False) for address in addresses]
+    if not yes:
+        screen_to_ask_at(addresses[0])
+    left = 0
     for hand in hands:
-        consent(hand.address, "motion is permitted again: a program may MOVE its fingers at once", yes=yes)
-    for hand in hands:
-        async with hand:
-            inhibit = hand.inhibited
-            await hand.permit()
-        print(f"{hand.address}  {'was not inhibited' if inhibit is None else f'permitted; {inhibit}'}")
+        try:
+            outcome = await _permitted(hand, yes=yes)
+        except (RobotiqError, CommandError) as error:
+            outcome, left = f"not permitted: {error}", left + 1
+        print(f"{hand.address}  {printable(outcome)}", flush=True)
+    if left:
+        raise CommandError(f"motion is not permitted: {left} of {len(hands)}")
+
+
+async def _permitted(hand: Hand, *, yes: bool) -> str:
+    """Ask, and permit motion after the halt that the question showed."""
+    async with hand:
+        seen = hand.inhibited
+    if seen is None:
+        return "was not inhibited"
+    consent(hand.address, f"{inhibit_shown(seen)}\n{PERMIT_WARNING}", yes=yes)
+    async with hand:  # again: a question may be open for hours
+        await hand.permit(seen=seen)
+    return f"permitted; {seen}"
 
 
 async def _watch(seen: Fleet, show: Callable[[Member], None]) -> None:

@@ -20,7 +20,7 @@ from ...runtime import now
 from ...tools.actions import ACTIONS, Operator
 from ...tools.recording.feed import Timeline
 from ...tools.recording.payloads import title
-from ...tools.wording import refusal_words
+from ...tools.wording import inhibit_shown, refusal_words
 from ...values import Finger, RobotiqError, RobotiqStatus, State
 from ..output.lines import clock, event_line
 from .asking import Asking, Question, TargetQuestion
@@ -74,7 +74,7 @@ class Monitor(App[None]):
         ("r", "act('reset')", "reset"),
         ("l", "act('release')", "release"),
         ("v", "act('recover')", "recover"),
-        ("m", "act('permit')", "permit"),
+        ("m", "permit", "permit"),
         ("p", "position", "position"),
         ("plus,equals_sign", f"speed({KEY_STEP})", "faster"),
         ("minus", f"speed(-{KEY_STEP})", "slower"),
@@ -185,14 +185,20 @@ class Monitor(App[None]):
     def action_act(self, name: str) -> None:
         """Carry out an action; a dangerous one only after a yes."""
         action = ACTIONS[name]
-
-        def begin() -> None:
-            self._begin(action.name, partial(self._operator.act, action))
-
+        begin = partial(self._begin, action.name, partial(self._operator.act, action))
         if action.warning:
             self.ask(Question(f"{action.name}: {action.what}?", action.warning, begin))
         else:
             begin()
+
+    def action_permit(self) -> None:
+        """Permit motion after a yes: of the halt that the question shows, and of none that comes later."""
+        action, seen = ACTIONS["permit"], self._hand.inhibited
+        if seen is None:
+            self.write_log("permit: motion is not inhibited", "bold")
+            return
+        begin = partial(self._begin, action.name, partial(self._operator.permit, seen))
+        self.ask(Question(f"{action.name}: {action.what}?\n{inhibit_shown(seen)}", action.warning, begin))
 
     def action_position(self) -> None:
         """Ask for axes and a position, and move."""

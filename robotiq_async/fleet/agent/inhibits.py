@@ -8,19 +8,18 @@ from typing import Final
 from ...local import RobotiqHand
 from ...runtime import now
 from ...values import Inhibit
-from ..errors import AgentError
 from ..wire.envelope import AgentCall
 from ..wire.values import LABEL_MAX, Fields, label_of
 
+_NONE: Final = Inhibit("none", "", 0.0)
 _UNREADABLE: Final = Inhibit("the record of an inhibit cannot be read", "", 0.0)
 
 
 class Inhibits:
-    """The inhibit of one hand. Each halt that inhibits has a number, and a permit lifts what it names."""
+    """The inhibit of one hand. A permit lifts what it names, and no later halt."""
 
     def __init__(self, hand: RobotiqHand) -> None:
         self._hand = hand
-        self._number = 0  # of the newest halt that has inhibited motion, in this run of the agent
 
     @property
     def record(self) -> Fields | None:
@@ -30,11 +29,7 @@ class Inhibits:
 
     def resume(self, record: object) -> None:
         """Continue an inhibit of the run before. One that cannot be read counts as well."""
-        try:
-            inhibit = Inhibit.from_dict(record)  # type: ignore[arg-type]
-        except (AttributeError, KeyError, TypeError, ValueError):
-            inhibit = _UNREADABLE
-        self._hand.resume_inhibit(inhibit)
+        self._hand.resume_inhibit(_read(record, _UNREADABLE))
 
     def halted(self, call: AgentCall) -> Inhibit | None:
         """Inhibit motion in this turn, if a halt asks for it. Nothing malformed keeps it from halting."""
@@ -43,21 +38,23 @@ class Inhibits:
             return None
         inhibit = Inhibit(label_of(reason) or "a halt", _signed(call), time.time())
         self._hand.resume_inhibit(inhibit)  # of several reasons the first one stays
-        self._number += 1  # a permit of an earlier one does not lift it
         return inhibit
 
     async def permit(self, call: AgentCall) -> None:
-        number = call.arguments.get("inhibit_number")
-        if type(number) is not int or number != self._number:
-            raise AgentError(
-                "a halt has inhibited motion that this permit does not name: look at the gripper, then "
-                "permit it again"
-            )
-        await self._hand.permit(who=_signed(call))  # in the turn of the check: no halt comes between
+        """Permit motion after the halt that a client names; one that names none is of none that there is."""
+        seen = _read(call.arguments.get("inhibited"), _NONE)
+        await self._hand.permit(who=_signed(call), seen=seen)
 
     def told(self) -> Fields:
-        """Whether motion is inhibited, the number that a permit of it names, and when that was so."""
-        return {"stamp": now(), "inhibited": self.record, "inhibit_number": self._number}
+        """Whether motion is inhibited, and when that was so."""
+        return {"stamp": now(), "inhibited": self.record}
+
+
+def _read(fields: object, otherwise: Inhibit) -> Inhibit:
+    try:
+        return Inhibit.from_dict(fields)  # type: ignore[arg-type]
+    except (AttributeError, KeyError, TypeError, ValueError):
+        return otherwise
 
 
 def _signed(call: AgentCall) -> str:

@@ -331,7 +331,7 @@ class ServedHand:
                 raise AgentError("the agent ended, and the fingers were not seen to stop")
         else:
             try:
-                await (self._hand.halt() if inhibit is None else self._hand.inhibit(inhibit.reason))
+                await (self._hand.halt() if inhibit is None else self._hand.halt_inhibited())
             finally:
                 if inhibit is not None:
                     self._keep_record()

@@ -74,7 +74,6 @@ class Mirror:
         received_at: arrival of the last current message.
         points: of the agent's stroke, measured on the gripper; empty for nominal openings.
         inhibited: why the agent refuses motion; None while it does not.
-        inhibit_number: the newest inhibit of that run of the agent; a permit names it. None if not known.
     """
 
     def __init__(
@@ -98,7 +97,6 @@ class Mirror:
         self.received_at: float = 0.0
         self.points: tuple[tuple[int, float], ...] = ()
         self.inhibited: Inhibit | None = None
-        self.inhibit_number: int | None = None
         self._inhibit_stamp = -math.inf
         """The agent's time of the newest word about it: a summary may be older than an answer."""
         self._mark = mark
@@ -224,7 +222,6 @@ class Mirror:
             inhibit = told["inhibited"]
             self.inhibited = None if inhibit is None else Inhibit.from_dict(inhibit)
             self._inhibit_stamp = stamp
-            self.inhibit_number = told.get("inhibit_number")
 
     def begin(self, at: float) -> None:
         self._report(State.DISCONNECTED, Trigger.ASK_START, at)
@@ -250,7 +247,7 @@ class Mirror:
         while len(self._clocks) > _RUNS:
             del self._clocks[next(iter(self._clocks))]
         self.newest = None
-        self._inhibit_stamp, self.inhibit_number = -math.inf, None
+        self._inhibit_stamp = -math.inf
         self.events = message.events
         self._events_state = as_seen_from_here(message.state)
         first = 0 if message.status is None else message.status.sequence

@@ -233,10 +233,11 @@ class RemoteHand(Hand):
         arguments = {"inhibit": inhibit.reason, "who": inhibit.who}
         self._take_over_inhibit(await self._halted(arguments))
 
-    async def _permit(self, who: str) -> None:
+    async def _permit(self, who: str, seen: Inhibit | None) -> None:
         session = self._running_session()
-        seen = session.mirror.inhibit_number  # a later halt, which this permit may overtake, stays
-        arguments = {"what": "permit", "label": own_label(), "who": who, "inhibit_number": seen}
+        named = seen or session.mirror.inhibited  # a halt that overtakes this permit stays
+        arguments: Fields = {"what": "permit", "label": own_label(), "who": who}
+        arguments["inhibited"] = None if named is None else named.as_dict()
         with no_answer_as_lost_connection():
             self._take_over_inhibit(await session.dialog.ask("lease", arguments, timeout=REMOTE_COMMAND_S))
 

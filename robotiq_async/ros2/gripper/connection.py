@@ -262,13 +262,10 @@ class PendingStop:
                 return
 
 
-def make_hand(settings: NodeSettings, before: Hand | None = None) -> Hand:
-    """A hand that is not started. In the ROS node only this function knows which kind of hand it is.
+def make_hand(settings: NodeSettings) -> Hand:
+    """A hand that is not started. In the ROS node only this module knows which kind of hand it is.
 
     A hand on another host acquires its lease with the first command: connecting only reads.
-
-    A person's inhibit stays over a cleanup and the next configure: at an agent by itself, else it is the one
-    of the hand ``before``.
 
     Raises:
         ValueError: an option that the hand refuses.
@@ -278,7 +275,24 @@ def make_hand(settings: NodeSettings, before: Hand | None = None) -> Hand:
         if find_spec("zenoh") is None:
             raise RobotiqError(f"a gripper on another host needs zenoh: {install('fleet')}")
         return RemoteHand(settings.address, control=None)
-    hand = RobotiqHand(settings.address, speed=settings.speed, force=settings.force, **settings.options)
-    if before is not None and before.inhibited is not None:
-        hand.resume_inhibit(before.inhibited)
-    return hand
+    return RobotiqHand(settings.address, speed=settings.speed, force=settings.force, **settings.options)
+
+
+class HandMaker:
+    """Makes the hand of each configure.
+
+    A person's inhibit stays over a cleanup and the next configure: at an agent by itself, here until it is
+    permitted here, also if the node has the hand of an agent in between.
+    """
+
+    def __init__(self) -> None:
+        self._newest_here: RobotiqHand | None = None
+
+    def make(self, settings: NodeSettings) -> Hand:
+        """As :func:`make_hand`."""
+        hand = make_hand(settings)
+        if isinstance(hand, RobotiqHand):
+            if self._newest_here is not None and self._newest_here.inhibited is not None:
+                hand.resume_inhibit(self._newest_here.inhibited)
+            self._newest_here = hand
+        return hand

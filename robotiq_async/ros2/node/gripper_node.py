@@ -17,9 +17,8 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
-from ...hands import Hand
 from ...values import RobotiqError
-from ..gripper.connection import NODE_COMMANDS, GripperConnection, RefusedError, make_hand
+from ..gripper.connection import NODE_COMMANDS, GripperConnection, HandMaker, RefusedError
 from ..translation.description import robot_description
 from . import parameters
 from .bridge import Bridge, ClosedError
@@ -42,7 +41,7 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
         super().__init__(NODE_NAME, context=context)
         self._bridge = bridge
         self._current: Configured | None = None  # set while the node is configured; the loop reads it too
-        self._newest_hand: Hand | None = None  # the next one has its inhibit
+        self._hands = HandMaker()
         parameters.declare(self)
         parameters.guard(self, lambda: self._current is not None, self._apply_live_parameters)
         parameters.warn_of_unknown(self)
@@ -121,8 +120,7 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
     def _configure(self) -> str:
         settings = parameters.read(self)
         given = robot_description(settings.urdf, settings.joint_prefix) if settings.urdf else ""
-        self._newest_hand = make_hand(settings, self._newest_hand)
-        connection = GripperConnection(self._newest_hand, settings)
+        connection = GripperConnection(self._hands.make(settings), settings)
         joints = JointStates(self.get_clock(), settings.joint_prefix, settings.frame_id)
         self._current = connection, joints, settings
         try:

@@ -10,7 +10,7 @@ from time import monotonic
 from types import MappingProxyType
 from typing import Any, Final
 
-from ...values import RobotiqError, State, parse_fingers
+from ...values import Inhibit, RobotiqError, State, parse_fingers
 from ..actions import ACTIONS, Action, Operator
 from ..recording.payloads import Properties
 from ..wording import refusal_words
@@ -58,11 +58,25 @@ async def call(operator: Operator, name: str, arguments: Arguments) -> str:
 
 def _of(action: Action) -> PageCommand:
     async def run(operator: Operator, arguments: Arguments) -> str:
-        if action.warning and arguments["confirm"] is not True:
-            raise ValueError(f"{action.name} needs confirm = true: {action.warning}")
+        if action.warning:
+            _check_confirmed(action, arguments)
         return await operator.act(action)
 
     return PageCommand(run, frozenset({"confirm"} if action.warning else ()))
+
+
+def _check_confirmed(action: Action, arguments: Arguments) -> None:
+    if arguments["confirm"] is not True:
+        raise ValueError(f"{action.name} needs confirm = true: {action.warning}")
+
+
+async def _permit(operator: Operator, arguments: Arguments) -> str:
+    """Permit motion after the halt that the question showed."""
+    _check_confirmed(ACTIONS["permit"], arguments)
+    seen = arguments["seen"]
+    if not isinstance(seen, Mapping):
+        raise TypeError(f"seen must be the inhibit that was shown, got {reprlib.repr(seen)}")
+    return await operator.permit(Inhibit(**seen))
 
 
 async def _move(operator: Operator, arguments: Arguments) -> str:
@@ -83,6 +97,7 @@ def _set(setting: Callable[[Operator, int], Awaitable[str]]) -> RunCommand:
 PAGE_COMMANDS: Final = MappingProxyType(
     {
         **{name: _of(action) for name, action in ACTIONS.items()},
+        "permit": PageCommand(_permit, frozenset({"confirm", "seen"})),
         "move": PageCommand(_move, frozenset({"position", "fingers"})),
         "set_speed": PageCommand(_set(Operator.set_speed), frozenset({"value"})),
         "set_force": PageCommand(_set(Operator.set_force), frozenset({"value"})),

@@ -83,7 +83,7 @@ class HandMirror:
         """Take in an update."""
         self.state, self.problem = State[update["state"]], update["problem"]
         told = update["inhibited"]
-        self.inhibited = None if told is None else Inhibit(**told)
+        self.inhibited = None if told is None else Inhibit.from_dict(told)
         if "registers" in update:
             model = model_of(update["model"])
             self.status = RobotiqStatus.from_registers(

@@ -11,7 +11,7 @@ from nicegui import events, ui
 
 from .....values import CLOSED, FORCE_MAX, OPEN, SPEED_MAX, Finger, names_of
 from ....actions import ACTIONS, Action
-from ....wording import JAW_NAME
+from ....wording import JAW_NAME, inhibit_shown
 from ..heartbeat import PRESS, PRESS_WITH_VALUE, Heartbeat
 from ..mirror import HandMirror, PageMirror
 from .allowed import why_not
@@ -188,19 +188,26 @@ class Controls:
 
     def _question(self, action: Action) -> None:
         asked_at = 0.0
+        confirmed: dict[str, Any] = {}
 
         def ask() -> None:
-            nonlocal asked_at
-            asked_at = monotonic()
+            nonlocal asked_at, confirmed
+            asked_at, confirmed = monotonic(), {"confirm": True}
+            if action.name == "permit":  # of the halt that is shown, and of none that comes later
+                if (seen := self._hand.inhibited) is None:
+                    return
+                confirmed["seen"] = seen.as_dict()
+                about.set_text(inhibit_shown(seen))
             dialog.open()
 
         def yes(event: events.GenericEventArguments) -> None:
             if monotonic() - asked_at >= ARMED_S:
                 dialog.close()
-                self._pressed(action.name, {"confirm": True}, event.args)
+                self._pressed(action.name, confirmed, event.args)
 
         with ui.dialog() as dialog, ui.card():
             ui.label(f"{action.name.capitalize()}: {action.what}").classes("text-lg")
+            about = ui.label("").props(f"data-testid=about-{action.name}")
             ui.label(action.warning).classes("rq-red")
             with ui.row().classes("w-full justify-end"):
                 ui.button("no", on_click=dialog.close, color=None).props("flat no-caps")

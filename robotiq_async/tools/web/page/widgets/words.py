@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from .....values import JAW, NO_REQUEST, Fault, Finger, Severity, State
 from ....description.palette import AXIS_COLORS
-from ....wording import AXIS_WORDS, JAW_NAME, STATE_WORDS, holding_words, inhibit_words
+from ....wording import AXIS_WORDS, JAW_NAME, STATE_WORDS, holding_words, inhibit_shown, inhibit_words
 from ..mirror import HandMirror
 
 NAMES: Final = tuple("scissor" if axis is Finger.SCISSOR else str(axis.name) for axis in Finger.ALL)
@@ -72,8 +72,7 @@ def fault_words(hand: HandMirror) -> tuple[str, bool]:
 def banner_words(hand: HandMirror) -> str:
     """The call for a person, in a sentence: an inhibit, a fault, a reset."""
     if hand.inhibited is not None:
-        since = timed("", hand.inhibited.since).partition(".")[0]
-        return f"{hand.inhibited}, since {since}"
+        return inhibit_shown(hand.inhibited)
     if hand.state is State.RESET:
         return "The gripper is not active: an activation moves its fingers to their stops."
     return fault_words(hand)[0]
