@@ -18,9 +18,9 @@ from typing import TypeVar
 
 from robotiq_async.fleet.network.bus import (
     BusReply,
-    MessageKind,
     PendingQuery,
     Query,
+    Sort,
     Undo,
     Urgency,
     is_any,
@@ -280,11 +280,11 @@ class MemoryBus:
         self,
         expression: str,
         handler: Callable[[Query], None],
-        sort: Callable[[str, bytes], MessageKind | None] = is_request,
+        sort: Sort = is_request,
     ) -> Undo:
         return _entered(
             self.queryables,
-            (expression, lambda query: handler(query) if sort(query.key, query.payload) else None),
+            (expression, lambda query: handler(query) if sort(query.key, lambda: query.payload) else None),
         )
 
     def ask(

@@ -203,10 +203,10 @@ async def test_whoever_commands_does_not_wait_for_the_requests_of_others(
     ask = AgentCall(LEFT.base, "stranger").pack()
     verbs = ("lease", "cmd/move")
     sort = here.agent._sort
-    assert {sort(LEFT.key(verb), ask) for verb in verbs} == {MessageKind.REQUEST}, "nobody does"
+    assert {sort(LEFT.key(verb), lambda: ask) for verb in verbs} == {MessageKind.REQUEST}, "nobody does"
     await reader.acquire()
-    assert {sort(LEFT.key(verb), ask) for verb in verbs} == {MessageKind.OTHERS}
-    assert {sort(LEFT.key(verb), call_of(reader).pack()) for verb in verbs} == {MessageKind.REQUEST}
+    assert {sort(LEFT.key(verb), lambda: ask) for verb in verbs} == {MessageKind.OTHERS}
+    assert {sort(LEFT.key(verb), call_of(reader).pack) for verb in verbs} == {MessageKind.REQUEST}
 
 
 @inside(lab)

@@ -15,7 +15,7 @@ from ...runtime import Log, now
 from ..control.lease import LEASE_WINDOW_S
 from ..errors import AgentError
 from ..limited_log import LimitedLog
-from ..network.bus import Bus, MessageKind, Query, Undo
+from ..network.bus import Bus, MessageKind, Query, Sort, Undo
 from ..wire.envelope import AgentCall, failure
 from ..wire.names import ROOT, GripperName
 from .questions import AgentQuestions
@@ -109,7 +109,7 @@ class Agent:
                 each.resume()
             undo.append(self._bus.watch(f"{self._prefix}/*/alive/*", self._report_conflict))
             questions = AgentQuestions(loop.time)
-            sorts: dict[str, Callable[[str, bytes], MessageKind | None]] = {
+            sorts: dict[str, Sort] = {
                 "halt": lambda *_: MessageKind.HALT,
                 "lease": self._sort,
                 "cmd/*": self._sort,
@@ -171,11 +171,11 @@ class Agent:
             if is_logged and name.gripper in self.hands:
                 self.hands[name.gripper].publisher.add({"kind": "conflict", "key": key})
 
-    def _sort(self, key: str, payload: bytes) -> MessageKind:
+    def _sort(self, key: str, read: Callable[[], bytes]) -> MessageKind:
         # In a thread of zenoh. Who commands does not wait for the requests of others, which say who they are.
         served = self.hands.get(key.split("/")[4])
         return (
-            MessageKind.REQUEST if served is None or served.may_be_of_holder(payload) else MessageKind.OTHERS
+            MessageKind.REQUEST if served is None or served.may_be_of_holder(read()) else MessageKind.OTHERS
         )
 
     def _receive(self, query: Query) -> None:

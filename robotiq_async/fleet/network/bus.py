@@ -66,7 +66,10 @@ class MessageKind(Enum):
     QUESTION = "question"  # of anybody
 
 
-def is_request(_key: str, _payload: bytes) -> MessageKind:
+Sort = Callable[[str, Callable[[], bytes]], MessageKind | None]
+
+
+def is_request(_key: str, _read: Callable[[], bytes]) -> MessageKind:
     return MessageKind.REQUEST
 
 
@@ -87,15 +90,15 @@ class Bus(Protocol):
         self,
         expression: str,
         handler: Callable[[Query], None],
-        sort: Callable[[str, bytes], MessageKind | None] = is_request,
+        sort: Sort = is_request,
     ) -> Undo:
         """Call a handler with each request under matching keys. Returns what ends it.
 
         Args:
             expression: the keys.
             handler: called in the event loop.
-            sort: the kind of a request with this key and payload; None drops it. Called first, in any
-                thread.
+            sort: the kind of a request with this key, from a function that reads its payload; None drops it.
+                Called first, in any thread.
         """
 
     def ask(

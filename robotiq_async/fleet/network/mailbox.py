@@ -54,26 +54,32 @@ class Mailbox:
         self._halts: deque[Callable[[], None]] = deque()
         self._deliveries: deque[Callable[[], None]] = deque()
         self._last = {kind: _Last(self._loop) for kind in (MessageKind.OTHERS, MessageKind.QUESTION)}
+        self._queues = {MessageKind.HALT: self._halts} | {
+            kind: last.deliveries for kind, last in self._last.items()
+        }
         self._is_due = False
         self._gathering: asyncio.TimerHandle | None = None
         self._opened_at = 0.0
         self._failed = LimitedLog()
         self._full = LimitedLog(clock=self._loop.time)
 
+    def has_room(self, kind: MessageKind) -> bool:
+        """Whether a delivery of this kind is not dropped now; thread-safe."""
+        waiting = len(self._queues.get(kind, self._deliveries))
+        if kind is MessageKind.ANSWER or waiting < (MOST_QUESTIONS if kind in self._last else MOST):
+            return True
+        if kind not in self._last:
+            self._full.warn("a fleet message was dropped: queue full")
+        return False
+
     def put(self, delivery: Callable[[], None], kind: MessageKind) -> bool:
         """Call a function in the loop; thread-safe. False if the mailbox is full: the call is dropped."""
-        last = self._last.get(kind)
-        deliveries = (
-            self._halts if kind is MessageKind.HALT else self._deliveries if last is None else last.deliveries
-        )
-        if kind is not MessageKind.ANSWER and len(deliveries) >= (MOST if last is None else MOST_QUESTIONS):
-            if last is None:
-                self._full.warn("a fleet message was dropped: queue full")
+        if not self.has_room(kind):
             return False
-        deliveries.append(delivery)
+        self._queues.get(kind, self._deliveries).append(delivery)
         # Telemetry, and what comes last, wait for a timer that is already set. Anything else wakes the loop
         # before that.
-        waits = kind is MessageKind.TELEMETRY or last is not None
+        waits = kind is MessageKind.TELEMETRY or kind in self._last
         if not self._is_due or (not waits and self._gathering is not None):
             self._is_due = True
             with contextlib.suppress(RuntimeError):  # the loop is closed

@@ -28,7 +28,7 @@ except ModuleNotFoundError as error:
 from ...runtime import in_a_thread
 from ...values import ConnectFailedError
 from ..keys.credentials import common_name
-from .bus import BusReply, MessageKind, PendingQuery, Query, Undo, Urgency, is_any, is_request
+from .bus import BusReply, MessageKind, PendingQuery, Query, Sort, Undo, Urgency, is_any, is_request
 from .mailbox import Mailbox, ReplySender
 
 CLOSE_S: Final = 1.0  # seconds for closing a session
@@ -131,17 +131,18 @@ class ZenohBus:
         self,
         expression: str,
         handler: Callable[[Query], None],
-        sort: Callable[[str, bytes], MessageKind | None] = is_request,
+        sort: Sort = is_request,
     ) -> Undo:
         def deliver(query: zenoh.Query) -> None:
-            payload = b"" if query.payload is None else query.payload.to_bytes()
-            key = str(query.key_expr)
-            drop = functools.partial(_drop, query)
-            kind = sort(key, payload) if len(payload) <= LONGEST_REQUEST else None
-            if kind is not None:
+            # A flood is recognized by its key alone. This thread of zenoh has the interpreter meanwhile.
+            key, drop = str(query.key_expr), functools.partial(_drop, query)
+            payload = query.payload or zenoh.ZBytes(b"")
+            kind = sort(key, payload.to_bytes) if len(payload) <= LONGEST_REQUEST else None
+            if kind is not None and self._mailbox.has_room(kind):
                 sender = self._repliers[kind]
                 received = Query(
-                    key, payload, lambda reply: sender.put(functools.partial(_reply, query, reply), drop)
+                    *(key, payload.to_bytes()),
+                    lambda reply: sender.put(functools.partial(_reply, query, reply), drop),
                 )
                 if self._mailbox.put(lambda: handler(received), kind):
                     return
