@@ -20,6 +20,7 @@ from robotiq_async.fleet.wire.status_message import SIZE
 from robotiq_async.values.request import Request
 from tests.fleet.lab import LEFT, Lab, lab
 from tests.fleet.network import Network
+from tests.fleet.outcomes import AFTER_S, outcome
 from tests.virtual import inside, until, virtual
 
 A, B = Finger.A, Finger.B
@@ -228,3 +229,12 @@ async def test_a_move_that_was_left_to_go_on_outlives_the_next_lease(here: Lab, 
         await asyncio.sleep(0.2)
         assert here.gripper.is_moving
         await third.release(halt=False)
+
+
+@pytest.mark.parametrize("after", AFTER_S)
+@pytest.mark.parametrize("trouble", ["freeze of the client", "take"])
+def test_the_words_for_a_move_whose_lease_ends_are_true(trouble: str, after: float) -> None:
+    found = outcome(trouble, after)
+    assert found["true"], found
+    begun = "it had begun" in found["said"]
+    assert begun or after < AFTER_S[-1], "it moved for half a second"
