@@ -28,10 +28,10 @@ from typing import Any, Final
 
 import anyio
 
-from ..hands import RUNNING, Hand
+from ..hands import Hand
 from ..runtime import INSIST_S, check_main_thread, ending_signals, log, now, pass_on
 from ..sync import RobotiqHand as BlockingHand
-from ..values import Fault, Finger, Inhibit, NotStartedError, RobotiqStatus, State, names_of
+from ..values import RUNNING, Fault, Finger, Inhibit, NotStartedError, RobotiqStatus, State, names_of
 
 HEALTH_S: Final = 1.0
 """A status that is older proves nothing about the gripper: two hundred polls have brought none."""

@@ -73,6 +73,7 @@ from .model import (
 from .move_result import MoveResult
 from .registers import RTU_REGISTERS, TCP_REGISTERS, Echo, RegisterMap, Registers
 from .request import AxisRequest, Request
+from .states import MOVES, RUNNING, TABLE, Verdict, refusal
 from .status import NO_REQUEST, Part, RobotiqStatus
 from .stroke import Point, Points, Stroke, check_points, why_not_after
 
@@ -95,5 +96,6 @@ __all__ += ["names_that_fit", "why_stranger"]
 __all__ += ["MoveResult"]
 __all__ += ["RTU_REGISTERS", "TCP_REGISTERS", "Echo", "RegisterMap", "Registers"]
 __all__ += ["AxisRequest", "Request"]
+__all__ += ["MOVES", "RUNNING", "TABLE", "Verdict", "refusal"]
 __all__ += ["NO_REQUEST", "Part", "RobotiqStatus"]
 __all__ += ["Point", "Points", "Stroke", "check_points", "why_not_after"]

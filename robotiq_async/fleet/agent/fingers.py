@@ -5,10 +5,9 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import Final
 
-from ...hands import RUNNING
 from ...local import RobotiqHand
 from ...runtime import Limit, Log
-from ...values import Finger, RobotiqConnectionError, RobotiqError
+from ...values import RUNNING, Finger, RobotiqConnectionError, RobotiqError
 
 FINGERS_REST_S: Final = 0.5
 """Seconds for a hand that keeps its grip to come to rest, as long as a stop that keeps one gives it."""

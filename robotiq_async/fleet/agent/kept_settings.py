@@ -20,9 +20,8 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any, Final
 
-from ...hands import RUNNING
 from ...local import RobotiqHand
-from ...values import Finger, RobotiqError, SentRequest, Transition
+from ...values import RUNNING, Finger, RobotiqError, SentRequest, Transition
 from ..wire.settings import (
     SETTINGS,
     Setting,

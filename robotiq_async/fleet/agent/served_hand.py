@@ -27,10 +27,9 @@ from dataclasses import replace
 from typing import Final
 
 from ... import __version__
-from ...hands import RUNNING
 from ...local import RobotiqHand
 from ...runtime import Log, now
-from ...values import Inhibit, MoveResult, RobotiqError
+from ...values import RUNNING, Inhibit, MoveResult, RobotiqError
 from ..control.admission import Admission
 from ..control.lease import Lease
 from ..errors import AgentError, ControlLostError

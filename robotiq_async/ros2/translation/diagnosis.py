@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from ...hands import RUNNING, Hand
-from ...values import NotStartedError, RobotiqStatus, Severity, State
+from ...hands import Hand
+from ...values import RUNNING, NotStartedError, RobotiqStatus, Severity, State
 
 
 class DiagnosticLevel(IntEnum):

@@ -8,8 +8,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import Final
 
-from .....hands import MOVES, RUNNING, TABLE, Verdict
-from .....values import State, Trigger
+from .....values import MOVES, RUNNING, TABLE, State, Trigger, Verdict
 from ....wording import STATE_WORDS
 from ..mirror import HandMirror
 
