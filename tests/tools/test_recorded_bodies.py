@@ -31,6 +31,7 @@ def messages(file: Path) -> Messages:
             assert schema is not None
             ros = (channel.message_encoding, schema.encoding) == ("cdr", "ros2msg")
             assert ros == (not channel.topic.startswith("/gripper/"))
+            assert message.publish_time == message.log_time
             found.setdefault(channel.topic, []).append((message.sequence, message.log_time, message.data))
     return found
 
