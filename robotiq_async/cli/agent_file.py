@@ -212,7 +212,7 @@ def line_of(text: str, path: Names) -> int | None:
     """The line, counted from 1, of the key or the table at a path; None if it is not certain.
 
     tomllib does not have it. Inside an inline table or an array it is the line where that begins. The search
-    looks at single lines, and a multi-line string may contain what looks like a key.
+    looks at single lines, and a multi-line string may contain text that looks like a key.
     """
     for length in range(len(path), 0, -1):
         lines = [number for number, found in _keys(text) if found == path[:length]]

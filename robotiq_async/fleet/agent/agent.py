@@ -29,7 +29,7 @@ EPOCH_BITS: Final = 53  # bits of an epoch: JSON readers that use doubles repres
 
 
 class Agent:
-    """Owns the hands of one host and serves them, each in a task of its own.
+    """Owns the hands of one host and serves them, each in a separate task.
 
     Attributes:
         hands: the served hands, by the name of the gripper.

@@ -1,4 +1,4 @@
-"""Fingers: what a client has set in motion, and what is to be held when nobody is there for it."""
+"""Fingers: the axes that a client has set in motion, and those to hold when no client is there for them."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Fingers:
             self._log.warning("the fingers could not be held: %s", error.message)
 
     async def hold_as_due(self) -> None:
-        """The gripper is reached: hold what should have been held before."""
+        """The gripper is reached: hold the axes that should have been held before."""
         if self._to_hold:
             await self.hold(self._to_hold)
 
@@ -59,7 +59,7 @@ class Fingers:
                 await self._hand.hold(Finger.ALL)
 
     async def come_to_rest(self) -> bool:
-        """Hold what moves; whether all of it rests within REST_S while the event loop runs."""
+        """Hold moving axes; whether all rest within FINGERS_REST_S while the event loop runs."""
         await self._hand.hold(Finger.ALL)
         with Limit(FINGERS_REST_S):
             async for _ in self._hand.statuses():

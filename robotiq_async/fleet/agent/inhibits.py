@@ -1,4 +1,4 @@
-"""Inhibits: whether motion of one hand is inhibited, as halts ask for it, and as a record has it."""
+"""Inhibits: whether motion of one hand is inhibited, as halts request it, and as a record has it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _UNREADABLE: Final = Inhibit("the record of an inhibit cannot be read", "", 0.0)
 
 
 class Inhibits:
-    """The inhibit of one hand. A permit lifts what it names, and no later halt."""
+    """The inhibit of one hand. A permit lifts the halt that it names, and no later one."""
 
     def __init__(self, hand: RobotiqHand) -> None:
         self._hand = hand
@@ -32,7 +32,7 @@ class Inhibits:
         self._hand.resume_inhibit(_read(record, _UNREADABLE))
 
     def halted(self, call: AgentCall) -> Inhibit | None:
-        """Inhibit motion in this turn, if a halt asks for it. Nothing malformed keeps it from halting."""
+        """Inhibit motion in this turn, if a halt requests it. Nothing malformed keeps it from halting."""
         reason = call.arguments.get("inhibit")
         if reason is None:
             return None
@@ -58,6 +58,6 @@ def _read(fields: object, otherwise: Inhibit) -> Inhibit:
 
 
 def _signed(call: AgentCall) -> str:
-    """Who asks: what the client says, and its label."""
+    """The person who asks, as the client says, and the label of the client."""
     who = label_of(call.arguments.get("who", ""))
     return f"{who}, {call.label}"[:LABEL_MAX] if who else call.label

@@ -1,4 +1,4 @@
-"""Jobs: what an agent does for its clients, and what became of it, also for repetitions."""
+"""Jobs: the work of an agent for its clients, and its outcome, also for repetitions."""
 
 from __future__ import annotations
 
@@ -86,9 +86,9 @@ class Job:
 class Jobs:
     """The jobs of one hand, found by client, lease and number.
 
-    What became of a job follows from what was seen. It was *carried out* if it has a result, or the gripper
-    acknowledged an image with all that it asks for. It was *not begun* if the hand refused it at once. In
-    between nobody knows: an image may be on the wire.
+    The outcome of a job follows from observations. It was *carried out* if it has a result, or the gripper
+    acknowledged an image with all its values. It was *not begun* if the hand refused it at once. In
+    between it is unknown: an image may be on the wire.
     """
 
     def __init__(

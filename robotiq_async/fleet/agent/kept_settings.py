@@ -1,7 +1,7 @@
 """KeptSettings: the agent is the keeper of speeds and forces, also over its own restart.
 
-They have no echo in the status, so only those who write them know them. The agent keeps what the gripper has
-acknowledged, and not before: what may or may not have been carried out never takes effect later.
+They have no echo in the status, so only those who write them know them. The agent keeps a value once the
+gripper has acknowledged it: one of unknown outcome never takes effect later.
 """
 
 # Theory of operation
@@ -12,7 +12,7 @@ acknowledged, and not before: what may or may not have been carried out never ta
 # not changed by a change of holder, by a hold or by a halt.
 #
 # While one client stays the last holder, nothing is restored, also after a loss of its lease: the gripper has
-# its values. A hand that is started again has no memory of them, so it is given what the gripper has.
+# its values. A hand that is started again has no memory of them, so it is given the values of the gripper.
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class KeptSettings:
         self._changed()
 
     def ask(self, asked: Mapping[Setting, int]) -> None:
-        """A command of this turn asks for these: give the axes that it moves the holder's other settings."""
+        """A command of this turn requests these: give the axes that it moves the holder's other settings."""
         self._ordered |= settings_of(asked)
         for axis in moved_by(asked) & self._hand.model.all_axes:
             own = {what: self._own(axis, what) for what in SETTINGS if self._is_missing((axis, what))}
@@ -75,7 +75,7 @@ class KeptSettings:
                     self._hand.command(axis, **own)
 
     def end(self, asked: Mapping[Setting, int], *, is_done: bool) -> None:
-        """A command has ended: what it asked for is carried out, or is on its way no more."""
+        """A command has ended: its values were carried out, or are no longer on their way."""
         ended = {each: value for each, value in asked.items() if self._ordered.get(each) == value}
         if is_done:
             self._keep(ended)
@@ -84,7 +84,7 @@ class KeptSettings:
 
     def observe(self, what: object) -> None:
         if isinstance(what, Transition) and what.target not in RUNNING:
-            self._ordered.clear()  # the hand drops what was not acknowledged
+            self._ordered.clear()  # the hand drops values that were not acknowledged
         if not (isinstance(what, SentRequest) and what.acknowledged and what.request.activate):
             return
         before, self._gripper = self._gripper, settings_in(what)

@@ -16,8 +16,8 @@ _CLIENTS: Final = 1000  # Clients with a budget of their own. The least recent o
 class AgentQuestions:
     """Admits a question before anything else is done with it, in any thread and in a few microseconds.
 
-    Each client has a budget, so that none uses up what the others need; what it does not use in a second is
-    not saved up. A dropped question gets no answer, not even a refusal, which would take as long as one.
+    Each client has a budget, so that none uses up the share of others; the rest of a second is not saved up.
+    A dropped question gets no answer, not even a refusal, which would take as long as one.
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:

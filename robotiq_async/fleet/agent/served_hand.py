@@ -1,4 +1,4 @@
-"""ServedHand: one hand of an agent. Answers requests, and holds what moves when a lease ends."""
+"""ServedHand: one hand of an agent. Answers requests, and holds moving fingers when a lease ends."""
 
 # Theory of operation
 #
@@ -146,7 +146,7 @@ class ServedHand:
         try:
             self._admission.check_meant(call, in_any_run=is_free)
             self._expire()
-            # First of all: what was begun gets its answer, whoever commands now.
+            # First: a request that was begun gets its answer, whichever client commands now.
             if not is_free and (job := self._jobs.find(call)) is not None:
                 self._jobs.repeat(job, query)
                 return
@@ -269,7 +269,7 @@ class ServedHand:
             f" by {by}" if by else "",
         )
         self._jobs.cancel_all(number, reason, leaves=leaves)
-        # A hold affects only what moves. A speed or a force that is not written yet would take effect under
+        # A hold affects only moving axes. A speed or a force that is not written yet would take effect under
         # the next holder, or, after a freeze of this process, seconds late.
         self._hand.drop_requests(f"the lease has ended: {reason}")
         axes = self._fingers.forget()

@@ -142,7 +142,7 @@ def access_control(
     """The part of a zenoh configuration that denies everything but the rights of the clients of some agents.
 
     It is an agent's, or that of a router: there the link of each agent has the other side of each right, for
-    the keys of its own host alone.
+    the keys of its host alone.
     """
     names = [role.common_name(each) for role in CLIENTS for each in clients.of(role)]
     rules = [_rule(right, [_base(site, host) for host in hosts]) for right in _rights_of(names)]
@@ -181,7 +181,7 @@ def rights(role: Role) -> tuple[str, ...]:
 
 
 def _rights_of(names: Sequence[str]) -> list[Right]:
-    # Each client asks under its own name alone: that is what its budget of questions is counted by.
+    # Each client asks under its own name alone: its budget of questions is counted by that.
     asking = [Right(f"ask info {name}", Role.READ, _ASK, _IN, (f"info/{name}",)) for name in names]
     return [*_RIGHTS, *asking]
 

@@ -19,13 +19,13 @@ class Urgency(Enum):
 
     STOP = "stop"  # halts: before everything else
     COMMAND = "command"  # commands, leases, their answers
-    QUESTION = "question"  # what anybody may ask, and the answers: behind telemetry
+    QUESTION = "question"  # of any client, and the answers: behind telemetry
     TELEMETRY = "telemetry"  # statuses, events, summaries: dropped when the link is full
 
 
 @dataclass(frozen=True, slots=True)
 class BusReply:
-    """An answer to a request, and what was sent with it."""
+    """An answer to a request, and the data sent with it."""
 
     payload: bytes
     attachment: bytes = b""

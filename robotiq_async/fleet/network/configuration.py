@@ -88,7 +88,7 @@ def session_configuration(
     listen: Sequence[str], connect: Sequence[str], keys: Path | None = None
 ) -> dict[str, object]:
     """Configuration of a peer without discovery: it uses only the endpoints given."""
-    # zenoh drops a message that finds no room within 1 ms, and each request takes a batch of its own.
+    # zenoh drops a message that finds no room within 1 ms, and each request takes a separate batch.
     room = {"real_time": QUEUED, "interactive_high": QUEUED}
     link: dict[str, object] = {"tx": {"lease": LINK_LEASE_MS, "queue": {"size": room}}}
     if keys is not None:

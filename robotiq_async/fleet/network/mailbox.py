@@ -77,8 +77,8 @@ class Mailbox:
         if not self.has_room(kind):
             return False
         self._queues.get(kind, self._deliveries).append(delivery)
-        # Telemetry, and what comes last, wait for a timer that is already set. Anything else wakes the loop
-        # before that.
+        # Telemetry, and the kinds that come last, wait for a timer that is already set. Anything else wakes
+        # the loop before that.
         waits = kind is MessageKind.TELEMETRY or kind in self._last
         if not self._is_due or (not waits and self._gathering is not None):
             self._is_due = True
@@ -120,7 +120,7 @@ class Mailbox:
 
 
 class ReplySender:
-    """Sends replies from a thread of its own, started with the first one.
+    """Sends replies from a separate thread, started with the first one.
 
     A reply takes the priority and the congestion control of its query, which the client chooses. Sending one
     to a client that does not read can block until the connection is closed; the event loop must not wait for

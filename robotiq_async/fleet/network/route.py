@@ -53,7 +53,7 @@ def default_route() -> Route:
 
 
 def parse_remote_address(address: object) -> tuple[GripperName, Route]:
-    """Parse an address into gripper and route. The environment supplies what the address leaves out.
+    """Parse an address into gripper and route. The environment supplies the rest.
 
     Raises:
         TypeError: not a string.

@@ -1,6 +1,6 @@
 """ZenohBus: the bus over zenoh. No other module imports zenoh.
 
-zenoh calls back in threads of its own. The callbacks only put each message into a mailbox, which wakes the
+zenoh calls back in its own threads. The callbacks only put each message into a mailbox, which wakes the
 event loop once for all that wait.
 """
 
@@ -33,7 +33,7 @@ from .mailbox import Mailbox, ReplySender
 
 CLOSE_S: Final = 1.0  # seconds for closing a session
 LAST_ANSWERS_S: Final = 0.2  # seconds to send the answers to requests that are cancelled at the end
-DROP_EVERY_S: Final = 0.02  # seconds: what is dropped is reported to its clients so often
+DROP_EVERY_S: Final = 0.02  # seconds from one report of dropped requests to the next
 LONGEST_REQUEST: Final = 4096  # bytes of a request; a longer one is dropped unread
 _PRIORITY: Final = {
     Urgency.STOP: zenoh.Priority.REAL_TIME,
@@ -234,7 +234,7 @@ class ZenohBus:
         for reply_sender in repliers:
             reply_sender.join(CLOSE_S)
 
-    def _undo(self, declared: Any) -> Undo:  # noqa: ANN401  # each kind has a class of its own
+    def _undo(self, declared: Any) -> Undo:  # noqa: ANN401  # each kind has its own class
         def undo() -> None:
             with contextlib.suppress(zenoh.ZError):
                 declared.undeclare()

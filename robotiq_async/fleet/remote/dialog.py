@@ -1,4 +1,4 @@
-"""Dialog: what one run of a hand says to its agent, and what comes of it."""
+"""Dialog: the requests of one run of a hand to its agent, and their outcomes."""
 
 from __future__ import annotations
 
@@ -184,7 +184,7 @@ class Dialog:
         await asyncio.gather(*self._halts, return_exceptions=True)
 
     def cancel(self, name: str, call: AgentCall) -> None:
-        """The call of a command was cancelled: hold what it set in motion."""
+        """The call of a command was cancelled: hold the axes that it set in motion."""
         if self.lease.is_held and not self.is_over:
             self.spawn(self._cancel(call), *([self._cancels] if name in MOTIONS else []))
 
@@ -193,7 +193,7 @@ class Dialog:
             await self.ask("cmd/cancel", {"number": call.number}, timeout=self.window)
         except RobotiqError as error:
             if getattr(error, "reason", "late") == "late":
-                # Without renewals the lease ends, and the agent holds what moves.
+                # Without renewals the lease ends, and the agent holds moving axes.
                 self.lose_lease("expired", "a command could not be cancelled")
 
     @property
@@ -208,7 +208,7 @@ class Dialog:
 
     @property
     def is_moving(self) -> bool:
-        """Whether a motion was asked for that the agent has not answered yet."""
+        """Whether a motion was requested that the agent has not answered yet."""
         waits = any("position" in changes for changes in self._waiting.values())
         return waits or bool(self._cancels) or any(moved_by(each.carries) for each in self._commands.values())
 
@@ -289,9 +289,9 @@ class Dialog:
         self.lease.release()
 
     def _await_last_answers(self, reason: str) -> None:
-        # The agent knows what became of the commands under a lease that has ended, so they are repeated for
-        # another moment. Without its answer each gets an error of its own: what the agent said of another
-        # request, such as that nothing was done, may not be so of this one.
+        # The agent knows the outcome of the commands under a lease that has ended, so they are repeated for
+        # another moment. Without its answer each gets its own error: the words of the agent about another
+        # request, such as that nothing was done, may not hold for this one.
         for errand in self._commands.values():
             if errand.call.lease == self.lease.number:
                 outcome = f"{errand.verb} may have been carried out"
@@ -381,7 +381,7 @@ class Dialog:
             answer = await errand.wait()
         if answer is not None:
             return answer
-        # The access rules let nobody have a lease who may not command (keys/access.py).
+        # The access rules give no lease to a client that may not command (keys/access.py).
         may_be_denied = errand.was_empty and not errand.verb.startswith("cmd/")
         is_heard = not self.mirror.is_silent  # enough for a halt, which has been repeated all the time
         if may_be_denied and (is_heard if errand.is_halt else await self._is_agent_present()):

@@ -95,7 +95,7 @@ class ClientLease:
 class OwnSettings:
     """The speeds and forces that were carried out, for an agent that has lost its record of them.
 
-    The agent is their keeper. What may have been carried out is left out, and so is what it replaced.
+    The agent is their keeper. A value of unknown outcome is left out, and so is the one before it.
     """
 
     def __init__(self) -> None:

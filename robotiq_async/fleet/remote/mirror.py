@@ -208,7 +208,7 @@ class Mirror:
         return self.newest is not None and self.newest.events > self.events
 
     def read_status(self, fields: Mapping[str, Any]) -> RobotiqStatus:
-        """The status in an answer, with a time and a sequence of ours."""
+        """The status in an answer, with our time and sequence."""
         status = RobotiqStatus.from_raw(fields)
         return self._as_ours(status, self.clock(status.timestamp))
 

@@ -284,7 +284,7 @@ class RemoteHand(Hand):
     async def _recover(self, timeout: float | None) -> None:
         await self._ask("recover", timeout=timeout)
 
-    async def _ask(self, name: str, **arguments: Any) -> Fields:  # noqa: ANN401  # what JSON holds
+    async def _ask(self, name: str, **arguments: Any) -> Fields:  # noqa: ANN401  # any JSON
         """Have the agent carry out a command; if this call is cancelled, cancel the command there."""
         timeout = arguments.get("timeout")
         seconds = _SECONDS.get(name, REMOTE_COMMAND_S) if timeout is None else timeout + SLACK_S
@@ -294,7 +294,7 @@ class RemoteHand(Hand):
             with no_answer_as_lost_connection():
                 await session.keeper.acquire()
         session.check_control()
-        # Commands that were asked for before are sent first.
+        # Earlier commands are sent first.
         dialog.flush()
         call = dialog.call(arguments)
         try:

@@ -4,12 +4,12 @@
 #
 # The agent has the gripper. A run here has three things, which change for different reasons:
 #
-# * the mirror: what the agent said last about the gripper (mirror.py). Every message names its gripper and
+# * the mirror: the last words of the agent about the gripper (mirror.py). Every message names its gripper and
 #   the run of its agent. One about another gripper is dropped, and so is one that is older than the last.
 # * the lease: whether this client commands (lease_state.py). The keeper renews it several times in a window.
 # * the dialog: requests without an answer (dialog.py), each an errand (errand.py).
 #
-# Silence ends control on both sides. Without renewals for a window the agent holds what moves; when nothing
+# Silence ends control on both sides. Without renewals for a window the agent holds moving axes; when nothing
 # was heard for a window the lease here is lost, and requests get no answer any more. If this loop was held
 # up, that is no silence: the messages that have arrived are handled first. A new run of the agent ends the
 # lease at once.
@@ -17,7 +17,7 @@
 # Events are numbered, and the network may drop some: the missing ones are fetched, as far as the agent still
 # has them.
 #
-# The end takes 2 s at most. It sends nothing but what ends motion, and the lease goes with the strongest
+# The end takes 2 s at most. It sends only requests that end motion, and the lease goes with the strongest
 # level that was requested: a halt or a hold without an answer makes a gentle one stronger.
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from .lease_keeper import ANSWER_S, RENEWALS, LeaseKeeper
 from .mirror import Mirror
 
 PAUSE_S: Final = 0.02
-"""Seconds between two questions for events: 50 a second, half of what an agent answers to one client."""
+"""Seconds between two questions for events: 50 a second, half the budget of a client."""
 CONNECT_S: Final = 5.0  # seconds to find the agent
 END_S: Final = 1.9  # seconds for the end of a run: a stop promises 2 s
 BUS_S: Final = 1.0  # of END_S: seconds that closing a session of zenoh may take
@@ -99,7 +99,7 @@ class RemoteSession:
     # -- start and end ---------------------------------------------------------------------------------
 
     async def connect(self, timeout: float, *, acquires: bool) -> None:
-        """Wait for the agent, and acquire the lease if that is asked for; errors as of RemoteHand.start()."""
+        """Wait for the agent, and acquire the lease if that is requested; errors as of RemoteHand.start()."""
         limit = Limit(timeout)
         try:
             while not await self._ask_info(limit):

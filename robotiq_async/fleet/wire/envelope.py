@@ -94,7 +94,7 @@ class AgentAnswer:
         value: the result of the request.
         error: the error of the request; None if it was carried out.
         begun: True if it was carried out, also if it has ended in an error; False if it was not begun, and
-            never will be; None if nobody knows.
+            never will be; None if that is unknown.
     """
 
     to: str
@@ -107,8 +107,8 @@ class AgentAnswer:
     def pack(self) -> bytes:
         return _pack(self)
 
-    def outcome(self, read_status: ReadStatus) -> Any:  # noqa: ANN401  # what each request returns
-        """Return what the request returned, or raise what it raised."""
+    def outcome(self, read_status: ReadStatus) -> Any:  # noqa: ANN401  # each request has another result
+        """Return the result of the request, or raise its error."""
         if self.error is not None:
             raise read_error(self.error, read_status)
         return self.value
@@ -132,7 +132,7 @@ _WORDS: Final = {False: "; nothing was done", None: "; it may have been carried 
 
 
 def failure(call: AgentCall, epoch: int, error: Exception, begun: bool | None) -> AgentAnswer:
-    """The answer with an error, which says what became of the request. No other place says that."""
+    """The answer with an error, which says whether the request was carried out. No other place says that."""
     fields = error_fields(error)
     if isinstance(error, AgentError | ControlLostError):
         fields["message"] += _WORDS[begun]
