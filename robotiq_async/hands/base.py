@@ -104,8 +104,8 @@ class Hand(HandKind):
         """
         check_flag("activate", activate)
         wait = check_seconds("wait", wait, 0.0, LONGEST_WAIT_S)
-        self._check_may_start(running_loop())
         with self._naming:
+            self._check_may_start(running_loop())
             await self._start(activate, wait)
 
     @describes_arguments()

@@ -156,9 +156,8 @@ class HandKind(ABC):
         self._channels.check_loop(loop)
         if self._is_started:
             allowed = {State.DISCONNECTED, State.SHUTDOWN}
-            raise InvalidStateError(
-                "this hand is started already", self.state, allowed, advice="stop() it first"
-            )
+            why = f"this hand runs on {self._address} already: stop() it first"
+            raise InvalidStateError(why, self.state, allowed)
 
     def _check_allowed(self, trigger: Trigger, *, presses: bool = True) -> None:
         """Refuse a call that the state, or an inhibit of what moves or ``presses``, does not allow."""
