@@ -21,6 +21,7 @@ from robotiq_async.values.model import TWO_FINGER_85
 from tests.docs.pages import DOCS, blocks, read
 from tests.grippers import activate_beforehand
 from tests.installed import install
+from tests.link.scripted_device import request_size
 from tests.serial_line import with_crc
 
 PAGE: Final = DOCS / "how-to" / "tunnels.md"
@@ -204,6 +205,20 @@ class DoosanController(Arm):
         else:
             said["read"] = (await self._line.read(call["read"])).hex()
         return json.dumps(said).encode() + b"\n"
+
+
+class SocketController(Arm):
+    """No arm: frames of the serial line on a socket, with as much work for each as the arms have."""
+
+    async def hear(self, reader: asyncio.StreamReader) -> bytes:
+        frame = await reader.readexactly(8)
+        while len(frame) < request_size(frame):
+            frame += await reader.readexactly(request_size(frame) - len(frame))
+        return frame
+
+    async def answer(self, asked: bytes) -> bytes:
+        reply = await self.ask(asked[0], asked[1:-2])
+        return with_crc(asked[:1] + reply) if reply else b""
 
 
 CONTROLLERS: Final[dict[str, type[Arm]]] = {

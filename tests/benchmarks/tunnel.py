@@ -26,8 +26,6 @@ from robotiq_async.hands.statistics import percentile
 from tests import arms
 from tests.benchmarks import program
 from tests.benchmarks.program import ROOT, Row, figures_of, median_of
-from tests.link.scripted_device import request_size
-from tests.serial_line import with_crc
 
 PARTS = ("beside",)
 DELAYS_MS: Final = (0, 4, 10)
@@ -37,27 +35,13 @@ PAUSE_S: Final = 0.02
 """From one command to the next, and up to 10 ms more: they meet the polls at any moment."""
 
 
-class SocketController(arms.Arm):
-    """Frames of the serial line on a socket; the same work for each as the arms have."""
-
-    async def hear(self, reader: asyncio.StreamReader) -> bytes:
-        frame = await reader.readexactly(8)
-        while len(frame) < request_size(frame):
-            frame += await reader.readexactly(request_size(frame) - len(frame))
-        return frame
-
-    async def answer(self, asked: bytes) -> bytes:
-        reply = await self.ask(asked[0], asked[1:-2])
-        return with_crc(asked[:1] + reply) if reply else b""
-
-
 async def serve(name: str, delay: float) -> None:
     """Serve both until the end is requested; print their ports."""
     # Doosan's client makes two calls for a request.
     beside = delay * (2 if name == "Doosan" else 1)
     async with arms.arm_with_jaw(name, delay) as (arm, server, _):
         port = int(server.address.partition("?")[0].rpartition(":")[2])
-        async with SocketController(arms.ToolLine(port), beside) as relay:
+        async with arms.SocketController(arms.ToolLine(port), beside) as relay:
             print(arm.port, relay.port, flush=True)  # noqa: T201
             await asyncio.Event().wait()
 

@@ -7,8 +7,9 @@ import asyncio
 import pytest
 
 from robotiq_async import JAW, ConnectionLostError, RobotiqHand, State
+from robotiq_async.link.address import parse_address
 from robotiq_async.runtime.clock import now
-from tests.arms import CONTROLLERS, arm_with_jaw
+from tests.arms import CONTROLLERS, SocketController, ToolLine, arm_with_jaw
 
 pytestmark = pytest.mark.virtual_time
 
@@ -35,16 +36,18 @@ async def test_it_carries_what_a_serial_line_carries(name: str) -> None:
         assert server.gripper.position(JAW) == pytest.approx(100, abs=2)
 
 
+@pytest.mark.parametrize("delay", [0.0, 0.004])
 @pytest.mark.parametrize("name", CONTROLLERS)
-async def test_it_is_as_quick_as_the_same_line_behind_a_socket(name: str) -> None:
-    """From the request to the first status that shows it; the arm takes 4 ms for each call."""
-    delay, calls = 0.004, 2 if name == "Doosan" else 1
+async def test_it_is_as_quick_as_a_socket_to_the_same_line(name: str, delay: float) -> None:
+    """From the request to the first status that shows it; both programs take as long for a request."""
+    calls = 2 if name == "Doosan" else 1
+    function = 16 if name == "Dobot" else 23
     async with arm_with_jaw(name, delay) as (_, server, tunnel):
-        function = 16 if name == "Dobot" else 23
         through = await asked_to_echo(RobotiqHand(tunnel, model="2f85", write_function=function))
-        beside = RobotiqHand(server.address, model="2f85", write_function=function)
-        server.reply_silence += calls * delay
-        as_usual = await asked_to_echo(beside)
+        line = ToolLine(parse_address(server.address).port)
+        async with SocketController(line, calls * delay) as relay:
+            beside = RobotiqHand(f"rtu+tcp://127.0.0.1:{relay.port}", model="2f85", write_function=function)
+            as_usual = await asked_to_echo(beside)
     assert through < 1.1 * as_usual, f"{through} s, not {as_usual}"
 
 
