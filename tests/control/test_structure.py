@@ -41,26 +41,33 @@ def way_of_a_status(scan: Scan) -> list[str]:
     return way[1:]
 
 
-def idle(_: Scan) -> None:
-    pass
+def idle(scan: Scan) -> None:
+    scan.run(1.0)
 
 
 def moving(scan: Scan) -> None:
     scan.move(255, speed=0)
+    scan.run(1.0)
+
+
+def streaming(scan: Scan) -> None:
+    for position in range(0, 200, 2):
+        scan.command(Finger.ABC, position, speed=20)
+        scan.step()
 
 
 def holding(scan: Scan) -> None:
     scan.gripper.place_object(Finger.ABC, 100)
     scan.moved(255)
+    scan.run(1.0)
 
 
-@pytest.mark.parametrize("begin", [idle, moving, holding])
+@pytest.mark.parametrize("begin", [idle, moving, streaming, holding])
 def test_a_status_passes_few_modules_and_comes_back_seldom(scan: Scan, begin: Callable[[Scan], None]) -> None:
     begin(scan)
-    scan.run(1.0)
     scan.now += POLL_S
     way = way_of_a_status(scan)
-    assert scan.latest.is_moving is (begin is moving)
+    assert scan.latest.is_moving is (begin in (moving, streaming))
     assert len(set(way)) <= 6, way
     assert len(way) - len(set(way)) <= 6, way
 
