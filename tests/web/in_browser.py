@@ -57,6 +57,7 @@ from tests.web.measures import CONTRAST, COVERED, WIDE
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
 FAST, SLOW = 20.0, 0.25
+LATER = "a halt came after the one that was seen"
 
 
 @contextlib.asynccontextmanager
@@ -356,17 +357,26 @@ async def test_a_yes_is_for_the_halt_that_its_question_showed(browser: Browser, 
     hand = stage.hand
     await hand.inhibit("the guard is open", who="PLC")
     await browser.says("banner", "the guard is open (PLC)")
-    await browser.click("helps")
-    await browser.says("about-permit", "motion is inhibited: the guard is open (PLC), since")
-    await hand.inhibit("a hand is in the gripper")
-    await browser.says("banner", "2 halts")
 
     def insist() -> bool:  # a yes does not count before it can have been read
         with contextlib.suppress(WebDriverException):
             browser.find("yes-permit").click()
-        return "a halt came after the one that was seen" in browser.find("outcome").text
+        return not browser.has("yes-permit")
 
-    await browser.until(insist)
+    def answer() -> str:
+        said = browser.find("outcome").text
+        return said if LATER in said or "too late" in said else ""
+
+    said = "too late"
+    while "too late" in said:  # a busy machine may have held up the press
+        await browser.click("helps")
+        await browser.says("about-permit", "motion is inhibited: the guard is open (PLC), since")
+        await hand.inhibit("a hand is in the gripper")
+        assert hand.inhibited is not None
+        await browser.says("banner", f"{hand.inhibited.halts} halts")
+        await browser.until(insist)
+        said = str(await browser.until(lambda: answer() or False))
+    assert LATER in said
     assert hand.inhibited is not None
     await permit(browser, hand)
 
