@@ -89,7 +89,7 @@ class GripperService:
         )
 
     def goto(self, request: bytes, context: Any) -> bytes:  # noqa: ANN401
-        """``GripperCommand``: returns when the hand has it, as polymetis does; with ``grasp`` it closes."""
+        """``GripperCommand``: returns when the hand has it, as in polymetis; ``grasp`` closes the hand."""
         try:
             asked = decoded(request)
             width, speed, force = (_number(asked, number) for number in (2, 3, 4))
@@ -139,15 +139,15 @@ def _counts(share: float) -> int:
 def serve(
     address: str, *, host: str = "localhost", port: int = POLYMETIS_PORT, activate: bool = True
 ) -> None:
-    """Serve a gripper until the program is interrupted. **The fingers of one that is reset MOVE**.
+    """Serve a gripper until the program is interrupted. **If the gripper is reset, its fingers MOVE**.
 
     Leaving stops fingers that move, and keeps a grip.
 
     Args:
         address: of the gripper, as of :class:`robotiq_async.RobotiqHand`.
-        host: where to listen. Beyond this machine anybody may move the fingers: plain gRPC asks for no name.
-        port: where to listen; it must be free. gRPC would share it with another server in silence.
-        activate: False takes a gripper that is active alone.
+        host: where to listen. Beyond this machine anybody can move the fingers: plain gRPC checks nobody.
+        port: where to listen; it must be free, because gRPC would silently share it with another server.
+        activate: False activates nothing: the gripper must be active already.
 
     Raises:
         OSError: the port is taken.
@@ -169,7 +169,7 @@ def serve(
             raise GripperFaultError(hand.status.fault)
         service.is_ready.set()
         log.warning(
-            "serving %s on %s:%d: who reaches the port can MOVE the fingers", hand.address, host, port
+            "serving %s on %s:%d: anyone who reaches the port can MOVE the fingers", hand.address, host, port
         )
         server.wait_for_termination()
     finally:

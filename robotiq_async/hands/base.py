@@ -181,7 +181,7 @@ class Hand(HandKind):
         *,
         label_n: float | None = None,
     ) -> None:
-        """Set the force of axes, as :meth:`set_position`; never starts a motion. More tightens a grip."""
+        """Set the force of axes as :meth:`set_position`; starts no motion. A higher force tightens a grip."""
         axes = self.model.mask(fingers)
         force = force_of(self.units, value, label_n, "value")
         with self._naming:

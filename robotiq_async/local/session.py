@@ -222,7 +222,7 @@ class Session:
         return self.loop.create_future()
 
     def ask(self, request: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Make a request of the controller; who must hear of it does so after it, or after its write."""
+        """Make a request of the controller; callers and readers hear of it afterwards, or after its write."""
         try:
             return request(*args, **kwargs)
         finally:

@@ -138,7 +138,7 @@ class Likeness:
             raise ValueError(f"this is no report of robotiq-async verify: {error!r}") from error
 
     def gripper(self, clock: Callable[[], float], *, speedup: float = 1.0) -> SimulatedGripper:
-        """A new gripper like it, on a clock."""
+        """A new gripper like the one of the report, on a clock."""
         limit = self.scissor_limit or (SCISSOR_LOW, SCISSOR_HIGH)
         return SimulatedGripper(
             clock,
