@@ -1,4 +1,4 @@
-"""Inhibit: that motion is refused, until a person permits it again."""
+"""Inhibit: that motion is refused, until a person permits it again. control/state_machine.py keeps it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The controls of a hand: buttons, sliders, questions, and the halt."""
+"""The controls of a hand: buttons, sliders and questions. The HALT button is in pages.py."""
 
 from __future__ import annotations
 
