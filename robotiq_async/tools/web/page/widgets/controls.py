@@ -205,7 +205,8 @@ class Controls:
                 dialog.close()
                 self._pressed(action.name, confirmed, event.args)
 
-        with ui.dialog() as dialog, ui.card():
+        # At the top, as HALT stays above it at the foot of a small window.
+        with ui.dialog().props("position=top") as dialog, ui.card():
             ui.label(f"{action.name.capitalize()}: {action.what}").classes("text-lg")
             about = ui.label("").props(f"data-testid=about-{action.name}")
             ui.label(action.warning).classes("rq-red")
