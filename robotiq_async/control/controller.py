@@ -551,7 +551,7 @@ class Controller:
         if isinstance(duty, Stop) and duty.level in (StopLevel.HALT, StopLevel.RESET):
             self._requests.merge_hold(Finger.ALL, "a stop was lost with the link: once it is back")
             self._owes_reset = self.is_driven
-        self._requests.lost(error)
+        self._requests.lost(error, self._ledger.ahead)
         self.evidence.lost()
         self._ledger.lost(now)
         self._update_state(Trigger.LINK_LOST)

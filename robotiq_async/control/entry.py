@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..values.enums import NO_AXES, Finger
 from ..values.registers import Echo
 from ..values.request import Request
 
@@ -18,6 +19,7 @@ class Entry:
     sent: float  # monotonic seconds; of a write lost with the link the latest at which it may have arrived
     acknowledged: float | None = None  # when; None before that
     is_doubtful: bool = False  # whether it may act late, or never
+    held: Finger = NO_AXES  # the axes that it is to hold
 
     @property
     def time(self) -> float:
@@ -27,6 +29,10 @@ class Entry:
     def is_on_the_line(self) -> bool:
         """Whether it is neither acknowledged nor lost."""
         return self.acknowledged is None and not self.is_doubtful
+
+    def hold(self, axes: Finger) -> None:
+        """Note axes that its callers count as held once it acts."""
+        self.held |= axes
 
     def acknowledge(self, now: float) -> None:
         self.acknowledged = now

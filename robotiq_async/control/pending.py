@@ -1,8 +1,8 @@
 """Requests of callers: changes for the next write, those in flight, and the calls that wait for an answer.
 
 All requests between two writes are merged into one; the last value wins. A position, a speed or a force is
-sent as a change once and never again: it may move an axis. A hold remains until it is acknowledged, also over
-a lost link, because it can only stop one. One without a caller goes if another client takes the axis over.
+sent as a change once and never again: it may move an axis. A hold can only stop one: over a lost link it
+remains unless a status has shown its write. One without a caller goes if another client takes the axis over.
 """
 
 from __future__ import annotations
@@ -188,6 +188,7 @@ class OpenRequests:
         has_sent = self.pending.has_changes and not keeps
         self._sent = self.pending if has_sent else Pending(hold=self.pending.hold & ~left.hold)
         self._keep(left)
+        entry.hold(self._sent.hold)
         for call in (*self.calls, *self.moves.values()):
             is_left = call.held & left.hold if call.held else keeps and not call.halts
             if call.entry is None and not is_left:
@@ -250,10 +251,13 @@ class OpenRequests:
         replaced = [move for move in self._written_moves if not move.is_under(status, limited)]
         fail(self._close(replaced), MoveSupersededError("another client commands the gripper"))
 
-    def lost(self, error: RobotiqError) -> None:
+    def lost(self, error: RobotiqError, ahead: Sequence[Entry]) -> None:
         """The link is down: fail everything. Holds stop motion: their axes remain, for when it is back."""
-        # A hold of our own making has no caller to get the error.
-        hold = self.pending.hold | self._sent.hold
+        # A hold of our own making has no caller to get the error. The entries ``ahead`` have not shown: a UR
+        # may acknowledge a SET, lose it, and lose its link next.
+        hold = self.pending.hold
+        for each in ahead:
+            hold |= each.held
         fail(self._close([*self.calls, *self._open_moves]), error)
         self._keep(Pending(hold=hold))
         self._sent = NONE_PENDING

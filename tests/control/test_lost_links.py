@@ -65,6 +65,32 @@ def test_a_hold_survives_a_lost_link_on_the_axes_that_no_other_client_has_moved(
     assert scan.gripper.position(S) == pytest.approx(theirs.get(S, 137), abs=2)
 
 
+def test_a_hold_that_was_acknowledged_and_forgotten_is_written_again_after_a_lost_link(scan: Scan) -> None:
+    """A UR acknowledges a SET, loses it, and its link goes: the axis went on to its request."""
+    scan.move(250, A, speed=0)
+    scan.run(0.3)
+    scan.forgets = 1
+    held = scan.hold(A)
+    scan.step()
+    assert held.is_answered
+    scan.blink()
+    at = scan.gripper.position(A)
+    scan.run(10.0)
+    assert scan.gripper.position(A) == pytest.approx(at, abs=10)
+
+
+def test_a_hold_that_has_shown_ends_no_later_motion_over_a_lost_link(scan: Scan) -> None:
+    scan.move(200, A, speed=0)
+    scan.run(0.3)
+    scan.hold(A)
+    scan.run(0.3)
+    scan.move(200, A, speed=0)
+    scan.run(0.3)
+    scan.blink()
+    scan.run(20.0)
+    assert scan.gripper.position(A) == pytest.approx(200, abs=2)
+
+
 def test_a_move_that_is_given_up_only_once_the_link_is_back_is_held_even_after_a_change_of_mode(
     scan: Scan,
 ) -> None:

@@ -170,6 +170,23 @@ async def test_a_motion_that_was_lost_is_not_sent_again_with_a_speed_or_a_force(
 
 
 @pytest.mark.parametrize("delay", DELAYS)
+async def test_a_hold_that_was_acknowledged_and_lost_is_written_once_the_link_is_back(delay: float) -> None:
+    """Its caller has heard that it was acknowledged, 0.4 s before the link was found lost."""
+    async with at_a_ur(reconnect=ReconnectPolicy(first_delay=delay)) as (server, hand):
+        hand.command(position=255, speed=0)
+        await until_moving(server, hand)
+        async with server.fault_injector.making(Trouble("lost-set")):
+            await hand.hold()
+            await asyncio.sleep(0.1)
+        await hand.wait_for_state(State.DISCONNECTED)
+        await hand.wait_for_state(State.RUNNING_IDLE)
+        await asyncio.sleep(0.1)
+        held_at = server.gripper.position(JAW)
+        await asyncio.sleep(2.0)
+        assert server.gripper.position(JAW) == pytest.approx(held_at, abs=3)
+
+
+@pytest.mark.parametrize("delay", DELAYS)
 @pytest.mark.parametrize("call", ["halt", "reset"])
 async def test_in_place_of_a_stop_that_was_lost_the_jaw_is_held(call: str, delay: float) -> None:
     async with at_a_ur(reconnect=ReconnectPolicy(first_delay=delay)) as (server, hand):
