@@ -38,8 +38,10 @@ class Entry:
         self.acknowledged = now
 
     def doubt(self, now: float) -> None:
-        """Note that the link went down before its acknowledgement, or that another client's image shows."""
-        self.sent, self.is_doubtful = max(self.sent, now), True
+        """Note that the link went down before it showed, or that another client's image shows."""
+        if self.acknowledged is None:
+            self.sent = max(self.sent, now)
+        self.is_doubtful = True
 
     def believe(self, now: float) -> None:
         """Note that it acts after all, by an echo: that is its acknowledgement if it had none."""

@@ -457,3 +457,18 @@ def test_an_adopted_axis_gets_the_time_to_show_its_direction_once_more() -> None
     assert scan.last_image.position(B) == 255
     scan.until(lambda: not scan.controller.is_moving)
     assert scan.positions()[B] >= 240
+
+
+def test_a_link_that_goes_down_before_a_write_shows_hides_no_delay_of_the_gripper() -> None:
+    """Its write counted as sent when the link went down: a held axis came back 15 counts."""
+    scan = started(0.2)
+    scan.moved(0, A, speed=255)
+    scan.move(255, A, speed=255)
+    scan.run(0.15)
+    scan.controller.lost(None, scan.now)
+    scan.until(lambda: scan.positions()[A] > 60)
+    travel, at = scan.gripper.travel(A), scan.positions()[A]
+    scan.hold(A)
+    scan.run(1.0)
+    back = scan.gripper.travel(A) - travel - abs(scan.positions()[A] - at)
+    assert back <= 2 * 3
