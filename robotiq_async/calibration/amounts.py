@@ -31,7 +31,7 @@ def position_of(
     open_fraction: float | None = None,
     name: str = "position",
 ) -> int | None:
-    """A position in counts; None if none is given. ``name`` is that of the argument in counts.
+    """A position in counts; None if none is given. ``name`` is the name of the argument in counts.
 
     Raises:
         TypeError: of the wrong type, or more than one is given.

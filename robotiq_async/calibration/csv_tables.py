@@ -1,6 +1,6 @@
 """CSV tables of measured runs: one value a row, one run a column.
 
-The layout is that of the thesis's own tables (``data/``)::
+The layout follows the thesis's own tables (``data/``)::
 
     speed_value,run_1_ms,run_2_ms,run_3_ms
     0,10021,10021,10021
@@ -168,7 +168,7 @@ MODEL: Final = "model"
 
 
 def _without_model(path: Path | str, rows: Sequence[CsvRow]) -> tuple[Sequence[CsvRow], Model | None]:
-    """The rows without their last column, and the model in it, if it is that of the model."""
+    """The rows without their last column, and the model in it, if that column names the model."""
     if not rows or rows[0][1][-1] != MODEL:
         return rows, None
     found = None

@@ -26,8 +26,8 @@ PRESSING_S: Final = 0.05
 """Seconds for which a finger of a 3-Finger presses before it reports a contact: no source gives them."""
 
 GOES_ON_S: Final = 0.2
-"""Seconds of rest within which an axis that goes on in the same direction needs no start: an assumption. The
-recorded motions were strokes to and fro, and none tells about a stream of small steps."""
+"""Seconds of rest within which an axis that continues in the same direction needs no start: an assumption.
+The recorded motions were strokes to and fro, and none tells about a stream of small steps."""
 
 # One 2F-85 read 225 closed at force 0 and speed 0, 226 at higher speeds and at force 30, another one 228 at
 # 64, and 230 from 80 on.

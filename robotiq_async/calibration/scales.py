@@ -73,7 +73,7 @@ class SpeedCalibration:
 
     @classmethod
     def usual(cls, model: Model) -> SpeedCalibration:
-        """The figures that time moves: the thesis's for a 3-Finger, those of its motion profile for a jaw."""
+        """The figures that time moves: the thesis's for a 3-Finger, its motion profile's for a jaw."""
         profile = profile_of(model)
         return cls.thesis() if profile is None else cls._of_profile(model, profile)
 

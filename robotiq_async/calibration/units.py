@@ -77,7 +77,7 @@ class Units:
             mm: millimetres between the fingertips, 0 (closed) .. the stroke (open); of a gripper with
                 measured points from their least to their most.
             open_fraction: instead of it, the share of the travel that is open: 1 (open) .. 0 (closed). The
-                ends are 0 and 255 counts, those of ``open()`` and ``close()``.
+                ends are 0 and 255 counts, as of ``open()`` and ``close()``.
 
         Raises:
             TypeError: not a number, or not exactly one of the two arguments.

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line and return its exit code; the arguments default to those of the process."""
+    """Run the command line and return its exit code; the arguments default to the process's."""
     try:
         from .run import run
     except ModuleNotFoundError as error:

@@ -50,7 +50,7 @@ _OF_AGENT: Final = tuple(each.name for each in fields(AgentSettings))
 
 
 def machine_name() -> str:
-    """This machine's name, with other characters than those of a key replaced."""
+    """This machine's name, with characters replaced that a key cannot have."""
     return re.sub(r"[^A-Za-z0-9_.-]+", "-", socket.gethostname())[:64] or "host"
 
 
@@ -146,7 +146,7 @@ class _Reader:
             table = {**table, "stroke": self._path.parent / table["stroke"]}
         address, model = table["address"], table.get("model")
         with self._blaming(*path, "model"):
-            HandOptions(model=model)  # type: ignore[arg-type]  # None is that of the address
+            HandOptions(model=model)  # type: ignore[arg-type]  # None: as the address says
         with self._blaming(*path, "address"):
             HandOptions(address, model=model)  # type: ignore[arg-type]
         for key, value in table.items():  # one by one: the error names the line of the key

@@ -1,10 +1,10 @@
-"""The gripper server of polymetis, which DROID's robot asks: gRPC on port 50052. Needs the extra ``grpc``.
+"""The gripper server of polymetis, for DROID's robot: gRPC on port 50052. Needs the extra ``grpc``.
 
-DROID stays as it is; in ``launch_gripper.sh`` one line is another. **The fingers of a reset gripper MOVE**::
+DROID stays as it is, except one line of ``launch_gripper.sh``. **The fingers of a reset gripper MOVE**::
 
     python -m robotiq_async.dropins.polymetis --yes 'rtu:///dev/ttyUSB0?model=2f85'
 
-It is a process of its own because DROID's environment is Python 3.8. Its numbers are those of DROID's data
+It is a separate process because DROID's environment is Python 3.8. Its numbers have the units of DROID's data
 sets: a width in "m" that is linear in counts, a speed of 0.013..0.1 "m/s", a force in percent.
 """
 
@@ -12,10 +12,10 @@ sets: a width in "m" that is linear in counts, a speed of 0.013..0.1 "m/s", a fo
 #
 # Calls come in threads of gRPC, and the blocking hand polls in its own. A call waits for a fresh status,
 # PATIENCE_S at most, and then fails with UNAVAILABLE: the last value is never given out as the present one.
-# The port answers before the gripper is active, because DROID asks for the metadata once, 5 s after the
+# The port answers before the gripper is active, because DROID reads the metadata once, 5 s after the
 # launch; a Goto waits for the activation. An active gripper is adopted: a part that is held stays held.
 #
-# DROID's thread of commands ends with the first error of a Goto. So what may be waited for is waited for.
+# DROID's thread of commands ends with the first error of a Goto. So a Goto waits wherever it may.
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Flat messages of Protocol Buffers, by the numbers of their fields: no generator and no package is needed.
 
-The wire format is that of https://protobuf.dev/programming-guides/encoding: a key for each field, with its
+The wire format is defined at https://protobuf.dev/programming-guides/encoding: a key for each field, with its
 number and its kind, and then a varint, four bytes of a float, or a length and bytes.
 """
 

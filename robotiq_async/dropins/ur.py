@@ -16,7 +16,7 @@ arguments, results and numbers, which are counts, **0 open and 255 closed**.
 #   the echo  after a link was lost in move_and_wait_for_pos() the echo of the gripper decides: our target is
 #             waited for; the echo of before shows that the request never came, and it is sent; any other is
 #             of another client, and raises
-#   the move  OBJ reads 0 until the gripper shows what move() was asked for, so that no wait loop takes the
+#   the move  OBJ reads 0 until the gripper shows the request of move(), so that no wait loop takes the
 #             arrival before for its own. A loop that waits has the rule of the echo, too: a request that
 #             never came is sent within socket_timeout of move(), as the copied class waits so long for its
 #             "ack". After that OBJ raises
@@ -62,7 +62,7 @@ class RobotiqGripper:
     false value, or waits for ever, this one raises. Nothing has run on real hardware yet.
 
     Args:
-        options: those of :class:`robotiq_async.sync.RobotiqHand`, such as ``response_timeout``.
+        options: as of :class:`robotiq_async.sync.RobotiqHand`, such as ``response_timeout``.
     """
 
     ACT, GTO, ATR, ADR, FOR, SPE, POS = "ACT", "GTO", "ATR", "ADR", "FOR", "SPE", "POS"
@@ -120,7 +120,7 @@ class RobotiqGripper:
     def disconnect(self) -> None:
         """Disconnect. **The fingers continue to their last target**, as programs that copy the class expect.
 
-        A move just asked for is handed over first. The end of a program without this call stops the fingers.
+        A move just requested is handed over first. The end of a program without this call stops the fingers.
         """
         if self._hand is None:
             return
@@ -228,7 +228,7 @@ class RobotiqGripper:
                 if not is_untouched or time.monotonic() > until:
                     raise
 
-    # -- what can be read ------------------------------------------------------------------------------
+    # -- reading ---------------------------------------------------------------------------------------
 
     def _get_var(self, variable: str) -> int:
         """A variable of the URCap's port, from a fresh status; programs read OBJ, PRE, FLT, SPE and FOR.
@@ -254,7 +254,7 @@ class RobotiqGripper:
                 return int(status.go_echo)
             case "FLT":
                 return int(status.fault)
-            case "SPE" | "FOR":  # nothing shows them: what was asked for
+            case "SPE" | "FOR":  # nothing shows them: as they were requested
                 return int(self._rates[variable == "FOR"])
         raise ValueError(f"{variable!r} is none of POS, OBJ, PRE, STA, ACT, GTO, FLT, SPE and FOR")
 

@@ -13,7 +13,7 @@ from typing import Any, Final, TypeVar
 F = TypeVar("F", bound=Callable[..., Any])
 
 WIDTH: Final = 96
-SECTIONS: Final = "Args:\n"  # the first of those of a constructor
+SECTIONS: Final = "Args:\n"  # the first section of a constructor's docstring
 STAYS: Final = (
     "It stays with the axes, also after a call that was cancelled or superseded: give it where it matters."
 )
@@ -21,18 +21,18 @@ ARGUMENTS: Final = {
     "fingers": "the axes, a :class:`Finger` mask or the same integer, 1..15; the others stay as they are. "
     "``Finger.ABC`` are the fingers of the model, ``Finger.ALL`` its axes; others that it lacks are refused.",
     "position": "the target in counts, 0 (open) .. 255 (closed).",
-    "mm": "in place of a position, the opening in millimetres, 0 .. the stroke of the model; not for the "
+    "mm": "instead of a position, the opening in millimetres, 0 .. the stroke of the model; not for the "
     "scissor.",
-    "open_fraction": "in place of a position, the share of the travel that is open, 1 (open) .. 0 (closed); "
+    "open_fraction": "instead of a position, the share of the travel that is open, 1 (open) .. 0 (closed); "
     "not for the scissor.",
     "speed": f"0 (the slowest) .. 255; None leaves the speed of these axes. {STAYS}",
     "new_speed": "0 (the slowest) .. 255, for these axes from now on.",
-    "mm_per_s": "in place of a speed, millimetres of opening a second, in the range of the model's speeds.",
+    "mm_per_s": "instead of a speed, millimetres of opening a second, in the range of the model's speeds.",
     "force": f"0 (the least, not none) .. 255, not linear; None leaves the force of these axes. {STAYS}",
     "new_force": "0 (the least, not none) .. 255, not linear, for these axes from now on.",
-    "label_n": "in place of a force, newtons of a label, in the range of the model's: no measured force.",
+    "label_n": "instead of a force, newtons of a label, in the range of the model's: no measured force.",
     "timeout": "seconds above 0; None for twice the expected time plus 2 s, by the speeds at the call. A "
-    "move that is slowed down afterwards needs one of its own.",
+    "move that is slowed down afterwards needs a timeout that allows for it.",
     "at_least": "the contacts that make a grasp, 1 .. the number of axes; None for all of them.",
     "activate": "False writes nothing: a gripper that is reset stays in RESET.",
     "wait": "seconds to keep trying while nothing answers, 0..86400, counted while the event loop runs, for "
@@ -40,8 +40,8 @@ ARGUMENTS: Final = {
     "halt": "False disconnects and leaves the fingers as they are; for programs that only look.",
     "keep_grip": "whether a grip stays in force; None for the hand's own ``keep_grip``.",
     "reason": "for people, 1..200 printable characters.",
-    "whose": "who or what has asked, for the log; 0..200 printable characters.",
-    "seen": "``hand.inhibited`` as the person was shown it, None for what it is at the call: a halt that "
+    "whose": "the person or program that does it, for the log; 0..200 printable characters.",
+    "seen": "``hand.inhibited`` as the person was shown it, None for its value at the call: a halt that "
     "came later stays, also where the reason is the same.",
     "recovery": "seconds above 0 for all of it, while the event loop runs; None for 90.",
     "buffer": "items that are kept for a slow reader, 1..1000000.",

@@ -35,7 +35,7 @@ class Hand(HandKind):
     Use a hand with ``async with``, or call :meth:`start` and :meth:`stop`. A hand belongs to the event loop
     in which it was started: any number of tasks of that loop may call it. No call blocks the loop, and each
     ends in bounded time unless its arguments allow longer. Every such time counts while the event loop runs:
-    what holds up the loop lets no call time out. From another thread or another loop every call raises
+    while the loop is held up no call times out. From another thread or another loop every call raises
     RuntimeError and sends nothing; the properties can be read from anywhere. A hand whose loop was closed
     before :meth:`stop` takes no call any more: its fingers may still move, and a new hand can start.
 
@@ -46,11 +46,11 @@ class Hand(HandKind):
     refused outside their range. One amount is given once: counts and millimetres together are a TypeError.
 
     A stop, a halt, a hold, a reset or a command ends the calls that it supersedes. Their callers hear of it
-    when its write has left, or at once if that takes 50 ms: what they do then may hold up the loop.
+    when its write has left, or at once if that takes 50 ms: their next steps may hold up the loop.
 
     Timestamps are monotonic seconds of this process, wherever the gripper is. No motion is ever sent twice.
 
-    To add a kind of hand, supply what is abstract, give ``_channels`` each status and transition, and set
+    To add a kind of hand, supply the abstract methods, give ``_channels`` each status and transition, and set
     ``_session`` to the present :class:`~robotiq_async.hands.present_run.PresentRun`, or override
     ``_check_running``.
 
@@ -59,7 +59,7 @@ class Hand(HandKind):
         name: of the hand in the log, errors and metrics; empty for its address.
         units: converts positions, speeds and forces of the model; by default by these calibrations.
         keep_grip: whether :meth:`stop` keeps a grip by default.
-        model: of the gripper; None for that of a calibration, and a 3-Finger.
+        model: of the gripper; None for the model of a calibration, else a 3-Finger.
         calibration: the speeds of the gripper; None for the thesis's gripper.
         force_calibration: the forces of the gripper; None for the manual's figures.
     """
@@ -118,17 +118,17 @@ class Hand(HandKind):
 
         It ends within 2 s, even on a dead link and when cancelled: the cancellation is raised once
         the hand has stopped. They count while the event loop runs, and the stop is tried at least once. A
-        link that is down is tried once more. Of several calls at a time the strongest counts, whichever comes
-        first: without ``keep_grip``, then with it, then ``halt=False``. A call stronger than those before it
-        has 2 s of its own. A halt or a reset that does not show yet, or a hold that was not delivered, turns
+        link that is down gets one more try. Of several calls at a time the strongest counts, in any order:
+        without ``keep_grip``, then with it, then ``halt=False``. A call stronger than the calls before it
+        gets another 2 s. A halt or a reset that does not show yet, or a hold that was not delivered, turns
         ``halt=False`` into a stop with ``keep_grip``.
 
         With ``keep_grip`` axes that move are held where they are, and rGTO stays set, so that a grip stays
-        while nothing is connected. This needs every axis seen at rest. In any doubt rGTO is cleared after
-        all, and the log has the reason: an axis is not at rest within 0.5 s, the link is or goes down, a
-        fault, a sequence, another client that commands, or a ``halt()``. A client that starts a motion after
-        the last status and before the disconnection is not seen. What a real gripper does with a part, either
-        way, is not known. A gripper that is not polled may lose its activation, and the part: it is in RESET
+        while nothing is connected. This needs every axis seen at rest. In any doubt rGTO is cleared, and
+        the log has the reason: an axis is not at rest within 0.5 s, the link is or goes down, a fault, a
+        sequence, another client that commands, or a ``halt()``. A client that starts a motion after the last
+        status and before the disconnection is not seen. It is not known what a real gripper does with a
+        part, either way. A gripper that is not polled may lose its activation, and the part: it is in RESET
         then.
         """
         check_flag("halt", halt)
@@ -243,8 +243,8 @@ class Hand(HandKind):
         """Move axes; when all have stopped, return the outcome of each: at the target, or against something.
 
         A contact is a result, not an error, and so is an axis that is "at position" elsewhere:
-        ``result.reached`` has those at their targets. When the call is cancelled (by a
-        task, ``asyncio.timeout`` or an anyio scope) or times out, those of its axes that still move are held
+        ``result.reached`` has the axes at their targets. When the call is cancelled (by a
+        task, ``asyncio.timeout`` or an anyio scope) or times out, its axes that still move are held
         where they are; an axis in contact keeps its request and its grip.
 
         Raises:
@@ -311,7 +311,7 @@ class Hand(HandKind):
         """Close fingers until each has met something or is closed, and return which of them hold it.
 
         Too few contacts are a result and not an error: the result is false, and the fingers stay as they are.
-        For the rest it is a :meth:`move`: what it raises, and what it does when cancelled or timed out.
+        Otherwise it is a :meth:`move`, with the same errors, and the same end when cancelled or timed out.
 
         An axis holds if the gripper reports a contact while closing. It may never report one for a thin
         object between fingertips. A contact latches: a finger that was in contact before still counts when
@@ -329,12 +329,12 @@ class Hand(HandKind):
         """Hold axes that move where they are; returns when the gripper has acknowledged it.
 
         An axis in contact keeps its request and its grip, and one at rest is left alone. Awaited moves and
-        pending requests of these axes end with MoveSupersededError, and their other axes run on. When
+        pending requests of these axes end with MoveSupersededError; their other axes keep moving. When
         cancelled, the hold is sent all the same. If a lost link prevents the acknowledgement, the hold is
         repeated once the link is back, unless another client moves the axes then. In RESET and ATR_DONE, and
         during an activation, a release or a reset, it sends nothing; :meth:`halt` ends those.
 
-        A hold needs to know what the gripper has, so it may wait: for ``write_spacing``, and for up to 0.25 s
+        A hold needs to know the gripper's request, so it may wait: for ``write_spacing``, and up to 0.25 s
         after a write of another client or a lost acknowledgement. :meth:`halt` waits for nothing.
 
         Raises:
@@ -353,7 +353,7 @@ class Hand(HandKind):
 
         Returns when the gripper reports that it has stopped, at most 1 s after the acknowledgement. Awaited
         moves end with MoveSupersededError. When cancelled, the halt is sent all the same. If the link goes
-        down before the acknowledgement, it is not sent again: once the link is back, what this hand moves is
+        down before the acknowledgement, it is not sent again: once the link is back, its moving axes are
         held. In RESET and ATR_DONE nothing moves and nothing is sent. rGTO does not stop an activation or an
         automatic release: during these, halt() clears rACT, as :meth:`reset` does, and returns in RESET.
 
@@ -371,18 +371,18 @@ class Hand(HandKind):
     async def inhibit(self, reason: str, *, who: str = "") -> None:
         """Halt for a person, and refuse calls that may move or press until a person calls :meth:`permit`.
 
-        After :meth:`halt` the next command goes on; after this every motion, force, activation, release and
-        recovery raises MotionInhibitedError, and so do calls that wait for one. It outlasts lost links,
-        :meth:`stop` and :meth:`start`; again, it halts again, and the first reason stays. Whatever it raises,
-        motion is inhibited; what moves while the link is down is held once it is back, and an activation or
-        a release reset. No emergency stop.
+        After :meth:`halt` the next command moves again; after this every motion, force, activation, release
+        and recovery raises MotionInhibitedError, and so do calls that wait for one. It outlasts lost links,
+        :meth:`stop` and :meth:`start`. A second call halts again, and the first reason stays. Motion is
+        inhibited even if the call raises; axes that move while the link is down are held once it is back, and
+        an activation or a release is ended by a reset. No emergency stop.
         A :meth:`stop` under way that leaves the fingers moving becomes one that stops them; then it raises.
 
         Raises:
             TypeError, ValueError: of the arguments; nothing is inhibited.
             NotStartedError: the hand was stopped: the fingers MAY STILL MOVE. A hand that was never started
                 raises nothing: it is inhibited from its start on.
-            RobotiqError: what :meth:`halt` raises: the fingers MAY STILL MOVE.
+            RobotiqError: as :meth:`halt`: the fingers MAY STILL MOVE.
         """
         with self._naming:
             await self._inhibit(Inhibit(reason, who, time.time()))
@@ -433,7 +433,7 @@ class Hand(HandKind):
             await self._reset()
 
     async def atr(self) -> None:
-        """Release automatically: all axes open slowly, whatever the fault. Only in FAULT.
+        """Release automatically: all axes open slowly, in any fault. Only in FAULT.
 
         Returns in ATR_DONE. After that only :meth:`reset` and :meth:`activate`, or :meth:`recover`, help.
         When cancelled, the release continues.
@@ -467,7 +467,7 @@ class Hand(HandKind):
         with self._naming:
             await self._recover(limit)
 
-    # -- what can be read ------------------------------------------------------------------------------
+    # -- reading ---------------------------------------------------------------------------------------
 
     @property
     def name(self) -> str:

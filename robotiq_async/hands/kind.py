@@ -60,7 +60,7 @@ class HandKind(ABC):
 
     __reduce__ = refuse_copy
 
-    # -- what each kind of hand supplies, with checked arguments -----------------------------------------
+    # -- supplied by each kind of hand, with checked arguments ---------------------------------------------
 
     @property
     @abstractmethod
@@ -130,7 +130,7 @@ class HandKind(ABC):
         """Of the stroke that was measured on the gripper; none for nominal openings."""
         return ()
 
-    # -- what the calls above share ----------------------------------------------------------------------
+    # -- shared by the calls above -------------------------------------------------------------------------
 
     def _keeps_grip(self, keep_grip: bool | None) -> bool:
         return self._keep_grip if keep_grip is None else check_flag("keep_grip", keep_grip)
@@ -160,7 +160,7 @@ class HandKind(ABC):
             raise InvalidStateError(why, self.state, allowed)
 
     def _check_allowed(self, trigger: Trigger, *, presses: bool = True) -> None:
-        """Refuse a call that the state, or an inhibit of what moves or ``presses``, does not allow."""
+        """Refuse a call that the state does not allow, or, if it may move or ``presses``, an inhibit."""
         check(trigger, self.state, self._newest_status, self.inhibited if presses else None)
 
     def _current_status(self) -> RobotiqStatus:

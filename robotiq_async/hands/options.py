@@ -1,6 +1,6 @@
 """The options of a hand, in one table.
 
-:class:`HandOptions` checks what a hand is made with. Each of its fields carries an :class:`Option`: range,
+:class:`HandOptions` checks the arguments of a hand. Each of its fields carries an :class:`Option`: range,
 unit, help, default, and the places that offer it. FLEET.toml, the parameters of ROS, the command line and the
 tables in docs/ are made from :data:`OPTIONS`. A new option is a field here, and an argument of
 :class:`~robotiq_async.RobotiqHand`, whose signature is written out for editors and type checkers.
@@ -66,12 +66,12 @@ CONNECT_TIMEOUT_S: Final = 2.0
 """A lost first packet is sent again after 1 s; a device that answers neither is not there."""
 RESPONSE_TIMEOUT_S: Final = 0.4
 """Two of these, a read in flight and a write, still end within the second that a write may take; on a serial
-line also with the time in which the read may be asked once more."""
+line also with the time in which the read may be repeated."""
 LONGEST_RESPONSE_S: Final = 5.0  # for gateways that are slow; a write may take more than a second then
 LONGEST_WAIT_S: Final = 86400.0  # how long a start may wait for its gripper: a day
 ACTIVATION_TIMEOUT_S: Final = 40.0
 """Drivers that ran on hardware saw about 15 s, and wait for 25 to 30 s; the notes of one list time-outs of
-the activation. What ends one early leaves a hand that does not know where its fingers are."""
+the activation. An early end leaves a hand that does not know where its fingers are."""
 LONGEST_NAME: Final = 64  # characters of a hand's name: it begins every line of the log
 
 
@@ -92,14 +92,14 @@ class Option:
     """A row of the table: one option.
 
     Attributes:
-        help: what it is, with its unit, as a sentence without its full stop.
+        help: its meaning, with its unit, as a sentence without its full stop.
         check: takes name and value, and returns the value that is kept.
         places: where it is offered.
         low: the lowest number, of all links.
         high: the highest number, of all links.
-        tcp: what None stands for over TCP.
-        rtu: what None stands for on a serial line.
-        default: what counts unless another value is given; None where it depends on the link.
+        tcp: the value that None stands for over TCP.
+        rtu: the value that None stands for on a serial line.
+        default: the value that counts unless another is given; None where it depends on the link.
         choices: the names that it can be, for one that is a name.
         is_file: whether it can be the path of a file.
     """
@@ -178,7 +178,7 @@ def _check_forces(_: str, forces: object) -> ForceCalibration | None:
 
 
 def check_stroke(name: str, stroke: object, model: Model | None = None) -> Points | None:
-    """Points that were measured on a gripper, or those of a file; None for nominal openings.
+    """Points that were measured on a gripper, or the points in a file; None for nominal openings.
 
     Raises:
         TypeError: not points, and not a path.
@@ -322,13 +322,13 @@ class HandOptions:
             Place.FILE | Place.COMMAND_LINE | Place.ROS,
             choices=tuple(MODELS),
         ),
-    ] = None  # type: ignore[assignment]  # that of the address; a name becomes its model
+    ] = None  # type: ignore[assignment]  # the address's; a name becomes its model
 
     link: GripperLink = field(default=None, repr=False, compare=False)  # type: ignore[assignment]
     """The way to the gripper; made from the address."""
     units: Units = field(init=False, repr=False, compare=False)
     """Units of positions, speeds and forces; default timeouts of moves come from its speeds."""
-    log: Log = field(init=False, repr=False, compare=False)  # for what happens to the hand
+    log: Log = field(init=False, repr=False, compare=False)  # for the events of the hand
 
     def __post_init__(self) -> None:
         self._keep("name", _check_name("name", self.name))  # the log of the link begins with it

@@ -120,7 +120,7 @@ class Counters:
         self._busy = answered - asked
 
     def note_write(self, took: float, age: float) -> None:
-        """Count a write that was acknowledged; ``age`` is that of the status it was decided on."""
+        """Count a write that was acknowledged; ``age`` is the age of the status it was decided on."""
         self.writes += 1
         self._busy += took
         self.status_ages.append(age)

@@ -183,8 +183,8 @@ class LimitedIntake(Intake[T]):
     for the start waits for the first item without a limit.
 
     Args:
-        buffer: as that of a stream.
-        kept: as that of a stream.
+        buffer: as of a stream.
+        kept: as of a stream.
         limit: seconds.
         make_error: makes the error for these seconds.
         since: when the time begins, by the clock of the loop; None if the hand does not run.
@@ -224,7 +224,7 @@ class LimitedIntake(Intake[T]):
 
 
 class DerivedIntake(Intake[T]):
-    """The inside of a stream of items that ``make`` derives from those of a channel; it drops none.
+    """The inside of a stream of items that ``make`` derives from a channel's items; it drops none.
 
     ``make`` is called in the turn of each push, so it must be quick and must not fail.
     """
@@ -245,9 +245,9 @@ class Listeners:
     def __init__(self, log: Log = log) -> None:
         self._log = log
         self._listeners: dict[object, Listener] = {}
-        """By a key of their own: the same callback may be added twice."""
+        """Each has a key, because the same callback may be added twice."""
         self._interrupted: set[object] = set()
-        """The keys of those in which the program was interrupted."""
+        """The keys of the listeners in which the program was interrupted."""
         self._items: deque[object] = deque()
         self._is_telling = False
 

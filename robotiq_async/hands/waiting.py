@@ -137,7 +137,7 @@ class StallWatch:
 
 
 class ActivationProgress:
-    """Logs how long an activation has taken so far, whichever client began it."""
+    """Logs how long an activation has taken so far, no matter which client began it."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop, log: Log) -> None:
         self._loop = loop

@@ -1,7 +1,7 @@
 """The plan of a cycle: read, decide and write at once, like the scan of a PLC.
 
-Pure: the next exchange follows from what is to be written and from the age of the newest status. So each
-decision is made on what the gripper has just shown.
+Pure: the next exchange follows from the pending write and from the age of the newest status. So each
+decision is made on a status that the gripper has just shown.
 """
 
 # Reads   To be written                           Newest status   Next
@@ -16,7 +16,7 @@ decision is made on what the gripper has just shown.
 # 1, 2    anything                                stale           READ
 # 3       anything                                stale           WRITE, the last
 #
-# Stale: the loop was held up since the status was asked for, or is at this moment. A write that write_spacing
+# Stale: the loop was held up since the status was requested, or is at this moment. A write that write_spacing
 # keeps back is waited for (WAIT), and planned again: a stop may have come, or a block.
 #
 # A stop does not wait for the read: a gripper may carry it out and not answer. Nor does a command on a slow
@@ -33,7 +33,7 @@ from ..hands.options import LONGEST_SPACING_S
 
 READS: Final = 3  # the most reads in a cycle that has something to write, while the loop is held up
 FRESH_S: Final = 0.006
-"""On a slow link a command is decided on the newest status if that was asked for within this time: the poll
+"""On a slow link a command is decided on the newest status if that was requested within this time: the poll
 interval and a bit. A read of three registers takes half of it."""
 SOON_S: Final = 0.0025
 """Longest wait of a cycle for write_spacing: half of a usual period, so that its status is still fresh."""
@@ -51,7 +51,7 @@ class CycleStep(Enum):
     WRITE_AND_READ = "write, and read in the same exchange where link and request allow that"
 
 
-# Each poll asks for them, and Python 3.11 finds a member of an Enum by a detour.
+# Each poll uses them, and Python 3.11 finds a member of an Enum by a detour.
 READ, WAIT, WRITE, WRITE_AND_READ = CycleStep
 
 
@@ -61,7 +61,7 @@ def next_step(write: NextWrite, reads: int, age: float, *, is_stale: bool, is_sl
     Args:
         write: the next write.
         reads: how often the cycle has read the status.
-        age: seconds since the newest status was asked for.
+        age: seconds since the newest status was requested.
         is_stale: whether the loop was held up in that time.
         is_slow: whether a read takes a good part of the poll interval.
     """

@@ -1,4 +1,4 @@
-"""The end of a run: the strongest stop that was asked for, and the time for it."""
+"""The end of a run: the strongest stop that was requested, and the time for it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Ending:
         self._limit: Final = Limit(STOP_S, shield=True)
 
     def strengthen(self, level: StopLevel) -> bool:
-        """Take in another stop; whether it is stronger, and so has time of its own."""
+        """Take in another stop; returns whether it is stronger, and so gets the full time again."""
         if level > self.level:
             self._log.info("a stronger stop came: the fingers are %s", level.done)
             self.level = level

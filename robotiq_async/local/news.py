@@ -1,7 +1,7 @@
 """News of a gripper, logged once each: its faults, a reset, an axis that does not get where it was sent.
 
-A fault is logged when the hand counts it as one: a passing 0x09 is none. A reset is logged, whoever it was,
-once the gripper has been active in this run: what it held may have fallen.
+A fault is logged when the hand counts it as one: a passing 0x09 is none. A reset by any client is logged,
+once the gripper has been active in this run: its part may have fallen.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class UnreachedNews:
     def ended(self, target: int, result: MoveResult) -> None:
         """A move has ended."""
         # Not of the scissor: its range ends within 15..232 (drivers), and programs ask it for 0 and 255. Nor
-        # where the gripper echoes its own limit in place of the request.
+        # where the gripper echoes its own limit instead of the request.
         for axis, how in result.outcomes.items():
             is_limited = axis is Finger.SCISSOR or result.status.requested_position(axis) != target
             is_there = axis in result.reached or how is not ObjectStatus.AT_POSITION
@@ -106,6 +106,6 @@ class UnreachedNews:
 
 
 def fault_words(fault: Fault) -> str:
-    """Code, name and description of a fault, what the fingers do, and what helps."""
+    """Code, name and description of a fault, the motion of the fingers, and the remedy."""
     does = OTHER_FAULTS.get(fault) or (DOES[fault.severity] if fault.is_known else UNKNOWN_FAULT)
     return f"0x{int(fault):02X} {fault.name}: {fault.description}; {does}"

@@ -40,7 +40,7 @@ class RunParts(NamedTuple):
 
 
 class Poller:
-    """Makes the cycles, and passes on what they read and write.
+    """Makes the cycles, and passes on the statuses and images that they read and write.
 
     Attributes:
         tick: the tick of the cycles.
@@ -59,8 +59,8 @@ class Poller:
         self._accepted: str | None = None
         """The contradiction that the gripper showed when its link was opened last; None before the first."""
         self._late_polls: Final = LatePolls(self.tick.time, options.log)
-        self._last_poll: float | None = None  # when the poll before was asked for; None: no period is counted
-        self._asked = -math.inf  # when the newest status was asked for
+        self._last_poll: float | None = None  # when the poll before began; None: no period is counted
+        self._asked = -math.inf  # when the newest status was requested
 
     def break_period(self) -> None:
         """Do not count the time from the last poll to the next as a period."""
@@ -144,7 +144,7 @@ class Poller:
         return next_step(write, reads, age, is_stale=self._is_stale(), is_slow=self._is_slow)
 
     def _is_stale(self) -> bool:
-        """Whether the loop was held up since the newest status was asked for, or is at this moment.
+        """Whether the loop was held up since the newest status was requested, or is at this moment.
 
         Such a status is too old to decide on: it may lack a write of another client, or the motion of an
         axis. A slow gripper does not count: then the ticks come in time.
@@ -182,7 +182,7 @@ class Poller:
                 return False
             answered = self.tick.time()
             if answer is None:
-                # Refused, and not repeated: what has been asked since replaces it, and is made from it.
+                # Refused, and not repeated: later requests replace it, and are made from it.
                 self._controller.acknowledged(answered)
                 self._note_sent(entry, acknowledged=False)
                 return True
@@ -241,7 +241,7 @@ class Poller:
         return None if controller.is_off or controller.has_request else entry.image.registers
 
     def _decide_stop(self) -> Registers | None:
-        """The image to write, if it is that of a stop."""
+        """The image to write, if it belongs to a stop."""
         write = self._controller.next_write(self.tick.time())
         is_stop = write is not None and write.is_urgent and not write.wait
         return self._decide() if is_stop and not self._is_stale() else None
@@ -269,7 +269,7 @@ class Poller:
         self._take(self._status(registers, answered), asked)
 
     async def _check_who_answers(self, registers: Registers) -> None:
-        """Refuse another gripper, and what is none.
+        """Refuse another gripper, and a device that is none.
 
         Reserved bits alone do not tell that a gripper is another one than before. It may be in motion, so it
         must get its stop.

@@ -8,9 +8,9 @@ What they do may hold up the loop. So a write that is due leaves first.
 # A listener may command the hand. If it got a change of state in the middle of a call, the rest of the call
 # would overwrite its request: changes are noted, and published after the call.
 #
-# A request may end what others wait for, and one that stops the fingers leaves soon. Until its image has left
+# A request may end the waits of others, and one that stops the fingers leaves soon. Until its image has left
 #
-# * the callers whom it has ended wait, whatever it is;
+# * the callers whose calls it has ended wait, for any request;
 # * the publication waits, too, if it is a stop, a halt, a reset or a hold: see hold_back(). State waiters are
 #   woken by the publication, and so they wait with it.
 #
@@ -35,7 +35,7 @@ from .news import BITS, FaultNews
 
 
 class Publisher:
-    """Publishes what happens in a run.
+    """Publishes the events of a run.
 
     Attributes:
         numbers: the sequence numbers of the statuses.
@@ -58,7 +58,7 @@ class Publisher:
         self._queue.append((self._channels.transitions, change, wake))
 
     def publish_changes(self) -> None:
-        """Publish what was noted."""
+        """Publish the noted changes."""
         while self._queue and not self._is_held_back:
             channel, item, wake = self._queue.popleft()
             if wake is not None:
@@ -99,7 +99,7 @@ class Publisher:
         self.answer_ended()
 
     def end(self, callers: Iterable[Waiter[Any]], error: RobotiqError) -> None:
-        """A request has ended what these callers wait for."""
+        """A request has ended the calls of these callers."""
         self._ended += [(caller, error) for caller in callers]
 
     @property

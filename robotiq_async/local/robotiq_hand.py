@@ -7,7 +7,7 @@
 #
 #   set_position, set_speed, set_force, hold, halt     answered(): acknowledged; a halt is seen to stop
 #   command                                            ask(): no answer
-#   move                                               moving(): a MoveResult; its end holds what still moves
+#   move                                               moving(): a MoveResult; its end holds axes that move
 #   activate, reset, atr                               activated(), reach(): a state, in limited time
 #
 # _admitted() is the gate of all of them: no request passes before start(), after stop(), or from elsewhere.
@@ -81,9 +81,9 @@ class RobotiqHand(Hand):
 
     Making a hand checks every option; it opens nothing and needs no running loop.
 
-    Speed and force have no echo. After adopting an active gripper, ``speed`` and ``force`` are therefore also
-    what the axes get that a first command does not address: pass what the gripper was used with if that
-    matters to the part it holds.
+    Speed and force have no echo. After adopting an active gripper, the first command therefore gives
+    ``speed`` and ``force`` also to the axes that it does not address: pass the values that the gripper was
+    used with if that matters to the part it holds.
 
     Nothing of this has run on real hardware yet.
 
@@ -98,7 +98,7 @@ class RobotiqHand(Hand):
         name: name of this hand, 1..64 printable characters: errors and the log begin with it, and
             metrics and recordings carry it. None calls it by its address.
         device_id: Modbus unit id, 0..255 over TCP and 1..247 over RTU; by default 2 over TCP and 9 over
-            RTU, of a jaw 9 on either. Two hands on one TCP address need one each: that of their gripper
+            RTU, of a jaw 9 on either. Two hands on one TCP address need one each: the id of their gripper
             behind the gateway. Over ``urcap://`` the number of one of several grippers (SID), 1..247; by
             default the one that the URCap has. The other options of Modbus are refused there.
         read_function: Modbus function that reads the status, 3 or 4; by default 4 over TCP and 3 over
@@ -116,7 +116,7 @@ class RobotiqHand(Hand):
         connect_timeout: seconds for opening the link, while the event loop runs, 0.01..5.
         response_timeout: seconds for one answer, 0.005..5. A write fails within twice that, and over RTU,
             where a read may be sent again, within 0.15 s more (three times that if it is above 0.4).
-            :meth:`stop` ends within 2 s whatever it is; but a gripper that takes longer than 0.4 s to
+            :meth:`stop` ends within 2 s with any value; but a gripper that takes longer than 0.4 s to
             answer may not have confirmed by then that the fingers were stopped, and the log says so.
         activation_timeout: seconds for an activation, while the event loop runs, 0.01..120.
         reconnect: whether a lost link is opened again, or a :class:`ReconnectPolicy`.
@@ -324,8 +324,8 @@ class RobotiqHand(Hand):
         """Drop the requests that were not sent, except holds and halts: for a client that has lost control.
 
         A speed or a force that is not written yet would take effect under the next client. Calls that wait
-        for what is dropped raise MoveSupersededError. What was sent continues: :meth:`hold` ends it. A hand
-        that does not run has nothing to drop.
+        for dropped requests raise MoveSupersededError. A motion that was sent continues: :meth:`hold` ends
+        it. A hand that does not run has nothing to drop.
 
         Args:
             why: the text of that error.
@@ -446,7 +446,7 @@ class RobotiqHand(Hand):
         fault = self.status.fault
         return fault.severity is Severity.MAJOR and fault.is_known
 
-    # -- what can be read ------------------------------------------------------------------------------
+    # -- reading ---------------------------------------------------------------------------------------
 
     @property
     def state(self) -> State:
@@ -483,12 +483,12 @@ class RobotiqHand(Hand):
         """Call a plain function with every status, change of state and request written, as it happens.
 
         It is called in the hand's event loop, in the turn in which it happens: before any reader of a stream
-        and any awaiting caller continues. What a stop, a halt or a reset changes comes when its write has
+        and any awaiting caller continues. The changes by a stop, a halt or a reset come when its write has
         left, if that is expected within 50 ms. Every poll waits for it, so it must be quick and not block.
-        Calls come in order: a change of state before the status or the request that leads to it, and what the
-        callback itself causes after the present item.
+        Calls come in order: a change of state before the status or the request that leads to it, and items
+        that the callback itself causes after the present item.
 
-        A callback that raises is logged with its traceback and not called again; the hand runs on. One that
+        A callback that raises is logged with its traceback and not called again; the hand continues. One that
         is added before the start waits for it, and it outlasts :meth:`stop`, until you remove it.
 
         Args:

@@ -10,19 +10,19 @@ start() and stop() may be called from different tasks.
 # State        Since                                        Until
 #
 # CONNECTING   the making                                   the first status, a stop, or there is no gripper
-# POLLING      the first status, or the link is back        the link fails, a stop, or a mistake of ours
+# POLLING      the first status, or the link is back        the link fails, a stop, or a bug
 # LOST         the link failed                              the link is back or given up, or a stop
 # ENDING       request_stop(), also by the run itself       the fingers are stopped and the link is closed
 # OVER         end_with()                                   -
 #
 # _become() alone sets the state, and _NEXT has the order. A stop may come in any turn of the loop, also in
-# that in which a link was opened: after each wait the state is looked at, and ENDING never goes back.
+# the turn in which a link was opened: after each wait the state is read again, and ENDING never goes back.
 #
-# ENDING takes no requests. Its level and its time are those of an Ending. A run that ends by itself requests
+# ENDING takes no requests. An Ending has its level and its time. A run that ends by itself requests
 # its own stop: the link was given up, there is none, or its task was cancelled.
 #
-# A run has ended by a stop, unless `failure` is set: the error of a link that was given up, or a mistake of
-# ours. why_over() makes the error for everybody who waits then.
+# A run has ended by a stop, unless `failure` is set: the error of a link that was given up, or of a bug.
+# why_over() makes the error for everybody who waits then.
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class Run:
         state: where it is in its course.
         connected: done after the first status; holds the error if there is none.
         down: the link while it is down; of one that was given up, for good.
-        failure: what has ended the run, unless that was a stop.
+        failure: the error that has ended the run; None after a stop.
     """
 
     def __init__(self, parts: RunParts, ended: Callable[[], None] = lambda: None) -> None:
@@ -116,7 +116,7 @@ class Run:
         self._parts.options.log.debug("run: %s -> %s", self.state.name, state.name)
         self.state = state
 
-    # -- what others ask -------------------------------------------------------------------------------
+    # -- requests of others -----------------------------------------------------------------------------
 
     def note_request(self) -> None:
         """A request was made: begin the next cycle at once if it may begin with its write.
@@ -248,8 +248,8 @@ class Run:
             raise
         except Exception as error:
             if self.state is RunState.CONNECTING:
-                raise  # a mistake of ours
-            # No thread, no memory, no descriptor: what the system lacks now it may have at the next try.
+                raise  # a bug
+            # No thread, no memory, no descriptor: the next try may find them.
             self._parts.options.log.debug("the link could not be opened", exc_info=error)
             raise ConnectFailedError(self._parts.options.link.address, repr(error)) from error
 
@@ -339,7 +339,7 @@ class Run:
 
     async def _stop_fingers_once(self) -> None:
         if not self._parts.link.is_open:
-            # It may have been lost since the last exchange: what has become of a grip meanwhile is not known.
+            # It may have been lost since the last exchange: a grip may have ended meanwhile.
             self._lose(self.link_error())
             # A gripper without a client keeps moving. Read first: if it has lost its power, an image
             # with rACT would activate it, and another device may have its address.

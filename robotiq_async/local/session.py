@@ -6,9 +6,9 @@
 # tasks of their own, and never touch the link: ask() gives a request to the controller in the caller's turn
 # of the loop, publishes the changes of state that follow, and wakes the run if something is due. A caller
 # then waits for a future. The controller answers the future of a request or a move; StateWaiters answers
-# that of a state.
+# the future of a state.
 #
-# A wait is in vain in DISCONNECTED and in DO_SHUTDOWN. An activation has further states that end it. Only
+# DISCONNECTED and DO_SHUTDOWN end a wait with an error. An activation has further states that end it. Only
 # wait_for_state() waits all of them out.
 #
 # A run ends once, in Run.end_with(), and _end() is called in that turn of the loop. The gripper is given back
@@ -59,7 +59,7 @@ T = TypeVar("T")
 MARGIN_S: Final = 2.0
 """Added to twice the expected time for the default timeout of a move."""
 Failing = Mapping[State, Callable[[], RobotiqError]]
-"""The states in which a wait is in vain, each with the error for the caller."""
+"""The states that end a wait, each with the error for the caller."""
 
 
 def usual_time(
@@ -73,7 +73,7 @@ def usual_time(
 
     ``closing_s`` gives the seconds of a full stroke at a speed.
     """
-    # No time is published for the scissor: it counts as a finger. The times are those of one gripper without
+    # No time is published for the scissor: it counts as a finger. The times are of one gripper without
     # load [thesis, table A1.1]: twice leaves room.
     full = status.model.stroke.counts
     strokes = {axis: abs(position - status.position(axis)) / full for axis in axes}
@@ -269,12 +269,12 @@ class Session:
     ) -> State:
         """Make a request and wait for one of some states; ``timeout`` in seconds, None for no limit.
 
-        ``failing`` are states in which the wait is in vain, besides a lost link and a stop; None waits those
+        ``failing`` are states that end the wait in error, besides a lost link and a stop; None waits those
         out, too. ``what`` is the message of a timeout.
 
         Raises:
             StateTimeoutError: not in time.
-            RobotiqError: refused, or in vain.
+            RobotiqError: refused, or ended by one of these.
         """
         ends = {} if failing is None else {**self._ends, **failing}
         state: State | None = None

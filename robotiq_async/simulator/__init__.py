@@ -11,7 +11,7 @@ room            contents
                 :class:`UrcapSimulatorServer` (the text port of a UR's URCap)
 ``troubles``    failures, as data and as text: :class:`Trouble`, :func:`parse_troubles`;
                 :class:`FaultInjector`, ``server.fault_injector``, makes it happen;
-                :func:`own_habits` and :func:`like_hardware`: those of real grippers
+                :func:`own_habits` and :func:`like_hardware`: habits of real grippers
 ``functions``   the Modbus functions that are served
 ==============  ===========================================================================
 

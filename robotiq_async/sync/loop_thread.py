@@ -37,14 +37,14 @@ Function = Callable[[], Coroutine[Any, Any, T]]
 
 THREAD_NAME: Final = "robotiq_async"  # of the thread
 HOLD_AFTER_S: Final = 0.1
-"""Seconds that an interrupted call has to end before the fingers are held: most calls hold what they moved
+"""Seconds that an interrupted call has to end before the fingers are held: most calls hold their axes
 themselves, and one that waits for a disk does not keep them moving."""
 LOOP_LOOK_S: Final = 0.1  # between two checks that the loop still exists; on Windows Ctrl-C arrives only then
 GIVE_UP_S: Final = 3.0  # for an interrupted call to end: stop() takes up to 2 s, a hold up to 1 s
 
 
 class LoopThread:
-    """Makes calls in an event loop of its own, for any number of other threads.
+    """Makes calls in a separate event loop, for any number of other threads.
 
     The thread starts with the first call and ends when no call and no hand is left in it.
     """
@@ -275,7 +275,7 @@ class _Call(Generic[T]):
             self._task.cancel()
 
     def forget(self) -> None:
-        """Drop its exception, if it has ended with one: asyncio would log that nobody looked at it."""
+        """Drop its exception, if it has ended with one: asyncio would log that it was never retrieved."""
         if self._task is not None and self._task.done() and not self._task.cancelled():
             self._task.exception()
 

@@ -85,7 +85,7 @@ class Stream(Generic[T]):
 
 
 def _documented_as(original: type) -> Callable[[K], K]:
-    """Copy the docstrings of public methods and properties from those of the same name, and the options'."""
+    """Copy the docstrings of public methods and properties of the same name, and the options'."""
 
     def copy(kind: K) -> K:
         if kind.__doc__ and original.__doc__:  # python -OO has none
@@ -103,12 +103,12 @@ class RobotiqHand:
     """A Robotiq gripper behind Modbus TCP, a serial line, or simulated, that blocks.
 
     Use it as ``with RobotiqHand(address) as hand:``, or call :meth:`start` and :meth:`stop`. The options, the
-    calls, their arguments, results and errors are those of :class:`robotiq_async.RobotiqHand`, and each call
-    returns when the async one has ended. All blocking hands share one event loop in a thread of its own,
+    calls, their arguments, results and errors are as of :class:`robotiq_async.RobotiqHand`, and each call
+    returns when the async one has ended. All blocking hands share one event loop in a separate thread,
     which polls while your code runs. Calls may come from any thread, also from one in which another event
     loop runs: that loop waits for them.
 
-    Ctrl-C does to a call what cancelling does to the async one, and then holds every axis that moves. A hand
+    Ctrl-C cancels a call as if it were the async one, and then holds every axis that moves. A hand
     that was not stopped is stopped when the program ends. After a fork it stays with the parent. Listeners
     are called in the hand's thread, where a call that waits raises RuntimeError.
 
@@ -369,7 +369,7 @@ class RobotiqHand:
     def recover(self, timeout: float | None = None) -> None:
         self._caller.wait(lambda: self._inner.recover(timeout))
 
-    # -- what can be read ------------------------------------------------------------------------------
+    # -- reading ---------------------------------------------------------------------------------------
 
     @property
     def name(self) -> str:

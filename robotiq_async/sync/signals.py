@@ -29,7 +29,7 @@ def stops_on_signals(*hands: RobotiqHand) -> Iterator[None]:
     """Stop blocking hands on SIGINT, SIGTERM and SIGHUP, and leave the block after that.
 
     Without it SIGTERM ends a program at once, and the fingers move on; and the first process of a container
-    (PID 1) does not get it at all. The stops run in the thread of the hands, whatever the program does. Then
+    (PID 1) does not get it at all. The stops run in the thread of the hands, also in a busy program. Then
     the call that it waits for, if any, is cancelled, and the program continues after the block. Further
     signals are ignored for 3 s after the stops; later ones act as before the block. An ignored signal stays
     ignored. SIGKILL stops nothing.

@@ -14,6 +14,6 @@ Products, beside each other:
 ``description``  for programs that plan motions or draw a gripper: URDF, SRDF and MJCF
 ===============  ======================================================================================
 
-They share ``actions`` (what a person can do with a hand), ``wording`` (states and refusals in plain words)
+They share ``actions`` (the actions of a person on a hand), ``wording`` (states and refusals in plain words)
 and ``errors``.
 """

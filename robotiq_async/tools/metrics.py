@@ -67,7 +67,7 @@ _SHARES: Final = {"link_use": "Share of the time in which the hand waits for an 
 
 
 class HandCollector(Collector):
-    """Collects the metrics of hands for a registry of your own."""
+    """Collects the metrics of hands for your registry."""
 
     def __init__(self, hands: Iterable[Hand]) -> None:
         """Create it in the event loop that the hands run in.

@@ -156,7 +156,7 @@ async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator
     Args:
         hands: to stop; one that does not run is left alone.
         forward: for servers that end themselves in order: pass the signal on to the handler that was there
-            before the block, in place of cancelling.
+            before the block, instead of cancelling.
 
     Raises:
         TypeError: a hand is a blocking one, or none.
@@ -189,7 +189,7 @@ async def stops_on_signals(*hands: Hand, forward: bool = False) -> AsyncIterator
         if not signals.received:
             signals.note(number)
             insist_at = time.monotonic() + INSIST_S
-            # A signal interrupts the loop anywhere: a stop has to begin in a turn of its own.
+            # A signal interrupts the loop anywhere: a stop has to begin in another turn.
             with suppress(RuntimeError):  # the loop was closed
                 loop.call_soon_threadsafe(begin, number)
         elif time.monotonic() > insist_at:

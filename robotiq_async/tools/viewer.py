@@ -6,9 +6,9 @@
 
 In this order a slow viewer does not delay the stop of the hand.
 
-The topics are those of a recording (:mod:`.recording.feed`); ``/gripper/state`` with state, fault and
-statistics, once a second and at every event; and ``/gripper/parts`` with what a simulation with physics has
-before the gripper. Viewers only look: there is no password, and nothing here moves the gripper.
+The topics are as in a recording (:mod:`.recording.feed`); ``/gripper/state`` with state, fault and
+statistics, once a second and at every event; and ``/gripper/parts`` with the parts that a simulation with
+physics has before the gripper. Viewers only look: there is no password, and nothing here moves the gripper.
 """
 
 from __future__ import annotations

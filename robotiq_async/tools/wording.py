@@ -88,7 +88,7 @@ def inhibit_words(fields: Mapping[str, Any]) -> str:
 
 
 def refusal_words(error: RobotiqError, hints: Mapping[State, str]) -> str:
-    """The reason for a refusal, and the key or button that helps: of the hints, that of the state.
+    """The reason for a refusal, and the key or button that helps: the hint of the state.
 
     The advice of the error is for programs, and left out.
     """

@@ -176,11 +176,11 @@ _SHARED: Final = frozenset({0x00, 0x05, 0x07, 0x09, 0x0B, 0x0D, 0x0F})
 
 
 class Fault(Code):
-    """gFLT: the fault codes of the thesis's table 4, and those of the 2F and the Hand-E.
+    """gFLT: the fault codes of the thesis's table 4, and the codes of the 2F and the Hand-E.
 
     Some codes mean one thing on a 3-Finger and another on its siblings; a status decodes them by its model,
-    and ``Fault(code)`` is that of the 3-Finger. A code that is missing in a table becomes a member of its
-    own, ``Fault(0x0C).name == "UNKNOWN_0x0C"``, with severity MAJOR: an unknown fault is never reported as no
+    and ``Fault(code)`` is the fault of the 3-Finger. A code that is missing in a table becomes a new member,
+    ``Fault(0x0C).name == "UNKNOWN_0x0C"``, with severity MAJOR: an unknown fault is never reported as no
     fault. Two faults are equal if they are the same; compared with a number, the code counts.
     """
 
@@ -311,7 +311,7 @@ class Trigger(Enum):
     """An event that can change the state of a hand.
 
     ``ASK_`` marks a call of the user, ``SEEN_`` a condition found in a status; the others concern the link
-    and the delivery of a request. DELIVERED comes, too, if there is nothing left to deliver: what was asked
+    and the delivery of a request. DELIVERED comes, too, if there is nothing left to deliver: the request
     was dropped, or is in force already. HALT_RESETS is a halt in a state that shows no activation and no
     release, while one drives the fingers or is about to: only a reset ends it.
     """

@@ -20,7 +20,7 @@
         +-- ProtocolError                       exception reply, wrong function, length or echo
             +-- WrongModelError                 a gripper of another model answers
 
-Errors of other hosts are in :mod:`robotiq_async.fleet`, those of recordings, viewers and measurements in
+Errors of other hosts are in :mod:`robotiq_async.fleet`, errors of recordings, viewers and measurements in
 :mod:`robotiq_async.tools.errors`: each is a RobotiqError, too.
 
 Bad arguments raise ValueError or TypeError.
@@ -141,7 +141,7 @@ class MoveTimeoutError(RobotiqStateError, TimeoutError):
 
 
 class MoveSupersededError(RobotiqStateError):
-    """Another command took over an axis of this move; its other axes run on."""
+    """Another command took over an axis of this move; its other axes keep moving."""
 
 
 class MotionInhibitedError(RobotiqStateError):
@@ -149,7 +149,7 @@ class MotionInhibitedError(RobotiqStateError):
 
     Attributes:
         reason: the reason that was given.
-        who: who has asked for it; may be empty.
+        who: the person or program that set it; may be empty.
         since: seconds since 1970.
     """
 
@@ -194,4 +194,4 @@ class ProtocolError(RobotiqConnectionError):
 
 
 class WrongModelError(ProtocolError):
-    """The registers are those of another model. Nothing was written to them."""
+    """The registers belong to another model. Nothing was written to them."""

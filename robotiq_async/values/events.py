@@ -38,7 +38,7 @@ class Transition:
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:
-        """The transition with this :meth:`as_dict`; KeyError or TypeError if it is that of none."""
+        """The transition with this :meth:`as_dict`; KeyError or TypeError for other fields."""
         source, target, trigger = fields["source"], fields["target"], fields["trigger"]
         return cls(State[source], State[target], Trigger[trigger], fields["timestamp"])
 
@@ -87,6 +87,6 @@ class SentRequest:
 
     @classmethod
     def from_raw(cls, fields: Mapping[str, Any]) -> Self:
-        """The image with this :meth:`as_raw`; KeyError, TypeError or ValueError if it is that of none."""
+        """The image with this :meth:`as_raw`; KeyError, TypeError or ValueError for other fields."""
         request = Request.from_registers(fields["registers"], model_of(fields.get("model")))
         return cls(request, fields["timestamp"], bool(fields["acknowledged"]))

@@ -64,9 +64,9 @@ class GraspResult:
         return self.move.status
 
     def as_dict(self) -> dict[str, Any]:
-        """The result in types that JSON and pandas accept; the key ``move`` holds that of the closing.
+        """The result in types that JSON and pandas accept; the key ``move`` holds the result of the closing.
 
-        What is None is left out.
+        A value of None is left out.
         """
         return {
             "is_held": self.is_held,

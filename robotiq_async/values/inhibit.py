@@ -17,10 +17,10 @@ class Inhibit:
 
     Attributes:
         reason: for people, 1..200 printable characters.
-        who: who or what has asked for it, 0..200 printable characters; empty if that was not said.
+        who: the person or program that set it, 0..200 printable characters; empty if that was not said.
         since: seconds since 1970, as it may outlive a process.
-        halts: how many halts of persons it stands for, from 1; the reason is that of the first. A permit of
-            what a person saw lifts no halt that came later.
+        halts: how many halts of persons it stands for, from 1; the first gave the reason. A permit of the
+            inhibit that a person saw lifts no halt that came later.
 
     Raises:
         TypeError: reason or who is not a str, since no number, or halts not an int.
@@ -53,7 +53,7 @@ class Inhibit:
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:
-        """The inhibit with this :meth:`as_dict`; KeyError, TypeError or ValueError if it is that of none."""
+        """The inhibit with this :meth:`as_dict`; KeyError, TypeError or ValueError for other fields."""
         return cls(fields["reason"], fields["who"], fields["since"], fields.get("halts", 1))
 
     def __str__(self) -> str:

@@ -1,7 +1,7 @@
 """Model: the properties of one gripper of the family, as data.
 
 All models have the registers of one finger. A 2F or a Hand-E is finger A of a 3-Finger whose object status
-lies in byte 0 in place of byte 1 (manuals of the 2F-85/2F-140 and of the Hand-E, chapter on registers).
+lies in byte 0 instead of byte 1 (manuals of the 2F-85/2F-140 and of the Hand-E, chapter on registers).
 Nothing of this has run on real hardware yet.
 """
 
@@ -154,7 +154,7 @@ class Model:
     def contradiction(self, registers: Registers) -> str:
         """The status registers that this model cannot have, as a text; empty if there are none.
 
-        They are those of :meth:`wrong_axes`, or reserved bits, which are 0.
+        They are found by :meth:`wrong_axes`, or set reserved bits, which are 0.
         """
         if wrong := self.wrong_axes(registers):
             return wrong
@@ -224,8 +224,8 @@ def _with_jaw(
         object_status=(reg.gOBJ,),
         faults=_ADAPTIVE_FAULTS,
         tcp=_GATEWAY,
-        # Manual of the 2F-85 and 2F-140 (4.7.5): function 23, which the vendor's software uses as well. What
-        # gateways make of it is unknown.
+        # Manual of the 2F-85 and 2F-140 (4.7.5): function 23, which the vendor's software uses as well.
+        # Whether gateways pass it on is unknown.
         rtu=replace(_GATEWAY, write_function=23),
         # A 2F-85 reads 3 and 227 to 230 (PickNik's driver); no other source gives the readings of the others.
         stroke=Stroke(mm, open_reading=3, closed_reading=228, arc=arc),
@@ -271,7 +271,7 @@ def model_of(value: object, name: str = "model") -> Model:
 
 
 def why_stranger(registers: Registers) -> str:
-    """The reason why status registers are of no model; empty if they may be those of one."""
+    """The reason why status registers fit no model; empty if they may fit one."""
     if not all(model.contradiction(registers) for model in MODELS.values()):
         return ""
     words = " ".join(f"{word:04X}" for word in registers)

@@ -84,7 +84,7 @@ class MoveResult:
         """The result with this :meth:`as_dict`, and the status in it.
 
         Raises:
-            KeyError, TypeError, ValueError: it is that of none.
+            KeyError, TypeError, ValueError: the fields are of no result.
         """
         axes = {axis: fields[str(axis.name)] for axis in Finger.ALL if axis.name in fields}
         return cls(

@@ -2,7 +2,7 @@
 
 Sixteen request bytes go to the gripper and sixteen status bytes come back. Register n holds byte 2n in
 its high half and byte 2n+1 in its low half. One :class:`Field` serves the decoder, the encoder, the
-simulator and the tables in the docs. The layout is that of the instruction manual of the 3-Finger
+simulator and the tables in the docs. The layout follows the instruction manual of the 3-Finger
 gripper (editions 2012, 2014 and 2018 agree but for the glove and centring bits).
 """
 

@@ -1,8 +1,8 @@
 """The states of a hand: which may follow which, and what each answers to a call.
 
 Every state has an entry for every trigger: the next state, IGNORED where there is nothing to do, or the
-error that the caller gets. A refusal changes nothing. What a status shows is never refused. The table comes
-from three rules and 18 entries, which are what differs.
+error that the caller gets. A refusal changes nothing. A status is never refused. The table comes
+from three rules and 18 entries for the exceptions.
 
 DO_ states and RUNNING_CC last from the call until the acknowledgement, so the last state before DISCONNECTED
 names the write that may be lost; DO_SHUTDOWN lasts until the hand has stopped. The diagram and the tables in
@@ -47,8 +47,8 @@ def _all(triggers: tuple[Trigger, ...], entry: State | Verdict) -> Row:
     return dict.fromkeys(triggers, entry)
 
 
-# First rule: what a call finds wherever the link is up, in _row(). Second: what a status shows leads to its
-# state, wherever no procedure runs, in SEEN. Third: a hand that is off refuses, in _OFF.
+# First rule: the outcome of a call wherever the link is up, in _row(). Second: the condition that a status
+# shows leads to its state, wherever no procedure runs, in SEEN. Third: a hand that is off refuses, in _OFF.
 _STOPS: Final = (Trigger.ASK_HOLD, Trigger.ASK_HALT)
 _MOTIONS: Final = (Trigger.ASK_ACTIVATE, Trigger.ASK_COMMAND)
 _USER: Final = (*_MOTIONS, *_STOPS, Trigger.ASK_RELEASE, Trigger.ASK_RESET, Trigger.HALT_RESETS)
@@ -91,8 +91,8 @@ TABLE: Final[dict[State, Row]] = {
         | _all(_USER, Verdict.LINK_DOWN)
         | {Trigger.ASK_START: State.DISCONNECTED, Trigger.ACTIVATES: State.DO_ACTIVATION}
     ),
-    # While a procedure sends or waits, what a status shows is its own matter (see procedures.py). WF_ states
-    # that another client has begun follow each status, as there is nothing of ours to wait for.
+    # While a procedure sends or waits, it judges each status itself (see procedures.py). WF_ states that
+    # another client has begun follow each status, as this client then waits for nothing.
     State.DO_ACTIVATION: _row(
         {Trigger.ASK_ACTIVATE: Verdict.IGNORED, Trigger.DELIVERED: State.WF_ACTIVATION}
     ),
@@ -149,7 +149,7 @@ def check(
 ) -> bool:
     """Whether there is anything to do for a trigger. Raises the error if the table or an inhibit refuses it.
 
-    ``inhibited`` counts for what may move or press.
+    ``inhibited`` counts for triggers that may move or press.
     """
     if inhibited is not None and trigger in MOVES:
         raise MotionInhibitedError(inhibited)

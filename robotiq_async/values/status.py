@@ -171,7 +171,7 @@ class RobotiqStatus:
     def opening_mm(self, finger: Finger | int) -> float:
         """The opening at a finger, in millimetres: nominal, unless the hand was made with measured points.
 
-        Of a jaw this is the width between its fingertips. See :class:`Units` for what it means on a 3-Finger.
+        Of a jaw this is the width between its fingertips. See :class:`Units` for its meaning on a 3-Finger.
 
         Raises:
             TypeError: not a Finger or an int.
@@ -190,7 +190,7 @@ class RobotiqStatus:
     def has_reached(self, finger: Finger | int, request: int) -> bool:
         """Whether an axis is within 2 counts of a request, or at the end of its stroke for one beyond it.
 
-        The end is that of the model, or of the points that were measured on this gripper.
+        The end comes from the model, or from the points that were measured on this gripper.
 
         Raises:
             TypeError, ValueError: as :meth:`position`.

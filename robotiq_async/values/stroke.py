@@ -29,7 +29,7 @@ from .checks import check_byte, check_number, repr_of
 
 WIDEST_MM: Final = 1000.0  # widest opening that a point may have
 LEAST_FALL_MM: Final = 0.02
-"""The least that a measured opening falls in a count. Nominal ones fall by 0.2 and more, whatever the
+"""The least that a measured opening falls in a count. Nominal ones fall by 0.2 and more, with any
 fingertips: less is a slip of the calliper or of the pen. And a position could not be found again by its
 opening, which is kept to 0.01 mm."""
 
@@ -134,7 +134,7 @@ class Stroke:
     def position_at(self, open_fraction: float) -> int:
         """The position, in counts, closest to a share of the travel.
 
-        The ends are those of ``open()`` and ``close()``: 1 is 0 counts, and 0 is 255, which presses.
+        The ends are as of ``open()`` and ``close()``: 1 is 0 counts, and 0 is 255, which presses.
 
         Raises:
             TypeError: not a number.

@@ -26,10 +26,10 @@ DEMO_LOOK_S: Final = 2.0
 def demo(
     address: AddressArgument = "sim://", /, *, yes: Yes = False, show: Flag = False
 ) -> Coroutine[None, None, None]:
-    """Show what the library does, call by call. THE FINGERS MOVE.
+    """Show the library, call by call. THE FINGERS MOVE.
 
     Four parts: movements, speeds, forces, status and faults. Unless the gripper is
-    that of sim:// it asks first; without a terminal it needs --yes.
+    simulated it asks first; without a terminal it needs --yes.
 
     For example:
 

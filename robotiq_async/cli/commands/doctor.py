@@ -65,7 +65,7 @@ async def doctor(
             parsed = parse_address(address)
             registers_of(parsed, device_id=device_id)
             if parsed.kind != "sim":
-                HandOptions(address, device_id=device_id)  # whatever a hand refuses
+                HandOptions(address, device_id=device_id)  # raises as a hand would
     print(gripper_words(address), flush=True)
     if is_remote(address):
         await examine_remote(address, report)

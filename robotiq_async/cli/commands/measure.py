@@ -192,7 +192,7 @@ def speed(
     As the thesis did (Pekonen 2012, table A1.1): every 4th value from 0, and 255, slowest first,
     three runs, from the command until nothing moves. It takes 20 minutes. The file is
     written after every row; started again, it continues there. Beside it a plot is drawn
-    (PNG and SVG) with the thesis's own curve. Unless the gripper is that of sim:// it asks
+    (PNG and SVG) with the thesis's own curve. Unless the gripper is simulated it asks
     first; without a terminal it needs --yes.
 
     For example:

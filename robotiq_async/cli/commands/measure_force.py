@@ -49,7 +49,7 @@ def force(
     value is set, up by 50 and down by 50, and its reading in grams is typed in, or
     taken from a table. At sim:// a simulated scale gives the thesis's readings. The
     currents of the fingers are recorded at every poll. Both files are written after every
-    row; started again, it continues there. Unless the gripper is that of sim:// it asks
+    row; started again, it continues there. Unless the gripper is simulated it asks
     first; without a terminal it needs --yes.
 
     For example:
@@ -60,7 +60,7 @@ def force(
     Args:
         surface: What the fingers touch: the scale itself, or foam around it.
         output: The readings (default: force_SURFACE_grams.csv); currents and plots have its name.
-        scale: A table of readings, in place of typing them.
+        scale: A table of readings, instead of typing them.
         step: Distance between force values.
         runs: Grasps at each force value.
         speed: Speed of the closing.

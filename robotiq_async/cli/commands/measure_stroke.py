@@ -35,7 +35,7 @@ TOUCH: Final = "The fingertips touch at {position} counts: that is the closed en
 DOUBT: Final = """From {first} to {last} counts this falls by {mm:g} mm, nominal are {nominal:.1f}. If the
 calliper is not in millimetres, press Ctrl-C and begin again: nothing is written yet."""
 DOUBTFUL: Final = 2.0
-"""The ratio of a fall to the nominal one, either way, that is doubted. Fingertips of one's own make the
+"""The ratio of a fall to the nominal one, either way, that is doubted. Custom fingertips make the
 opening wider or narrower, and hardly change by how much it falls."""
 OPENING_FORM: Final = r"[0-9]{1,3}(?:\.[0-9]{1,2})?"
 
@@ -57,8 +57,8 @@ def stroke(
     calliper between the fingertips. The file has the reading of each position and the figure,
     and is the option stroke of a hand: millimetres then follow this gripper and its
     fingertips. Between two points the nominal shape is stretched, so that two points,
-    open and closed, will do for fingertips of your own. At sim:// a simulated calliper
-    answers. Unless the gripper is that of sim:// it asks first; without a terminal it
+    open and closed, will do for custom fingertips. At sim:// a simulated calliper
+    answers. Unless the gripper is simulated it asks first; without a terminal it
     needs --yes.
 
     For example:
@@ -97,7 +97,7 @@ async def _measure(address: str, output: Path, count: int) -> None:
 async def measured(hand: Hand, count: int, calliper: Calliper) -> Points:
     """The points of a jaw, from open to closed; the calliper is read at each.
 
-    Fingertips of one's own may meet before the gripper's end: a contact is the closed end.
+    Custom fingertips may meet before the gripper's end: a contact is the closed end.
 
     Raises:
         CommandError: the jaw does not open, did not move on, or the gripper has more than one axis.

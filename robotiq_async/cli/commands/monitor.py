@@ -54,7 +54,7 @@ async def monitor(
 
     Quitting stops the fingers only if they were moved from here.
 
-    Without a terminal, for example in a pipe, it prints what --json prints.
+    Without a terminal, for example in a pipe, it prints the lines of --json.
 
     For example:
 

@@ -52,7 +52,7 @@ def move(
 
     A gripper that is not active yet is activated first: its fingers then open and
     close to their stops. An axis that meets an object stops there; that is a
-    success, and is in the table. Unless the gripper is that of sim:// it asks
+    success, and is in the table. Unless the gripper is simulated it asks
     first; without a terminal it needs --yes.
 
     At the end it stops every axis (rGTO = 0), also those that hold something. According

@@ -101,7 +101,7 @@ async def simulate(
         object_: Count at which the fingers A, B and C meet something when they close.
         fixed: The object stays there in an activation, which then fails with fault 0x0D.
         physics: Move bodies (extra physics): "table", a part as "box:40x60x60,0.3" (mm, kg), or an MJCF file.
-        serial: Serve Modbus RTU on this serial device in place of TCP (extra serial).
+        serial: Serve Modbus RTU on this serial device instead of TCP (extra serial).
         rtu_over_tcp: Serve Modbus RTU through a TCP socket, as serial servers and tool ports do.
         urcap: Serve the text port of Robotiq's URCap, as a UR controller does; for a 2F or a Hand-E.
         unpaced: Do not simulate the transmission time of bytes; for a real serial port, which takes it.
@@ -239,7 +239,7 @@ def _tell_of(likeness: Likeness) -> None:
 
 
 def _check_alone(likeness: Likeness, *others: object) -> None:
-    """Refuse what a report says itself."""
+    """Refuse options that a report sets itself."""
     if any(others):
         raise ValueError(
             f"--like takes all from the report, the model {likeness.model.name} too: no "

@@ -88,7 +88,7 @@ async def verify(
         if model is not None:
             parsed = replace(parsed, model=model_of(model))
         if parsed.kind != "sim":
-            HandOptions(str(parsed))  # whatever a hand refuses
+            HandOptions(str(parsed))  # raises as a hand would
     need("mcap", "record")
     from ...tools.verify import Plan
     from ...tools.verify.files import Folder

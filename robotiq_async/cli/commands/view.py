@@ -30,7 +30,7 @@ async def view(
     It prints the address to open there (Open connection, Foxglove WebSocket). Status,
     commands, events and joint states are the topics of a recording; /gripper/state has
     state, fault and statistics, /robot_description and /tf the hand in three dimensions,
-    /gripper/parts what a simulation with physics has before it.
+    /gripper/parts the parts that a simulation with physics has before it.
 
     There is no password: every program that reaches the port sees the gripper.
 

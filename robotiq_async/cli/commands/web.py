@@ -62,8 +62,8 @@ async def web(
         open_browser: Open the page in a browser.
         port: TCP port; 0 takes a free one.
         host: Interface to listen on. All but 127.0.0.1 let others in, and need a password or a certificate.
-        password_file: File whose first line is the password, in place of the token.
-        certificate: Certificate of your own in PEM, for https.
+        password_file: File whose first line is the password, instead of the token.
+        certificate: Your certificate in PEM, for https.
         key: Its private key in PEM.
         speed: Speed of all axes from the first command on; the present one cannot be read.
         force: Force of all axes from the first command on. A grip made with more loosens.

@@ -50,13 +50,13 @@ class Monitor(App[None]):
     """Shows the hand of an operator, who moves it by keys."""
 
     ENABLE_COMMAND_PALETTE = False
-    ALLOW_SELECT = False  # Ctrl-C would copy what is selected, and not quit.
+    ALLOW_SELECT = False  # Ctrl-C would copy the selection, and not quit.
     CSS = """
     #state, #link, #keys, #axes { padding: 0 1; text-wrap: nowrap; text-overflow: ellipsis; }
     #state, #link, #keys { height: 2; }
     #axes { height: 5; margin: 1 0; }
     #log { height: 1fr; border: round $surface-lighten-2; }
-    /* A scroll bar that came later would lie on what had been wrapped before. */
+    /* A scroll bar that came later would lie on lines wrapped before. */
     #log { overflow-x: hidden; overflow-y: scroll; scrollbar-size-vertical: 1; }
     #keys { color: $text-muted; }
     Screen { layers: below above; }

@@ -39,9 +39,9 @@ REPORTED_S: Final = 0.1  # three frames at 30 Hz: a longer wait is a warning
 
 
 class GripperPart:
-    """A gripper whose positions are those of a convention: ``Convention.LEROBOT`` is 0 closed .. 100 open.
+    """A gripper whose positions follow a convention: ``Convention.LEROBOT`` is 0 closed .. 100 open.
 
-    It drives a blocking hand, which polls in a thread of its own, and takes its options from it. The fingers
+    It drives a blocking hand, which polls in a separate thread, and takes its options from it. The fingers
     of a 3-Finger go together, and its scissor stays as it is. Nothing has run on real hardware yet.
 
         part = GripperPart(RobotiqHand("rtu:///dev/ttyUSB0?model=2f85", speed=255), Convention.DROID)
@@ -112,7 +112,7 @@ class GripperPart:
         Raises:
             NotActivatedError: the gripper is not active, and neither is True. Nothing was written.
             GripperFaultError: the gripper reports a fault.
-            InvalidStateError: connected already; the hand runs on.
+            InvalidStateError: connected already; the hand keeps running.
             RobotiqError: as :meth:`RobotiqHand.start`.
         """
         hand = self._hand
@@ -177,7 +177,7 @@ class GripperPart:
         ``clamp`` brought into it. NaN and infinity are refused always.
 
         Args:
-            pos: by the convention. The ends are those of ``open()`` and ``close()``: the closed one presses.
+            pos: by the convention. Its ends are ``open()`` and ``close()``: the closed end presses.
             force: 0 (the least, not none) .. 100 percent of the force value, not linear; None leaves it.
             clamp: whether a number beyond its range counts as the end, for policies, which overshoot.
 
@@ -214,7 +214,7 @@ class GripperPart:
 
 
 def percent(name: str, value: object, *, clamp: bool = False) -> float:
-    """A number in 0..100; that of an array or a tensor with one value, too, as LeRobot's replay has them."""
+    """A number in 0..100, also from an array or a tensor with one value, as LeRobot's replay has them."""
     number = as_float(value := single(value))
     if clamp and number is not None and math.isfinite(number):
         value = min(max(number, 0.0), 100.0)

@@ -35,7 +35,7 @@ from .goals import GoalOutcome, GoalRunner
 NODE_COMMANDS: Final = ("activate", "reset", "halt", "recover", "release", "inhibit", "permit")
 """Names of the services, and of the actions that they carry out."""
 PERSON: Final = "~/inhibit"
-"""Who asks, in what others hear of an inhibit."""
+"""The ``who`` of an inhibit, as others hear it."""
 MOST_CALLS: Final = 16  # commands that run at a time, without halts, which are always accepted
 
 
@@ -191,7 +191,7 @@ class GripperConnection:
             self._stopping -= 1
 
     def _end_all(self, reason: str) -> None:
-        # Also what has not reached the hand yet: run_goal() compares the number of stops.
+        # Also goals that have not reached the hand yet: run_goal() compares the number of stops.
         self.stops += 1
         self._goals.abort(reason)
         for call in self._calls:

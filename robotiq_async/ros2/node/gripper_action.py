@@ -36,7 +36,7 @@ RECEIPT_LOOK_S: Final = 0.01  # seconds between two looks at that
 
 
 class _Server(ActionServer):  # type: ignore[misc]  # rclpy is not here
-    """Calls a function, in the executor's thread, when a client has asked for the result of a goal."""
+    """Calls a function, in the executor's thread, when a client has requested the result of a goal."""
 
     _asked: Callable[[bytes], object]
 
@@ -59,7 +59,7 @@ class GripperAction:
     ) -> None:
         """Offer the action; the callbacks of ``group`` may overlap.
 
-        ``configured`` returns what the node is configured with, and raises RefusedError if it is not.
+        ``configured`` returns the configuration of the node, and raises RefusedError if there is none.
         """
         self._log = node.get_logger()
         self._bridge = bridge
@@ -86,7 +86,7 @@ class GripperAction:
         self._server.when_asked(lambda key: bridge.tell(unasked.asked, key))
 
     async def results_asked(self) -> None:
-        """Wait, in the loop, until clients have asked for the results of their goals, for seconds at most."""
+        """Wait, in the loop, until clients have requested the results of their goals, for seconds at most."""
         if number := self._unasked.number:
             self._log.info(f"results that no client has asked for yet: {number}; the node waits for that")
         await self._unasked.wait()

@@ -27,7 +27,7 @@ from .publishing import JointStates, Publishing
 
 NODE_NAME: Final = "gripper"
 _CALLS: Final = QoSProfile(depth=100)
-"""Calls that may wait for the executor. With ROS's default of 10 a busy client displaces those of others."""
+"""Calls that may wait for the executor. With ROS's default of 10 a busy client displaces other calls."""
 _SUCCESS, _FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
 
@@ -95,7 +95,7 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
             await self._disconnect(self._current[0], "the node is shutting down")
 
     async def results_asked(self) -> None:
-        """Wait, in the loop, until clients have asked for the results of their goals, for seconds at most."""
+        """Wait, in the loop, until clients have requested the results of their goals, for seconds at most."""
         await self._action.results_asked()
 
     async def results_received(self) -> None:
@@ -106,7 +106,7 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
         # ROS would swallow the error of a transition.
         try:
             self.get_logger().info(work())
-        except ClosedError as error:  # no error: a launch asks for the shutdown, and sends a signal at once
+        except ClosedError as error:  # no error: a launch requests the shutdown, and sends a signal at once
             self.get_logger().warning(f"cannot {what}: {error}")
             return _FAILURE
         except (RobotiqError, ValueError, OSError) as error:

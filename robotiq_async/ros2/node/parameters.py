@@ -13,7 +13,7 @@ from ..translation.settings import PARAMETERS, NodeSettings, Parameter, check_pa
 
 
 def declare(node: Node) -> None:
-    """Declare all parameters, whatever values the node was started with: a wrong one fails the configuration.
+    """Declare all parameters, also with a wrong value from the start, which fails the configuration.
 
     Types are checked here, not by ROS, which would reject the integer 50 for publish_rate and not start the
     node.
@@ -64,7 +64,7 @@ def warn_of_unknown(node: Node) -> None:
 
 
 def _ours(given: Sequence[RosParameter]) -> list[RosParameter]:
-    # Without those of ROS, such as use_sim_time.
+    # Without the parameters of ROS, such as use_sim_time.
     return [each for each in given if each.name in PARAMETERS]
 
 

@@ -1,6 +1,6 @@
 """The process of the node: the event loop in the main thread, ROS's executor in a second one.
 
-It ends in this order: the hand stops, results are sent, also those that clients ask for a little later, the
+It ends in this order: the hand stops, results are sent, also if clients request them a little later, the
 executor ends, then the node, then ROS.
 """
 
@@ -24,7 +24,7 @@ from ...runtime import ending_signals, log
 from .bridge import Bridge
 from .gripper_node import GripperNode
 
-ANSWERS_S: Final = 2.0  # seconds to answer what the end has aborted: milliseconds, unless the executor hangs
+ANSWERS_S: Final = 2.0  # seconds to answer the aborted goals: milliseconds, unless the executor hangs
 LINGER_S: Final = 0.1  # seconds for sent messages to leave: of services ROS does not report when they have
 JOIN_S: Final = 2.0  # seconds for the executor to shut down, and for its thread to end
 MOST_FAILURES: Final = 20  # failing callbacks per second: with more, the executor itself is broken

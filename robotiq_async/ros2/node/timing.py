@@ -1,4 +1,4 @@
-"""Pace and Timer: what is done at a rate. Does not import ROS."""
+"""Pace and Timer: work at a rate. Does not import ROS."""
 
 from __future__ import annotations
 

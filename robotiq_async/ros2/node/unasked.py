@@ -1,6 +1,6 @@
-"""UnaskedGoals: goals whose result no client has asked for yet. Does not import ROS."""
+"""UnaskedGoals: goals whose result no client has requested yet. Does not import ROS."""
 
-# In ROS a client asks for the result of a goal with a request of its own, after the goal was accepted. If the
+# In ROS a client requests the result of a goal separately, after the goal was accepted. If the
 # request comes after the end of the node, the client waits forever, so the end waits for these requests.
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from typing import Final
 from ...runtime import now
 
 ASKING_S: Final = 3.0
-"""Seconds after the end of a goal in which its client may ask for the result. On a busy machine requests came
+"""Seconds after the end of a goal in which its client may request the result. On a busy machine requests came
 0.3 s after they had been sent; a launch kills its nodes 10 s after the first signal."""
 
 
 class UnaskedGoals:
-    """The goals that were accepted, less those that a client has asked for. Belongs to the event loop."""
+    """The accepted goals whose result no client has requested yet. Belongs to the event loop."""
 
     def __init__(self) -> None:
         self._until: dict[bytes, float] = {}  # when the end of the node no longer waits for it, by its key
@@ -42,7 +42,7 @@ class UnaskedGoals:
         self._asked.set()
 
     async def wait(self) -> None:
-        """Wait until a client has asked for each of them, or until ASKING_S after the last has ended."""
+        """Wait until a client has requested each result, or until ASKING_S after the last goal has ended."""
         at_most = now() + ASKING_S  # also for a goal that has not ended, because the executor hangs
         with suppress(TimeoutError):
             while self._until:

@@ -14,7 +14,7 @@ _REFERENCES: Final = {"parent": "link", "child": "link", "mimic": "joint"}
 
 
 def robot_description(path: str, prefix: str, model: Model | str | None = None) -> str:
-    """The URDF in a file, unchanged; without a path that of the model, with the prefix on all names.
+    """The URDF in a file, unchanged; without a path the model's URDF, with the prefix on all names.
 
     Raises:
         OSError: the file cannot be read.

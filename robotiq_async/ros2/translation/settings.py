@@ -103,7 +103,7 @@ def check_settings(values: Mapping[str, object]) -> NodeSettings:
 
 
 def _option_value(name: str, value: Value) -> object:
-    # The default of the option, which may be None: that of write_spacing stands for another of a jaw.
+    # The default of the option, which may be None: None as write_spacing stands for another value of a jaw.
     return OF_HAND[name].default if value == PARAMETERS[name].default else value
 
 

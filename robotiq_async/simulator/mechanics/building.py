@@ -75,8 +75,8 @@ def in_own_world(text: str, file: str) -> Any:
     """The gripper at the site ``gripper`` of a file.
 
     Raises:
-        ValueError: there is no such file, MuJoCo cannot read it, it has no such site, it disables what a
-            gripper needs, or its timestep is too long or too short.
+        ValueError: there is no such file, MuJoCo cannot read it, it has no such site, it disables effects
+            that a gripper needs, or its timestep is too long or too short.
     """
     if not Path(file).is_file():
         raise ValueError(f"physics: there is no file {file!r:.100}")
@@ -86,7 +86,7 @@ def in_own_world(text: str, file: str) -> Any:
         raise ValueError(f"physics: MuJoCo cannot read {file!r:.100}: {_in_one_line(error)}") from error
     _check_fit(spec, file)
     gripper = mujoco.MjSpec.from_string(text)
-    for option in ("timestep", "integrator", "cone", "impratio"):  # those of the file, without a complaint
+    for option in ("timestep", "integrator", "cone", "impratio"):  # as the file has them, without a complaint
         setattr(gripper.option, option, getattr(spec.option, option))
     spec.attach(gripper, site="gripper", prefix=OURS)
     return spec

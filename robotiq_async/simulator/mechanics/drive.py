@@ -2,11 +2,12 @@
 
 A motor is a position servo whose reference moves at the speed of the request, never farther ahead of the axis
 than its force reaches. So a blocked axis pushes with its force and no more, and does not jump when the part
-goes. Its gears lock themselves: what pushes an axis back meets more than the force of the request.
+goes. Its gears lock themselves: a push back meets more than the force of the request.
 
 It reports a contact when it has rested before its target for as long as its motion profile says. A jaw that
-moves on after that, because the part slips or is taken away, is in motion again: by the manual of the 2F its
-object status reports a lost part. A finger of the 3-Finger locks where it met the part, and its status stays.
+moves on after that, because the part slips or is taken away, is in motion again: its object status reports a
+lost part, says the manual of the 2F. A finger of the 3-Finger locks where it met the part, and its status
+stays.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ _BLOCKED_S: Final = 0.02
 _BEYOND: Final = 255.0
 """Counts beyond its target that the reference of a blocked axis may go, for the force of the request."""
 _GONE: Final = 4.0
-"""Counts that a blocked axis moves on when what was in its way has gone: more than a part yields."""
+"""Counts that a blocked axis moves on when the body in its way has gone: more than a part yields."""
 _LEAD: Final = 1.3
 """Share of the way at which the servo gives its full force that the reference may be ahead."""
 
@@ -157,7 +158,7 @@ class MotorDrive:
             return self._value(self._reference), _LOCK * (self._forces[1] * self._lever())
         position, sign, most = self.position, self._sign, self._rate() * step_s
         limit, back = self._limit(), self._pushed_back()
-        # However near the target is: what is in the way is pressed with the force of the request.
+        # However near the target is: a body in the way is pressed with the force of the request.
         way = self._aim + sign * _BEYOND * self._is_blocked - self._reference
         moved = min(max(way, -most), most)
         lead = _LEAD * limit / self._stiffness + back + 2 * most
@@ -245,7 +246,7 @@ class MotorDrive:
     def _see_blocked(self) -> None:
         if self._is_blocked:
             on, beyond = self.position - self._blocked_at, self.position - self._target
-            if self._sign * on > _GONE or self._sign * beyond > _NEAR:  # what was in the way has gone
+            if self._sign * on > _GONE or self._sign * beyond > _NEAR:  # the body in the way has gone
                 self._is_blocked = False
                 self._reference = self._sign * min(self._sign * self._reference, self._sign * self._aim)
         elif not (self._is_near or self._is_locked):
@@ -278,6 +279,6 @@ def _counts_at_ends(model: Model, axis: Finger, values: tuple[float, float]) -> 
 
 
 def _slopes(levers: Sequence[float]) -> list[tuple[float, float]]:
-    """Each lever, and what it gains to the next."""
+    """Each lever, and its gain to the next."""
     gains = [after - before for before, after in pairwise(levers)]
     return [*zip(levers, gains, strict=False), (levers[-2] + gains[-1], 0.0)]

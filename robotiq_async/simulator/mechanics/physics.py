@@ -1,4 +1,4 @@
-"""Physics: bodies and contacts behind a simulated gripper, stepped by its user or in a thread of its own."""
+"""Physics: bodies and contacts behind a simulated gripper, stepped by its user or in a separate thread."""
 
 from __future__ import annotations
 
@@ -219,11 +219,10 @@ class Physics:
 
     @property
     def forces(self) -> dict[str, float]:
-        """The force of each finger on what it touches, in newtons, and that of the palm.
+        """The force of each finger and of the palm on the bodies that it touches, in newtons.
 
-        Each is the sum of the normal forces at all contacts: of pads, phalanges and cranks. The names are
-        those of the links that hang on the root link, and of the root link for the palm. What touches nothing
-        is left out.
+        Each is the sum of the normal forces at all contacts: of pads, phalanges and cranks. The names are the
+        links that hang on the root link, and the root link for the palm. Without a touch there is no entry.
         """
         with self._lock:
             return self._made.forces()
@@ -232,8 +231,8 @@ class Physics:
     def opening_mm(self) -> float:
         """Distance between the faces of the pads in millimetres.
 
-        Of a 3-Finger, from that of A to the middle between those of B and C. Between tips that are not at one
-        height it is too large.
+        Of a 3-Finger, from the pad of A to the middle between the pads of B and C. Between tips that are not
+        at one height it is too large.
         """
         with self._lock:
             return self._made.opening_mm()

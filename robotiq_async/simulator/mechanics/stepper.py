@@ -1,8 +1,8 @@
-"""Steps a world in real time, in a thread of its own, for a gripper that stands in an event loop.
+"""Steps a world in real time, in a separate thread, for a gripper that stands in an event loop.
 
 The loop waits for nothing here. It reads single numbers that the thread leaves behind, and gives orders that
-the thread takes up before its next step. MuJoCo lets go of Python's lock in a step; what the thread does in
-Python takes some ten microseconds of each.
+the thread takes up before its next step. MuJoCo lets go of Python's lock in a step; the Python code of the
+thread takes some ten microseconds of each.
 
 An error ends the thread and stays in the world: the next call of :class:`Physics` raises it.
 """
@@ -82,7 +82,7 @@ class Stepper:
             self._world.fail(error)
 
     def _catch_up(self, due: float) -> None:
-        """Make steps that are due, but not so many that nobody would see what happens between them."""
+        """Make steps that are due, but not so many that readers would miss events between them."""
         for _ in range(_STEPS_AT_ONCE):
             if self._world.time + self._world.step_s > due or self._ends.is_set():
                 return
@@ -96,7 +96,7 @@ class Stepper:
 class OrderedDrive:
     """The motor of an axis, for a gripper in another thread than the world: neither waits for the other.
 
-    An order is taken up before the next step. Until then the motor counts as in motion, for what it tells is
+    An order is taken up before the next step. Until then the motor counts as in motion, because its report is
     about the goal before.
 
     Attributes:

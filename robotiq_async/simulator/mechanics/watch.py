@@ -1,7 +1,7 @@
 """Sees where the bodies of a world are.
 
-A look copies some numbers, so that a thread can leave one behind after its steps; :meth:`Watch.told` makes
-of it, later and elsewhere, what others understand.
+A look copies some numbers, so that a thread can leave one behind after its steps; :meth:`Watch.told` turns
+it, later and elsewhere, into :class:`Bodies`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Look(NamedTuple):
 
 
 class Watch:
-    """Knows which numbers of a world are those of the gripper and of the parts."""
+    """Knows which numbers of a world belong to the gripper and to the parts."""
 
     def __init__(self, model: Any, parts: Sequence[int]) -> None:
         """``parts`` are the geoms of all parts."""

@@ -1,7 +1,7 @@
 """The bodies: a gripper above a table, or in a world of the user's own, in MuJoCo.
 
 The gripper is the packaged MJCF. Over a table it points downwards, on a mount that :meth:`World.lift` raises.
-One step is 2 ms, or that of the user's file. Nothing here knows a clock.
+One step is 2 ms, or as long as the user's file says. Nothing here knows a clock.
 """
 
 from __future__ import annotations

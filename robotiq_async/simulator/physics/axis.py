@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 # (figures 13 to 15, without numbers) the peak grows with the force, at once on something rigid and bit by bit
 # in foam.
 _SHARE_OF_FRICTION: Final = 0.5
-# Above what the fastest motion draws, or it would stop itself; three fingers at once stay within the 1.5 A
-# that the manual lets the whole gripper take.
+# Above the current of the fastest motion, or it would stop itself; three fingers at once stay within the
+# 1.5 A that the manual lets the whole gripper take.
 _WEAKEST_PEAK: Final = 20
 _STRONGEST_PEAK: Final = 50
 
@@ -70,7 +70,7 @@ class Goal(NamedTuple):
         speed: 0..255.
         force: 0..255.
         is_reading: the axis ends exactly at the position, without the spread of a request.
-        rate: counts a second, if not those of the speed.
+        rate: counts a second, if the speed does not decide them.
         clears: obstacles that are not fixed do not count.
     """
 
@@ -184,7 +184,7 @@ class Axis:
         return max(self.low, min(self.high, position))
 
     def current(self, time: float) -> int:
-        """Motor current in counts: that of the motion, up to the peak of a contact, and 0 at rest."""
+        """Motor current in counts: as the motion draws, up to the peak of a contact, and 0 at rest."""
         if not self.is_moving:
             return 0
         return round(self._running + (self._peak - self._running) * self._pressed(time))
@@ -274,7 +274,7 @@ class Axis:
         return of_a_jaw(begin, here, end, rate, motion, lands=is_stop, presses=presses, early=early)
 
     def _start_s(self, time: float, *, closing: bool) -> float:
-        """Seconds until an axis at rest begins to move: none if it goes on in the same direction."""
+        """Seconds until an axis at rest begins to move: none if it continues in the same direction."""
         goes_on = closing is self._closes and time - self._moved_at < GOES_ON_S
         return 0.0 if goes_on else self._motion.start_s(closing=closing)
 

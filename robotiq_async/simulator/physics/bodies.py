@@ -32,7 +32,7 @@ class Bodies(NamedTuple):
 
     Attributes:
         joints: radians, or metres of one that slides, by the names of the description.
-        parts: what parts consist of; none while they are out of the way, as in an activation.
+        parts: the shapes of the parts; none while they are out of the way, as in an activation.
     """
 
     joints: Mapping[str, float]

@@ -81,7 +81,7 @@ class Drive(Protocol):
 
         Args:
             target: the position.
-            way: the speed, and what a motion takes besides.
+            way: the speed, and the other properties of a motion.
             force: of the register, 0..255.
             clears: parts are out of the way until it has opened, or has another order.
         """
@@ -132,7 +132,7 @@ class Mechanism(Protocol):
 class DrivenAxis(Axis):
     """An axis without a plan: it waits for the reports of its drive.
 
-    It is exact: its stops and contacts are those of the mechanism.
+    It is exact: the mechanism decides where it stops and touches.
     """
 
     def __init__(

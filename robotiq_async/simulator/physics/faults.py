@@ -38,7 +38,7 @@ class PresentFaults:
         self._weigh()
 
     def update(self, time: float) -> None:
-        """End what ends at this time; interference that has lasted 20 s becomes the major fault."""
+        """End the faults whose time is over; interference that has lasted 20 s becomes the major fault."""
         self._ends = {fault: end for fault, end in self._ends.items() if end > time}
         if Fault.SCISSOR_INTERFERENCE not in self._ends:
             self._escalates_at = math.inf

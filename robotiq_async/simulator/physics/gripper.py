@@ -60,7 +60,7 @@ class SimulatedGripper:
     * A minor or major fault stops the axes where they are, with gDT 0; interference below 20 s stops the
       scissor only. When a minor fault ends, a request with rGTO = 1 resumes.
     * The scissor takes its requests as counts, within 15..232.
-    * The motor of a sibling draws what finger A of a 3-Finger does.
+    * The motor of a sibling draws as much as finger A of a 3-Finger.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class SimulatedGripper:
             seed: number of this gripper, 0 or more: another seed, other counts; the same seed, the same.
             habits: its choices that the manual leaves open; None for the usual ones.
             model: of the gripper, a :class:`Model` or its name; None for a 3-Finger.
-            physics: a :class:`Physics` of its own, which moves the axes and has the parts they meet; None for
+            physics: a :class:`Physics` for it alone, which moves the axes and has the parts they meet; None:
                 straight lines in time and the obstacles of :meth:`place_object`. There is no spread with it.
             motion: its motion in time; None for the usual one of its model.
             ends: counts that a finger, or the jaw, reads when it is open, and closed with the least force;
@@ -337,8 +337,8 @@ class SimulatedGripper:
     def is_asleep(self) -> bool:
         """Whether the next image with rACT = 1 only wakes the gripper: it is echoed, and moves nothing.
 
-        Axes that move run on, and rGTO = 0 stops them. One driver found that a gripper ignores motions on a
-        new connection until rACT = 1 has been written.
+        Axes that move keep moving, and rGTO = 0 stops them. One driver found that a gripper ignores motions
+        on a new connection until rACT = 1 has been written.
         """
         self._catch_up()
         return self._controller.is_asleep

@@ -46,7 +46,7 @@ class Inbox:
         self._kept_at: float | None = None
 
     def checked(self, address_offset: int, registers: Sequence[int]) -> reg.Registers:
-        """The image with some registers replaced; raises what :meth:`SimulatedGripper.write` does."""
+        """The image with some registers replaced; raises as :meth:`SimulatedGripper.write`."""
         offset = check_int("address_offset", address_offset, 0, reg.REGISTER_COUNT - 1)
         room = reg.REGISTER_COUNT - offset
         if not 1 <= len(registers) <= room:

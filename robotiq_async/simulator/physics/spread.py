@@ -53,7 +53,7 @@ class Spread:
         return self._figure(f"goes past {position}", 0, _TOLERANCE)
 
     def contact(self, position: int) -> int:
-        """Counts from the position of an object to that of the contact."""
+        """Counts from the position of an object to the position of the contact."""
         return self._figure(f"contact at {position}", -2, 3)
 
     @property

@@ -90,7 +90,7 @@ class Connection(asyncio.Protocol):
             self.transport.write(part)
 
     def hang_up(self, *, reset: bool = False) -> None:
-        """Drop the connection at once with a reset (RST); what was not sent is lost."""
+        """Drop the connection at once with a reset (RST); unsent bytes are lost."""
         if self.is_active():
             line = self.transport.get_extra_info("socket") if reset else None
             if line is not None:

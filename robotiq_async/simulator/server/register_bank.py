@@ -27,7 +27,7 @@ _MOST_WRITTEN_AND_READ: Final = 121
 
 
 class _RefusedError(Exception):
-    """A request that gets an exception in place of a reply."""
+    """A request that gets an exception instead of a reply."""
 
     def __init__(self, code: int) -> None:
         super().__init__(code)

@@ -1,4 +1,4 @@
-"""Responder: hears and answers the clients of one simulated gripper, whatever carries their bytes."""
+"""Responder: hears and answers the clients of one simulated gripper, over any carrier of bytes."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Responder(ABC):
     Attributes:
         gripper: the device that answers.
         fault_injector: decides on requests and replies.
-        clients: those that are there, oldest first.
+        clients: the present ones, oldest first.
         failure: the error that has ended the physics of the gripper, if one has; no client is answered then.
         failed: set with it.
     """
@@ -102,7 +102,7 @@ class Responder(ABC):
 
     @abstractmethod
     def take(self, inbox: bytearray) -> Frame | None:
-        """Cut the next request out of what has arrived; raises BadFrameError."""
+        """Cut the next request out of the bytes that have arrived; raises BadFrameError."""
 
     def hears(self, frame: Frame) -> bool:
         """Whether a request is heard, and meant for this gripper."""

@@ -60,7 +60,7 @@ LATE_TIMER_S: Final = 0.0015
 LONGEST_PAUSE_S: Final = 0.02
 """Longest pause of a frame on its way to this program, which does not see the wire: a USB adapter keeps bytes
 for up to 16 ms (the usual latency timer), and a writer of half a frame to a pseudo terminal was kept from the
-other half for 1.9 ms (4000 frames on a busy machine). A client that waits in vain for an answer waits longer
+other half for 1.9 ms (4000 frames on a busy machine). A client that gets no answer waits longer
 before its next request, so no more than one request is lost with a frame that was cut off."""
 
 MOST_UNSENT: Final = 4096
@@ -94,7 +94,7 @@ class _RtuEndpoint(SimulatorEndpoint):
         paced: whether bytes take their time, of connections to come.
         reply_silence: seconds from a request to the first byte of its reply, of connections to come.
         device_id: the unit id of the gripper.
-        others: the servers of the other grippers at this line, by unit id, each with troubles of its own.
+        others: the servers of the other grippers at this line, by unit id, each with separate troubles.
     """
 
     functions: ClassVar[frozenset[int]] = RTU_FUNCTIONS
@@ -139,7 +139,7 @@ class LineNeighbour(_RtuEndpoint):
     """Another gripper at the line of a server, which opens and closes the line for both."""
 
     def __init__(self, server: _RtuEndpoint, gripper: SimulatedGripper, device_id: int) -> None:
-        self.link = server.link  # type: ignore[misc]  # that of its server
+        self.link = server.link  # type: ignore[misc]  # its server's
         super().__init__(gripper, device_id)
         self.device_id = device_id
         self.paced: bool = server.paced
@@ -193,8 +193,8 @@ class SerialSimulatorServer(_RtuEndpoint):
     (:attr:`reply_silence`): a read of 8 registers takes 3.3 ms, a write 3.7 ms. Timers make that longer by up
     to a millisecond, and never shorter.
 
-    Serves what :class:`~robotiq_async.simulator.SimulatorServer` serves, and FC23, which writes before it
-    reads. The RTU gripper has no exception replies (manual 2014, p. 59), so a bad request gets no answer.
+    Serves the functions of :class:`~robotiq_async.simulator.SimulatorServer`, and FC23, which writes before
+    it reads. The RTU gripper has no exception replies (manual 2014, p. 59), so a bad request gets no answer.
     Broadcasts (unit 0) are carried out and not answered, requests to other units are left to them, as Modbus
     has it; no source covers a real gripper's answer to a broadcast.
     """
@@ -269,7 +269,7 @@ class SerialSimulatorServer(_RtuEndpoint):
 class RtuOverTcpSimulatorServer(_RtuEndpoint, SimulatorServer):
     """Serves a simulated gripper as a serial server does, or an arm's tool port: RTU frames in a TCP socket.
 
-    It serves what :class:`~robotiq_async.simulator.SerialSimulatorServer` serves, at the speed of the
+    It serves the functions of :class:`~robotiq_async.simulator.SerialSimulatorServer`, at the speed of the
     line behind. Requests sent without waiting are lost if the line cannot take them.
     """
 
@@ -390,7 +390,7 @@ class SerialConnection(Connection):
             self._hear(data, pause)
 
     def _hear(self, data: bytes, pause: float) -> None:
-        """Take bytes that have come; those of a frame that was cut off before them are dropped."""
+        """Take bytes that have come; bytes of a frame that was cut off before them are dropped."""
         self._answer_next()  # complete frames are answered, even if their turn has not come
         if not self._goes_on and _begins_anew(pause, data, self._unit):
             self._inbox.clear()

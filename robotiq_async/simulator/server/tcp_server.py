@@ -74,7 +74,7 @@ class SimulatorServer(SimulatorEndpoint):
         """Drop all connections now; new ones are welcome.
 
         Args:
-            reset: reset them (RST) in place of closing them in order (FIN).
+            reset: reset them (RST) instead of closing them in order (FIN).
 
         Raises:
             RuntimeError: the server is not running.

@@ -43,7 +43,7 @@ _STATUS: Final = {
     "POS": reg.gPO[0],
     "COU": reg.gCU[0],
 }
-"""Names that a GET reads from the status; two are those of a request, too. COU is the current in 10 mA."""
+"""Names that a GET reads from the status; two also name a value of a request. COU is the current in 10 mA."""
 _REQUEST: Final = {
     "ACT": reg.rACT,
     "GTO": reg.rGTO,
@@ -69,8 +69,8 @@ _ABOUT: Final = {
     "MSC": "0",
     "VST": "0",
 }
-"""Names that say something about gripper and driver: state of the driver, its version, that of the firmware,
-serial number, cycles. The values but those of DRI and VER are made up; what the last three mean is open."""
+"""Names that say something about gripper and driver: state and version of the driver, version of the
+firmware, serial number, cycles. All values but DRI and VER are made up; the last three are not explained."""
 
 
 _NAMES: Final = frozenset({"SID", *_STATUS, *_REQUEST, *_ABOUT})
@@ -97,7 +97,7 @@ class UrcapResponder(Responder):
         """The timer of the next of them."""
 
     def take(self, inbox: bytearray) -> Frame | None:
-        """Cut the next line out of what has arrived."""
+        """Cut the next line out of the bytes that have arrived."""
         end = inbox.find(b"\n")
         if end < 0:
             if len(inbox) > LONGEST_LINE:
@@ -214,13 +214,13 @@ class UrcapSimulatorServer(SimulatorServer):
     """Serves a simulated jaw as Robotiq's URCap on a UR controller does, to any number of clients.
 
     A line is ``GET NAME`` or ``SET NAME VALUE NAME VALUE ...``. The answer to a GET ends with an end of line,
-    the ``ack`` of a SET without one, as clients want it that ran on hardware. Several lines may come in one
+    the ``ack`` of a SET without one, as clients that ran on hardware want it. Several lines may come in one
     write. A ``GET NAME`` without an end of line is answered by the bare value, as the vendor's script has it;
     so is the beginning of a longer line that comes in pieces, if it is one. All variables of a SET take
     effect at once, unless the trouble ``one-by-one`` spaces them: then the ``ack`` comes before the first.
-    Other lines are answered by a question mark. With the trouble ``lost-set`` a SET is acknowledged in vain;
-    with ``unreadable`` a question mark is the value of each variable of the gripper, and a SET still reaches
-    it: no source says.
+    Other lines are answered by a question mark. With the trouble ``lost-set`` a SET is acknowledged and does
+    not reach the gripper; with ``unreadable`` each variable of the gripper reads as a question mark, and a
+    SET still reaches it: no source says whether it does.
     """
 
     link: ClassVar[TroubleLink] = "urcap"

@@ -6,8 +6,8 @@
 # hit if it is for once. It acts in one of three ways:
 #
 #   on demand   the simulator calls hears(), lets_in(), loses_set() and deliver(), and reads the attributes;
-#               of several troubles about one request or reply the oldest decides. What needs no more than
-#               the reply is a function of corruption.py; what needs earlier ones keeps them in deliver()
+#               of several troubles about one request or reply the oldest decides. A trouble that needs only
+#               the reply is a function of corruption.py; one that needs earlier ones keeps them in deliver()
 #   on state    _do() changes the gripper or the server, and _undo() restores it. Troubles of one kind overlap
 #               in any order, so those that last are applied again
 #   on habits   the gripper's own habits are kept from the first such trouble on, and restored at its end
@@ -93,7 +93,7 @@ class FaultInjector:
         strict_silence: seconds after a reply in which no request is heard.
         served_registers: the number of registers of each block that are served.
         set_spacing: seconds between the variables of a SET; 0 if they are taken at once.
-        is_unreadable: whether what a GET asks of the gripper cannot be read.
+        is_unreadable: whether a GET cannot read the variables of the gripper.
     """
 
     def __init__(self, target: TroubledServer) -> None:
@@ -155,7 +155,7 @@ class FaultInjector:
         return ongoing
 
     async def end(self, ongoing: Ongoing) -> None:
-        """End a trouble and undo what it did, also when cancelled. Idempotent."""
+        """End a trouble and undo its effects, also when cancelled. Idempotent."""
         if ongoing not in self._ongoing:
             return
         self._forget(ongoing)
@@ -213,7 +213,7 @@ class FaultInjector:
             await asyncio.sleep(began + trouble.every - loop.time())
 
     def _decide(self) -> None:
-        """Work out what lasts; the simulator asks for it at each request."""
+        """Work out which troubles last; the simulator calls it at each request."""
         refusing = {"function-3-only": READ_INPUT, "no-function-23": READ_WRITE}
         silences = [trouble.amount for trouble in self._lasting("strict-silence")]
         served = [int(trouble.amount) for trouble in self._lasting("registers")]
@@ -377,7 +377,7 @@ class FaultInjector:
                 self._change_habit(each)
 
     def _change_habit(self, trouble: Trouble) -> None:
-        """Give the gripper a habit; its times are the gripper's, those of a trouble are real."""
+        """Give the gripper a habit; its times are the gripper's, the times of a trouble are real."""
         gripper, kind = self._target.gripper, KINDS[trouble.kind]
         change: Any = {kind.habit: True if kind.value is None else trouble.amount * gripper.speedup}
         gripper.habits = replace(gripper.habits, **change)

@@ -5,10 +5,10 @@ habit                   of which       sources
 ======================  =============  ====================================================================
 activation of 12 s      3-Finger       one driver reports 15 s; others wait for 25 and 30
 activation of 4.2 s     2F, Hand-E     pyRobotiqGripper gives up after 5 s, and its users do not complain
-``status-lag``          3-Finger       none of its own: no driver looks soon enough to have seen one. The
+``status-lag``          3-Finger       none for it: no driver looks soon enough to have seen one. The
                                        vendor's SDK for the 2F waits up to 0.2 s
 no ``status-lag``       2F, Hand-E     pyRobotiqGripper's and the vendor's example loop end with the first
-                                       gOBJ after a write; only by the SDK's text gOBJ trails
+                                       gOBJ after a write; only the SDK's text says that gOBJ trails
 ``silence-fault``       all            the manual of a sibling, two recordings of 2F in normal operation
 ``write-spacing``       3-Finger       the manual of 2014, pp. 58 and 75
 no ``write-spacing``    2F, Hand-E     the vendor's loop writes 100 times a second, and up to 250 times

@@ -3,8 +3,8 @@
 # Theory of operation
 #
 # A report has figures of the gripper as a client saw them, over its link. Each is turned back into a figure
-# of the gripper: what an exchange adds is taken off, and of a range (the longest silence that passed, the
-# shortest that did not) the middle is taken. What the report does not have stays as usual. A check that
+# of the gripper: the time of an exchange is taken off, and of a range (the longest silence that passed, the
+# shortest that did not) the middle is taken. Figures that the report lacks stay as usual. A check that
 # differs and that no simulator can have is named in ``unknown``. Effects that are shorter than an exchange
 # do not show in a report, and so not here.
 

@@ -263,7 +263,7 @@ class Trouble:
 
     Attributes:
         kind: one of :data:`KINDS`.
-        value: its meaning is that of the kind; None for its usual value.
+        value: its meaning depends on the kind; None for its usual value.
         on: the requests whose replies it is about.
         at: seconds after the beginning of the plan.
         lasts: seconds, infinity for ever, 0 for once (one reply, one request, one cut); None for the
@@ -323,7 +323,7 @@ class Trouble:
         return self.on in (this, "any") and KINDS[self.kind].on in (this, "any")
 
     def corrupt(self, reply: Reply, amount: float) -> Parts | None:
-        """The bytes to send in place of a reply; None for a refusal, or a reply that it does not concern."""
+        """The bytes to send instead of a reply; None for a refusal, or a reply that it does not concern."""
         # A multiplexer is late, and that is not all it does.
         kind = KINDS["delay" if self.kind == "multiplexer" else self.kind]
         if kind.corruption is None or reply.is_exception or not self.is_about(write=reply.is_to_a_write):

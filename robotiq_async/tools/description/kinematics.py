@@ -6,12 +6,12 @@ Each finger has three phalanges and one motor: up to about 110 counts the base t
 parallel to itself, to 140 the base turns alone, from there to 240 the middle one, and beyond nothing moves
 (Indiana University, technical report 711). The scissor turns the bases of B and C against each other.
 
-The slopes and limits below are those of the joint state publisher for ROS 1 (robotiq_3f_gripper_joint_states
+The slopes and limits below come from the joint state publisher for ROS 1 (robotiq_3f_gripper_joint_states
 of ros-industrial), which cites that report for the fingers; its author measured the scissor. They are one
-formula, and no second source confirms them: public recordings of real hands, that of TAMS among them, have
-joint angles which that same publisher computed from the positions.
+formula, and no second source confirms them: public recordings of real hands, also by TAMS, have joint angles
+which that same publisher computed from the positions.
 
-Angles are those of a mechanism without load and play: a finger that closes around something bends
+Angles are of a mechanism without load and play: a finger that closes around something bends
 earlier. Nothing here has been checked on a real hand.
 """
 
@@ -43,9 +43,9 @@ BASE: Final[AngleTable] = ((0, 0.0), (140, 70.0))
 MIDDLE: Final[AngleTable] = ((140, 0.0), (240, 90.0))
 """joint_2: still until the base stops, then up to its own stop."""
 TIP: Final[AngleTable] = ((0, 0.0), (110, -55.0))
-"""joint_3: against the base, for the tip stays parallel, until its stop."""
+"""joint_3: against the base, because the tip stays parallel, until its stop."""
 PALM: Final[AngleTable] = ((15, 11.0), (240, -11.0))
-"""The palm joint of finger_1 against the scissor; that of finger_2 is its negative. The publisher's author
+"""The palm joint of finger_1 against the scissor; finger_2 has its negative. The publisher's author
 measured about 11 degrees to each side, where the manual has 32 in all; the source of 15 and 240 is not
 given."""
 
@@ -114,7 +114,7 @@ def finger_angles(position: int) -> tuple[float, float, float]:
 
 
 def palm_angle(scissor: int) -> float:
-    """The palm joint of finger_1 in radians at a position of the scissor; that of finger_2 is minus that."""
+    """The palm joint of finger_1 in radians at a position of the scissor; finger_2 has the negative."""
     return radians(_between(scissor, PALM))
 
 

@@ -1,4 +1,4 @@
-"""Rigid links, the joints between them and what drives these: the form of every description.
+"""Rigid links, the joints between them and their drives: the form of every description.
 
 A description is data. The drawing, the URDF and the MJCF are made from it, so they cannot disagree. Metres,
 radians, kilograms.
@@ -73,7 +73,7 @@ class RigidLink:
 
 @dataclass(frozen=True, slots=True)
 class Mimic:
-    """A joint that follows another: its value is that of the other, times a factor.
+    """A joint that follows another: its value is the other's, times a factor.
 
     Attributes:
         joint: the name of the other.

@@ -33,9 +33,9 @@ def bodies_of(hand: Hand) -> Bodies | None:
 
 
 def joints_and_parts(bodies: Bodies) -> tuple[dict[str, float], tuple[Shape, ...]]:
-    """The values of the joints by name, and what parts consist of, in the frame of the root link.
+    """The values of the joints by name, and the shapes of the parts, in the frame of the root link.
 
-    ``bodies`` are as :func:`bodies_of` gives them, or what JSON has made of them.
+    ``bodies`` are as :func:`bodies_of` gives them, or read from JSON.
     """
     joints, parts = bodies
     return dict(joints), tuple(

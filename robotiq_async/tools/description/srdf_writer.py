@@ -1,6 +1,6 @@
 """Writes the SRDF that MoveIt reads beside a URDF, with a group, its states and the collisions to ignore.
 
-The group ``gripper`` is the whole gripper, for what is held touches all of it. Joints that no motor drives
+The group ``gripper`` is the whole gripper, because a held part touches all of it. Joints that no motor drives
 are passive: MoveIt wants a controller for the others alone. The gripper's collisions with itself are ignored,
 as in the MJCF: links overlap at their joints, pads meet, and no position does harm.
 

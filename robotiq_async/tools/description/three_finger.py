@@ -47,7 +47,7 @@ _BENT: Final = pi / 6
 _EFFORT: Final = 60.0
 _VELOCITY: Final = 2.0
 _MIDDLE_SPRING: Final = (0.1, -3.0)
-"""Stiffness in N m/rad and rest angle: holds the joint with 0.3 N m, below what the least force gives it."""
+"""Stiffness in N m/rad and rest angle: holds the joint with 0.3 N m, below the torque of the least force."""
 _TIP_STIFFNESS: Final = 1.0
 _SHARED: Final = (BASE[1][1] / BASE[1][0]) / (MIDDLE[1][1] / (MIDDLE[1][0] - MIDDLE[0][0]))
 """Degrees of the base that cost the motor as much as one degree of the middle joint: 5/9."""

@@ -123,7 +123,7 @@ def two_finger(model: Model) -> HandModel:
 
 
 def _link_name(name: str, side: str) -> str:
-    # PickNik's links end in _link, those of ros-industrial's 2F-140 do not.
+    # PickNik's links end in _link, the links of ros-industrial's 2F-140 do not.
     return name.format(side) + ("_link" if name.startswith("robotiq_85") else "")
 
 

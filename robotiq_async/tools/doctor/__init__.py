@@ -1,6 +1,6 @@
 """Diagnoses a connection: one finding per check, each with advice.
 
-Nothing moves, whatever is examined: a gripper that this host reaches, or one that an agent serves.
+Nothing moves. The doctor examines a gripper that this host reaches, or one that an agent serves.
 """
 
 from .findings import Finding, Level, ReportFinding

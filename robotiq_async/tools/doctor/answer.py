@@ -92,7 +92,7 @@ async def find_gripper(address: Address, usual: RegisterMap, report: ReportFindi
             continue
         tries = number + 1
         if registers != usual and (again := await _ask_again(address, usual, link)) is not None:
-            # The line had lost the first requests, whatever they were: nothing about this gripper is unusual.
+            # The line had lost the first requests, of any kind: nothing about this gripper is unusual.
             (link, status, seconds), registers, tries = again, usual, tries + 1
         if _echoes(link):
             report(Finding(Level.GOOD, "echo", "the line echoes what is sent, and the echo is dropped"))
@@ -115,7 +115,7 @@ async def _ask_again(
     """Read with the usual unit id and registers again; None if only ``other`` answers, which is open then.
 
     Some lines lose the first requests of a connection, or of a client. Settings that answered after them
-    would else be taken for those of the gripper.
+    would else be taken for the gripper's.
     """
     await other.close()
     for _ in range(PROBE_TRIES):
@@ -161,7 +161,7 @@ def _attempts(address: Address, usual: RegisterMap) -> Iterator[tuple[RegisterMa
 
 
 async def _other_frames(address: Address) -> str:
-    # Advice for a socket with the wrong framing: RTU in place of Modbus TCP, or the reverse.
+    # Advice for a socket with the wrong framing: RTU instead of Modbus TCP, or the reverse.
     if not address.is_socket:
         return ""
     other = replace(address, kind="tcp" if address.is_rtu else "rtu+tcp")

@@ -34,7 +34,7 @@ SHOWN_FORCES: Final = (0, 125, 250)  # force values whose currents are drawn ove
 def plot_speed(path: Path, table: RunsTable, label: str) -> list[Path]:
     """Plot closing time against speed value beside the thesis's curve, and the difference between the two.
 
-    The path has no suffix; the label is that of the table. Returns the files written, as all plots do.
+    The path has no suffix; the table has the label. Returns the files written, as all plots do.
     """
     thesis = SpeedCalibration.thesis()
     values = sorted(table)

@@ -108,7 +108,7 @@ class Panel(NamedTuple):
     """One row of the picture.
 
     Attributes:
-        what: of an axis is drawn.
+        what: the curve of an axis: "position" or "current".
         is_of_scissor: whether it is of the scissor alone, which has no opening; None for all axes.
         height: in the units of the other rows.
     """
@@ -212,7 +212,7 @@ def _shade(panel: Panel, axes: Axes, curves: RecordingCurves, inches: float) -> 
 
 
 def _add_legend(panel: Panel, axes: Axes, curves: RecordingCurves) -> None:
-    """Names above a panel; what is shaded is named once."""
+    """Names above a panel; each shading is named once."""
     is_jaw = len(curves.axes) == 1
     if panel.what == "current":
         if not axes.collections:
@@ -234,7 +234,7 @@ def _add_legend(panel: Panel, axes: Axes, curves: RecordingCurves) -> None:
 
 
 def _same_scale(axes: Sequence[Axes], panel: Panel) -> None:
-    """The same limits for those of a row that have the same unit."""
+    """The same limits for all panels of a row that have the same unit."""
     for unit in {each.get_ylabel() for each in axes}:
         alike = [each for each in axes if each.get_ylabel() == unit]
         top = max(each.get_ylim()[1] for each in alike)

@@ -36,7 +36,7 @@ LEAST_GAP_S: Final = 0.25
 """Statuses have a gap between them that are further apart, and by so many times their usual interval:"""
 GAP_INTERVALS: Final = 10
 NEAR_MM: Final = 5.0
-"""A jaw whose openings are as near to those of a model is of that model, if the recording does not say it."""
+"""A jaw with openings as near to a model's is of that model, if the recording does not name it."""
 LONGEST_LABEL: Final = 40  # characters of a label
 _NAMED: Final = re.compile(rb'<robot name="([^"]+)"')
 
@@ -222,7 +222,7 @@ class _Reading:
 
 
 def _millimetres(model: Model | None, seen: dict[int, float]) -> Values:
-    """The opening at each position: that of the model, moved to those recorded, which may be measured."""
+    """The opening at each position: the model's, moved to the recorded ones, which may be measured."""
     if model is None or not seen:
         return np.empty(0)
     nominal: Values = np.array(model.stroke.openings)

@@ -5,7 +5,7 @@
         ...
 
 In this order the file contains start and stop, and a slow disk does not delay the stop. A blocking hand is
-recorded with ``with`` in place of ``async with``.
+recorded with ``with`` instead of ``async with``.
 
 Six channels: ``/gripper/status`` (every poll), ``/gripper/command`` (every request that was written) and
 ``/gripper/event`` (transitions, faults and marks) as JSON with a JSON Schema; ``/joint_states``,
@@ -89,7 +89,7 @@ class Recorder:
 
     Attributes:
         path: the file.
-        recorded: polls so far; those of the last half second may not be on the disk yet.
+        recorded: polls so far; polls of the last half second may not be on the disk yet.
         saved: polls on the disk; 0 once the file has been deleted. An incomplete write does not count.
     """
 
@@ -120,7 +120,7 @@ class Recorder:
         self._outbox = Outbox()
         self._joints_only = ros2
         self._is_open = False
-        self._unsaved = b""  # what could not be written for want of a thread
+        self._unsaved = b""  # bytes that could not be written for want of a thread
         self._waits = 0.0  # the seconds for which that has lasted
         self._format = self._make_format(ros2=ros2)
         self._file: FileIO
@@ -186,7 +186,7 @@ class Recorder:
         ending = asyncio.ensure_future(self._end())
         await wait_shielded(ending)
         if error is None:
-            ending.result()  # a mistake of ours would be lost
+            ending.result()  # the error of a bug would be lost
             if self._failed.done():
                 raise self._failed.result()
 
@@ -288,7 +288,7 @@ class Recorder:
             self._fail(f"the disk does not answer within {DISK_S:g} s")
         except NoThreadError as error:
             self._fail(str(error))
-            self._file.close()  # no thread of ours uses it: the last one has ended
+            self._file.close()  # no thread of the recorder uses it: the last one has ended
         except OSError as error:
             self._fail(error.strerror)
 

@@ -175,8 +175,8 @@ def export(
     """Write the messages of one kind into a CSV file, all or none; an existing file is replaced.
 
     A column that has no value in any row is left out. With a convention statuses have a last column of its
-    name: the opening in its numbers. It is asked for, as None, too, so that nobody guesses the sign of
-    another column.
+    name: the opening in its numbers. The argument is required, even as None, so that no reader has to guess
+    the sign of another column.
 
     Raises:
         RecordingError: a message does not have a recorder's format.

@@ -64,12 +64,12 @@ class Bench:
     ) -> RecordedLink:
         """Another link, not opened.
 
-        ``registers`` are those of the gripper unless given. Its frames are kept with the others unless
+        ``registers`` are the gripper's unless given. Its frames are kept with the others unless
         ``keep`` is given.
         """
         there = registers or self.registers
         make: Callable[..., Link] = partial(UrcapTransport, self.address)
-        if there is not None:  # function 23 is what is examined
+        if there is not None:  # function 23 is examined
             sure = replace(there, write_function=23, is_sure=True)
             make = partial(ModbusTransport, self.address, sure)
         link = make(connect_timeout=BENCH_CONNECT_S, response_timeout=RESPONSE_TIMEOUT_S)

@@ -25,7 +25,7 @@ class Assumption(NamedTuple):
 
 TCP: Final = "tcp"
 URCAP: Final = "urcap"
-"""Kinds of links: those of addresses."""
+"""Kinds of links, as addresses have them."""
 
 CATALOGUE: Final[dict[str, Assumption]] = {
     "host.timer": Assumption(0, "This computer's timers are at most 1 ms late."),

@@ -1,6 +1,6 @@
 """The folder of a report: recording.mcap, report.json, report.md and pictures. Needs the extra ``record``.
 
-Statuses and commands are those of a recorded hand. An event of the kind "state" marks the beginning of a
+Statuses and commands are as of a recorded hand. An event of the kind "state" marks the beginning of a
 stage (``verify stage 4``), one of the kind "log" a failed exchange, or a finding in another place.
 """
 
@@ -75,7 +75,7 @@ class Recording:
     # The disk.
 
     async def end(self) -> None:
-        """Write what is left, and close the file; a failure is kept in :attr:`failure`."""
+        """Write the rest, and close the file; a failure is kept in :attr:`failure`."""
         self._over.set()
         await self._saving
         if not self.failure:

@@ -101,7 +101,7 @@ async def stop_fingers(
     Args:
         link: to the gripper; opened again if it was lost.
         image: the one that was written last; rATR is cleared as well.
-        alarm: takes a text for the person when the gripper cannot be reached, and when it is after all; must
+        alarm: takes a text for the person when the gripper cannot be reached, and when it answers again; must
             not block.
 
     Returns:

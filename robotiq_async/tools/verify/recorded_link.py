@@ -16,7 +16,7 @@ from ...values import Echo, Model, Registers, Request, RobotiqConnectionError, R
 T = TypeVar("T")
 
 RECENT_EXCHANGES_S: Final = 2.0
-"""Seconds that an image may take to act: ten times those of a slow gripper."""
+"""Seconds that an image may take to act: ten times as long as a slow gripper takes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +24,7 @@ class RecordedExchange:
     """One exchange."""
 
     began: float  # the loop's time of sending
-    ended: float  # that of the answer, or of the failure
+    ended: float  # when the answer came, or the failure
     kind: str  # "status", "command", "failure", or "probe" for a read in another place
     registers: Registers = ()  # those read or written; empty for a probe and for a failure of a read
     words: str = ""  # the failure, or the finding of a probe

@@ -122,7 +122,7 @@ WITHOUT_ROS: Final = ("activation_timeout", "request_address", "status_address")
 
 
 def sentences(report: Report) -> tuple[str, str, str]:
-    """Three sentences: on the use of the gripper as it is, on what is known, and on what to report."""
+    """Three sentences: on the use of the gripper as it is, on the checks, and on the report to send."""
     return _usable(report), _known(report), _to_report(report)
 
 

@@ -196,7 +196,7 @@ class Runner:
     # -- after it --------------------------------------------------------------------------------------------
 
     async def _stop(self, image: Request) -> None:
-        """Write rGTO = 0, whatever has happened; an activation that runs is taken back."""
+        """Write rGTO = 0 in any case; an activation that runs is taken back."""
         link = self._bench.link
         written, shown = link.written or image, link.shown
         if written.activate and shown is not None and not shown.is_activated:

@@ -205,7 +205,7 @@ class StageWatch:
 
 
 def _may_echo(asked: tuple[int, ...], shown: tuple[int, ...]) -> bool:
-    """Whether an echo is that of a request; one beyond a limit may be echoed as the limit."""
+    """Whether an echo repeats a request; one beyond a limit may be echoed as the limit."""
     return asked[:2] == shown[:2] and all(
         wanted == got or wanted <= got <= LIMITS[0] or LIMITS[1] <= got <= wanted
         for wanted, got in zip(asked[2:], shown[2:], strict=True)

@@ -144,7 +144,7 @@ class PageCommands:
 
         task = asyncio.get_running_loop().create_task(self._carry_out(request, page, name))
         tasks.add(task)
-        # A callback, because a task that is cancelled before its first step runs no code of its own.
+        # A callback, because a task that is cancelled before its first step runs no code.
         task.add_done_callback(ended)
 
     def gone(self, page: str) -> None:

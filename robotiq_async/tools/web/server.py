@@ -252,7 +252,7 @@ class PageServer:
             while (message := await self._read()) is not None:
                 self._heard_at = now()
                 self._hear(message)
-        except Exception:  # noqa: BLE001  # whatever the other process has sent, the axes are held
+        except Exception:  # noqa: BLE001  # after any message of the other process the axes are held
             log.exception("the page has sent an invalid message: its commands are ignored from now on")
         finally:
             self._commands.all_gone()

@@ -27,7 +27,7 @@ OVERRUN: Final = 10
 """Counts: one 2F-85 read a part at 91 at the slowest speed, and at 96 to 99 at full speed."""
 EARLY: Final = 2
 """Counts: one 2F-85 showed a contact with or before its last motion in 3 of 9, once by 13 counts, which may
-come from asking for its position first."""
+come from reading its position first."""
 HELD_QUESTION: Final = "rGTO has been 0 for some seconds. Is the foam still held?"
 ANSWERS: Final = {"y": "yes, it is held", "n": "no, it is loose or has fallen"}
 
@@ -66,7 +66,7 @@ async def _open(bench: Bench, home: dict[Finger, int]) -> None:
 
 
 async def _at_speed(bench: Bench, home: dict[Finger, int], slowly: RobotiqStatus) -> None:
-    """Close a jaw on the part at full speed, if the person puts it back: it runs on a little."""
+    """Close a jaw on the part at full speed, if the person puts it back: it overruns a little."""
     answer = await bench.person.chooses(AGAIN, GO_OR_SKIP)
     if answer == "s" or not slowly.contacts:
         bench.inconclusive("soft.speed", "skipped" if answer == "s" else "nothing was held before")
@@ -93,7 +93,7 @@ async def _at_speed(bench: Bench, home: dict[Finger, int], slowly: RobotiqStatus
 
 @dataclass
 class _Closing:
-    """Fingers that close: what gDT shows, beside the time at which they stand.
+    """Fingers that close: the time at which gDT shows rest, beside the time at which they stand.
 
     Attributes:
         rest: the standstill by positions.

@@ -65,12 +65,12 @@ class _StopTrial(NamedTuple):
 
     counts: int
     seconds: float  # until rest
-    exchange_s: float  # from asking for the last status before it to its acknowledgement
+    exchange_s: float  # from requesting the last status before it to its acknowledgement
     rate: float  # counts a second before it
 
     @property
     def allowed(self) -> float:
-        """Counts: those of a quick stop, and of the time in which the gripper could not know of it."""
+        """Counts of a quick stop, and of the time in which the gripper could not know of it."""
         return COUNTS + self.rate * self.exchange_s
 
     @property

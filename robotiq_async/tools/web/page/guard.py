@@ -45,7 +45,7 @@ _FORM: Final = """<form method="post" action="/"><label>Password <input type="pa
 
 
 class Guard:
-    """An ASGI application that passes on only what the rules allow."""
+    """An ASGI application that passes on only requests that the rules allow."""
 
     def __init__(self, app: App, access: Access) -> None:
         self.app = app

@@ -57,8 +57,8 @@ class HandMirror:
     address: str
     state: State = State.DISCONNECTED
     status: RobotiqStatus | None = None  # the newest; None before the first
-    joints: dict[str, float] | None = None  # what a simulation knows beside the status; None for nothing
-    parts: tuple[Shape, ...] = ()  # the same, of what stands before the gripper
+    joints: dict[str, float] | None = None  # from a simulation, beside the status; None without
+    parts: tuple[Shape, ...] = ()  # the same, of the parts before the gripper
     age: float = 0.0  # seconds since the status was read, at the last update
     problem: str = ""  # why the hand could not be started; empty if it was
     inhibited: Inhibit | None = None  # why a person has the hand refuse motion

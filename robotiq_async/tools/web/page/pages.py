@@ -48,7 +48,7 @@ STYLE: Final = """
   .rq-line .rq-axis { grid-template-columns: 4.2rem 1fr 2.2rem 3.6rem 4.2rem 8.5rem; min-height: 1.7rem; }
   .rq-line .rq-does { grid-column: auto; min-height: 0; }
 }
-/* The foot covers nothing: what is above it scrolls by itself. */
+/* The foot covers nothing: the part above it scrolls by itself. */
 .rq-foot { z-index: 7000; height: 5rem; background: #fff; }
 .body--dark .rq-foot { background: #121212; }
 .rq-halt { min-height: 4rem; font-size: 1.5rem !important; font-weight: 700; letter-spacing: .1em;
@@ -210,7 +210,7 @@ def _halt_button(
     shown: list[str] = [name]
 
     def show() -> None:
-        # It is pressed all the same: what moves is held once the link is back, and motion stays refused.
+        # It is pressed all the same: moving axes are held once the link is back, and motion stays refused.
         arrives = not mirror.is_quiet and not all(hand.is_lost or hand.problem for hand in hands)
         words = name if arrives else f"{name}: does not arrive now"
         if words != shown[0]:

@@ -24,15 +24,15 @@ from .pipes import Pipes
 BEAT_S: Final = 0.25
 HEAD_S: Final = 5.0  # seconds for the head of the first request of a connection
 MOST_CONNECTIONS: Final = 200
-"""Connections at a time: half of what fits into the usual limit of files, and enough for thirty browsers."""
+"""Connections at a time: half of the usual limit of files, and enough for thirty browsers."""
 MESSAGE_MAX: Final = 65_536
 """Limit of a websocket message in bytes."""
 
 
 class _Connection(H11Protocol):
-    """A connection that has to ask something soon. Strangers must not keep those of the browsers away.
+    """A connection that has to send a request soon. Strangers must not keep browsers away.
 
-    Of too many the oldest that has asked nothing goes: a browser asks at once, and gets in.
+    If there are too many, the oldest without a request is closed: a browser sends one at once, and gets in.
     """
 
     since = 0.0

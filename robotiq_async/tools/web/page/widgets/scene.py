@@ -2,7 +2,7 @@
 
 The drawing follows from the description of the model. A scene is made before the model is known: until the
 first status it is a 3-Finger. A simulation with physics tells where joints and parts are. Of any other
-gripper only the positions are known, and what it holds is a guess (:mod:`.held`).
+gripper only the positions are known, and its part is a guess (:mod:`.held`).
 """
 
 from __future__ import annotations
@@ -178,7 +178,7 @@ class Drawing:
         self.ghost: HandFigure | None = None if compact else HandFigure(model, ghost=True)
         self.figure = HandFigure(model, ghost=False)
         with self.figure.root:
-            # A cylinder of three.js lies along y, that of a 3-Finger's bar along z.
+            # A cylinder of three.js lies along y, a 3-Finger's bar along z.
             self.bar = ui.scene.cylinder(1.0, 1.0, 1.0, 48).with_name("bar")
             if kind is THREE_FINGER:
                 self.bar.rotate(pi / 2, 0, 0)
