@@ -145,7 +145,7 @@ def serve(
 
     Args:
         address: of the gripper, as of :class:`robotiq_async.RobotiqHand`.
-        host: where to listen. Beyond this machine anybody can move the fingers: plain gRPC checks nobody.
+        host: where to listen. Beyond this machine anybody can move the fingers: plain gRPC has no login.
         port: where to listen; it must be free, because gRPC would silently share it with another server.
         activate: False activates nothing: the gripper must be active already.
 

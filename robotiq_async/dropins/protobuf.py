@@ -15,7 +15,7 @@ VARINT, EIGHT_BYTES, BYTES, FOUR_BYTES = 0, 1, 2, 5
 
 
 def encoded(fields: Mapping[int, FieldValue]) -> bytes:
-    """A message of fields by their numbers; an int is written as one, a float with single precision."""
+    """A message of fields by their numbers; an int is written as an int, a float with single precision."""
     out = bytearray()
     for number, value in fields.items():
         if isinstance(value, bytes):

@@ -566,7 +566,7 @@ class Hand(HandKind):
 
         For one reader; ends as :meth:`statuses` does. Changes while the link is down are reported when it
         is back. The events follow the gripper's reports, and a contact latches: a part that is pulled out
-        is noticed once its finger closes further, by the manual only when the force is raised.
+        is noticed once its finger closes further; the manual says, only when the force is raised.
         """
         watch = GripWatch(self.model.mask(fingers), since=since, slip=slip)
         self._check_may_listen()

@@ -64,7 +64,7 @@ class StateWaiters:
             wake()
 
     def woken_by(self, state: State) -> Callable[[], None] | None:
-        """Make the function that wakes those who wait for a state by now; None if there are none."""
+        """Make the function that wakes those who wait for a state by now; None if nothing waits for it."""
         waiting = [each for each in self._waiters if state in each[0] or state in each[1]]
         if not waiting:
             return None  # a control loop goes to RUNNING_CC and back with every command

@@ -1,6 +1,6 @@
 """News of a gripper, logged once each: its faults, a reset, an axis that does not get where it was sent.
 
-A fault is logged when the hand counts it as one: a passing 0x09 is none. A reset by any client is logged,
+A fault is logged when the hand counts it as a fault: not a passing 0x09. A reset by any client is logged,
 once the gripper has been active in this run: its part may have fallen.
 """
 

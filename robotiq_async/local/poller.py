@@ -269,7 +269,7 @@ class Poller:
         self._take(self._status(registers, answered), asked)
 
     async def _check_who_answers(self, registers: Registers) -> None:
-        """Refuse another gripper, and a device that is none.
+        """Refuse another gripper, and a device that is no gripper.
 
         Reserved bits alone do not tell that a gripper is another one than before. It may be in motion, so it
         must get its stop.

@@ -1,4 +1,4 @@
-"""The order in which a run is heard of: by readers, listeners, and the callers whom a request has ended.
+"""The order in which a run is heard of: by readers, listeners, and the callers that a request has ended.
 
 What they do may hold up the loop. So a write that is due leaves first.
 """
@@ -93,7 +93,7 @@ class Publisher:
             self._loop.call_soon(self.tell)
 
     def tell(self) -> None:
-        """Let everybody hear who waits for a write: it has left, or there is none."""
+        """Let everybody hear who waits for a write: it has left, or there is no write."""
         self.has_to_tell = self._is_held_back = False
         self.publish_changes()
         self.answer_ended()
@@ -107,7 +107,7 @@ class Publisher:
         return bool(self._ended)
 
     def answer_ended(self) -> None:
-        """Answer those whom a request has ended: its write has left, or there is none."""
+        """Answer the callers that a request has ended: its write has left, or there is no write."""
         ended, self._ended = self._ended, []
         for caller, error in ended:
             fail([caller], error)

@@ -53,8 +53,8 @@ _GAUGES: Final = {
     "round_trip_p50": "Median time from a read to its reply.",
     "round_trip_p99": "99th percentile of the time from a read to its reply.",
     "longest_stall": "Longest time the event loop was blocked.",
-    "status_age_p50": "Median time from asking for a status to the write that was decided on it.",
-    "status_age_p99": "99th percentile of the time from asking for a status to the write decided on it.",
+    "status_age_p50": "Median time from requesting a status to the write that was decided on it.",
+    "status_age_p99": "99th percentile of the time from requesting a status to the write decided on it.",
 }
 _NOW: Final = {
     "ready": "1 while the hand takes motion commands.",

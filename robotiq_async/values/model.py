@@ -243,7 +243,7 @@ def _with_jaw(
 _ARC_85: Final = (0.869, 0.775)
 _ARC_140: Final = (0.868, 0.70)
 
-# Manual of the 2F-85 and 2F-140, specifications; manual of the Hand-E, the 130 N are those of its example.
+# Manual of the 2F-85 and 2F-140, specifications; manual of the Hand-E, the 130 N come from its example.
 TWO_FINGER_85: Final = _with_jaw("2f85", "2F-85", 85.0, (20.0, 150.0), (20.0, 235.0), _ARC_85)
 """The gripper with two fingers that opens by 85 mm."""
 TWO_FINGER_140: Final = _with_jaw("2f140", "2F-140", 140.0, (30.0, 250.0), (10.0, 125.0), _ARC_140)

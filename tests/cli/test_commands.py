@@ -186,7 +186,7 @@ def test_a_grip_is_kept_from_one_move_to_the_next(call: Call, there: SimulatorSe
     assert "the grip is in force" in outcome.out
     assert there.gripper.grips == held
     outcome = call("move", "9", "--fingers", "A", "-y", there.address)
-    assert "the vendor says that what is held stays held; no one has measured it. With --keep" in outcome.out
+    assert "the vendor says that a held part stays held; that is not measured. With --keep" in outcome.out
     assert not there.gripper.grips
     call("move", "60", "--fingers", "A", "--yes", there.address).assert_succeeded()
     assert not there.gripper.grips

@@ -172,7 +172,7 @@ def print_files(files: list[Path]) -> None:
 
 
 SPEED_WARNING = """the fingers MOVE: they open and close fully, {count} times. Nothing may be between them.
-If it is not active yet it is activated first, and what it holds drops."""
+If it is not active yet it is activated first, and a held part drops."""
 
 
 def speed(

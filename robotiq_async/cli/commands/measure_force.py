@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from ...simulator import SimulatedGripper
     from ...tools.measure.campaigns import Campaign, Currents
 
-FORCE_WARNING = """the fingers MOVE: they open and close on what lies between them, {count} times.
-If it is not active yet it is activated first, and what it holds drops."""
+FORCE_WARNING = """the fingers MOVE: they open and close on anything between them, {count} times.
+If it is not active yet it is activated first, and a held part drops."""
 MOST_GRAMS = 100_000
 
 

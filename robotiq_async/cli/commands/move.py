@@ -28,10 +28,10 @@ from ..consent import consent
 from ..failures import usage
 
 WARNING = """this MOVES {fingers} to {position}.
-If it is not active yet ALL its fingers open and close to their stops first, and what they hold drops."""
+If it is not active yet ALL its fingers open and close to their stops first, and a held part drops."""
 
 IN_FORCE = "rGTO stays set: the grip is in force."
-LET_GO = "rGTO is clear now: the vendor says that what is held stays held; no one has measured it."
+LET_GO = "rGTO is clear now: the vendor says that a held part stays held; that is not measured."
 HINT = " With --keep it stays set."
 
 
@@ -56,7 +56,7 @@ def move(
     first; without a terminal it needs --yes.
 
     At the end it stops every axis (rGTO = 0), also those that hold something. According
-    to the vendor the part stays held then; no one has measured it on a 3-Finger. The next
+    to the vendor the part stays held then; that is not measured on a 3-Finger. The next
     move does not resume that grip. With --keep rGTO stays set if everything has come to
     rest, also after Ctrl-C, and the next move leaves the other axes their grip. Speed and
     force cannot be read back: the other axes get 128 and 64 then.

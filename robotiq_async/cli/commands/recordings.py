@@ -196,8 +196,7 @@ def plot(
 
     Args:
         files: The recordings.
-        picture: Name of the plot without suffix (default: that of the first recording, as cup+1
-            where there is one more).
+        picture: Name of the plot without suffix (default: the first recording's; cup+1 if one more follows).
         begin: Draw from this time on; the time axis begins with the recording.
         end: Draw up to this time.
     """

@@ -173,7 +173,7 @@ async def simulate(
 
 
 async def _play(server: SimulatorServer | SerialSimulatorServer, plan: Sequence[Trouble]) -> None:
-    """Carry out a plan, and go on until the physics of the gripper fails."""
+    """Carry out a plan, and continue until the physics of the gripper fails."""
     playing = asyncio.ensure_future(
         server.fault_injector.run(plan, lambda trouble: tell(f"trouble: {trouble}"))
     )
@@ -251,7 +251,7 @@ def _check_line(kinds: Sequence[Model], units: Sequence[int | None], *, is_line:
     if len(units) > 1 and not is_line:
         raise ValueError("several --device-id need a line: --serial or --rtu-over-tcp")
     if len(set(units)) < len(units):
-        raise ValueError("each gripper at a line needs a --device-id of its own")
+        raise ValueError("each gripper at a line needs a different --device-id")
     if len(kinds) not in (1, len(units)):
         raise ValueError(
             f"--model is for all, or once for each --device-id: got {len(kinds)} and {len(units)}"

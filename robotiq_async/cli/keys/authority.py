@@ -48,11 +48,11 @@ class Authority:
 
     @classmethod
     def load(cls, pair: Pair) -> Self:
-        """Load an authority: ValueError unless the key is that of the certificate."""
+        """Load an authority: ValueError unless the key belongs to the certificate."""
         certificate = x509.load_pem_x509_certificate(pair.certificate)
         key = serialization.load_pem_private_key(pair.key, None)
         if not isinstance(key, ec.EllipticCurvePrivateKey) or key.public_key() != certificate.public_key():
-            raise ValueError("the key is not that of the certificate")
+            raise ValueError("the key does not belong to the certificate")
         return cls(certificate, key)
 
     def pair(self) -> Pair:

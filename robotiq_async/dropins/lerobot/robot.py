@@ -44,7 +44,7 @@ class RobotiqGripperConfig(RobotConfig):  # type: ignore[misc]  # LeRobot is not
         activate: whether a gripper that is reset is activated when the robot connects: **its fingers MOVE**.
         speed: of the fingers, in counts 0..255.
         force: in counts 0..255, until an action sets another.
-        action_force: whether an action has ``gripper.force``; False for a leader that gives none. Recordings
+        action_force: whether an action has ``gripper.force``; False for a leader without it. Recordings
             then cannot be replayed with ``lerobot-replay``.
         clamp: whether an action beyond 0..100 is brought into it, as LeRobot's own motors do; else refused.
         cameras: LeRobot's, by name.

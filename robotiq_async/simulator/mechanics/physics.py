@@ -35,7 +35,7 @@ class Physics:
 
     The thread begins with the first read or write of the gripper, or with :meth:`start`, and ends with
     :meth:`stop` or a ``with`` block of the physics. A server starts it and stops it with itself, and so does
-    a hand with a ``sim://`` address. While there is none, bodies stand still.
+    a hand with a ``sim://`` address. Without the thread bodies stand still.
 
     After an error in the bodies every call raises :class:`PhysicsError`, reads of the gripper too.
 

@@ -1,6 +1,6 @@
 """An axis that a mechanism moves: its position and contacts come from a simulation of bodies.
 
-The registers, the firmware and their timing are as without one. A mechanism moves drives; an axis gives its
+The registers, the firmware and their timing are as without a mechanism. It moves drives; an axis gives its
 drive goals, and reports their outcomes.
 """
 

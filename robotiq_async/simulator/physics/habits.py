@@ -32,12 +32,12 @@ class Habits:
             and in no other (siblings: 1 s). A write that comes first takes it away.
         write_spacing: a write that comes less than so many seconds after the last one that was kept is
             acknowledged and forgotten (manual 2014, pp. 58, 75: leave 10 ms between commands).
-        echoes_limits: a request beyond a software limit is echoed as the limit. By the manual it is
+        echoes_limits: a request beyond a software limit is echoed as the limit. The manual says that it is
             replaced by the limit (2014, p. 45; 2018, p. 36); which of the two gPR has is open.
-        lets_go_on_halt: clearing rGTO, or a fault, releases the part. By the vendor's article on
-            protective stops it stays held, and by the manual fingers lock themselves; no one has measured it.
+        lets_go_on_halt: clearing rGTO, or a fault, releases the part. The vendor's article on protective
+            stops says that it stays held, the manual that fingers lock themselves; neither is measured.
         keeps_status_on_halt: with rGTO = 0 an axis in a contact or at its request keeps its gDT;
-            otherwise gDT and gSTA are 0 then. By the manual their 0 means nothing while gGTO = 0.
+            otherwise gDT and gSTA are 0 then. The manual says that their 0 means nothing while gGTO = 0.
         opens_without_rics: clearing rICS is a mode change: it opens the fingers, rGTO or not, and drops the
             part. Otherwise the scissor alone goes to its mode, as soon as rGTO is set. No source settles it.
         answers_with_echo: the reply to function 23 reflects the request that came with it. By the 2F's manual

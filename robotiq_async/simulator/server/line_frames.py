@@ -48,7 +48,7 @@ def has_checksum(frame: bytes) -> bool:
 def size_of_others(line: bytearray) -> int | None:
     """The bytes of the frame of another unit that a line begins with.
 
-    None while it is not whole, 0 if there is none, or one of a function that is not known.
+    None while it is not whole, 0 without such a frame, or with a function that is not known.
     """
     if len(line) < 2:
         return None

@@ -216,8 +216,8 @@ class UrcapSimulatorServer(SimulatorServer):
     A line is ``GET NAME`` or ``SET NAME VALUE NAME VALUE ...``. The answer to a GET ends with an end of line,
     the ``ack`` of a SET without one, as clients that ran on hardware want it. Several lines may come in one
     write. A ``GET NAME`` without an end of line is answered by the bare value, as the vendor's script has it;
-    so is the beginning of a longer line that comes in pieces, if it is one. All variables of a SET take
-    effect at once, unless the trouble ``one-by-one`` spaces them: then the ``ack`` comes before the first.
+    so is the beginning of a longer line that comes in pieces, if it is a GET. All variables of a SET act
+    at once, unless the trouble ``one-by-one`` spaces them: then the ``ack`` comes before the first.
     Other lines are answered by a question mark. With the trouble ``lost-set`` a SET is acknowledged and does
     not reach the gripper; with ``unreadable`` each variable of the gripper reads as a question mark, and a
     SET still reaches it: no source says whether it does.

@@ -49,7 +49,7 @@ class Reply:
 
     @property
     def is_to_a_write(self) -> bool:
-        """Whether it answers a write; FC23 is one, though its reply carries the status."""
+        """Whether it answers a write; FC23 counts as a write, though its reply carries the status."""
         return self.pdu[0] & 0x7F in (WRITE_SINGLE, WRITE_MULTIPLE, READ_WRITE)
 
     @property
@@ -80,7 +80,7 @@ class TextReply(Reply):
 
     @property
     def is_exception(self) -> bool:
-        """The text port has none."""
+        """The text port has no exceptions."""
         return False
 
 
@@ -179,7 +179,7 @@ def wrong_protocol(reply: Reply, value: float) -> Parts:
 
 
 def wrong_echo(reply: Reply, value: float) -> Parts:
-    """The reply to a write names the register next to the one that was written; one to FC23 names none."""
+    """The reply to a write names the register next to the one that was written; to FC23 it names none."""
     pdu = reply.pdu
     if reply.has_registers:
         return reply.changed()

@@ -29,7 +29,7 @@ from .trouble import Trouble
 def own_habits(model: Model) -> Habits:
     """The habits of a real gripper of this model, to pass to :class:`SimulatedGripper` as ``habits``.
 
-    They go by the time of the gripper: faster in a simulation that is.
+    They follow the time of the gripper: a faster simulation has faster habits.
     """
     return Habits(activation_time=REAL_ACTIVATION if model is THREE_FINGER else QUICK_ACTIVATION)
 

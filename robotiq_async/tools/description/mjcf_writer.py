@@ -1,7 +1,7 @@
 """Writes a description as MJCF for MuJoCo, with the couplings and springs that a URDF has no form for.
 
 Coupled joints are equality constraints; a motor that drives several joints pulls a tendon. Every drive is a
-position actuator whose force is limited to that of full force; the simulator lowers the limit to that of the
+position actuator whose limit is the full force; the simulator lowers the limit to the force of the
 force register. The gripper collides with everything but itself.
 
 Frictions, dampings and the gains of the drives are estimates: stiff enough to stop within a count, and soft

@@ -1,11 +1,11 @@
 """The bodies of a gripper that is simulated with physics, for drawings.
 
-How they get there: the simulated gripper stands in the program of its hand. Whoever shows that hand asks
-:func:`bodies_of` at each update, and sends the answer beside the status. It is no part of the status, for no
-gripper reports it. A page gets it as JSON.
+How they get there: the simulated gripper stands in the program of its hand. A viewer of that hand calls
+:func:`bodies_of` at each update, and sends the answer beside the status. It is no part of the status, because
+no gripper reports it. A page gets it as JSON.
 
-There are none, and a drawing goes by the positions alone, for a real gripper, for one without physics, for
-one in another program (``robotiq-async simulate``) or on another host, and while the link is lost.
+A real gripper has no bodies, and neither has one without physics, in another program (``robotiq-async
+simulate``) or on another host, or while the link is lost: a drawing then follows the positions alone.
 """
 
 from __future__ import annotations

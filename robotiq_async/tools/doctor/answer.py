@@ -336,7 +336,7 @@ def _report_place(usual: RegisterMap, found: RegisterMap, report: ReportFinding)
     if given:
         advice = f"Pass {', '.join(given)}, or the options of these names."
         if found.read_function != usual.read_function:
-            advice += " This function may read the requests: check that status shows what the gripper does."
+            advice += " This function may read the requests: check that the status follows the fingers."
         where = Finding(Level.DOUBT, "registers", f"{at}: unusual on this kind of link", advice)
     report(where)
 

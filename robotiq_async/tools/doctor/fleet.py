@@ -53,7 +53,7 @@ async def _examine_way_and_agent(name: GripperName, route: Route, report: Report
     try:
         configuration = route.configuration()
     except ValueError as error:
-        advice = "robotiq-async fleet keys makes keys; &insecure=1 is for a network of your own."
+        advice = "robotiq-async fleet keys makes keys; &insecure=1 is for your own network."
         report(Finding(Level.BAD, "way", str(error), advice))
         raise GiveUpError from error
     await examine_way(route, report)
@@ -94,7 +94,7 @@ async def _find(name: GripperName, bus: Bus, report: ReportFinding) -> None:
             advice = "Check the three names in the address."
         else:
             advice = (
-                "Does robotiq-async agent run there, and is it what listens? With keys: is this client in "
+                "Does robotiq-async agent run there, and no other program? With keys: is this client in "
                 "the agent's access.toml, and was the agent started since?"
             )
         report(Finding(Level.BAD, "agent", found, advice))
@@ -224,7 +224,7 @@ async def _shake_hands(endpoint: Endpoint, keys: Path, report: ReportFinding) ->
     except ssl.SSLCertVerificationError as error:
         found = f"its certificate is not trusted: {error.verify_message}"
         advice = (
-            "It must be from the same authority, still valid, and name what you connect to "
+            "It must be from the same authority, still valid, and name the address you connect to "
             "(fleet keys --agent NAME=HOST,...)."
         )
     except OSError as error:

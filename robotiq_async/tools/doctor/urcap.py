@@ -41,7 +41,7 @@ async def find_urcap(address: Address, gripper: int | None, report: ReportFindin
     report(Finding(Level.GOOD, "URCap", "answers"))
     if gripper is not None:
         report(Finding(Level.GOOD, "gripper id", f"{gripper} was chosen"))
-    current = "COU" if link.has_current else "none: this port does not tell what the motor draws"
+    current = "COU" if link.has_current else "none: this port does not tell the motor's current"
     report(Finding(Level.GOOD, "current", current))
     report_silence(status, report)
     return link
@@ -67,7 +67,4 @@ def _advice(error: RobotiqConnectionError) -> str:
         return "Release the emergency stop, switch the arm on, and look at the gripper at the teach pendant."
     if isinstance(error, ConnectionLostError):
         return "It closes the connection when asked: another program listens there, or the URCap was stopped."
-    return (
-        "What answers is not the text port of Robotiq's URCap, or a version of it that nobody has described: "
-        "report this line."
-    )
+    return "This is not the text port of Robotiq's URCap, or an unknown version of it: report this line."

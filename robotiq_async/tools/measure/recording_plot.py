@@ -50,7 +50,7 @@ COUNT_TICKS: Final = (0, 50, 100, 150, 200, 255)
 BESIDE: Final = 1.15  # inches of a recording beside its panels
 LABEL_SIZE: Final = 0.08  # inches between two labels
 LETTER: Final = 0.064  # inches of a character of a label
-ROW: Final = 0.17  # height of a row of labels, where that of the positions is 3
+ROW: Final = 0.17  # height of a row of labels, where the positions have 3
 PLOT_ROWS: Final = 6  # of labels, at most; where they do not suffice, labels are cut
 
 

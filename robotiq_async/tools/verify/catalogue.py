@@ -29,7 +29,7 @@ URCAP: Final = "urcap"
 
 CATALOGUE: Final[dict[str, Assumption]] = {
     "host.timer": Assumption(0, "This computer's timers are at most 1 ms late."),
-    "host.adapter": Assumption(0, "A USB adapter passes on what it hears within 2 ms."),
+    "host.adapter": Assumption(0, "A USB adapter passes on bytes within 2 ms."),
     "read.registers": Assumption(
         1, "Unit id, function and registers are the defaults of the link.", of_registers=True
     ),
@@ -162,7 +162,7 @@ ENDINGS: Final = {
     "declined": "the answer was not Enter",
     "stopped": "a key was pressed, or the terminal closed",
     "interrupted": "Ctrl-C, or a signal",
-    "refused": "the stage moved nothing: what answers, or its state, forbids it",
+    "refused": "the stage moved nothing: the device that answers, or its state, forbids it",
     "link": "the link failed",
     "fault": "the gripper reports a fault",
     "envelope": "an axis left the range that its stage allows",

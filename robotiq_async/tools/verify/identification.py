@@ -41,7 +41,7 @@ async def find(bench: Bench) -> None:
     bench.first_seen(statuses[-1])
     strange = [why for status in statuses if (why := why_no_gripper(status))]
     if strange:
-        raise EndError("refused", f"what answers may be another device: {strange[0]}")
+        raise EndError("refused", f"another device may be answering: {strange[0]}")
 
 
 def why_no_gripper(status: RobotiqStatus) -> str:
@@ -74,7 +74,7 @@ async def check_before_writing(bench: Bench) -> RobotiqStatus:
         await asyncio.sleep(interval)
         last = await bench.link.read()
         if why := why_no_gripper(last):
-            raise EndError("refused", f"what answers may be another device: {why}")
+            raise EndError("refused", f"another device may be answering: {why}")
         if last.echo != first.echo:
             raise EndError(
                 "refused", "another client commands the gripper: its requests change. Stop that client."

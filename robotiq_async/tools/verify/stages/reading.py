@@ -53,7 +53,7 @@ def _adapter(bench: Bench) -> None:
         why = "unknown: only FTDI adapters on Linux have a timer that can be read"
         bench.inconclusive("host.adapter", why)
         return
-    found = f"passes on what it receives after {kept} ms"
+    found = f"passes on bytes after {kept} ms"
     file = latency_file("PORT")
     follows = f"Every read waits that long: echo 1 | sudo tee {file}, with your port (ttyUSB0) for PORT."
     bench.judge("host.adapter", kept <= KEPT_MS, found, follows, latency_ms=kept)

@@ -81,7 +81,7 @@ class _StopTrial(NamedTuple):
     def on_the_way(self) -> str:
         if self.counts <= COUNTS:
             return ""
-        return f", of which {self.rate * self.exchange_s:.0f} may be those of exchanges on this link"
+        return f", of which {self.rate * self.exchange_s:.0f} may come from exchanges on this link"
 
     @property
     def figures(self) -> dict[str, Figure]:
