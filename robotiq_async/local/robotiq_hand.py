@@ -290,6 +290,7 @@ class RobotiqHand(Hand):
         Raises:
             RobotiqError: as :meth:`inhibit`; the fingers MAY STILL MOVE.
         """
+        self._check_running_loop()
         session = self._session
         if session is None:
             return  # it counts from the first start on; nothing was moved

@@ -16,7 +16,16 @@ from typing import Any
 
 import pytest
 
-from robotiq_async import ConnectFailedError, Finger, NotStartedError, RobotiqHand, State, Transition, Tunnel
+from robotiq_async import (
+    ConnectFailedError,
+    Finger,
+    MoveSupersededError,
+    NotStartedError,
+    RobotiqHand,
+    State,
+    Transition,
+    Tunnel,
+)
 from robotiq_async.simulator import SerialSimulatorServer, SimulatedGripper, SimulatorServer
 from tests.calls import COMMANDS, called
 from tests.link.test_tunnel import Arm
@@ -53,6 +62,18 @@ async def test_a_start_from_another_loop_is_refused(hand: RobotiqHand) -> None:
     with pytest.raises(RuntimeError, match=r"hand.start\(\) was used outside of the event loop"):
         await asyncio.to_thread(lambda: asyncio.run(hand.start()))
     assert hand.state is State.RUNNING_IDLE
+
+
+async def test_a_halt_of_an_inhibit_from_another_loop_ends_no_move(hand: RobotiqHand) -> None:
+    move = asyncio.create_task(hand.move(255, Finger.A, speed=0))
+    await asyncio.sleep(0)
+    with pytest.raises(RuntimeError, match="outside of the event loop"):
+        await asyncio.to_thread(lambda: asyncio.run(hand.halt_inhibited()))
+    await anext(hand.statuses())
+    assert not move.done()
+    await hand.halt()
+    with pytest.raises(MoveSupersededError):
+        await move
 
 
 class _Handle:
