@@ -19,7 +19,8 @@ import pytest
 from robotiq_async import (
     ConnectFailedError,
     Finger,
-    MoveSupersededError,
+    Inhibit,
+    MotionInhibitedError,
     NotStartedError,
     RobotiqHand,
     State,
@@ -67,12 +68,15 @@ async def test_a_start_from_another_loop_is_refused(hand: RobotiqHand) -> None:
 async def test_a_halt_of_an_inhibit_from_another_loop_ends_no_move(hand: RobotiqHand) -> None:
     move = asyncio.create_task(hand.move(255, Finger.A, speed=0))
     await asyncio.sleep(0)
+    hand.resume_inhibit(Inhibit("HALT", "", 0.0))
     with pytest.raises(RuntimeError, match="outside of the event loop"):
         await asyncio.to_thread(lambda: asyncio.run(hand.halt_inhibited()))
-    await anext(hand.statuses())
+    await hand.permit()
+    await hand.set_speed(9, Finger.B)
+    await asyncio.sleep(0)
     assert not move.done()
-    await hand.halt()
-    with pytest.raises(MoveSupersededError):
+    await hand.inhibit("HALT")
+    with pytest.raises(MotionInhibitedError):
         await move
 
 
