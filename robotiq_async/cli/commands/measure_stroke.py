@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 STROKE_WARNING: Final = """the jaw MOVES to {count} positions, from open to closed, at its least force, and
 waits at each for the figure of a calliper. Nothing but the calliper may be between the fingertips; take it
-out before you answer. If the gripper is not active yet the jaw opens and closes first, and what it holds
+out before you answer. If the gripper is not active yet the jaw opens and closes first, and a held part
 drops."""
 CALLIPER_QUESTION: Final = "At {position} counts: what does the calliper show between the fingertips, in mm?"
 MET: Final = """The fingertips met at {position} counts: that is the closed end. If they met something else,

@@ -32,7 +32,7 @@ class Parameter:
 def _of_hand(name: str, option: Option) -> Parameter:
     text, low, default = option.help, option.low, option.default
     if option.choices:
-        return Parameter("", f"{text}; empty for that of the address.")
+        return Parameter("", f"{text}; empty: as the address says.")
     if option.is_file:
         return Parameter("", f"{text}; empty for nominal ones.")
     if default is None:  # it depends on the link

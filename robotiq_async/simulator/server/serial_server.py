@@ -218,7 +218,7 @@ class SerialSimulatorServer(_RtuEndpoint):
             device_id: the unit id of the gripper.
             paced: whether bytes take their time. False for a real serial port, which takes it itself, and for
                 programs that cannot wait.
-            others: more grippers at this line, by unit id; each hears what the others are asked and answer.
+            others: more grippers at this line, by unit id; each hears the requests and answers of the others.
 
         Raises:
             TypeError: device_id is not an int, or paced is not a bool.
@@ -293,7 +293,7 @@ class RtuOverTcpSimulatorServer(_RtuEndpoint, SimulatorServer):
             port: TCP port, 0 for any free one.
             device_id: the unit id of the gripper.
             paced: whether bytes take the time that they take on the line.
-            others: more grippers at this line, by unit id; each hears what the others are asked and answer.
+            others: more grippers at this line, by unit id; each hears the requests and answers of the others.
 
         Raises:
             TypeError: port or device_id is not an int, or paced is not a bool.

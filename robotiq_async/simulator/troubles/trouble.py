@@ -160,7 +160,7 @@ KINDS: Final[dict[str, TroubleKind]] = {
     ),
     # Requests and connections.
     "silence": TroubleKind("requests are not heard; connections stay open", _CONDITION),
-    "echo": TroubleKind("the line brings back what is sent", _CONDITION, link="rtu"),
+    "echo": TroubleKind("the line brings back the bytes sent", _CONDITION, link="rtu"),
     "strict-silence": TroubleKind(
         "a request that comes within VALUE seconds after a reply is not heard",
         *(_CONDITION, 0.00175, 0, 1),

@@ -49,7 +49,7 @@ class Stage(NamedTuple):
 
 ACTIVATION: Final = 3  # the stage that activates
 _NOTHING: Final = ("nothing", "", "", "")
-_WAY: Final = "the fingers' whole way, and the way of what they could push; no hand, no cable"
+_WAY: Final = "the fingers' whole way, and the way of anything that they could push; no hand, no cable"
 _SLOWEST: Final = "the slowest speed (20 to 30 mm/s by the manuals), the weakest force"
 
 STAGES: Final = (
@@ -57,7 +57,7 @@ STAGES: Final = (
     Stage(1, "reading only", reading.reading, *_NOTHING, "3 minutes"),
     Stage(
         *(2, "writing with rGTO = 0", writing.writing),
-        "nothing should; stay clear: this is what the stage checks",
+        "nothing should; stay clear: the stage checks this",
         *("", "", "", "20 s"),
     ),
     Stage(
