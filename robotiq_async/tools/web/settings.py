@@ -62,7 +62,7 @@ class PageSettings:
         if bool(self.certificate) != bool(self.key):
             raise ValueError("a certificate needs its key, and a key its certificate")
         if not self.loopback and not (self.password or self.certificate):
-            raise ValueError(f"{self.host} lets others in: that needs a password or your own certificate")
+            raise ValueError(f"{self.host} lets others in: that needs a password or a certificate")
 
     @property
     def loopback(self) -> bool:
