@@ -29,10 +29,9 @@ from tests.verify.people import SHORT, Helper, verified
 from tests.virtual import run
 
 FIRST, SETS = (int(each) for each in os.environ.get("HABIT_SETS", "0:20").split(":"))
-"""``HABIT_SETS=100:200`` in the environment tries 200 from number 100 on."""
+"""``HABIT_SETS=100:200`` in the environment tries 200 from number 100 on. About one in a hundred may fail:
+effects shorter than an exchange do not show."""
 LENGTHS = replace(SHORT, interval=0.02)
-SHARE = 0.95
-"""The least share of sets whose report comes back the same: effects shorter than an exchange do not show."""
 UNSTEADY = ("host.", "soak.")
 """Checks of this computer, and of chance."""
 VARIES = ("soft.standstill", "seconds")
@@ -175,18 +174,15 @@ def _are_alike(figure: str, here: Any, there: Any, trip_ms: float) -> bool:
     return bool(here == pytest.approx(there, rel=0.05, abs=resolution))
 
 
-def test_a_report_comes_back_from_the_simulator_that_is_like_it() -> None:
-    """Twenty grippers drawn at random, of all models, over TCP and a line."""
-    wrong = {}
-    for number in range(FIRST, FIRST + SETS):
+@pytest.mark.parametrize("number", range(FIRST, FIRST + SETS))
+def test_a_report_comes_back_from_the_simulator_that_is_like_it(number: int) -> None:
+    """Grippers drawn at random, of all models, over TCP and a line."""
 
-        async def both(number: int = number) -> list[str]:
-            first = as_json(await Set(number).report())
-            return differences(first, as_json(await again(first)))
+    async def both() -> list[str]:
+        first = as_json(await Set(number).report())
+        return differences(first, as_json(await again(first)))
 
-        if found := run(both):
-            wrong[number] = found
-    assert len(wrong) <= (1 - SHARE) * SETS + 1e-9, json.dumps(wrong, indent=1)
+    assert not run(both)
 
 
 def test_the_plain_simulator_has_another_report() -> None:
