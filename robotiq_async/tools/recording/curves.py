@@ -1,4 +1,7 @@
-"""The curves of a recording that a plot draws; nothing else of it is kept. Needs numpy (extra ``plot``)."""
+"""The curves of a recording that a plot draws; nothing else of it is kept.
+
+Needs numpy, which comes with matplotlib (extra ``plot``).
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ try:
 except ModuleNotFoundError as error:
     from ...runtime import install
 
-    raise ImportError(f"pictures need numpy: {install('plot')}") from error
+    raise ImportError(f"pictures need matplotlib: {install('plot')}") from error
 
 from ...runtime import printable
 from ...values import MODELS, THREE_FINGER, Finger, Model
