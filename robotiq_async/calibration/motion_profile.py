@@ -16,7 +16,7 @@ the simulator moves by it.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Final
 
@@ -149,14 +149,5 @@ def profile_of(model: Model) -> MotionProfile | None:
     if model.name == TWO_FINGER_85.name:
         return RECORDED_85
     slow, fast = (speed * model.stroke.counts / model.stroke.mm for speed in model.speeds_mm_s)
-    return MotionProfile(
-        "estimate: the manual's speeds, starts and ends of a 2F-85",
-        0,
-        _straight(slow, fast),
-        start_closing_s=RECORDED_85.start_closing_s,
-        start_opening_s=RECORDED_85.start_opening_s,
-        landing=RECORDED_85.landing,
-        pressing=RECORDED_85.pressing,
-        overrun=RECORDED_85.overrun,
-        give=RECORDED_85.give,
-    )
+    source = "estimate: the manual's speeds, starts and ends of a 2F-85"
+    return replace(RECORDED_85, source=source, runs=0, rates=_straight(slow, fast))
