@@ -40,8 +40,9 @@
 # A stop goes before commands and holds: a halt, a reset, the end of the hand. It may be written again, as it
 # only ends motion; stops.py has for each level when it is written, and when it is over. A halt that does not
 # show after two writes fails. A halt and a reset fail with the link, too: sent later they would stop another
-# client, or drop a part. Once it is back, what we move is held instead; and an activation or a release that
-# they were to end, and that goes on, is reset. A hand that was ending asks for its stop again on a new link.
+# client, or drop a part. Once it is back, what we move is held instead; and an activation or a release
+# that they were to end, and that continues, is reset. A hand that was ending asks for its stop again on a new
+# link.
 #
 # Procedures raise rACT or rATR. While one runs, it alone judges what a status shows. When it ends, no write
 # of ours is on its way: the ledger begins again with our last image, and what shows in place of it is another

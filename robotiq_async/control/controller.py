@@ -50,7 +50,7 @@ class NextWrite(NamedTuple):
     wait: float  # seconds until it may leave, because of write_spacing
     is_urgent: bool  # a stop, which does not wait for a status that may never come
     is_command: bool  # a command or a hold, and no step of something longer
-    is_stop: bool  # it stops motion, as urgent ones and holds do: nobody hears of it before it leaves
+    is_stop: bool  # it stops motion, as urgent ones and holds do: no caller hears of it before it leaves
 
 
 class Left(NamedTuple):
@@ -392,7 +392,7 @@ class Controller:
         changes_mode = status.initialization is Initialization.CHANGING_MODE
         if is_found and owes and self.is_driven and not changes_mode:
             why = "motion is inhibited" if is_inhibited else "a stop was lost with the link"
-            self._take_back(f"{why}: an activation or a release that goes on is reset")
+            self._take_back(f"{why}: an activation or a release that continues is reset")
 
     def _advance(self, stop: Stop) -> None:
         """Let a stop see the newest status."""
@@ -547,7 +547,7 @@ class Controller:
         error.__cause__ = why
         duty, self._duty = self._duty, None
         # A halt and a reset are not sent again: on return the axes that we move are held instead, and a
-        # sequence that goes on is reset.
+        # sequence that continues is reset.
         if isinstance(duty, Stop) and duty.level in (StopLevel.HALT, StopLevel.RESET):
             self._requests.merge_hold(Finger.ALL, "a stop was lost with the link: once it is back")
             self._owes_reset = self.is_driven

@@ -213,6 +213,7 @@ class Ledger:
 
     def _age(self, entry: Entry) -> float:
         """Seconds from its acknowledgement, or from its latest sending, to the newest status."""
+        # Entry.time, written out: a stream comes here for each entry ahead at each poll.
         return self.now.time - (entry.acknowledged or entry.sent)
 
     def _is_over(self, entry: Entry) -> bool:

@@ -5,7 +5,7 @@ sent is one that can show the effect. The first status decides whether the proce
 client may have changed the gripper since the call. A procedure does no I/O and has no clock; its caller
 limits its time. It never yields its image again, even if a gripper may have forgotten it: the image moves the
 fingers. It returns why it has failed, if it has. An activation may outlast it: one that a fault has stopped
-may go on as that clears, and one whose link was lost goes on. Begun is about that of the gripper.
+may continue as that clears, and one whose link was lost continues. Begun is about that of the gripper.
 """
 
 from __future__ import annotations

@@ -286,7 +286,7 @@ def yields(model: Model) -> int:
 
 
 class Contacts:
-    """Where each axis was last seen in contact, until it has moved off: what may press.
+    """The place where each axis was last seen in contact, until it has moved off: these may press.
 
     An axis in contact that is asked to press on keeps its request, and with it its grip: when others are
     held, and when rGTO rises (gDT shows no contact while that is clear; what becomes of a grip then is

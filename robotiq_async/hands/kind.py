@@ -70,7 +70,7 @@ class HandKind(ABC):
     @property
     @abstractmethod
     def inhibited(self) -> Inhibit | None:
-        """Why motion is refused, since when, and by whom; None while it is permitted."""
+        """The reason that motion is refused, since when, and by whom; None while it is permitted."""
 
     @property
     @abstractmethod

@@ -82,7 +82,7 @@ class GripperLink:
     stroke: str | None = None
 
     def why_not_beside(self, other: GripperLink) -> str:
-        """Why one process cannot have hands for both; empty if it can."""
+        """The reason that one process cannot have hands for both; empty if it can."""
         own, theirs = self.gripper(), other.gripper()
         if own.may_be(theirs):
             return f"both may be one gripper{own.hint}"

@@ -273,7 +273,7 @@ class RobotiqHand(Hand):
 
     @property
     def inhibited(self) -> Inhibit | None:
-        """Why motion is refused, since when, and by whom; None while it is permitted."""
+        """The reason that motion is refused, since when, and by whom; None while it is permitted."""
         return self._machine.inhibited
 
     def resume_inhibit(self, inhibit: Inhibit) -> None:

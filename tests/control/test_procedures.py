@@ -49,7 +49,7 @@ def begun(begin: Begin, *shown: RobotiqStatus) -> Steps:
 
 
 def end_of(steps: Steps, status: RobotiqStatus) -> str:
-    """Why a procedure has failed that ends with a status; empty if it has not."""
+    """The reason that a procedure which ends with a status has failed; empty if it has not."""
     with pytest.raises(StopIteration) as end:
         steps.send(status)
     why = end.value.value

@@ -27,7 +27,7 @@ Array = npt.NDArray[Any]
 
 
 def program(text: str) -> dict[str, Any]:
-    """What a program of the page defines."""
+    """The names that a program of the page defines."""
     names: dict[str, Any] = {"__name__": "page"}
     exec(text, names)
     return names

@@ -204,7 +204,7 @@ async def test_a_damaged_reply_costs_no_command_and_no_link(
 async def test_a_hold_behind_a_read_that_is_repeated_stops_where_the_axis_is(
     monkeypatch: pytest.MonkeyPatch, model: str, to: int
 ) -> None:
-    """The status counted from the read that nobody heard: the axis was asked for a place far ahead."""
+    """The status counted from the read that was not heard: the axis was asked for a place far ahead."""
     async with at_a_line(monkeypatch, model) as (hand, replies):
         injector, gripper = replies.server.fault_injector, replies.server.gripper
         moving = asyncio.create_task(hand.move(to, A, speed=0))

@@ -131,14 +131,14 @@ async def test_an_inhibit_stays_over_a_cleanup_and_the_next_configure(
     await connection.command("inhibit")
     await connection.close("the node was cleaned up")
     assert hands.make(replace(SETTINGS, address="zenoh://lab/cell/left")).inhibited is None
-    anew = GripperConnection(hands.make(settings), settings)
-    await anew.open()
-    await anew.permit()
+    other = GripperConnection(hands.make(settings), settings)
+    await other.open()
+    await other.permit()
     at = await settled(gripper)
-    await refuses("HALT was pressed.*call ~/permit", begin(anew))
+    await refuses("HALT was pressed.*call ~/permit", begin(other))
     assert await settled(gripper) == at
-    assert await anew.command("permit")
-    await anew.close("the node was cleaned up")
+    assert await other.command("permit")
+    await other.close("the node was cleaned up")
     assert hands.make(settings).inhibited is None
 
 

@@ -250,7 +250,7 @@ class RemoteHand(Hand):
 
     @property
     def inhibited(self) -> Inhibit | None:
-        """Why the agent refuses motion, since when, and by whom; None while it does not, or is not known."""
+        """The reason for which the agent refuses motion, since when, by whom; None if none is known."""
         return None if self._session is None else self._session.mirror.inhibited
 
     async def _halt(self) -> None:

@@ -34,7 +34,7 @@ _IDLE: Final = {"activate": "it is active", "recover": "there is nothing to reco
 
 
 def why_not(name: str, hand: HandMirror, *, is_quiet: bool) -> str:
-    """Why a button cannot be pressed now; empty if it can. A halt always can."""
+    """The reason that a button cannot be pressed now; empty if it can. A halt always can."""
     if is_quiet:
         return QUIET
     if name == "permit":
