@@ -17,7 +17,7 @@ Programs import from here. The packages below it::
     cli         the command line
     runtime     below all of it: clocks, event loops, logging, optional packages
 
-Nothing of this has run on real hardware yet.
+None of this has run on real hardware yet.
 """
 
 from .calibration import Units

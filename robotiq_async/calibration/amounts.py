@@ -31,10 +31,10 @@ def position_of(
     open_fraction: float | None = None,
     name: str = "position",
 ) -> int | None:
-    """A position in counts; None if none is given. ``name`` is the name of the argument in counts.
+    """A position in counts; None if no amount is given. ``name`` is the name of the argument in counts.
 
     Raises:
-        TypeError: of the wrong type, or more than one is given.
+        TypeError: of the wrong type, or more than one of the amounts is given.
         ValueError: outside its range, or millimetres or a fraction for the scissor.
     """
     if mm is None and open_fraction is None:

@@ -18,7 +18,7 @@ class Convention:
         hand.command(open_fraction=Convention.DROID.fraction(action))
         state = Convention.DROID.value(status.open_fraction(JAW))
 
-    Yours is ``Convention("bench", open=0.0, closed=5.0)``. None is of millimetres: the metres of
+    Yours is ``Convention("bench", open=0.0, closed=5.0)``. No convention measures an opening: the metres of
     POLYMETIS_2F85 are linear in counts, and up to 2.8 mm off the arc of the linkage.
 
     Attributes:
@@ -57,7 +57,7 @@ class Convention:
         """The share of the travel that is open, for ``open_fraction=``: exactly 1 and 0 at the two ends.
 
         Args:
-            value: a number, or an array or a tensor of one.
+            value: a number, or an array or a tensor with one element.
             clamp: whether a number beyond the range counts as its end, as for policies, which overshoot.
 
         Raises:

@@ -127,8 +127,8 @@ def read_stroke(path: Path | str, model: Model | None = None) -> Points:
     """Read the measured points of a gripper, as ``robotiq-async measure stroke`` writes them.
 
     Raises:
-        TableError: the file cannot be read, its points do not make a stroke, or it says that it was measured
-            on another model than ``model``.
+        TableError: the file cannot be read, its points do not make a stroke, or it was measured on another
+            model than ``model``.
     """
     found, measured_on = _without_model(path, read_rows(path))
     if model is not None and measured_on not in (None, model):

@@ -118,7 +118,7 @@ class SpeedCalibration:
 
         Raises:
             TypeError: speed is not an int.
-            ValueError: speed is outside 0..255, or outside what was measured.
+            ValueError: speed is outside 0..255, or outside the measured range.
         """
         return interpolated("speed", speed, self.points)
 
@@ -127,7 +127,7 @@ class SpeedCalibration:
 
         Raises:
             TypeError: an argument is not an int.
-            ValueError: an argument is outside 0..255, or the speed outside what was measured.
+            ValueError: an argument is outside 0..255, or the speed outside the measured range.
         """
         if self.profile is None:
             return check_byte("counts", counts) / self.stroke.counts * self.closing_time(speed)
@@ -139,7 +139,7 @@ class SpeedCalibration:
 
         Raises:
             TypeError: speed is not an int.
-            ValueError: speed is outside 0..255, or outside what was measured.
+            ValueError: speed is outside 0..255, or outside the measured range.
         """
         return self.counts_per_s(speed) * self.stroke.mm / self.stroke.counts
 
@@ -148,7 +148,7 @@ class SpeedCalibration:
 
         Raises:
             TypeError: speed is not an int.
-            ValueError: speed is outside 0..255, or outside what was measured.
+            ValueError: speed is outside 0..255, or outside the measured range.
         """
         if self.profile is None:
             return self.stroke.counts / self.closing_time(speed)
@@ -234,7 +234,7 @@ class ForceCalibration:
 
         Raises:
             TypeError: force is not an int.
-            ValueError: force is outside 0..255, or outside what was measured.
+            ValueError: force is outside 0..255, or outside the measured range.
         """
         return interpolated("force", force, self.points)
 
@@ -297,19 +297,19 @@ def interpolated(name: str, value: int, points: Sequence[tuple[int, float]]) -> 
     low, high = points[0][0], points[-1][0]
     value = check_byte(name, value)
     if not low <= value <= high:
-        raise ValueError(f"{name} {value} lies outside what was measured: {low}..{high}")
+        raise ValueError(f"{name} {value} lies outside the measured range: {low}..{high}")
     after = min(bisect_right(points, value, key=lambda point: point[0]), len(points) - 1)
     (left, at_left), (right, at_right) = points[after - 1], points[after]
     return at_left + (at_right - at_left) * (value - left) / (right - left)
 
 
 def outwards(low: float, high: float) -> tuple[float, float]:
-    """A range to two digits, none of which it loses."""
+    """A range to two digits, rounded so that it loses no value."""
     return floor(low * 100) / 100, ceil(high * 100) / 100
 
 
 class Figures:
-    """The figures of values, in order: control loops ask in every cycle which value is closest.
+    """The figures of values, in order, to find the closest value quickly: control loops do so in every cycle.
 
     Attributes:
         low: the lowest figure.

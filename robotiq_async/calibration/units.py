@@ -157,7 +157,7 @@ class Units:
 
         Raises:
             TypeError: not an int.
-            ValueError: outside 0..255, or outside what was measured.
+            ValueError: outside 0..255, or outside the measured range.
         """
         return self.speeds.mm_per_s(speed)
 
@@ -166,7 +166,7 @@ class Units:
 
         Raises:
             TypeError: not an int.
-            ValueError: outside 0..255, or outside what was measured.
+            ValueError: outside 0..255, or outside the measured range.
         """
         return self.speeds.closing_time(speed)
 
@@ -175,7 +175,7 @@ class Units:
 
         Raises:
             TypeError: not an int.
-            ValueError: outside 0..255, or outside what was measured.
+            ValueError: outside 0..255, or outside the measured range.
         """
         return self.forces.newton(force)
 

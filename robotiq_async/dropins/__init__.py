@@ -9,5 +9,5 @@ module          contents
 ``patience``    the wait of their calls for a link that is down
 ==============  ================================================================================
 
-Import from these modules. Nothing of this has run on real hardware yet.
+Import from these modules. None of this has run on real hardware yet.
 """

@@ -330,7 +330,7 @@ class Hand(HandKind):
 
         An axis in contact keeps its request and its grip, and one at rest is left alone. Awaited moves and
         pending requests of these axes end with MoveSupersededError; their other axes keep moving. When
-        cancelled, the hold is sent all the same. If a lost link prevents the acknowledgement, the hold is
+        cancelled, the hold is still sent. If a lost link prevents the acknowledgement, the hold is
         repeated once the link is back, unless another client moves the axes then. In RESET and ATR_DONE, and
         during an activation, a release or a reset, it sends nothing; :meth:`halt` ends those.
 
@@ -352,7 +352,7 @@ class Hand(HandKind):
         An axis that held a part resumes pressing with that command, and closes if the part was taken out.
 
         Returns when the gripper reports that it has stopped, at most 1 s after the acknowledgement. Awaited
-        moves end with MoveSupersededError. When cancelled, the halt is sent all the same. If the link goes
+        moves end with MoveSupersededError. When cancelled, the halt is still sent. If the link goes
         down before the acknowledgement, it is not sent again: once the link is back, its moving axes are
         held. In RESET and ATR_DONE nothing moves and nothing is sent. rGTO does not stop an activation or an
         automatic release: during these, halt() clears rACT, as :meth:`reset` does, and returns in RESET.
@@ -372,11 +372,12 @@ class Hand(HandKind):
         """Halt for a person, and refuse calls that may move or press until a person calls :meth:`permit`.
 
         After :meth:`halt` the next command moves again; after this every motion, force, activation, release
-        and recovery raises MotionInhibitedError, and so do calls that wait for one. It outlasts lost links,
-        :meth:`stop` and :meth:`start`. A second call halts again, and the first reason stays. Motion is
-        inhibited even if the call raises; axes that move while the link is down are held once it is back, and
-        an activation or a release is ended by a reset. No emergency stop.
-        A :meth:`stop` under way that leaves the fingers moving becomes one that stops them; then it raises.
+        and recovery raises MotionInhibitedError, and so do calls that already wait for the end of one of
+        these. The inhibit outlasts lost links, :meth:`stop` and :meth:`start`. A second call halts again, and
+        the first reason stays. Motion is inhibited even if the call raises; axes that move while the link is
+        down are held once it is back, and an activation or a release is ended by a reset. It is no emergency
+        stop. A :meth:`stop` under way that would leave the fingers moving stops them, and this call then
+        raises.
 
         Raises:
             TypeError, ValueError: of the arguments; nothing is inhibited.
@@ -410,7 +411,7 @@ class Hand(HandKind):
         When cancelled, the activation continues; :meth:`reset` ends it.
 
         Raises:
-            GripperFaultError: a fault is latched (see :meth:`recover`), or the activation ended in one.
+            GripperFaultError: a fault is latched (see :meth:`recover`), or the activation ended in a fault.
             NotActivatedError: the gripper was reset during the activation.
             ActivationTimeoutError: not finished within the activation timeout while the event loop runs, or
                 nothing but fault 0x05 for 5 s, as with a pressed emergency stop. The activation continues.
@@ -492,7 +493,7 @@ class Hand(HandKind):
 
     @property
     def status(self) -> RobotiqStatus:
-        """The newest status, however old by its timestamp; NotStartedError before the first."""
+        """The newest status, of any age (see its timestamp); NotStartedError before the first."""
         if (status := self._newest_status) is not None:
             return status
         with self._naming:

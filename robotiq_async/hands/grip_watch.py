@@ -106,7 +106,7 @@ class GripWatch:
 
     @property
     def holds(self) -> Finger:
-        """The axes in contact, without those that are slipping."""
+        """The axes in contact that do not slip."""
         return Finger(sum(axis for axis, grip in self._grips.items() if not grip.is_slipping))
 
     def see(self, status: RobotiqStatus) -> list[GripEvent]:

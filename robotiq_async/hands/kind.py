@@ -1,4 +1,4 @@
-"""Kind: the parts that each kind of hand supplies, and those that all share."""
+"""Kind: the parts that each kind of hand supplies, and the parts that all kinds share."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ class HandKind(ABC):
         return self._session is not None and not self._session.is_over
 
     def _check_may_start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Refuse a second start, another loop than that of a run that was closed under it, and of readers."""
+        """Refuse a second start, and a start in another event loop than the loop of a run or of readers."""
         self._check_loop("hand.start()")
         self._channels.check_loop(loop)
         if self._is_started:
@@ -169,7 +169,7 @@ class HandKind(ABC):
             if (status := self._newest_status) is None:
                 raise NotStartedError("no status has been read yet: start the hand first")
             if self.state is State.DISCONNECTED:
-                raise ConnectionLostError("the link to the gripper is down: what it does is not known")
+                raise ConnectionLostError("the link is down: the present status of the gripper is not known")
             return status
 
     def _check_may_listen(self) -> None:
@@ -181,8 +181,8 @@ class HandKind(ABC):
             self._check_called_in_loop(what)
 
     def _check_called_in_loop(self, what: str = "the hand") -> None:
-        """Raise RuntimeError if called outside the event loop of the run, or after that was closed."""
-        assert self._session is not None, "it has one"
+        """Raise RuntimeError if called outside the event loop of the run, or after that loop was closed."""
+        assert self._session is not None, "the hand was started"
         check_loop(self._session.loop, what)
 
     def _opened(self, channel: Channel[T], buffer: int | None, limit: float | None = None) -> Stream[T]:

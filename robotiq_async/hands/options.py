@@ -100,7 +100,7 @@ class Option:
         tcp: the value that None stands for over TCP.
         rtu: the value that None stands for on a serial line.
         default: the value that counts unless another is given; None where it depends on the link.
-        choices: the names that it can be, for one that is a name.
+        choices: the allowed names, if the value is a name.
         is_file: whether it can be the path of a file.
     """
 
@@ -243,7 +243,7 @@ class HandOptions:
             Place.FILE | Place.ROS,
         ),
     ] = "sim://"
-    name: Annotated[str | None, Option("What errors and the log call the hand", _check_name)] = None
+    name: Annotated[str | None, Option("Name of the hand in errors and in the log", _check_name)] = None
     device_id: Annotated[
         int | None, _by_link("Modbus unit id (1..247 on a serial line)", "device_id", 0, 255, Place.ROS)
     ] = None
@@ -275,7 +275,7 @@ class HandOptions:
         float,
         _seconds(
             f"Seconds from one write to the next ({JAW_WRITE_SPACING_S} unless given for a 2F or Hand-E), 0 "
-            "for one that loses none. Stops do not wait",
+            "if the gripper loses no write. Stops do not wait",
             0.0,
             LONGEST_SPACING_S,
             Place.FILE | Place.ROS,
@@ -356,7 +356,7 @@ class HandOptions:
 
     @property
     def given_name(self) -> str:
-        """The name that was given; empty if there was none."""
+        """The given name; empty for a hand without a name."""
         return self.name or ""
 
     @property
@@ -420,7 +420,7 @@ class UnitsByModel:
     def __init__(
         self, calibration: SpeedCalibration | None, force_calibration: ForceCalibration | None
     ) -> None:
-        self._of = cache(partial(units_of, calibration, force_calibration))  # loops ask in every cycle
+        self._of = cache(partial(units_of, calibration, force_calibration))  # loops need them in every cycle
         named = [getattr(each, "model", None) for each in (calibration, force_calibration)]
         self.model: Model = next(filter(None, named), THREE_FINGER)  # as long as the gripper has not said it
         self._of(self.model)

@@ -24,7 +24,7 @@ class PresentRun(Protocol):
 
 
 class NamesErrors:
-    """Puts the name of a hand into every RobotiqError that leaves a block, if it was given one.
+    """Puts the name of a hand, if it has one, into every RobotiqError that leaves a block.
 
     The errors are made in many places, most of which know no names.
     """

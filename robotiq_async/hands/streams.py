@@ -1,6 +1,7 @@
 """Async iterators over the statuses, transitions and requests of a hand, and callbacks for them.
 
-The iterators are plain classes and not async generators: a reader that drops one leaves nothing to clean up.
+The iterators are plain classes and not async generators: a reader that drops an iterator leaves nothing to
+clean up.
 """
 
 from __future__ import annotations
@@ -258,7 +259,7 @@ class Listeners:
         return lambda: self._remove(key)
 
     def tell(self, item: object) -> None:
-        """Call every listener. What a listener itself causes comes after the present item."""
+        """Call every listener. Items that a listener itself causes come after the present item."""
         if not self._listeners:
             return  # the common case, at every poll
         self._items.append(item)
@@ -339,7 +340,7 @@ class Channel(Generic[T]):
         if any(each.waits_outside_of(loop) for each in self._living()):
             raise RuntimeError(
                 "a stream of the hand is read in another event loop than the hand starts in, and nothing was "
-                "asked of the gripper"
+                "sent to the gripper"
             )
 
     def reopen(self, loop: asyncio.AbstractEventLoop) -> None:

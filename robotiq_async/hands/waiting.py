@@ -38,7 +38,7 @@ def check_states(states: Collection[object]) -> None:
 
 
 class StateWaiters:
-    """Wakes callers for the states that they wait for, however short these last."""
+    """Wakes callers for the states that they wait for, also for a state that lasts only a moment."""
 
     def __init__(self) -> None:
         self._waiters: list[_Waiter] = []
@@ -59,12 +59,12 @@ class StateWaiters:
                 reached.exception()  # retrieved: the caller may have been cancelled, and asyncio would log it
 
     def reached(self, state: State) -> None:
-        """Wake those who wait for a state."""
+        """Wake the callers that wait for a state."""
         if (wake := self.woken_by(state)) is not None:
             wake()
 
     def woken_by(self, state: State) -> Callable[[], None] | None:
-        """Make the function that wakes those who wait for a state by now; None if nothing waits for it."""
+        """Make the function that wakes the present waiters for a state; None if nobody waits for it."""
         waiting = [each for each in self._waiters if state in each[0] or state in each[1]]
         if not waiting:
             return None  # a control loop goes to RUNNING_CC and back with every command

@@ -44,6 +44,6 @@ class LatePolls:
 
 
 def _where() -> str:
-    """A hint for those who type at IPython's prompt, empty for others."""
+    """A hint for users of IPython's prompt; empty for others."""
     ipython = sys.modules.get("IPython")
     return IN_IPYTHON if ipython is not None and ipython.get_ipython() is not None else ""

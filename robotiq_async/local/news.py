@@ -20,7 +20,7 @@ BITS: Final = 0xFF00  # of the second register: gFLT, and kFLT of the controller
 _FAULTY: Final = frozenset({State.FAULT, State.ATR_DONE, State.WF_ATR})
 _HELD: Final = "the fingers are held, and nothing resumes when it clears"
 DOES: Final = {
-    Severity.PRIORITY: "the action is delayed or ignored: see what was asked too early",
+    Severity.PRIORITY: "the action is delayed or ignored: see which request came too early",
     Severity.MINOR: f"{_HELD}; free what blocks, recover() waits for it",
     Severity.MAJOR: "the fingers stop, a part stays held until the reset; free what blocks, then recover() "
     "resets and activates: it DROPS the part and MOVES the fingers",
@@ -30,11 +30,11 @@ UNKNOWN_FAULT: Final = (
     f"{_HELD}; no manual names it: recover() waits, reset() may clear it and DROPS the part"
 )
 OTHER_FAULTS: Final = {
-    Fault.AUTOMATIC_RELEASE: "all axes OPEN slowly, what they hold DROPS; halt() ends it, by a reset",
-    Fault.AUTOMATIC_RELEASE_DONE: "what was held has DROPPED; recover() activates it: the fingers MOVE",
+    Fault.AUTOMATIC_RELEASE: "all axes OPEN slowly and DROP the part; halt() ends it, by a reset",
+    Fault.AUTOMATIC_RELEASE_DONE: "the part has DROPPED; recover() activates it: the fingers MOVE",
 }
-"""The same of single faults."""
-OF_A_RESET: Final = "what it held may have fallen; activate() or recover() MOVES its fingers"
+"""The same for single faults."""
+OF_A_RESET: Final = "its part may have fallen; activate() or recover() MOVES its fingers"
 
 
 class FaultNews:
@@ -52,10 +52,10 @@ class FaultNews:
         self._was_active = False
 
     def see(self, status: RobotiqStatus) -> None:
-        """A status shows other bits than those that have been dealt with."""
+        """Take in a status whose fault bits differ from ``shown``."""
         fault, log = status.fault, self._machine.log
         if fault.is_serious and self._machine.state not in _FAULTY:
-            return  # it may pass; the next status asks again
+            return  # the fault may pass; the next status decides
         self.shown = status.registers[1] & BITS
         if fault is not self._fault:
             self._fault = fault
@@ -79,7 +79,7 @@ class FaultNews:
 
 
 class UnreachedNews:
-    """Warns once of an axis that says "at position" far from where it was asked to go."""
+    """Warns once of an axis that reports "at position" far from its request."""
 
     def __init__(self, log: Log) -> None:
         self._log: Final = log
@@ -87,8 +87,8 @@ class UnreachedNews:
 
     def ended(self, target: int, result: MoveResult) -> None:
         """A move has ended."""
-        # Not of the scissor: its range ends within 15..232 (drivers), and programs ask it for 0 and 255. Nor
-        # where the gripper echoes its own limit instead of the request.
+        # Not for the scissor: its range ends within 15..232 (drivers), and programs send it to 0 and 255.
+        # Nor if the gripper echoes its own limit instead of the request.
         for axis, how in result.outcomes.items():
             is_limited = axis is Finger.SCISSOR or result.status.requested_position(axis) != target
             is_there = axis in result.reached or how is not ObjectStatus.AT_POSITION
@@ -96,8 +96,8 @@ class UnreachedNews:
                 continue
             self._has_warned = True
             self._log.warning(
-                "%s was asked for %d, and the gripper says that it is at position, at %d: it ends there (a "
-                "software limit, fingertips of your own), or it did not follow. See MoveResult.reached; "
+                "%s was sent to %d, and the gripper reports it at position, at %d: its range ends there (a "
+                "software limit, custom fingertips), or it did not follow. See MoveResult.reached; "
                 "logged once",
                 axis,
                 target,

@@ -30,7 +30,7 @@ from .publisher import Publisher
 
 
 class RunParts(NamedTuple):
-    """The parts of a run; its poller works with the same."""
+    """The parts of a run, which its poller uses too."""
 
     link: Link
     controller: Controller
@@ -83,13 +83,13 @@ class Poller:
         if tick.is_awaited:
             at_once = begins_at_once(write, is_slow=self._is_slow)
             return write.wait if at_once else max(write.wait, tick.due - tick.time())
-        # An exchange is in flight. The time of the last one tells nothing if the loop was held up in it.
+        # An exchange is in flight. The last one is no measure for it if the loop was held up in that one.
         if status is None or tick.held_up_at > self._asked:
             return write.wait
         return write.wait + status.timestamp - self._asked
 
     def note_ticks(self, passed: int) -> bool:
-        """Count the missed ones of the ticks that a wait has seen; False if it saw none: it was hurried."""
+        """Count the missed ticks of a wait in which ``passed`` came; False if none came: it was hurried."""
         if not passed:
             self.break_period()
             return False
@@ -123,7 +123,7 @@ class Poller:
                 return
             elif planned is WRITE_AND_READ:
                 if not await self._write_and_read(write) and not reads:
-                    await self.read()  # it shows the echo; a later command begins the next cycle
+                    await self.read()  # for the echo; a later command begins the next cycle
                 return
             elif (step := planned) is WAIT:
                 await asyncio.sleep(write.wait)
@@ -219,7 +219,7 @@ class Poller:
         self._note_sent(entry, acknowledged=True)
 
     def _note_sent(self, entry: Entry, *, acknowledged: bool) -> None:
-        # Listeners get the changes after the write: a request of theirs would come too late for this one.
+        # Listeners get the changes after the write: their own requests would come too late for it.
         self._publisher.publish_request(SentRequest(entry.image, entry.sent, acknowledged=acknowledged))
 
     def _decide(self) -> Registers | None:
@@ -293,7 +293,7 @@ class Poller:
         return RobotiqStatus(registers, answered, number, self._model, self._stroke, has_current)
 
     def _take(self, status: RobotiqStatus, asked: float) -> None:
-        """Pass on a status whose poll began at ``asked``, by a read that may have left later."""
+        """Pass on a status whose poll began at ``asked``; its read may have left later."""
         period = None if self._last_poll is None else asked - self._last_poll
         self._counters.note_poll(asked, status.timestamp, period)
         self._last_poll = self._asked = asked  # no command is written right behind a repeated read

@@ -1,6 +1,6 @@
-"""The order in which a run is heard of: by readers, listeners, and the callers that a request has ended.
+"""The order of the news of a run: for readers, listeners, and the callers whose calls a request has ended.
 
-What they do may hold up the loop. So a write that is due leaves first.
+Their code may hold up the loop. So a write that is due leaves first.
 """
 
 # Theory of operation
@@ -8,15 +8,16 @@ What they do may hold up the loop. So a write that is due leaves first.
 # A listener may command the hand. If it got a change of state in the middle of a call, the rest of the call
 # would overwrite its request: changes are noted, and published after the call.
 #
-# A request may end the waits of others, and one that stops the fingers leaves soon. Until its image has left
+# A request may end the waits of others, and a request that stops the fingers leaves soon. Before its image
+# has left
 #
 # * the callers whose calls it has ended wait, for any request;
 # * the publication waits, too, if it is a stop, a halt, a reset or a hold: see hold_back(). State waiters are
 #   woken by the publication, and so they wait with it.
 #
-# They hear in the turn of the loop after that in which the image leaves; sooner if none leaves, because the
-# cycle had nothing to write, the link failed or is closed: see tell(). A write that is not expected soon, as
-# behind a slow gateway, is not waited for: Run decides that.
+# Both waits end one turn of the loop after the image left; sooner if no image leaves, because the cycle had
+# nothing to write, or the link failed or is closed: see tell(). A write that is not expected soon, as behind
+# a slow gateway, is not waited for: Run decides that.
 
 from __future__ import annotations
 
@@ -80,7 +81,7 @@ class Publisher:
         self._queue.append((self._channels.requests, sent, None))
         self.publish_changes()
 
-    # -- the order of a write and of those who hear of it ---------------------------------------------
+    # -- the order of a write and of its news ---------------------------------------------------------
 
     def hold_back(self, *, publication: bool) -> None:
         """Let the callers whom a request has ended wait for its write; for a stop the publication, too."""
@@ -93,7 +94,7 @@ class Publisher:
             self._loop.call_soon(self.tell)
 
     def tell(self) -> None:
-        """Let everybody hear who waits for a write: it has left, or there is no write."""
+        """Publish and answer everything that waits for a write: it has left, or there is no write."""
         self.has_to_tell = self._is_held_back = False
         self.publish_changes()
         self.answer_ended()

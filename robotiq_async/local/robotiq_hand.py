@@ -85,13 +85,13 @@ class RobotiqHand(Hand):
     ``speed`` and ``force`` also to the axes that it does not address: pass the values that the gripper was
     used with if that matters to the part it holds.
 
-    Nothing of this has run on real hardware yet.
+    None of this has run on real hardware yet.
 
     Args:
         address: ``tcp://HOST[:502]`` (or HOST, HOST:PORT), ``rtu:///dev/ttyUSB0``, ``rtu+tcp://HOST:PORT``
             (a serial line behind a socket), ``urcap://HOST[:63352]`` (a UR with Robotiq's URCap, for a jaw:
             it carries no currents), ``sim://`` (or ``sim://?speedup=10&object=150``), or a :class:`Tunnel`.
-            Without one the gripper is simulated, and the first start logs a warning of that. A serial port
+            Without an address the gripper is simulated, and the first start logs a warning. A serial port
             sends at 115200 baud, 8N1, unless the address ends in
             ``?baud=500000``, ``&parity=E`` or ``&stopbits=2``. Any of them can end in ``?model=2f85`` and in
             ``?stroke=/cell/left.csv``, which are the options ``model`` and ``stroke``.
@@ -111,7 +111,7 @@ class RobotiqHand(Hand):
             missed. At least 0.0172 on Windows before Python 3.13, where the clock counts in steps of 15.6 ms.
         write_spacing: seconds from sending a write to the next one, 0..0.1; 0.005 unless given for a jaw.
             Requests made in that time are merged. A gripper may lose writes that come sooner (3-Finger
-            manual of 2014: 10 ms; manual of the 2F-85: 5 ms); pass 0 for one that does not. A stop and a
+            manual of 2014: 10 ms; manual of the 2F-85: 5 ms); pass 0 if yours loses none. A stop and a
             halt do not wait.
         connect_timeout: seconds for opening the link, while the event loop runs, 0.01..5.
         response_timeout: seconds for one answer, 0.005..5. A write fails within twice that, and over RTU,
@@ -280,7 +280,7 @@ class RobotiqHand(Hand):
         """Inhibit motion as :meth:`inhibit` does, but send nothing: for an inhibit of an earlier process.
 
         Args:
-            inhibit: its reason, who asked, and when. One that there is already stays, and has one more halt.
+            inhibit: its reason, author and time. An earlier inhibit stays, and counts one more halt.
         """
         self._machine.inhibit(inhibit)
 
@@ -296,7 +296,7 @@ class RobotiqHand(Hand):
             return  # it counts from the first start on; nothing was moved
         session.controller.end_inhibited()
         if self.state is State.DO_SHUTDOWN:
-            await session.stop(halt=True)  # it may be one that leaves the fingers moving
+            await session.stop(halt=True)  # the stop under way may leave the fingers moving
         await self._halt()  # raises if the hand runs no more: the fingers may still move
 
     async def _halt(self) -> None:
@@ -443,7 +443,7 @@ class RobotiqHand(Hand):
 
     @property
     def _needs_reset(self) -> bool:
-        """Whether the fault is known to need one. A reset drops the part: no unknown code is worth that."""
+        """Whether the fault is known to need a reset. That drops the part, so an unknown code gets none."""
         fault = self.status.fault
         return fault.severity is Severity.MAJOR and fault.is_known
 
@@ -475,7 +475,7 @@ class RobotiqHand(Hand):
         return error.of_hand(why.hand)
 
     def _is_moving(self) -> bool:
-        assert self._session is not None, "only asked of a hand that runs"
+        assert self._session is not None, "the hand runs"
         return self._session.controller.is_moving
 
     def add_listener(
@@ -507,7 +507,7 @@ class RobotiqHand(Hand):
         return self._channels.listeners.add(callback)
 
     async def _wait_for_state(self, states: Collection[State], timeout: float | None) -> State:
-        assert self._session is not None, "only asked of a hand that runs"
+        assert self._session is not None, "the hand runs"
         self._session.check_loop("the hand")
         names = " or ".join(state.name for state in states)
         return await self._session.reach(states, timeout, what=f"{names} was not reached")

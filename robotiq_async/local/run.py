@@ -19,7 +19,7 @@ start() and stop() may be called from different tasks.
 # the turn in which a link was opened: after each wait the state is read again, and ENDING never goes back.
 #
 # ENDING takes no requests. An Ending has its level and its time. A run that ends by itself requests
-# its own stop: the link was given up, there is none, or its task was cancelled.
+# its own stop: the link was given up or never opened, or its task was cancelled.
 #
 # A run has ended by a stop, unless `failure` is set: the error of a link that was given up, or of a bug.
 # why_over() makes the error for everybody who waits then.
@@ -91,9 +91,9 @@ class Run:
     """Owns the link of one hand from start to stop; :meth:`run` is the body of its task.
 
     Attributes:
-        state: where it is in its course.
-        connected: done after the first status; holds the error if there is none.
-        down: the link while it is down; of one that was given up, for good.
+        state: the present state.
+        connected: done after the first status; holds the error if no status came.
+        down: the reason while the link is down; it stays if the link was given up.
         failure: the error that has ended the run; None after a stop.
     """
 
@@ -121,7 +121,7 @@ class Run:
     def note_request(self) -> None:
         """A request was made: begin the next cycle at once if it may begin with its write.
 
-        Who must not hear of it before the write waits for that, unless it is far.
+        Callers and readers that must not hear of it before its write wait for the write, if that is near.
         """
         publisher, write = self._parts.publisher, self._poller.hurry()
         if write is not None and (write.is_stop or publisher.has_ended_callers) and self._is_soon(write):
@@ -136,8 +136,8 @@ class Run:
     def request_stop(self, *, halt: bool, keep_grip: bool = False) -> None:
         """End the task as a :class:`StopLevel` says; the strongest of several requests counts. Never blocks.
 
-        From here on the controller refuses every request and has dropped those that were not sent: between
-        the read and the write of this cycle it would still take one and begin a motion.
+        From here on the controller refuses every request and has dropped the requests that were not sent:
+        between the read and the write of this cycle it would still take one and begin a motion.
         """
         level = StopLevel.of(halt=halt, keep_grip=keep_grip)
         if self._ending is None:
@@ -166,7 +166,7 @@ class Run:
         return error.of_hand(self._parts.options.given_name)
 
     def why_over(self) -> RobotiqError:
-        """Make the error for those who wait for anything of a run that is over."""
+        """Make the error for everybody who waits for a run that is over."""
         if self.failure is None:
             return NotStartedError("the hand was stopped")
         if isinstance(self.failure, RobotiqConnectionError):
@@ -176,7 +176,7 @@ class Run:
     # -- its course ------------------------------------------------------------------------------------
 
     async def run(self, wait: float = 0.0) -> None:
-        """Own the link until asked to stop, or until it is given up.
+        """Own the link until a stop is requested, or until the link is given up.
 
         Args:
             wait: seconds to keep trying for the first status.

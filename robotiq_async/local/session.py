@@ -215,7 +215,7 @@ class Session:
     # -- waiting ---------------------------------------------------------------------------------------
 
     async def connected(self) -> None:
-        """Wait for the first status; raises RobotiqError if there is none."""
+        """Wait for the first status; raises RobotiqError if none comes."""
         await self.run.connected
 
     def waiter(self) -> asyncio.Future[Any]:
@@ -229,7 +229,7 @@ class Session:
             self.run.note_request()
 
     async def answered(self, request: Callable[[Waiter[None]], None]) -> None:
-        """Make a request and wait for its acknowledgement; raises RobotiqError if there is none."""
+        """Make a request and wait for its acknowledgement; raises RobotiqError if none comes."""
         waiter = self.waiter()
         self.ask(request, waiter)
         await waiter
@@ -240,7 +240,7 @@ class Session:
     ) -> Iterator[tuple[asyncio.Future[MoveResult], float]]:
         """Move axes; yield the future of the result, and the seconds that it may take by default.
 
-        However the block is left, a move that has not ended is given up, and its axes that move are held.
+        If the block is left before the move has ended, the move is given up, and its axes that move are held.
         """
         ended: asyncio.Future[MoveResult] = self.waiter()
         move, is_seen = Move(position, axes, now(), ended), True
@@ -269,8 +269,8 @@ class Session:
     ) -> State:
         """Make a request and wait for one of some states; ``timeout`` in seconds, None for no limit.
 
-        ``failing`` are states that end the wait in error, besides a lost link and a stop; None waits those
-        out, too. ``what`` is the message of a timeout.
+        ``failing`` are states that end the wait in error, besides a lost link and a stop; None waits out a
+        lost link and a stop, too. ``what`` is the message of a timeout.
 
         Raises:
             StateTimeoutError: not in time.
@@ -288,16 +288,16 @@ class Session:
         return state
 
     async def activated(self, ask: Callable[[], None] | None = None) -> None:
-        """Wait for the end of an activation. One that this hand began must not end in a fault.
+        """Wait for the end of an activation. If this hand began it, it must not end in a fault.
 
         Args:
             ask: makes the request; None for an activation that the start, or another caller, has begun.
 
         Raises:
-            GripperFaultError: it is refused because of a fault, or ended in one.
+            GripperFaultError: the activation is refused because of a fault, or ended in a fault.
             NotActivatedError: the gripper was reset during it, or reset() or halt() took over.
             ActivationTimeoutError: not finished within the activation timeout, or stalled.
-            InvalidStateError: it is refused during a reset or a release.
+            InvalidStateError: the activation is refused during a reset or a release.
             MotionInhibitedError: a person has stopped the hand.
             ConnectionLostError: the link is or went down.
             NotStartedError: the hand was stopped.

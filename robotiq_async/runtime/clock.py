@@ -1,8 +1,8 @@
 """The one clock of everything that happens to a hand.
 
 Timestamps, durations and ages are seconds of ``time.monotonic()``. asyncio's own loops use it, and so does
-uvloop: its ``time()`` is the same in whole milliseconds. A loop with another ``time()`` of its own (virtual
-time, in tests) is timed by that.
+uvloop: its ``time()`` is the same in whole milliseconds. A loop with another ``time()`` (virtual
+time, in tests) keeps its own time.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def clock_of(loop: asyncio.AbstractEventLoop) -> Callable[[], float]:
 
 
 def resolution_of(loop: asyncio.AbstractEventLoop) -> float:
-    """The step of a loop's clock in seconds: asyncio calls what is due within it. 0 if the loop has none.
+    """The step of a loop's clock in seconds: asyncio calls timers that are due within it. 0 without a step.
 
     15.6 ms on Windows before Python 3.13, and else a millionth of a second or less.
     """
@@ -33,5 +33,5 @@ def resolution_of(loop: asyncio.AbstractEventLoop) -> float:
 
 
 def now() -> float:
-    """The time by the clock of the running loop."""
+    """The time of the running loop's clock."""
     return clock_of(asyncio.get_running_loop())()

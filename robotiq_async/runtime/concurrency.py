@@ -27,7 +27,7 @@ class LateError(Exception):
 async def wait_shielded(work: asyncio.Future[Any]) -> None:
     """Wait until the work is done, even when cancelled; then raise the cancellation.
 
-    Does not raise what the work raises: read the future's result.
+    Does not raise the error of the work: read the future's result.
     """
     cancelled: asyncio.CancelledError | None = None
     with anyio.CancelScope(shield=True):
@@ -41,7 +41,7 @@ async def wait_shielded(work: asyncio.Future[Any]) -> None:
 
 
 def in_a_thread(work: Callable[[], T]) -> asyncio.Future[T]:
-    """Start a call that may block for ever (a disk, a pipe) in a daemon thread of its own.
+    """Start a call that may block for ever (a disk, a pipe) in a separate daemon thread.
 
     Neither the end of the loop nor the end of the interpreter waits for it, and a full thread pool does not
     delay it. If the system starts no thread, awaiting the result raises a :class:`NoThreadError`.
@@ -119,7 +119,7 @@ def check_loop(own: asyncio.AbstractEventLoop, what: str) -> None:
         running = None
     if running is not own:
         raise RuntimeError(
-            f"{what} was used outside of the event loop that the hand runs in, and nothing was asked of the "
+            f"{what} was used outside of the event loop that the hand runs in, and nothing was sent to the "
             "gripper; from another thread use loop.call_soon_threadsafe(hand.command, ...) or "
             "asyncio.run_coroutine_threadsafe(hand.move(...), loop)"
         )

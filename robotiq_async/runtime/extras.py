@@ -1,4 +1,4 @@
-"""The command that installs an extra, however the library was installed.
+"""The command that installs an extra, for each way to install the library.
 
 ``pip install "robotiq-async[web]"`` works only where a package index has the library. Installing the packages
 of the extra works everywhere: from a clone, a wheel or an index.

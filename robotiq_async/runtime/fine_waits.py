@@ -1,8 +1,8 @@
 """Waits of whole milliseconds on Windows, where a wait ends with an interrupt: by default 64 come a second.
 
-``timeBeginPeriod(1)`` of its library winmm asks for a thousand, until ``timeEndPeriod(1)``; since Windows 10
-2004 that is no other process's business. Each call of :func:`begin` wants one of :func:`end`. Elsewhere both
-do nothing.
+``timeBeginPeriod(1)`` of its library winmm requests a thousand, until ``timeEndPeriod(1)``; since Windows 10
+2004 that affects no other process. Each call of :func:`begin` needs a call of :func:`end`. Elsewhere both do
+nothing.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ async def addresses_of(host: str, port: int) -> list[str]:
 
 
 def why_unreachable(error: OSError | None) -> str:
-    """Readable reason for a failed connection. ``error`` is that of the last attempt, or None."""
+    """Readable reason for a failed connection. ``error`` is from the last attempt, or None."""
     match error.errno if error is not None else None:
         case errno.ECONNREFUSED:
             return "connection refused: nothing listens there"

@@ -1,7 +1,7 @@
 """Limits of time that count only while the event loop runs.
 
 A loop that is held up (a blocking call, a debugger, a suspended process) hears nothing. A limit that passed
-meanwhile would take for silent what has answered long ago.
+meanwhile would report a device as silent that answered long ago.
 """
 
 # Theory of operation
@@ -9,8 +9,8 @@ meanwhile would take for silent what has answered long ago.
 # The end is a point in time. Until then the limit looks at the clock every SLICE_S: a look that comes late
 # moves the end by its lateness. So a block counts for a slice at most, and a limit without one ends exactly.
 #
-# What a block leaves may be too short for the answers that wait in the sockets. So at least GRACE_S are left
-# after one; that is given once, for a loop that is held up again and again must come to an end, too.
+# The time that is left after a block may be too short for the answers that wait in the sockets. So at least
+# GRACE_S are left. That is given once: a limit must end, too, in a loop that is held up again and again.
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ class Limit:
     """A block that is cancelled when the event loop has run for some seconds.
 
     The time counts from the making or from :meth:`restart`, also before the block is entered. A block that is
-    entered too late gets the time of grace: what is limited is tried once. It may be entered again.
+    entered too late gets the time of grace: its work is tried once. It may be entered again.
 
     Args:
         seconds: None for no limit.
-        shield: whether the block ends by nothing but this limit, however its task is cancelled.
+        shield: whether only this limit ends the block, and no cancellation of its task.
 
     Attributes:
         is_over: whether the last block was ended by the limit.
@@ -97,7 +97,7 @@ class Limit:
     def _wait(self) -> None:
         self.stop()
         if self._end < math.inf:
-            # Not by the last look: what is due together runs in the order in which it was set.
+            # Not by the last look: timers that are due together run in the order in which they were set.
             self._timers.append(self._loop.call_at(self._end, self._expire))
             self._wait_for_look()
 

@@ -9,5 +9,5 @@ import re
 
 
 def quoted(word: str) -> str:
-    """A word for a command line, in double quotes unless it needs none. It holds no quotes itself."""
+    """A word for a command line, in double quotes if it needs them. The word itself must hold no quotes."""
     return word if re.fullmatch(r"[\w.:/+=-]+", word, re.ASCII) else f'"{word}"'

@@ -10,8 +10,8 @@ from typing import Final
 INSIST_S: Final = 3.0
 """Seconds after a signal in which further ones are ignored. A stop takes 2 s at most."""
 ENDING: Final = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
-"""Ctrl-C, ``kill``, a closed terminal, and Ctrl-Break on Windows. There a closed console ends the process at
-once, whatever handles SIGBREAK, which it raises too."""
+"""Ctrl-C, ``kill``, a closed terminal, and Ctrl-Break on Windows. There a closed console raises
+SIGBREAK too, and ends the process at once, even if a handler is set."""
 
 
 def check_main_thread() -> None:
@@ -21,7 +21,7 @@ def check_main_thread() -> None:
 
 
 def ending_signals() -> list[signal.Signals]:
-    """Those of :data:`ENDING` that the system has and that are not ignored.
+    """The signals of :data:`ENDING` that the system has and that are not ignored.
 
     An ignored signal stays ignored: that is how a shell keeps Ctrl-C from its background jobs.
     """

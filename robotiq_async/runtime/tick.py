@@ -2,15 +2,15 @@
 
 A loop's own timers are too coarse for 200 Hz: epoll rounds their timeouts up to a millisecond, and uvloop's
 clock counts milliseconds. On Linux the kernel therefore keeps the next deadline, in a timerfd that the loop
-watches like a socket. Elsewhere, and in a loop with a clock of its own, the loop's timers keep it. All hands
-of a loop share one timer, so those that are due wake together, and many hands do not wake a busy loop more
+watches like a socket. Elsewhere, and in a loop with its own clock, the loop's timers keep it. All hands of a
+loop share one timer, so all pollers that are due wake together, and many hands do not wake a busy loop more
 often.
 
-Windows waits as finely as fine_waits.py asks for. Where the clock counts in steps of 15.6 ms (Windows before
-Python 3.13), an interval is at least a tenth longer than a step: no tick is promised that cannot come.
+On Windows fine_waits.py makes waits finer. Where the clock counts in steps of 15.6 ms (Windows
+before Python 3.13), an interval is at least a tenth longer than a step: no tick is promised that cannot come.
 
 A missed tick is counted and not caught up with. The delay of a tick is the time for which the loop was held
-up, whatever the poller task was doing.
+up; it does not depend on the poller task.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ class Tick:
     """A periodic tick for one task. :meth:`close` it at the end. Making one needs a running event loop.
 
     Attributes:
-        interval: seconds between ticks; longer than asked for where the clock cannot tell them apart.
+        interval: seconds between ticks; longer than requested if the clock's step is too coarse.
         time: the clock of the deadlines.
         due: the next deadline.
-        late: the longest delay in seconds of the ticks that ended the last wait. What a step of the clock may
-            hide is no delay.
+        late: the longest delay in seconds of the ticks that ended the last wait. A delay within a step of the
+            clock counts as none.
         longest_late: the longest delay so far.
         held_up_at: the time of the last tick that was so late that the loop was held up before it.
     """
@@ -132,7 +132,7 @@ class _LoopTimer:
 
     @classmethod
     def of(cls, loop: asyncio.AbstractEventLoop) -> _LoopTimer:
-        """The timer of a loop; releases those of loops that were closed under their ticks."""
+        """The timer of a loop; releases the timers of loops that were closed under their ticks."""
         for each in list(cls._timers):
             if each.is_closed() and (left := cls._timers.pop(each, None)) is not None:
                 left.release()
@@ -189,14 +189,14 @@ class _LoopTimer:
             return
         if self._handle is not None:
             self._handle.cancel()
-        # The loop calls what is due within a step of its clock. A deadline in this step has not passed before
-        # the next one: it would be called and armed again and again until then.
+        # The loop calls timers that are due within a step of its clock. A deadline in this step has not
+        # passed before the next step: the timer would be called and armed again and again until then.
         if due > (now := self._clock()):
             due = max(due, now + self._step)
         self._handle = self._loop.call_at(due, self._expire_due)
 
     def _watched_timerfd(self) -> TimerFd | None:
-        """A timerfd that the loop watches; None without timerfd, or if the loop has a clock of its own."""
+        """A timerfd that the loop watches; None without timerfd, or if the loop has its own clock."""
         if self._clock is not time.monotonic:
             return None
         with contextlib.suppress(OSError, NotImplementedError):

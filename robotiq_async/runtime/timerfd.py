@@ -46,7 +46,7 @@ elif sys.platform == "linux":
         """A timer, and its descriptor: ready from the time it is set to until it is set again."""
 
         def __init__(self) -> None:
-            # TFD_NONBLOCK and TFD_CLOEXEC are those of open(2).
+            # TFD_NONBLOCK and TFD_CLOEXEC have the values of O_NONBLOCK and O_CLOEXEC of open(2).
             self.descriptor: int = _checked(
                 _libc.timerfd_create(time.CLOCK_MONOTONIC, os.O_NONBLOCK | os.O_CLOEXEC)
             )

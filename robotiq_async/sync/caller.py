@@ -42,7 +42,7 @@ class Caller:
 
     def __init__(self, hand: AsyncRobotiqHand) -> None:
         self.hand: Final = hand  # in its event loop
-        self._calls: set[object] = set()  # those that run: the hand may be about to start
+        self._calls: set[object] = set()  # the running calls: the hand may be about to start
         self._is_left_behind = False
         self._has_warned = False
 
@@ -62,7 +62,7 @@ class Caller:
                     _IN_USE.add(self)
 
     def tell(self, function: Callable[[], T]) -> T:
-        """Make a call that does not wait. Listeners may make one, too."""
+        """Make a call that does not wait. Listeners may call this, too."""
         if LOOP_THREAD.is_here:
             return function()
 

@@ -275,7 +275,7 @@ class _Call(Generic[T]):
             self._task.cancel()
 
     def forget(self) -> None:
-        """Drop its exception, if it has ended with one: asyncio would log that it was never retrieved."""
+        """Drop the exception of its task, if any: asyncio would log that it was never retrieved."""
         if self._task is not None and self._task.done() and not self._task.cancelled():
             self._task.exception()
 

@@ -112,7 +112,7 @@ class RobotiqHand:
     that was not stopped is stopped when the program ends. After a fork it stays with the parent. Listeners
     are called in the hand's thread, where a call that waits raises RuntimeError.
 
-    Nothing of this has run on real hardware yet.
+    None of this has run on real hardware yet.
     """
 
     def __init__(

@@ -28,17 +28,17 @@ class _SignalError(BaseException):
 def stops_on_signals(*hands: RobotiqHand) -> Iterator[None]:
     """Stop blocking hands on SIGINT, SIGTERM and SIGHUP, and leave the block after that.
 
-    Without it SIGTERM ends a program at once, and the fingers move on; and the first process of a container
-    (PID 1) does not get it at all. The stops run in the thread of the hands, also in a busy program. Then
-    the call that it waits for, if any, is cancelled, and the program continues after the block. Further
-    signals are ignored for 3 s after the stops; later ones act as before the block. An ignored signal stays
-    ignored. SIGKILL stops nothing.
+    Without it SIGTERM ends a program at once, and the fingers keep moving; and the first process of a
+    container (PID 1) does not get SIGTERM at all. The stops run in the thread of the hands, also in a busy
+    program. Then the call that it waits for, if any, is cancelled, and the program continues after the block.
+    Further signals are ignored for 3 s after the stops; later ones act as before the block. An ignored signal
+    stays ignored. SIGKILL stops nothing.
 
     Args:
-        hands: to stop; one that does not run is left alone.
+        hands: to stop; a hand that does not run is left alone.
 
     Raises:
-        TypeError: a hand is one for asyncio, or none.
+        TypeError: an argument is not a blocking hand.
         RuntimeError: not in the main thread.
     """
     for each in hands:
@@ -72,7 +72,7 @@ def stops_on_signals(*hands: RobotiqHand) -> Iterator[None]:
 
 
 def _stop(hands: tuple[RobotiqHand, ...]) -> None:
-    """Stop all hands that run, at once; without the thread of the hands there is none."""
+    """Stop all running hands at the same time. Without the thread of the hands no hand runs."""
     running = [caller for caller in map(caller_of, hands) if caller.is_in_use]
     if not running or not LOOP_THREAD.is_running:
         return

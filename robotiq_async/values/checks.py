@@ -133,7 +133,7 @@ def as_float(value: object) -> float | None:
 
 
 def single(value: object) -> object:
-    """The number in an array or a tensor of one; anything else as it is."""
+    """The number in an array or a tensor with one element; anything else as it is."""
     item = getattr(value, "item", None)
     if as_float(value) is None and callable(item):
         with suppress(ValueError, RuntimeError):  # numpy's and torch's, of several

@@ -178,8 +178,8 @@ _SHARED: Final = frozenset({0x00, 0x05, 0x07, 0x09, 0x0B, 0x0D, 0x0F})
 class Fault(Code):
     """gFLT: the fault codes of the thesis's table 4, and the codes of the 2F and the Hand-E.
 
-    Some codes mean one thing on a 3-Finger and another on its siblings; a status decodes them by its model,
-    and ``Fault(code)`` is the fault of the 3-Finger. A code that is missing in a table becomes a new member,
+    Some codes differ in meaning between a 3-Finger and its siblings; a status decodes them for its model, and
+    ``Fault(code)`` is the fault of the 3-Finger. A code that is missing in a table becomes a new member,
     ``Fault(0x0C).name == "UNKNOWN_0x0C"``, with severity MAJOR: an unknown fault is never reported as no
     fault. Two faults are equal if they are the same; compared with a number, the code counts.
     """

@@ -2,7 +2,7 @@
 
 All models have the registers of one finger. A 2F or a Hand-E is finger A of a 3-Finger whose object status
 lies in byte 0 instead of byte 1 (manuals of the 2F-85/2F-140 and of the Hand-E, chapter on registers).
-Nothing of this has run on real hardware yet.
+None of this has run on real hardware yet.
 """
 
 from __future__ import annotations
@@ -152,7 +152,7 @@ class Model:
         return request > position >= self.closed_reading_min - TOLERANCE
 
     def contradiction(self, registers: Registers) -> str:
-        """The status registers that this model cannot have, as a text; empty if there are none.
+        """The status registers that this model cannot have, as a text; empty without a contradiction.
 
         They are found by :meth:`wrong_axes`, or set reserved bits, which are 0.
         """
@@ -256,7 +256,7 @@ MODELS: Final = {model.name: model for model in (THREE_FINGER, TWO_FINGER_85, TW
 
 
 def model_of(value: object, name: str = "model") -> Model:
-    """A model, or the one with this name; None is the 3-Finger."""
+    """A model, also by its name; None is the 3-Finger."""
     if value is None:
         return THREE_FINGER
     if isinstance(value, Model):

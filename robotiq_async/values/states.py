@@ -1,4 +1,4 @@
-"""The states of a hand: which may follow which, and what each answers to a call.
+"""The states of a hand: their order, and the answer of each state to a call.
 
 Every state has an entry for every trigger: the next state, IGNORED where there is nothing to do, or the
 error that the caller gets. A refusal changes nothing. A status is never refused. The table comes

@@ -237,13 +237,14 @@ class RobotiqStatus:
     def controller_fault(self) -> int:
         """The fault code of the controller before a 2F or a Hand-E (kFLT), 0..15; 0 for none.
 
-        Only the retired Universal Controller has one; behind another link, and on a 3-Finger, it is 0.
+        Only the retired Universal Controller has such a code; behind another link, and on a 3-Finger, it is
+        0.
         """
         return 0 if self._model.has_modes else reg.kFLT.read(self._registers)
 
     @property
     def controller_fault_text(self) -> str:
-        """The fault of the controller for people; empty for none."""
+        """The fault of the controller for people; empty without a fault."""
         code = self.controller_fault
         what = CONTROLLER_FAULTS.get(code, "a fault that no manual names")
         return f"its controller reports: {what} (kFLT 0x{code:02X})" if code else ""
@@ -452,5 +453,5 @@ class RobotiqStatus:
 
 
 def milliampere(current: int | None) -> str:
-    """A current as the end of a text; empty for none."""
+    """A current as the end of a text; empty if it is not known."""
     return "" if current is None else f" {current}mA"

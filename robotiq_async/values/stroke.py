@@ -45,8 +45,8 @@ class Stroke:
         mm: the opening of an open gripper, in millimetres.
         open_reading: position, in counts, that an open finger reads.
         closed_reading: position, in counts, that a closed finger reads.
-        arc: radians of the link that carries a pad, against the direction of closing, when open, and by how
-            much it turns; None for a straight line.
+        arc: radians of the link that carries a pad, against the direction of closing: its angle when open,
+            and its turn; None for a straight line.
         points: positions with their openings that were measured on one gripper; empty for nominal figures.
         openings: the opening at each position 0..255, in millimetres, to 0.01 mm: a count is 20 times that.
         fractions: the same as a share of the travel in counts, 1 (open) .. 0 (closed), to 0.0001.
@@ -88,7 +88,7 @@ class Stroke:
         """The source of the openings, for people."""
         return "measured" if self.points else "nominal"
 
-    @lru_cache(maxsize=16)  # noqa: B019  # a remote hand asks at every status
+    @lru_cache(maxsize=16)  # noqa: B019  # a remote hand calls this at every status
     def measured(self, points: Points) -> Stroke:
         """The stroke of one gripper, from points as :func:`check_points` returns them; itself without any."""
         if not points:

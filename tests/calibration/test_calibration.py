@@ -83,7 +83,7 @@ def test_an_owners_table(tmp_path: Path) -> None:
     assert mine.closing_time(10) == 10
     assert mine.closing_time(15) == pytest.approx(7.5)
     for outside in (9, 21):
-        with pytest.raises(ValueError, match=r"lies outside what was measured: 10\.\.20"):
+        with pytest.raises(ValueError, match=r"lies outside the measured range: 10\.\.20"):
             mine.closing_time(outside)
     for table, words in (
         ({0: (5,)}, "at least two speed values"),
@@ -152,7 +152,7 @@ def test_nominal_forces_are_the_manuals() -> None:
 def test_grams_become_newton(tmp_path: Path) -> None:
     foam = ForceCalibration.thesis("foam")
     assert foam.newton(0) == pytest.approx(mean((630, 650, 570)) / 1000 * 9.81)
-    with pytest.raises(ValueError, match="outside what was measured"):
+    with pytest.raises(ValueError, match="outside the measured range"):
         foam.newton(255)
     with pytest.raises(ValueError, match="surface must be 'foam' or 'rigid'"):
         ForceCalibration.thesis("wood")

@@ -35,7 +35,7 @@ def test_they_are_by_the_owners_calibrations(tmp_path: Path) -> None:
         assert hand.units.force(label_n=19.62) == 75
         with pytest.raises(ValueError, match=r"newton of a label \(no measured force\) in 9\.81\.\.29\.43"):
             hand.units.force(label_n=30)
-        with pytest.raises(ValueError, match=r"force 10 lies outside what was measured: 50\.\.100"):
+        with pytest.raises(ValueError, match=r"force 10 lies outside the measured range: 50\.\.100"):
             hand.units.label_n(10)
 
 

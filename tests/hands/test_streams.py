@@ -361,7 +361,7 @@ def test_a_hand_does_not_start_while_a_reader_waits_in_another_loop(channel: Cha
     with asyncio.Runner() as here, asyncio.Runner() as other:
         task = other.get_loop().create_task(rest(stream))
         other.run(steps())
-        with pytest.raises(RuntimeError, match="nothing was asked of the gripper"):
+        with pytest.raises(RuntimeError, match="nothing was sent to the gripper"):
             channel.check_loop(here.get_loop())
         with pytest.raises(RuntimeError, match="outside of the event loop"):
             here.run(stream.aclose())

@@ -186,7 +186,7 @@ async def test_an_activation_that_times_out_is_taken_back() -> None:
 
 # -- a gripper that does not follow, or whose fingertips end elsewhere ---------------------------------------
 
-FAR = "it ends there (a software limit, fingertips of your own), or it did not follow"
+FAR = "its range ends there (a software limit, custom fingertips), or it did not follow"
 
 
 async def test_a_motion_that_moves_nothing_and_is_reported_as_done_has_reached_nothing(

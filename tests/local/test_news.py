@@ -94,7 +94,7 @@ async def test_a_gripper_that_is_back_in_reset(who: str, caplog: pytest.LogCaptu
             gripper.write(0, [0] * 8)
         await hand.wait_for_state(State.RESET)
         (line,) = [each for each in lines(caplog) if "back in RESET" in each]
-        assert f"by {who}; what it held may have fallen" in line
+        assert f"by {who}; its part may have fallen" in line
 
 
 @virtual

@@ -1,6 +1,6 @@
 """The first hour with a real gripper: guarded stages, checks of assumptions, and a report.
 
-It uses the link and no hand: a hand's belief cannot hide the gripper's behaviour. Nothing of this has met
+It uses the link and no hand: a hand's belief cannot hide the gripper's behaviour. None of this has met
 hardware yet. docs/decisions/verify.md has the reasons.
 """
 
