@@ -53,7 +53,7 @@ SPEED_LAYOUT: Final = Layout("speed_value", "ms", 600_000)  # closing times, at 
 FORCE: Final = Layout("force_value", "g", 100_000)  # readings of a scale between the fingers, at most 100 kg
 LONGEST_ROW: Final = 10_000
 """Characters of a line at most, so that a large file without line ends is not read into memory."""
-NEW: Final = 0o666  # mode of a new file, before the umask
+NEW_MODE: Final = 0o666  # mode of a new file, before the umask
 
 
 class TableError(ValueError):
@@ -243,7 +243,7 @@ def write_rows(path: Path | str, rows: Iterable[Sequence[object]]) -> None:
     target = Path(os.path.realpath(path))  # a symbolic link stays a link
     beside = target.with_name(f".{target.name}.{secrets.token_hex(8)}")
     # O_EXCL: in a folder that others can write to, a file of this name could be a link that they made.
-    descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, NEW if mode is None else mode)
+    descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, NEW_MODE if mode is None else mode)
     try:
         # A recording of others may hold half a character, which UTF-8 does not have.
         with open(descriptor, "w", encoding="utf-8", errors="backslashreplace", newline="") as file:

@@ -35,7 +35,7 @@ SHORT_OF_CLOSED: Final = 3
 """Counts by which a jaw that closes with the least force, slowly, reads less than its nominal reading."""
 _FIRM: Final = 80
 """The least force that presses the closed stop as far as any."""
-_SWING: Final = 0.6
+_OVERREADING: Final = 0.6
 """Counts that the closed stop reads further at full speed."""
 _BETWEEN: Final = 0.8
 """Share of a count at which the closed stop of that gripper lies, from one reading to the next."""
@@ -106,7 +106,7 @@ class MotionProfile:
         """Counts by which the closed stop reads further at a force, and after a way at this rate."""
         if not self.give:
             return 0
-        return int(_BETWEEN + min(1.0, force / _FIRM) ** 3 * self.give + _SWING * rate / self.fastest)
+        return int(_BETWEEN + min(1.0, force / _FIRM) ** 3 * self.give + _OVERREADING * rate / self.fastest)
 
     def closing_s(self, counts: float, speed: int) -> float:
         """Seconds from a request at rest to the reported end, closing by so many counts to the stop."""

@@ -24,7 +24,7 @@ from ..values import check_seconds
 
 _GRIPPERS: Final = "grippers"
 Names = tuple[str, ...]
-_KEY: Final = re.compile(r"""\s*((?:"[^"\n]*"|'[^'\n]*'|[A-Za-z0-9_.\s-])+)=""")
+_KEY_OF_LINE: Final = re.compile(r"""\s*((?:"[^"\n]*"|'[^'\n]*'|[A-Za-z0-9_.\s-])+)=""")
 
 
 class AgentFileError(ValueError):
@@ -228,7 +228,7 @@ def _keys(text: str) -> Iterator[tuple[int, Names]]:
         if line.lstrip().startswith("["):
             table = _path(line) or table
             yield number, table
-        elif (found := _KEY.match(line)) is not None:
+        elif (found := _KEY_OF_LINE.match(line)) is not None:
             yield number, table + _path(f"{found[1]}= 0")
 
 

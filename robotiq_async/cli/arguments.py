@@ -140,17 +140,17 @@ def _argument(option: Option) -> object:
     return Annotated[int | None, Parameter(converter=convert, metavar=f"{low:g}..{high:g}", help=text)]
 
 
-_ARGUMENTS: Final = offered(Place.COMMAND_LINE)
-_Arguments: Any = make_dataclass(
-    "_Arguments",
-    [(name, _argument(option), option.default) for name, option in _ARGUMENTS.items()],
+_LINK_OPTIONS: Final = offered(Place.COMMAND_LINE)
+_LinkArguments: Any = make_dataclass(
+    "_LinkArguments",
+    [(name, _argument(option), option.default) for name, option in _LINK_OPTIONS.items()],
     frozen=True,
 )
 
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class LinkOptions(_Arguments):  # type: ignore[misc]  # made from the table of options
+class LinkOptions(_LinkArguments):  # type: ignore[misc]  # made from the table of options
     """Options of the link for a gripper with unusual settings; the command doctor finds them."""
 
     def options(self) -> dict[str, Any]:

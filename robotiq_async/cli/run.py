@@ -44,7 +44,7 @@ def run(arguments: Sequence[str]) -> int:
         if LATE_POLLS not in warning:
             warnings.append(warning)
 
-    with forwarded_warnings(keep), _Signals() as signals:
+    with forwarded_warnings(keep), _EndingSignals() as signals:
         code, problem = _outcome(arguments, signals)
     # A failure is always one line, for logs and scripts.
     if problem is not None:
@@ -73,7 +73,7 @@ def _mend_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
-def _outcome(arguments: Sequence[str], signals: _Signals) -> tuple[int, str | None]:
+def _outcome(arguments: Sequence[str], signals: _EndingSignals) -> tuple[int, str | None]:
     try:
         _check_units(arguments)
         command, bound, _ = build(arguments).parse_args(arguments, print_error=False, exit_on_error=False)
@@ -114,7 +114,7 @@ def _check_units(arguments: Sequence[str]) -> None:
         raise UsageError(f"an amount must be 0 or more, got {amount!r}")
 
 
-class _Signals:
+class _EndingSignals:
     """The first SIGINT, SIGTERM, SIGHUP (a closed terminal) or SIGBREAK (Windows) ends the command.
 
     Further ones are ignored: closing a terminal sends several, a person may press Ctrl-C again and again, and

@@ -46,7 +46,7 @@ PATIENCE_S: Final = 2.0
 ACTIVATION_S: Final = 60.0  # that a Goto waits for it
 LOOP_RESPONSE_S: Final = 0.1  # a lost reply costs one and a half of DROID's cycles, at 15 Hz
 HZ: Final = 60  # as polymetis says; DROID does not use it
-SLOWEST, FASTEST = 0.013, 0.1  # "m/s"
+SLOWEST_M_S, FASTEST_M_S = 0.013, 0.1  # "m/s"
 THREADS: Final = 8
 
 
@@ -91,10 +91,10 @@ class GripperService:
     def goto(self, request: bytes, context: Any) -> bytes:  # noqa: ANN401
         """``GripperCommand``: returns when the hand has it, as in polymetis; ``grasp`` closes the hand."""
         try:
-            asked = decoded(request)
-            width, speed, force = (_number(asked, number) for number in (2, 3, 4))
-            opening = 0.0 if asked.get(5) else self._widths.fraction(width, clamp=True)
-            rates = {"speed": _counts(speed / (FASTEST - SLOWEST)), "force": _counts(force / 100)}
+            fields = decoded(request)
+            width, speed, force = (_number(fields, number) for number in (2, 3, 4))
+            opening = 0.0 if fields.get(5) else self._widths.fraction(width, clamp=True)
+            rates = {"speed": _counts(speed / (FASTEST_M_S - SLOWEST_M_S)), "force": _counts(force / 100)}
         except ValueError as error:
             _abort(context, grpc.StatusCode.INVALID_ARGUMENT, error)
         self.is_ready.wait(ACTIVATION_S)
@@ -124,8 +124,8 @@ def _abort(context: Any, code: grpc.StatusCode, error: Exception) -> NoReturn:  
     raise AssertionError("abort() raises") from error
 
 
-def _number(asked: dict[int, FieldValue], number: int) -> float:
-    value = asked.get(number, 0.0)
+def _number(fields: dict[int, FieldValue], number: int) -> float:
+    value = fields.get(number, 0.0)
     if isinstance(value, bytes) or not math.isfinite(value):
         raise ValueError(f"field {number} must be a finite number, got {value!r}")
     return value

@@ -275,7 +275,7 @@ def _inhibited(fields: Mapping[str, Any]) -> str:
 
 
 @dataclass(slots=True)
-class _Run:
+class _AgentRun:
     """A run of an agent: its clock, and the newest stamp."""
 
     epoch: int
@@ -292,7 +292,7 @@ class Summaries:
     """Reads summaries, and drops those that were overtaken."""
 
     def __init__(self) -> None:
-        self._runs: dict[GripperName, _Run] = {}  # the last run of the agent, by gripper
+        self._runs: dict[GripperName, _AgentRun] = {}  # the last run of the agent, by gripper
 
     def read(self, payload: bytes, arrival: float) -> tuple[GripperName, dict[str, Any]] | None:
         """The gripper of a summary, and the fields of its member; None if a newer one has overtaken it."""
@@ -319,8 +319,8 @@ class Summaries:
             return None
         return name, what | {"seen_at": None if age is None else run.clock(seen)}
 
-    def _run_of(self, name: GripperName, epoch: int) -> _Run:
+    def _run_of(self, name: GripperName, epoch: int) -> _AgentRun:
         run = self._runs.get(name)
         if run is None or run.epoch != epoch:
-            run = self._runs[name] = _Run(epoch)
+            run = self._runs[name] = _AgentRun(epoch)
         return run

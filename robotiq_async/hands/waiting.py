@@ -25,7 +25,7 @@ shows nothing new for this time, makes no progress. While it moves, its currents
 figure is published."""
 TOLD_EVERY_S: Final = 4.0  # an activation may take half a minute on a real gripper
 ACTIVATING: Final = frozenset({State.DO_ACTIVATION, State.WF_ACTIVATION})
-_Waiter = tuple[Collection[State], Mapping[State, Callable[[], RobotiqError]], asyncio.Future[State]]
+_StateWaiter = tuple[Collection[State], Mapping[State, Callable[[], RobotiqError]], asyncio.Future[State]]
 
 
 def check_states(states: Collection[object]) -> None:
@@ -41,7 +41,7 @@ class StateWaiters:
     """Wakes callers for the states that they wait for, also for a state that lasts only a moment."""
 
     def __init__(self) -> None:
-        self._waiters: list[_Waiter] = []
+        self._waiters: list[_StateWaiter] = []
 
     @contextmanager
     def watching(

@@ -36,8 +36,8 @@ GRIPPER_OPTIONS: Final = ("model", "stroke")
 """Options at the end of any address."""
 LINE_OPTIONS: Final = ("baud", "parity", "stopbits")
 
-SLOWEST: Final = 0.01
-FASTEST: Final = 1000.0
+LEAST_SPEEDUP: Final = 0.01
+MOST_SPEEDUP: Final = 1000.0
 """Speedups of a simulated gripper; faster than that, whole motions pass between two polls."""
 SIMULATION_OPTIONS: Final = ("speedup", "object", "physics")
 
@@ -213,7 +213,7 @@ def parse_address(address: object) -> Address:
     if scheme == "zenoh":
         what = "is a gripper on another host: use robotiq_async.fleet.RemoteHand, or an address here"
         raise ValueError(_within(f"{_shown(address)} {what}: {FORMS}"))
-    if scheme in ("sim", "rtu", *_SOCKETS) or not _SCHEME.fullmatch(scheme):
+    if scheme in ("sim", "rtu", *_SOCKETS) or not _SCHEME_FORM.fullmatch(scheme):
         raise malformed(address)
     try:
         return _through_a_tunnel(scheme, rest, model, stroke)
@@ -221,7 +221,7 @@ def parse_address(address: object) -> Address:
         raise malformed(address, str(error)) from None
 
 
-_SCHEME: Final = re.compile("[a-z][a-z0-9+.-]*")
+_SCHEME_FORM: Final = re.compile("[a-z][a-z0-9+.-]*")
 
 
 def entry_of(scheme: str) -> EntryPoint | None:
@@ -413,8 +413,8 @@ def _unknown(name: str, known: Sequence[str]) -> str:
 
 def _speedup(text: str) -> float:
     is_number = re.fullmatch(r"[0-9]{1,9}(\.[0-9]{1,9})?", text)
-    if not is_number or not SLOWEST <= float(text) <= FASTEST:
-        raise ValueError(f"speedup must be a number in {SLOWEST:g}..{FASTEST:g}, got {text!r}")
+    if not is_number or not LEAST_SPEEDUP <= float(text) <= MOST_SPEEDUP:
+        raise ValueError(f"speedup must be a number in {LEAST_SPEEDUP:g}..{MOST_SPEEDUP:g}, got {text!r}")
     return float(text)
 
 

@@ -32,11 +32,11 @@ _FROM_GATEWAYS: Final = (10, 11)
 
 CHECKSUM: Final = 2
 """Bytes of the checksum at the end of a frame on a serial line."""
-_READS: Final = (3, 4)
+_READ_FUNCTIONS: Final = (3, 4)
 """Function codes of reads of registers."""
-_WRITE: Final = 16
+_WRITE_FUNCTION: Final = 16
 """Function code of a write of several registers."""
-_WRITE_AND_READ: Final = 23
+_WRITE_AND_READ_FUNCTION: Final = 23
 """Function code of a write and a read in one exchange; the device writes first."""
 _READ_REQUEST: Final = Struct(">BBHH")
 """Unit, function, address, count."""
@@ -57,14 +57,14 @@ def read_request(registers: RegisterMap, count: int) -> bytes:
 def write_request(registers: RegisterMap, image: Sequence[int]) -> bytes:
     """Unit and PDU of the write of an image of eight registers (FC16), as many of them as the gripper has."""
     count = registers.count
-    head = _WRITE_REQUEST.pack(registers.device_id, _WRITE, registers.request, count, 2 * count)
+    head = _WRITE_REQUEST.pack(registers.device_id, _WRITE_FUNCTION, registers.request, count, 2 * count)
     return head + _BLOCK.pack(*image)[: 2 * count]
 
 
 def write_and_read_request(registers: RegisterMap, image: Sequence[int]) -> bytes:
     """Unit and PDU of a write of an image and a read of the status in one exchange (FC23)."""
     count = registers.count
-    head = _READ_REQUEST.pack(registers.device_id, _WRITE_AND_READ, registers.status, count)
+    head = _READ_REQUEST.pack(registers.device_id, _WRITE_AND_READ_FUNCTION, registers.status, count)
     head += _WRITE_PART.pack(registers.request, count, 2 * count)
     return head + _BLOCK.pack(*image)[: 2 * count]
 
@@ -89,7 +89,7 @@ def registers_in(body: bytes) -> Registers:
 
 def is_write(frame: bytes) -> bool:
     """Whether a request frame of a serial line writes."""
-    return frame[1] in (_WRITE, _WRITE_AND_READ)
+    return frame[1] in (_WRITE_FUNCTION, _WRITE_AND_READ_FUNCTION)
 
 
 class Expected(NamedTuple):
@@ -149,9 +149,9 @@ class Expected(NamedTuple):
         function = self._function
         who = "gateway" if code in _FROM_GATEWAYS else "gripper"
         said = f"the {who} refuses function {function}: exception {code} ({_EXCEPTIONS.get(code, 'unknown')})"
-        if function == _WRITE and code in (1, 2, 3):
+        if function == _WRITE_FUNCTION and code in (1, 2, 3):
             return said + _whole(self._count)
-        if function in _READS and code == 1:
+        if function in _READ_FUNCTIONS and code == 1:
             return f"{said}: read_function={7 - function} asks with the other one"
         return said
 
@@ -160,7 +160,7 @@ class Expected(NamedTuple):
         at = len(self.start) - 2
         count = int.from_bytes(frame[at : at + 2], "big")  # of registers, in the answer to a write
         is_shorter = len(frame) == self.size and frame.startswith(self.start[:at]) and count < self._count
-        if self._function == _WRITE and is_shorter:
+        if self._function == _WRITE_FUNCTION and is_shorter:
             what = f"it reports {count} registers written, and not {self._count}{_whole(self._count)}"
             return f"not the answer: {what}"
         return f"not the answer: {show(frame)}, expected {show(self.start)}..."
@@ -182,18 +182,18 @@ def _reply_size(received: bytes) -> int:
     if len(received) < 3:
         return 3
     function, count = received[1:3]
-    if function & 0x7F not in (*_READS, _WRITE, _WRITE_AND_READ):
+    if function & 0x7F not in (*_READ_FUNCTIONS, _WRITE_FUNCTION, _WRITE_AND_READ_FUNCTION):
         return 0
     if function & 0x80:
         return 3 + CHECKSUM
-    return 6 + CHECKSUM if function == _WRITE else 3 + count + CHECKSUM
+    return 6 + CHECKSUM if function == _WRITE_FUNCTION else 3 + count + CHECKSUM
 
 
 @lru_cache(maxsize=32)  # a poll is always the same
 def expected_reply(request: bytes, *, checksum: int = 0) -> Expected:
     """The reply to a request (unit and PDU) of function 3, 4, 16 or 23, with a checksum of this size."""
     unit, function, payload = request[:1], request[1], 0
-    if function == _WRITE:
+    if function == _WRITE_FUNCTION:
         pdu = request[1:6]  # the echo of address and count
     else:
         payload = 2 * int.from_bytes(request[4:6], "big")

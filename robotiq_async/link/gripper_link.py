@@ -23,10 +23,12 @@ from .transport import Link
 from .tunnel.protocol import Tunnel, tunnel_to
 from .urcap.transport import UrcapTransport
 
-_GATEWAY: Final = " (two grippers behind one gateway: give each of the hands its device_id)"
-_LINE: Final = " (two grippers on one serial line: give each of the hands its device_id, in one event loop)"
+_BEHIND_GATEWAY: Final = " (two grippers behind one gateway: give each of the hands its device_id)"
+_ON_ONE_LINE: Final = (
+    " (two grippers on one serial line: give each of the hands its device_id, in one event loop)"
+)
 _TUNNEL: Final = " (two grippers behind one arm: give each of the hands its device_id)"
-_URCAP: Final = " (two grippers behind one URCap: give each of the hands its device_id)"
+_BEHIND_URCAP: Final = " (two grippers behind one URCap: give each of the hands its device_id)"
 
 MOST_LEFT: Final = 64
 """The most grippers whose last hands leave something for the next. Half a second after its end only the
@@ -140,7 +142,7 @@ def _over_modbus(address: Address, registers: RegisterMap, names_unit: bool, nam
     # On a gateway each hand has its own connection. On a serial line, where replies carry no number, the
     # hands of an event loop share one.
     unit = registers.device_id if names_unit else None
-    hint = _LINE if address.is_rtu else _GATEWAY  # for users who meant two grippers
+    hint = _ON_ONE_LINE if address.is_rtu else _BEHIND_GATEWAY  # for users who meant two grippers
     shares_line = address.is_rtu and names_unit
     return GripperLink(
         str(address),
@@ -175,7 +177,7 @@ def _over_urcap(address: Address, registers: RegisterMap, names_unit: bool, name
     chosen = registers.device_id if names_unit else None
     return GripperLink(
         str(address),
-        lambda: Gripper(canonical_address(address), chosen, _URCAP),
+        lambda: Gripper(canonical_address(address), chosen, _BEHIND_URCAP),
         partial(UrcapTransport, address, chosen, log=Log(name or str(address))),
         is_slow=True,
         model=model_of(address.model),

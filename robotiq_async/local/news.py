@@ -18,16 +18,16 @@ from ..values.status import RobotiqStatus
 
 BITS: Final = 0xFF00  # of the second register: gFLT, and kFLT of the controller before a jaw
 _FAULTY: Final = frozenset({State.FAULT, State.ATR_DONE, State.WF_ATR})
-_HELD: Final = "the fingers are held, and nothing resumes when it clears"
+_STAYS_HELD: Final = "the fingers are held, and nothing resumes when it clears"
 DOES: Final = {
     Severity.PRIORITY: "the action is delayed or ignored: see which request came too early",
-    Severity.MINOR: f"{_HELD}; free what blocks, recover() waits for it",
+    Severity.MINOR: f"{_STAYS_HELD}; free what blocks, recover() waits for it",
     Severity.MAJOR: "the fingers stop, a part stays held until the reset; free what blocks, then recover() "
     "resets and activates: it DROPS the part and MOVES the fingers",
 }
 """The motion of the fingers in a fault, and the remedy."""
 UNKNOWN_FAULT: Final = (
-    f"{_HELD}; no manual names it: recover() waits, reset() may clear it and DROPS the part"
+    f"{_STAYS_HELD}; no manual names it: recover() waits, reset() may clear it and DROPS the part"
 )
 OTHER_FAULTS: Final = {
     Fault.AUTOMATIC_RELEASE: "all axes OPEN slowly and DROP the part; halt() ends it, by a reset",

@@ -7,7 +7,7 @@ fingers. It passes calls with :meth:`~asyncio.loop.call_soon_threadsafe` and wai
 
 # Theory of operation
 #
-# There is at most one loop (_Server): a thread that wants to start one takes _starting, and finds the one
+# There is at most one loop (_ServingLoop): a thread that wants to start one takes _starting, and finds one
 # that came first. A call is passed to the loop, and then one of three things happens:
 #
 #   it begins      as a task, whose end wakes its caller
@@ -56,7 +56,7 @@ class LoopThread:
         """Start without a thread; also after a fork, because the parent's thread is not in this process."""
         self.is_closing = False  # whether the program ends
         self._starting = threading.Lock()  # taken only by loop threads, which Ctrl-C cannot interrupt
-        self._server: _Server | None = None
+        self._server: _ServingLoop | None = None
 
     def close(self) -> None:
         """The program ends: no hand may start any more."""
@@ -106,7 +106,7 @@ class LoopThread:
         if sys.is_finalizing():
             # The thread has stopped and no other can start: this call would never end.
             raise RuntimeError("the interpreter is ending: a blocking hand takes no calls now")
-        call = _Call(function)
+        call = _ThreadedCall(function)
         try:
             task = self._made(call, limit)
         except LateError:
@@ -119,7 +119,7 @@ class LoopThread:
         finally:
             del call, task  # a kept exception must not keep the call alive
 
-    def _made(self, call: _Call[T], limit: float | None) -> asyncio.Task[T]:
+    def _made(self, call: _ThreadedCall[T], limit: float | None) -> asyncio.Task[T]:
         """Make a call; again if the loop ended before the call began."""
         until = None if limit is None else time.monotonic() + limit
         while True:
@@ -135,7 +135,7 @@ class LoopThread:
             if call.has_begun:  # do not make it twice
                 raise RuntimeError("the event loop of the hand has ended")
 
-    def _serving(self, call: _Call[Any]) -> _Server:
+    def _serving(self, call: _ThreadedCall[Any]) -> _ServingLoop:
         """Start the loop thread with a call, unless another thread starts it at this moment."""
         self.check_open()
         if patched := green_threads():
@@ -143,7 +143,7 @@ class LoopThread:
                 f"{patched} has replaced Python's threads, and a blocking hand needs a real one; nothing was "
                 "sent: use the hand in a process that is not patched, such as robotiq-async agent"
             )
-        answer: SimpleQueue[_Server | OSError] = SimpleQueue()
+        answer: SimpleQueue[_ServingLoop | OSError] = SimpleQueue()
         try:
             threading.Thread(target=self._serve, args=(call, answer), name=THREAD_NAME, daemon=True).start()
         except RuntimeError as error:
@@ -153,12 +153,12 @@ class LoopThread:
             raise RuntimeError(f"the event loop of the hand cannot be started: {server}") from server
         return server
 
-    def _serve(self, call: _Call[Any], answer: SimpleQueue[_Server | OSError]) -> None:
+    def _serve(self, call: _ThreadedCall[Any], answer: SimpleQueue[_ServingLoop | OSError]) -> None:
         with self._starting:
             server, is_new = self._server, False
             if server is None or server.loop.is_closed():
                 try:
-                    self._server = server = _Server(self._ended)
+                    self._server = server = _ServingLoop(self._ended)
                 except OSError as error:
                     answer.put(error)
                     return
@@ -169,11 +169,11 @@ class LoopThread:
         if is_new:
             server.run()
 
-    def _ended(self, server: _Server) -> None:
+    def _ended(self, server: _ServingLoop) -> None:
         if self._server is server:  # another thread replaces only a loop that has ended
             self._server = None
 
-    def _give_up(self, call: _Call[Any], interrupted: Function[None] | None) -> None:
+    def _give_up(self, call: _ThreadedCall[Any], interrupted: Function[None] | None) -> None:
         """Cancel a call whose caller was interrupted, and wait for its end."""
         call.give_up()
         server, settled = self._server, SimpleQueue[None]()
@@ -191,7 +191,7 @@ class LoopThread:
             log.warning("a call that was interrupted did not end within %g s, and still runs", GIVE_UP_S)
 
 
-class _Server:
+class _ServingLoop:
     """One event loop, from its first call to the end of its last. All its methods run in the loop.
 
     ``ended`` is called when no task is left.
@@ -200,7 +200,7 @@ class _Server:
         OSError: no file descriptors are left.
     """
 
-    def __init__(self, ended: Callable[[_Server], None]) -> None:
+    def __init__(self, ended: Callable[[_ServingLoop], None]) -> None:
         self.loop: Final = asyncio.new_event_loop()
         self._ended = ended
         self._is_ending = False
@@ -218,14 +218,16 @@ class _Server:
         self._is_ending = True
         self._ended(self)
 
-    def begin(self, call: _Call[Any]) -> None:
+    def begin(self, call: _ThreadedCall[Any]) -> None:
         """Begin a call, or refuse it if the loop is ending."""
         if self._is_ending:
             call.refuse()
         elif not call.is_given_up:
             call.begin()
 
-    def give_up(self, call: _Call[Any], then: Function[None] | None, settled: SimpleQueue[None]) -> None:
+    def give_up(
+        self, call: _ThreadedCall[Any], then: Function[None] | None, settled: SimpleQueue[None]
+    ) -> None:
         """Cancel a call if it has begun, call ``then``, and signal ``settled`` when both have ended."""
 
         async def give_up() -> None:
@@ -243,7 +245,7 @@ class _Server:
         task.add_done_callback(self._giving_up.discard)
 
 
-class _Call(Generic[T]):
+class _ThreadedCall(Generic[T]):
     """A call and its result."""
 
     def __init__(self, function: Function[T]) -> None:

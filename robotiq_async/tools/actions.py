@@ -274,7 +274,7 @@ async def _permit(operator: Operator) -> str:
     return await operator.permit(operator.hand.inhibited)
 
 
-_ALL: Final = (
+_IN_ORDER: Final = (
     Action("open", "open the fingers", _open),
     Action("close", "close the fingers", _close),
     Action("wide", "B and C furthest apart", _width(WIDTH_WIDE)),
@@ -313,5 +313,5 @@ _ALL: Final = (
         warning="A major fault needs a reset and an activation: what it holds DROPS, the fingers MOVE.",
     ),
 )
-ACTIONS: Final = MappingProxyType({action.name: action for action in _ALL})
+ACTIONS: Final = MappingProxyType({action.name: action for action in _IN_ORDER})
 """The actions by name."""

@@ -152,7 +152,7 @@ class _Handler(MetricsHandler):
     timeout = IDLE_S
 
 
-class _Server(ThreadingMixIn, TCPServer):
+class _ScrapeServer(ThreadingMixIn, TCPServer):
     """Answers scrapes, each in a thread.
 
     It runs in the process of the hands. So it limits the threads and files that strangers can use up, which
@@ -210,7 +210,7 @@ async def serve_metrics(
     port = check_int("port", port, 0, 65535)
     registry = CollectorRegistry()
     registry.register(HandCollector(hands))
-    server = _Server(host, port, registry)
+    server = _ScrapeServer(host, port, registry)
     thread = threading.Thread(target=server.serve_forever, daemon=True, name="robotiq_async metrics")
     try:
         thread.start()

@@ -43,9 +43,9 @@ VIEWER_PORT: Final = 8765
 STATE_TOPIC: Final = json_topic("state", SCHEMAS["state"])
 _TIME: Final = {"title": "time", **object_schema(sec=INTEGER, nsec=INTEGER)}
 _XYZ: Final = object_schema(**dict.fromkeys("xyz", NUMBER))
-_TURN: Final = object_schema(**dict.fromkeys("xyzw", NUMBER))
+_QUATERNION: Final = object_schema(**dict.fromkeys("xyzw", NUMBER))
 _SOLID: Final = object_schema(
-    pose=object_schema(position=_XYZ, orientation=_TURN),
+    pose=object_schema(position=_XYZ, orientation=_QUATERNION),
     size=_XYZ,
     color=object_schema(**dict.fromkeys("rgba", NUMBER)),
     bottom_scale=NUMBER,
@@ -139,7 +139,7 @@ class Viewer:
             name=f"robotiq_async: {title(self._hand)}",
             host=self.host,
             port=self.port,
-            server_listener=_Listener(self._describe),
+            server_listener=_SubscriptionListener(self._describe),
             context=self._context,
         )
 
@@ -176,7 +176,7 @@ class Viewer:
             await asyncio.sleep(STATE_S)
 
 
-class _Listener(ServerListener):
+class _SubscriptionListener(ServerListener):
     """Reports subscriptions to the description; the server calls it in a thread."""
 
     def __init__(self, describe: Callable[[], None]) -> None:

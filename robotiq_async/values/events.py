@@ -73,7 +73,7 @@ class SentRequest:
             "mode": request.mode.name,
             "individual_fingers": request.individual_fingers,
             "individual_scissor": request.individual_scissor,
-            **{str(axis.name): asdict(asked) for axis, asked in request.by_axis},
+            **{str(axis.name): asdict(wanted) for axis, wanted in request.by_axis},
         }
 
     def as_raw(self) -> dict[str, Any]:

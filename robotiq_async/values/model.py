@@ -201,7 +201,7 @@ THREE_FINGER: Final = Model(
 )
 """The 3-Finger gripper (S-Model): the default everywhere."""
 
-_JAW: Final = (Finger.A,)
+_JAW_AXES: Final = (Finger.A,)
 _ADAPTIVE_FAULTS: Final = tuple(Fault.adaptive(code) for code in range(16))
 # No model of these speaks Modbus TCP (but for the retired universal controller): a gateway passes on the
 # registers of the serial line. The vendor's software reads with function 3, newer manuals list 4 and 23.
@@ -220,7 +220,7 @@ def _with_jaw(
     return Model(
         name=name,
         title=title,
-        axes=_JAW,
+        axes=_JAW_AXES,
         object_status=(reg.gOBJ,),
         faults=_ADAPTIVE_FAULTS,
         tcp=_GATEWAY,

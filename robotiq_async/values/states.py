@@ -50,8 +50,8 @@ def _all(triggers: tuple[Trigger, ...], entry: State | Verdict) -> Row:
 # First rule: the outcome of a call wherever the link is up, in _row(). Second: the condition that a status
 # shows leads to its state, wherever no procedure runs, in SEEN. Third: a hand that is off refuses, in _OFF.
 _STOPS: Final = (Trigger.ASK_HOLD, Trigger.ASK_HALT)
-_MOTIONS: Final = (Trigger.ASK_ACTIVATE, Trigger.ASK_COMMAND)
-_USER: Final = (*_MOTIONS, *_STOPS, Trigger.ASK_RELEASE, Trigger.ASK_RESET, Trigger.HALT_RESETS)
+_STARTING: Final = (Trigger.ASK_ACTIVATE, Trigger.ASK_COMMAND)
+_USER: Final = (*_STARTING, *_STOPS, Trigger.ASK_RELEASE, Trigger.ASK_RESET, Trigger.HALT_RESETS)
 SEEN: Final = {
     Trigger.SEEN_READY: State.RUNNING_IDLE,
     Trigger.SEEN_BUSY: State.WF_ACTIVATION,
@@ -60,12 +60,12 @@ SEEN: Final = {
     Trigger.SEEN_FAULT: State.FAULT,
     Trigger.SEEN_RELEASED: State.ATR_DONE,
 }
-_SEEN: Final[Row] = {**SEEN}  # the same as a Row: the types of a dictionary are its own
-_RUNNING: Final[Row] = _SEEN | {
+_AS_SEEN: Final[Row] = {**SEEN}  # the same as a Row: the types of a dictionary are its own
+_WHILE_RUNNING: Final[Row] = _AS_SEEN | {
     Trigger.ASK_ACTIVATE: Verdict.IGNORED,
     **_all((Trigger.ASK_COMMAND, *_STOPS), State.RUNNING_CC),
 }
-_FAULTY: Final[Row] = _SEEN | _all(_MOTIONS, Verdict.IN_FAULT)
+_FAULTY: Final[Row] = _AS_SEEN | _all(_STARTING, Verdict.IN_FAULT)
 
 
 def _row(entries: Row) -> Row:
@@ -87,7 +87,7 @@ _OFF: Final[Row] = _row(
 
 TABLE: Final[dict[State, Row]] = {
     State.DISCONNECTED: _row(
-        _SEEN
+        _AS_SEEN
         | _all(_USER, Verdict.LINK_DOWN)
         | {Trigger.ASK_START: State.DISCONNECTED, Trigger.ACTIVATES: State.DO_ACTIVATION}
     ),
@@ -96,15 +96,15 @@ TABLE: Final[dict[State, Row]] = {
     State.DO_ACTIVATION: _row(
         {Trigger.ASK_ACTIVATE: Verdict.IGNORED, Trigger.DELIVERED: State.WF_ACTIVATION}
     ),
-    State.WF_ACTIVATION: _row(_SEEN | {Trigger.ASK_ACTIVATE: Verdict.IGNORED}),
-    State.RUNNING_IDLE: _row(_RUNNING),
+    State.WF_ACTIVATION: _row(_AS_SEEN | {Trigger.ASK_ACTIVATE: Verdict.IGNORED}),
+    State.RUNNING_IDLE: _row(_WHILE_RUNNING),
     State.RUNNING_CC: _row(
-        _RUNNING | {Trigger.SEEN_READY: State.RUNNING_CC, Trigger.DELIVERED: State.RUNNING_IDLE}
+        _WHILE_RUNNING | {Trigger.SEEN_READY: State.RUNNING_CC, Trigger.DELIVERED: State.RUNNING_IDLE}
     ),
     # Holds and halts are sent in a fault: no motion may resume when a minor one clears [manual 2012, 4.7].
     State.FAULT: _row(_FAULTY | _all(_STOPS, State.FAULT) | {Trigger.ASK_RELEASE: State.DO_ATR}),
     State.DO_ATR: _row({Trigger.DELIVERED: State.WF_ATR}),
-    State.WF_ATR: _row(_SEEN),
+    State.WF_ATR: _row(_AS_SEEN),
     State.ATR_DONE: _row(_FAULTY | {Trigger.ASK_HALT: Verdict.IGNORED}),
     State.DO_RESET: _row(
         _all((Trigger.ASK_HALT, Trigger.HALT_RESETS, Trigger.ASK_RESET), Verdict.IGNORED)
@@ -113,7 +113,7 @@ TABLE: Final[dict[State, Row]] = {
     # A fault may show for a device cycle after the reset was written: only the reset itself counts.
     State.WF_RESET: _row({Trigger.SEEN_RESET: State.RESET}),
     State.RESET: _row(
-        _SEEN
+        _AS_SEEN
         | {
             Trigger.ASK_ACTIVATE: State.DO_ACTIVATION,
             Trigger.ASK_COMMAND: Verdict.NOT_ACTIVATED,

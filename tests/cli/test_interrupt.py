@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from robotiq_async.cli.run import _Signals
+from robotiq_async.cli.run import _EndingSignals
 from robotiq_async.simulator import SimulatedGripper, SimulatorServer, Trouble
 from robotiq_async.values.request import Request
 from tests import conftest
@@ -121,7 +121,7 @@ def test_a_late_ctrl_c_ends_a_command_that_does_not_end() -> None:
             with contextlib.suppress(asyncio.CancelledError):
                 await asyncio.sleep(60)
 
-    with _Signals(insist_s=0.0) as signals, pytest.raises(KeyboardInterrupt):
+    with _EndingSignals(insist_s=0.0) as signals, pytest.raises(KeyboardInterrupt):
         signals.run(deaf())
 
 

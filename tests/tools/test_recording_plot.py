@@ -25,7 +25,7 @@ from robotiq_async.tools.measure.recording_plot import (
     GAP,
     PIXELS,
     PLOT_ROWS,
-    ROW,
+    ROW_HEIGHT,
     WIDTH_ALONE,
     draw,
     placed_labels,
@@ -328,7 +328,7 @@ def test_labels_take_as_many_rows_as_they_need_and_no_third_of_the_picture() -> 
     many = [Event(each / 10, "X" * LONGEST_LABEL, False) for each in range(20)]
     close = placed_labels(many, 0.0, 10.0, LETTER)
     assert {each.row for each in close} == set(range(PLOT_ROWS))
-    assert ROW * PLOT_ROWS / (ROW * PLOT_ROWS + 5) < 0.2
+    assert ROW_HEIGHT * PLOT_ROWS / (ROW_HEIGHT * PLOT_ROWS + 5) < 0.2
     whole = [each for each in close if not each.words.endswith("…")]
     assert len(whole) == PLOT_ROWS, "the last one of each row"
     for row in range(PLOT_ROWS):

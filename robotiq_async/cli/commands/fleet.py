@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 PERMIT_WARNING = "If motion is permitted again, a program may MOVE its fingers at once."
 DISCOVERY_S = 1.5
 """Seconds to collect: agents publish a summary of each gripper once a second."""
-_ROW = "{:<27} {:<13} {:<6} {:<17} {}"  # 80 columns, unless a name is long
+_ROW_FORMAT = "{:<27} {:<13} {:<6} {:<17} {}"  # 80 columns, unless a name is long
 
 Site = Annotated[str | None, Parameter(help="The site's name; all sites without it.")]
 
@@ -64,7 +64,7 @@ async def fleet(
     async with seen:
         await asyncio.sleep(DISCOVERY_S)
         if not as_json:
-            print(_ROW.format("GRIPPER", "STATE", "FAULT", "COMMANDED BY", "AGE, PROBLEM"))
+            print(_ROW_FORMAT.format("GRIPPER", "STATE", "FAULT", "COMMANDED BY", "AGE, PROBLEM"))
         if watch:
             await _watch(seen, show)
             return
@@ -167,7 +167,7 @@ def _print_row(member: Member) -> None:
     problem += "; ".join(filter(None, (member.inhibited, member.problem)))
     age = "-" if member.seen_at is None else f"{now() - member.seen_at:.1f} s"
     words = f"{age} {problem}".rstrip()
-    row = _ROW.format(str(member.name), state, fault, member.holder or "-", words)
+    row = _ROW_FORMAT.format(str(member.name), state, fault, member.holder or "-", words)
     print(printable(row.rstrip()), flush=True)
 
 

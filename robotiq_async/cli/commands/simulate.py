@@ -145,7 +145,7 @@ async def simulate(
         grippers = [made(kind) for kind in _of_each(kinds, units)]
         for each in grippers:
             _place(each, object_, fixed=fixed)
-        wire = _Wire(port, host, serial, rtu_over_tcp=rtu_over_tcp, urcap=urcap, paced=not unpaced)
+        wire = _ServedLink(port, host, serial, rtu_over_tcp=rtu_over_tcp, urcap=urcap, paced=not unpaced)
         server = wire.server(grippers, units)
         server.fault_injector.check(plan)
     if serial is None and not is_loopback(host):
@@ -191,7 +191,7 @@ async def _play(server: SimulatorServer | SerialSimulatorServer, plan: Sequence[
 
 
 @dataclass(frozen=True, slots=True)
-class _Wire:
+class _ServedLink:
     """The kind of link, and its place."""
 
     port: int

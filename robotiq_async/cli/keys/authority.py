@@ -17,7 +17,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 DAYS_MAX: Final = 36500
 _SKEW: Final = timedelta(days=1)
 """Certificates are valid from this long ago: the clocks of other machines may be behind."""
-_LABELS: Final = re.compile(
+_HOST_NAME: Final = re.compile(
     r"(?=.{1,253}$)[A-Za-z0-9_]([A-Za-z0-9_-]{0,62})(\.[A-Za-z0-9_][A-Za-z0-9_-]{0,62})*"
 )
 
@@ -90,7 +90,7 @@ def check_host(host: str) -> x509.GeneralName:
     try:
         return x509.IPAddress(ip_address(host))
     except ValueError:
-        if not _LABELS.fullmatch(host) or re.fullmatch(r"[0-9.]+", host):
+        if not _HOST_NAME.fullmatch(host) or re.fullmatch(r"[0-9.]+", host):
             raise ValueError(f"a host must be a name or an IP address, got {host!r}") from None
         return x509.DNSName(host)
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 NO_VALUE: Final = "-"
 """The text for a state without a meaning."""
-_NAMES: Final = [str(axis.name) for axis in Finger.ALL]
+_AXIS_NAMES: Final = [str(axis.name) for axis in Finger.ALL]
 
 
 def clock(seconds: float) -> str:
@@ -31,7 +31,7 @@ def clock(seconds: float) -> str:
 
 
 def _axes_in(fields: Properties) -> list[str]:
-    return [name for name in _NAMES if name == "A" or name in fields]  # a sibling has A alone
+    return [name for name in _AXIS_NAMES if name == "A" or name in fields]  # a sibling has A alone
 
 
 def _title(name: str, fields: Properties) -> str:

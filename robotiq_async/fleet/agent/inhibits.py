@@ -12,7 +12,7 @@ from ..wire.envelope import AgentCall
 from ..wire.values import LABEL_MAX, Fields, label_of
 
 _NONE: Final = Inhibit("none", "", 0.0)
-_UNREADABLE: Final = Inhibit("the record of an inhibit cannot be read", "", 0.0)
+_UNREADABLE_RECORD: Final = Inhibit("the record of an inhibit cannot be read", "", 0.0)
 
 
 class Inhibits:
@@ -29,7 +29,7 @@ class Inhibits:
 
     def resume(self, record: object) -> None:
         """Continue an inhibit of the run before. One that cannot be read counts as well."""
-        self._hand.resume_inhibit(_read(record, _UNREADABLE))
+        self._hand.resume_inhibit(_read(record, _UNREADABLE_RECORD))
 
     def halted(self, call: AgentCall) -> Inhibit | None:
         """Inhibit motion in this turn, if a halt requests it. Nothing malformed keeps it from halting."""

@@ -33,7 +33,7 @@ from ..wire.settings import (
 )
 from ..wire.values import Fields
 
-_CLIENTS: Final = 64  # clients whose settings are kept; any program can make up clients
+_MOST_KEPT: Final = 64  # clients whose settings are kept; any program can make up clients
 
 
 class KeptSettings:
@@ -65,18 +65,18 @@ class KeptSettings:
         self._of[self._holder] = dict(settings)
         self._changed()
 
-    def ask(self, asked: Mapping[Setting, int]) -> None:
+    def ask(self, settings: Mapping[Setting, int]) -> None:
         """A command of this turn requests these: give the axes that it moves the holder's other settings."""
-        self._ordered |= settings_of(asked)
-        for axis in moved_by(asked) & self._hand.model.all_axes:
+        self._ordered |= settings_of(settings)
+        for axis in moved_by(settings) & self._hand.model.all_axes:
             own = {what: self._own(axis, what) for what in SETTINGS if self._is_missing((axis, what))}
             if own:
                 with suppress(RobotiqError):  # the hand refuses the command, too
                     self._hand.command(axis, **own)
 
-    def end(self, asked: Mapping[Setting, int], *, is_done: bool) -> None:
+    def end(self, settings: Mapping[Setting, int], *, is_done: bool) -> None:
         """A command has ended: its values were carried out, or are no longer on their way."""
-        ended = {each: value for each, value in asked.items() if self._ordered.get(each) == value}
+        ended = {each: value for each, value in settings.items() if self._ordered.get(each) == value}
         if is_done:
             self._keep(ended)
         else:
@@ -98,7 +98,7 @@ class KeptSettings:
         if settings:
             self._ordered = {each: value for each, value in self._ordered.items() if each not in settings}
             self._of[self._holder] = {**self._of.pop(self._holder, {}), **settings}
-            if len(self._of) > _CLIENTS:
+            if len(self._of) > _MOST_KEPT:
                 del self._of[next(iter(self._of))]
             self._has |= settings.keys()
             self._changed()

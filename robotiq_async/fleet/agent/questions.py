@@ -10,7 +10,7 @@ from ..limited_log import LimitedLog
 from ..network.bus import MessageKind
 
 EACH: Final = 100.0  # questions a second of one client; fetching missed events takes 50
-_CLIENTS: Final = 1000  # Clients with a budget of their own. The least recent one is forgotten
+_MOST_CLIENTS: Final = 1000  # Clients with a budget of their own. The least recent one is forgotten
 
 
 class AgentQuestions:
@@ -44,6 +44,6 @@ class AgentQuestions:
         left = min(EACH, left + (now - at) * EACH)
         is_within = left >= 1
         self._left[client] = left - is_within, now
-        if len(self._left) > _CLIENTS:
+        if len(self._left) > _MOST_CLIENTS:
             del self._left[next(iter(self._left))]
         return is_within

@@ -23,7 +23,7 @@ from ..wire.names import GripperName
 from ..wire.values import Fields
 
 KEPT_S: Final = 0.1  # seconds that the answer to a halt waits for its record at most; a disk may stall
-_UNREADABLE: Final = "cannot be read"  # no inhibit, and not None
+_NOT_READABLE: Final = "cannot be read"  # no inhibit, and not None
 _BOOT: Final = Path("/proc/sys/kernel/random/boot_id")
 
 
@@ -55,7 +55,7 @@ class Records:
         Of a record that cannot be read, something that is no inhibit.
         """
         record = self._stored(name)
-        return _UNREADABLE if record is None else record.get("inhibited")
+        return _NOT_READABLE if record is None else record.get("inhibited")
 
     def _stored(self, name: GripperName) -> Fields | None:
         # Empty if there is none, None if it cannot be read.

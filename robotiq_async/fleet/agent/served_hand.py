@@ -375,9 +375,9 @@ class ServedHand:
     async def _set(self, job: Job, axes: Fields) -> Fields:
         """Like :meth:`RobotiqHand.command`, for several axes at once."""
         mask = self._hand.model.mask  # all are checked before the first takes effect
-        asked = {mask(int(each)): check_changes(changes) for each, changes in axes.items()}
+        by_axes = {mask(int(each)): check_changes(changes) for each, changes in axes.items()}
         self._settings.ask(job.carries)
-        for fingers, changes in asked.items():
+        for fingers, changes in by_axes.items():
             self._hand.command(fingers, **changes)
         self._fingers.are_commanded(moved_by(job.carries))
         return {}

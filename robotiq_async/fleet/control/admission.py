@@ -12,7 +12,7 @@ from ..errors import AgentError, ControlLostError
 from ..wire.envelope import AgentCall
 from .lease import Holder, Lease
 
-_CLIENTS: Final = 1000
+_MOST_CLIENTS: Final = 1000
 """Clients whose last request for the lease is kept, to recognize repetitions. Bounds the memory: any program
 can make up clients."""
 
@@ -51,7 +51,7 @@ class Admission:
         """
         before = self._by_client.pop(call.client, -1)
         self._by_client[call.client] = max(before, call.number)
-        if len(self._by_client) > _CLIENTS:
+        if len(self._by_client) > _MOST_CLIENTS:
             del self._by_client[next(iter(self._by_client))]
         if call.number > before:
             return False

@@ -16,8 +16,8 @@ LEASE_WINDOW_S: Final = 1.0
 """Seconds that a lease lasts beyond the newest stamp that its holder has proven to have received."""
 WINDOW_MIN_S: Final = 0.1
 WINDOW_MAX_S: Final = 10.0
-_KEPT: Final = 64  # leases whose reason for ending is kept
-_RUNS: Final = 64  # runs of the agent that are kept: a client may reacquire a lease of one of these
+_ENDS_KEPT: Final = 64  # leases whose reason for ending is kept
+_RUNS_KEPT: Final = 64  # runs of the agent that are kept: a client may reacquire a lease of one of these
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ class Lease:
         holder, self.holder = self.holder, None
         if holder is not None:
             self._ends[self.number] = reason
-            self._ends.pop(self.number - _KEPT, None)
+            self._ends.pop(self.number - _ENDS_KEPT, None)
             self.number += 1
             self._changed()
         return holder
@@ -115,7 +115,7 @@ class Lease:
         """Continue from the record of an earlier run. KeyError, TypeError, ValueError: it is malformed."""
         number, (barred, reason) = int(record["number"]), record["barred"]
         runs = tuple(int(run) for run in record["runs"])
-        self.runs = (*runs, *self.runs)[-_RUNS:]
+        self.runs = (*runs, *self.runs)[-_RUNS_KEPT:]
         # The lease that was held at the end of that run ended with it.
         self.number, self._barred = number + 1, (int(barred), str(reason))
 

@@ -14,7 +14,7 @@ from .configuration import LOOPBACK_ENDPOINT, LOOPBACK_TLS, client_configuration
 ROUTE_FORM: Final = "zenoh://SITE/HOST/GRIPPER[?connect=tls/HOST:7447][&keys=FOLDER]"
 CONNECT_VARIABLE: Final = "ROBOTIQ_ASYNC_CONNECT"
 KEYS_VARIABLE: Final = "ROBOTIQ_ASYNC_KEYS"
-_OPTIONS: Final = frozenset({"connect", "keys", "insecure"})
+_ROUTE_OPTIONS: Final = frozenset({"connect", "keys", "insecure"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ def parse_remote_address(address: object) -> tuple[GripperName, Route]:
         pairs = parse_qsl(query, strict_parsing=True) if query else []
     except ValueError as error:
         raise _malformed(address, str(error)) from None
-    unknown = [option for option, _ in pairs if option not in _OPTIONS]
+    unknown = [option for option, _ in pairs if option not in _ROUTE_OPTIONS]
     if unknown:
         raise _malformed(address, f"no option {unknown[0]!r}")
     usual = default_route()

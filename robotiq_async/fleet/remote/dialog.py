@@ -230,18 +230,18 @@ class Dialog:
 
     def flush(self) -> None:
         """Send the waiting commands now, because another request follows."""
-        asked, self._oldest = self._oldest, None
+        oldest, self._oldest = self._oldest, None
         waiting, self._waiting = self._waiting, {}
-        if waiting and asked is not None and self._is_under_this_lease(asked):
+        if waiting and oldest is not None and self._is_under_this_lease(oldest):
             arguments = {"axes": {str(int(axis)): changes for axis, changes in waiting.items()}}
             # With the stamp of its first command: the time of waiting here counts like time in the network.
-            call = replace(self.call(arguments), seen=asked.seen)
+            call = replace(self.call(arguments), seen=oldest.seen)
             errand = self.post(call, "cmd/command", timeout=COMMAND_S)
             self._under_way += 1
             self.spawn(self._await(errand)).add_done_callback(lambda _: self._command_done())
 
-    def _is_under_this_lease(self, asked: AgentCall) -> bool:
-        return self.lease.is_held and (asked.epoch, asked.lease) == (self.mirror.epoch, self.lease.number)
+    def _is_under_this_lease(self, oldest: AgentCall) -> bool:
+        return self.lease.is_held and (oldest.epoch, oldest.lease) == (self.mirror.epoch, self.lease.number)
 
     def _command_done(self) -> None:
         self._under_way -= 1

@@ -102,8 +102,8 @@ class OwnSettings:
         self._known: dict[Setting, tuple[int, int | None]] = {}
         """By setting: the number of the newest request that was begun, and the value if that is certain."""
 
-    def note(self, number: int, asked: Mapping[Setting, int], begun: bool | None) -> None:
-        for setting, value in settings_of(asked).items():
+    def note(self, number: int, settings: Mapping[Setting, int], begun: bool | None) -> None:
+        for setting, value in settings_of(settings).items():
             if begun is not False and number > self._known.get(setting, (0, 0))[0]:
                 self._known[setting] = number, value if begun else None
 

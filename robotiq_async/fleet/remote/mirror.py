@@ -15,9 +15,9 @@ from ..limited_log import LimitedLog
 from ..wire.status_message import StatusMessage
 from ..wire.values import Fields, reading
 
-_RUNS: Final = 16  # runs of an agent whose clocks are kept
+_CLOCKS_KEPT: Final = 16  # runs of an agent whose clocks are kept
 DRIFT: Final = 200e-6  # drift between two clocks at most, in seconds per second
-_SEEN: Final = {
+_TRIGGER_OF: Final = {
     State.RUNNING_IDLE: Trigger.SEEN_READY,
     State.RUNNING_CC: Trigger.SEEN_READY,
     State.FAULT: Trigger.SEEN_FAULT,
@@ -244,7 +244,7 @@ class Mirror:
         # With the clock of an earlier run, late messages of that run are recognized as late.
         self.clock = self._clocks.pop(message.epoch) if message.epoch in self._clocks else AgentClock()
         self._clocks[message.epoch] = self.clock
-        while len(self._clocks) > _RUNS:
+        while len(self._clocks) > _CLOCKS_KEPT:
             del self._clocks[next(iter(self._clocks))]
         self.newest = None
         self._inhibit_stamp = -math.inf
@@ -260,7 +260,7 @@ class Mirror:
         if self.is_silent:
             self.is_silent = False
             # The state after the events, not of this status: the events up to it may still arrive.
-            self._report(self._events_state, _SEEN.get(self._events_state, Trigger.SEEN_BUSY), arrival)
+            self._report(self._events_state, _TRIGGER_OF.get(self._events_state, Trigger.SEEN_BUSY), arrival)
         if source is not state:
             self._entered(state)
 
@@ -302,7 +302,7 @@ class Mirror:
         self._events_state = target
         if not (self.is_silent or self._is_over):
             # Transitions in between, if any, are lost: the agent keeps only the newest events.
-            self._report(source, _SEEN.get(source, Trigger.SEEN_BUSY), at)
+            self._report(source, _TRIGGER_OF.get(source, Trigger.SEEN_BUSY), at)
             self._report(target, transition.trigger, at)
 
     def _report(self, state: State, trigger: Trigger, at: float) -> None:

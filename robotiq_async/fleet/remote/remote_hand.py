@@ -31,7 +31,7 @@ from .session import CONNECT_S, RemoteSession
 REMOTE_COMMAND_S: Final = 5.0  # seconds for commands that end with the acknowledgment of the gripper
 SEQUENCE_S: Final = 130.0
 MOVE_S: Final = 100.0  # without a timeout
-_SECONDS: Final = {"move": MOVE_S} | dict.fromkeys(("activate", "reset", "atr", "recover"), SEQUENCE_S)
+_LIMIT_S: Final = {"move": MOVE_S} | dict.fromkeys(("activate", "reset", "atr", "recover"), SEQUENCE_S)
 """For the answer to a command; the agent's own limits are shorter."""
 SLACK_S: Final = 5.0  # seconds beyond a timeout that the agent applies
 
@@ -287,7 +287,7 @@ class RemoteHand(Hand):
     async def _ask(self, name: str, **arguments: Any) -> Fields:  # noqa: ANN401  # any JSON
         """Have the agent carry out a command; if this call is cancelled, cancel the command there."""
         timeout = arguments.get("timeout")
-        seconds = _SECONDS.get(name, REMOTE_COMMAND_S) if timeout is None else timeout + SLACK_S
+        seconds = _LIMIT_S.get(name, REMOTE_COMMAND_S) if timeout is None else timeout + SLACK_S
         session = self._running_session()
         dialog = session.dialog
         if self._control is None and not dialog.lease.is_held and dialog.lease.lost is None:

@@ -12,7 +12,7 @@ from ..errors import AgentError, ControlLostError
 from .names import VERSION, other_version
 from .values import Fields, ReadStatus, error_fields, label_of, read_error
 
-_LONGEST: Final = 64 * 1024
+_MOST_BYTES: Final = 64 * 1024
 _INTEGERS: Final = ("epoch", "lease", "number", "after")
 
 
@@ -148,7 +148,7 @@ def _pack(message: AgentCall | AgentAnswer) -> bytes:
 
 def _object(what: str, data: bytes) -> Fields:
     try:
-        fields = json.loads(data) if len(data) <= _LONGEST else None
+        fields = json.loads(data) if len(data) <= _MOST_BYTES else None
     except (ValueError, RecursionError) as error:
         raise ProtocolError(f"not {what}: {data[:200]!r}") from error
     if not isinstance(fields, dict):

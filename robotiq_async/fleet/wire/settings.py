@@ -26,10 +26,10 @@ COMMANDS: Final[Mapping[str, frozenset[str]]] = {
 """The methods of a hand that the holder of a lease may call, and ``command`` for several axes at once, with
 their arguments. Clients convert other amounts to counts: the agent restores the counts that it saw."""
 SETTINGS: Final = ("speed", "force")
-_ALL: Final = ("position", *SETTINGS)
+_SETTABLE: Final = ("position", *SETTINGS)
 Setting = tuple[Finger, str]
 """One axis, and "position", "speed" or "force"."""
-_USUAL: Final = {"move": 7}  # the axes of a command that names none; 15 of all others
+_USUAL_FINGERS: Final = {"move": 7}  # the axes of a command that names none; 15 of all others
 
 
 def asked_of(name: str, arguments: Mapping[str, Any]) -> dict[Setting, int]:
@@ -38,40 +38,42 @@ def asked_of(name: str, arguments: Mapping[str, Any]) -> dict[Setting, int]:
         changes = arguments.get("axes", {})
     else:
         what = name.removeprefix("set_")
-        asked = arguments if name == "move" else {what: arguments.get("value")} if what in _ALL else {}
-        changes = {str(arguments.get("fingers", _USUAL.get(name, 15))): asked}
+        settings = (
+            arguments if name == "move" else {what: arguments.get("value")} if what in _SETTABLE else {}
+        )
+        changes = {str(arguments.get("fingers", _USUAL_FINGERS.get(name, 15))): settings}
     try:
-        return dict(_by_axis(changes, _ALL))
+        return dict(_by_axis(changes, _SETTABLE))
     except (AttributeError, TypeError, ValueError):
         return {}
 
 
 def check_changes(changes: Mapping[str, Any]) -> Mapping[str, int]:
-    """The changes of an axis: TypeError or ValueError unless they are some of _ALL in counts."""
-    if not changes or changes.keys() - {*_ALL}:
+    """The changes of an axis: TypeError or ValueError unless they are some of _SETTABLE in counts."""
+    if not changes or changes.keys() - {*_SETTABLE}:
         raise TypeError(f"requests are in counts, got {', '.join(changes) or 'none'}")
     return {what: check_byte(what, value) for what, value in changes.items()}
 
 
-def moved_by(asked: Mapping[Setting, int]) -> Finger:
+def moved_by(settings: Mapping[Setting, int]) -> Finger:
     """The axes that are sent to a position."""
-    return Finger(sum({axis for axis, what in asked if what == "position"}))
+    return Finger(sum({axis for axis, what in settings if what == "position"}))
 
 
-def settings_of(asked: Mapping[Setting, int]) -> dict[Setting, int]:
-    return {each: value for each, value in asked.items() if each[1] in SETTINGS}
+def settings_of(settings: Mapping[Setting, int]) -> dict[Setting, int]:
+    return {each: value for each, value in settings.items() if each[1] in SETTINGS}
 
 
 def settings_in(sent: SentRequest) -> dict[Setting, int]:
     axes = sent.request.by_axis
-    return {(axis, what): getattr(asked, what) for axis, asked in axes for what in SETTINGS}
+    return {(axis, what): getattr(settings, what) for axis, settings in axes for what in SETTINGS}
 
 
-def is_in(asked: Mapping[Setting, int], sent: SentRequest) -> bool:
+def is_in(settings: Mapping[Setting, int], sent: SentRequest) -> bool:
     """Whether a written image has all of it, for the axes that the gripper has."""
     axes = dict(sent.request.by_axis)
     return all(
-        axis not in axes or getattr(axes[axis], what) == value for (axis, what), value in asked.items()
+        axis not in axes or getattr(axes[axis], what) == value for (axis, what), value in settings.items()
     )
 
 

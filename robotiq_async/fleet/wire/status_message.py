@@ -16,9 +16,9 @@ from .names import VERSION, other_version
 _LAYOUT: Final = struct.Struct("<BBBBIIIQQdf8H")
 SIZE: Final = _LAYOUT.size
 _STATES: Final = tuple(State)
-_MODELS: Final = tuple(MODELS.values())
+_MODEL_ORDER: Final = tuple(MODELS.values())
 _PLACES: Final = {state: place for place, state in enumerate(_STATES)}
-_READ, _MOVES, _HELD, _NO_CURRENT = 1, 2, 4, 8
+_READ_BIT, _MOVES_BIT, _HELD_BIT, _NO_CURRENT_BIT = 1, 2, 4, 8
 _NO_REGISTERS: Final[tuple[int, ...]] = (0,) * 8
 
 
@@ -49,11 +49,11 @@ class StatusMessage(NamedTuple):
 
     def pack(self) -> bytes:
         mark, epoch, stamp, state, lease, is_held, events, is_moving, status = self
-        flags = _MOVES * is_moving | _HELD * is_held
+        flags = _MOVES_BIT * is_moving | _HELD_BIT * is_held
         model, sequence, age, registers = 0, 0, 0.0, _NO_REGISTERS
         if status is not None:
-            flags |= _READ | _NO_CURRENT * (not status.has_current)
-            model, registers = _MODELS.index(status.model), status.registers
+            flags |= _READ_BIT | _NO_CURRENT_BIT * (not status.has_current)
+            model, registers = _MODEL_ORDER.index(status.model), status.registers
             sequence, age = status.sequence, stamp - status.timestamp
         return _LAYOUT.pack(
             *(VERSION, _PLACES[state], flags, model),
@@ -77,17 +77,17 @@ def unpack(data: bytes) -> StatusMessage:
     )
     if place >= len(_STATES):
         raise ProtocolError(f"a status in a state that does not exist: {place}")
-    if model >= len(_MODELS):
+    if model >= len(_MODEL_ORDER):
         raise ProtocolError(f"a status of a model that does not exist: {model}")
     if not (isfinite(stamp) and isfinite(age)):
         # The client returns the newest stamp with every request and ignores older ones: an infinite stamp
         # would block all that follow.
         raise ProtocolError(f"a status with an impossible time: {stamp}, {age} s old")
     status = None
-    if flags & _READ:
-        has_current = not flags & _NO_CURRENT
+    if flags & _READ_BIT:
+        has_current = not flags & _NO_CURRENT_BIT
         status = RobotiqStatus(
-            tuple(registers), stamp - age, sequence, _MODELS[model], has_current=has_current
+            tuple(registers), stamp - age, sequence, _MODEL_ORDER[model], has_current=has_current
         )
     return StatusMessage(
         mark=mark,
@@ -95,8 +95,8 @@ def unpack(data: bytes) -> StatusMessage:
         stamp=stamp,
         state=_STATES[place],
         lease=lease,
-        is_held=bool(flags & _HELD),
+        is_held=bool(flags & _HELD_BIT),
         events=events,
-        is_moving=bool(flags & _MOVES),
+        is_moving=bool(flags & _MOVES_BIT),
         status=status,
     )

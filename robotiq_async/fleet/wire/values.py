@@ -47,7 +47,7 @@ def _kinds(kind: type[RobotiqError]) -> Iterator[type[RobotiqError]]:
         yield from _kinds(each)
 
 
-_KINDS: Final[Mapping[str, type[Exception]]] = {
+_ERROR_KINDS: Final[Mapping[str, type[Exception]]] = {
     **{each.__name__: each for each in _kinds(RobotiqError)},
     "TypeError": TypeError,
     "ValueError": ValueError,
@@ -67,7 +67,7 @@ _WRITTEN: Final[Mapping[str, Callable[[Any], object]]] = {
     "fault": lambda fault: fault.value,  # a gripper may report one that has no name
     "status": lambda status: status.as_raw(),
 }
-_READ: Final[Mapping[str, Callable[[Any], object]]] = {
+_READERS: Final[Mapping[str, Callable[[Any], object]]] = {
     "state": lambda name: State[name],
     "allowed": lambda names: frozenset(State[name] for name in names),
     "fault": lambda code: Fault(tuple(code) if isinstance(code, list) else code),  # type: ignore[arg-type]
@@ -100,7 +100,7 @@ def read_error(fields: Fields, read_status: ReadStatus) -> Exception:
 
 
 def _error(fields: Fields, read_status: ReadStatus) -> Exception:
-    kind, message = _KINDS.get(fields["kind"]), words(fields["message"])
+    kind, message = _ERROR_KINDS.get(fields["kind"]), words(fields["message"])
     if kind is None:
         return AgentError(f"{words(fields['kind'])}: {message}")
     error: Exception = kind.__new__(kind)
@@ -108,6 +108,6 @@ def _error(fields: Fields, read_status: ReadStatus) -> Exception:
     names = [*_ATTRIBUTES.get(fields["kind"], ())]
     if issubclass(kind, RobotiqError) and "advice" in fields:
         names.append("advice")
-    read = {**_READ, "status": read_status}
+    read = {**_READERS, "status": read_status}
     vars(error).update({name: read.get(name, words)(fields[name]) for name in names})
     return error

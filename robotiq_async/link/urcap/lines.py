@@ -25,8 +25,8 @@ ACKNOWLEDGED: Final = b"ack"
 UNREADABLE: Final = "?"
 """The answer of the port for a value that it cannot read from the gripper: in an emergency stop of the arm,
 or when the tool has no power (ur_rtde's client expects it)."""
-_END: Final = b"\r\n"
-_LONGEST: Final = 16
+_LINE_END: Final = b"\r\n"
+_LINE_BYTES: Final = 16
 """More bytes than this are no line of this port."""
 
 
@@ -96,7 +96,7 @@ def value_in(received: bytes, name: str) -> int | str | None:
     """
     text = without_ends(received)
     head, value = f"{name} ".encode(), text[len(name) + 1 :].strip()
-    if text[: len(head)] != head[: len(text)] or len(text) > _LONGEST:
+    if text[: len(head)] != head[: len(text)] or len(text) > _LINE_BYTES:
         raise _misfit(received, name)
     is_unreadable = value == UNREADABLE.encode()
     if not (value.isdigit() or is_unreadable or not value):
@@ -116,7 +116,7 @@ def is_acknowledged(received: bytes) -> bool:
     Raises:
         ProtocolError: the bytes cannot become the answer.
     """
-    text = received.strip(_END)
+    text = received.strip(_LINE_END)
     if not ACKNOWLEDGED.startswith(text):
         raise ProtocolError(f"not an acknowledgement: {show(received)}")
     return text == ACKNOWLEDGED
@@ -124,7 +124,7 @@ def is_acknowledged(received: bytes) -> bool:
 
 def without_ends(received: bytes) -> bytes:
     """The rest without empty lines before it: an ``ack`` may have had an end of line after all."""
-    return received.lstrip(_END)
+    return received.lstrip(_LINE_END)
 
 
 def stray(received: bytes) -> Stray | None:
@@ -146,4 +146,8 @@ def _misfit(received: bytes, name: str) -> ProtocolError:
 
 def show(received: bytes) -> str:
     """Bytes for a message, shortened."""
-    return repr(received)[1:] if len(received) <= 2 * _LONGEST else f"{repr(received[: 2 * _LONGEST])[1:]}..."
+    return (
+        repr(received)[1:]
+        if len(received) <= 2 * _LINE_BYTES
+        else f"{repr(received[: 2 * _LINE_BYTES])[1:]}..."
+    )

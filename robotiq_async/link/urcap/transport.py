@@ -117,10 +117,10 @@ class UrcapSetting(Exchange):
         return _late(place, self._received, self.frame.decode().strip(), seconds)
 
 
-def _late(place: object, received: bytes, asked: str, seconds: float) -> Silent:
+def _late(place: object, received: bytes, question: str, seconds: float) -> Silent:
     half = lines.without_ends(received)
     what = f"half a line, {lines.show(half)}, answers" if half else "no answer to"
-    return Silent(ResponseTimeoutError(f"{place}: {what} {asked} within {seconds:g} s"))
+    return Silent(ResponseTimeoutError(f"{place}: {what} {question} within {seconds:g} s"))
 
 
 class UrcapTransport:

@@ -217,7 +217,7 @@ class GripperConnection:
 PENDING_S: Final = 60.0
 """Seconds after which every motion from before the loss has ended; the longest is an automatic release."""
 RETRY_S: Final = 0.05  # seconds between two attempts
-_REACHED: Final = tuple(set(State) - {State.DISCONNECTED, State.DO_SHUTDOWN, State.SHUTDOWN})
+_CONNECTED: Final = tuple(set(State) - {State.DISCONNECTED, State.DO_SHUTDOWN, State.SHUTDOWN})
 
 
 class PendingStop:
@@ -246,7 +246,7 @@ class PendingStop:
         while (left := until - now()) > 0:
             try:
                 try:
-                    await self._hand.wait_for_state(*_REACHED, timeout=left)
+                    await self._hand.wait_for_state(*_CONNECTED, timeout=left)
                 except StateTimeoutError:
                     return  # it is too late
                 await stop()

@@ -34,7 +34,7 @@ class GoalOutcome:
     reason: str  # for the log and the client
 
 
-class _Goal:
+class _RunningGoal:
     def __init__(self, key: bytes) -> None:
         self.key = key
         self.work: asyncio.Task[Sequence[MoveResult]] | None = None
@@ -67,7 +67,7 @@ class GoalRunner:
     def __init__(self, hand: Hand, lost: Callable[[Finger], object] = lambda _: None) -> None:
         self._hand = hand
         self._lost = lost
-        self._newest: _Goal | None = None
+        self._newest: _RunningGoal | None = None
 
     async def run(
         self,
@@ -84,7 +84,7 @@ class GoalRunner:
         ``key`` identifies the goal for :meth:`cancel`. With ``allow_stalling`` a contact is a success.
         ``feedback`` is called 20 times a second while the axes move.
         """
-        goal, before = _Goal(key), self._newest
+        goal, before = _RunningGoal(key), self._newest
         self._newest = goal
         if before is not None:
             before.end(GoalEnding.ABORTED, "another goal took over")
@@ -118,7 +118,7 @@ class GoalRunner:
             self._newest.end(GoalEnding.ABORTED, reason)
 
     async def _move_axes(
-        self, goal: _Goal, targets: Targets, speed: int, force: int, feedback: Callable[[], object]
+        self, goal: _RunningGoal, targets: Targets, speed: int, force: int, feedback: Callable[[], object]
     ) -> Sequence[MoveResult] | None:
         """The results of the moves; None if the goal was ended first."""
         try:
@@ -144,7 +144,7 @@ class GoalRunner:
         finally:
             goal.is_over.set()
 
-    async def _hold_axes(self, goal: _Goal, axes: Finger) -> str:
+    async def _hold_axes(self, goal: _RunningGoal, axes: Finger) -> str:
         """Hold axes; returns why the gripper has not acknowledged it, empty if it has."""
         try:
             await self._hand.hold(axes)

@@ -35,7 +35,7 @@ RECEIPT_S: Final = 3.0  # seconds for clients to receive results: milliseconds, 
 RECEIPT_LOOK_S: Final = 0.01  # seconds between two looks at that
 
 
-class _Server(ActionServer):  # type: ignore[misc]  # rclpy is not here
+class _ResultServer(ActionServer):  # type: ignore[misc]  # rclpy is not here
     """Calls a function, in the executor's thread, when a client has requested the result of a goal."""
 
     _asked: Callable[[bytes], object]
@@ -73,7 +73,7 @@ class GripperAction:
             GoalStatusArray, "~/gripper_cmd/_action/status", qos_profile_action_status_default
         )
         self._unasked = unasked = UnaskedGoals()
-        self._server = _Server(
+        self._server = _ResultServer(
             node,
             ParallelGripperCommand,
             "~/gripper_cmd",
@@ -166,7 +166,7 @@ class GripperAction:
         if _key(handle) not in self._accepted:
             raise RefusedError("the node is not configured")
         (connection, joints, settings), stops = self._accepted[_key(handle)]
-        asked = _targets(handle.request, connection, settings)
+        targets = _targets(handle.request, connection, settings)
 
         def feedback() -> None:
             state = joints.message(connection.hand.status)
@@ -174,7 +174,7 @@ class GripperAction:
 
         async def work() -> GoalOutcome:
             try:
-                return await connection.run_goal(_key(handle), asked, settings, feedback, stops)
+                return await connection.run_goal(_key(handle), targets, settings, feedback, stops)
             finally:
                 with suppress(NotStartedError):  # no status has been read
                     result.state = joints.message(connection.hand.status)

@@ -28,7 +28,7 @@ from .publishing import JointStates, Publishing
 NODE_NAME: Final = "gripper"
 _CALLS: Final = QoSProfile(depth=100)
 """Calls that may wait for the executor. With ROS's default of 10 a busy client displaces other calls."""
-_SUCCESS, _FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
+_CALLBACK_DONE, _CALLBACK_FAILED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
 
 class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
@@ -86,7 +86,7 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
             wanted = parameters.read(self).autostart
         except ValueError:
             wanted = True  # the configuration fails and reports the error
-        if wanted and self.trigger_configure() == _SUCCESS:
+        if wanted and self.trigger_configure() == _CALLBACK_DONE:
             self.trigger_activate()
 
     async def close(self) -> None:
@@ -108,14 +108,14 @@ class GripperNode(LifecycleNode):  # type: ignore[misc]  # rclpy is not here
             self.get_logger().info(work())
         except ClosedError as error:  # no error: a launch requests the shutdown, and sends a signal at once
             self.get_logger().warning(f"cannot {what}: {error}")
-            return _FAILURE
+            return _CALLBACK_FAILED
         except (RobotiqError, ValueError, OSError) as error:
             self.get_logger().error(f"cannot {what}: {error}")
-            return _FAILURE
+            return _CALLBACK_FAILED
         except Exception as error:  # noqa: BLE001  # ROS would swallow it
             self.get_logger().error(f"cannot {what}: {error!r}")
-            return _FAILURE
-        return _SUCCESS
+            return _CALLBACK_FAILED
+        return _CALLBACK_DONE
 
     def _configure(self) -> str:
         settings = parameters.read(self)

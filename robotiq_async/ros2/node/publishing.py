@@ -32,7 +32,7 @@ from .timing import Pace, Timer
 STATUS_RATE_HZ: Final = 10.0
 """Rate of the status while connected, else the rate below. A change of state is published at once."""
 DIAGNOSTICS_RATE_HZ: Final = 1.0
-_LATEST: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Late subscribers get the last message."""
 
 
@@ -47,8 +47,8 @@ class Publishing:
         self._failed = failed
         self._joint_states = node.create_publisher(JointState, "joint_states", 10)
         self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._status = node.create_publisher(String, "~/status", _LATEST)
-        self._description = node.create_publisher(String, "robot_description", _LATEST)
+        self._status = node.create_publisher(String, "~/status", _LATCHED)
+        self._description = node.create_publisher(String, "robot_description", _LATCHED)
         self._timer: Timer | None = None
         self._readers: list[asyncio.Task[None]] = []
 

@@ -20,7 +20,7 @@ class DiagnosticLevel(IntEnum):
     STALE = 3
 
 
-_LEVELS = {
+_LEVEL_OF = {
     Severity.NONE: DiagnosticLevel.OK,
     Severity.PRIORITY: DiagnosticLevel.OK,
     Severity.MINOR: DiagnosticLevel.WARN,
@@ -75,7 +75,7 @@ def _gripper(hand: Hand) -> Diagnosis:
         values[f"{axis.name} state"] = status.axis_state(axis)
         if (current := status.current_ma(axis)) is not None:
             values[f"{axis.name} current [mA]"] = str(current)
-    level = _LEVELS[status.fault.severity]
+    level = _LEVEL_OF[status.fault.severity]
     words = hand.state.name if level is DiagnosticLevel.OK else status.fault.description
     if text := status.controller_fault_text:
         level, words = DiagnosticLevel.ERROR, f"{words}; {text}"

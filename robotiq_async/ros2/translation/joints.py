@@ -49,7 +49,7 @@ scissor.
 The angles exceed them at the ends: a finger below 6 counts, a scissor above 232. Consumers reject a joint
 outside its limits, so published angles are clamped.
 """
-_LIMITS: Final = tuple(JOINT_LIMITS[name] for name in JOINTS)
+_RANGES: Final = tuple(JOINT_LIMITS[name] for name in JOINTS)
 
 CLOSING_END: Final = 2.8
 """End of the closing angle of all fingers: 70 degrees of the base and 90 of the middle joint, rounded up."""
@@ -96,7 +96,7 @@ def positions(status: RobotiqStatus) -> tuple[float, ...]:
 @lru_cache(maxsize=16)
 def _inside(angles: tuple[float, ...]) -> tuple[float, ...]:
     # Cached, because the fingers are still most of the time.
-    return tuple(min(max(angle, low), high) for angle, (low, high) in zip(angles, _LIMITS, strict=True))
+    return tuple(min(max(angle, low), high) for angle, (low, high) in zip(angles, _RANGES, strict=True))
 
 
 class Motion:
@@ -135,16 +135,16 @@ def targets(
     """
     if model is not THREE_FINGER:
         return _jaw_targets(names, angles, prefix, model)
-    asked = _pairs(names, angles, prefix, _COMMANDED)
+    given = _pairs(names, angles, prefix, _COMMANDED)
     counts: dict[Finger, int] = {}
-    for name, angle in asked.items():
+    for name, angle in given.items():
         if name == FINGERS_JOINT:
             for finger in FINGER_NAMES:
                 counts[finger] = _closing_counts(angle)
         elif name == _PALM_JOINT:
             counts[Finger.SCISSOR] = _counts(name, angle, JOINT_LIMITS[name], PALM)
     for finger, name in FINGER_NAMES.items():
-        base, middle = asked.get(f"{name}_joint_1"), asked.get(f"{name}_joint_2")
+        base, middle = given.get(f"{name}_joint_1"), given.get(f"{name}_joint_2")
         if base is None and middle is None:
             continue
         if finger in counts:
@@ -179,15 +179,15 @@ def _pairs(
         raise GoalError(f"no joint is named, so one position is needed, got {len(angles)}")
     if len(names) != len(angles):
         raise GoalError(f"{len(names)} joints and {len(angles)} positions")
-    asked: dict[str, float] = {}
+    given: dict[str, float] = {}
     for name, angle in zip(names, angles, strict=True):
         plain = _plain_name(name, prefix, commanded)
-        if plain in asked:
+        if plain in given:
             raise GoalError(f"two positions for one joint: {name!r}")
         if not math.isfinite(angle):
             raise GoalError(f"the position of {name!r} is {angle}")
-        asked[plain] = angle
-    return asked
+        given[plain] = angle
+    return given
 
 
 def _plain_name(name: str, prefix: str, commanded: Sequence[str]) -> str:

@@ -33,20 +33,20 @@ _RESTING: Final = 0.4
 """Counts within which an axis rests: the slowest moves by more than one while a contact is awaited."""
 _TREMBLING: Final = 0.1
 """Counts that are no travel: bodies in contact never rest entirely."""
-_STILL_S: Final = 0.3
+_AT_REST_S: Final = 0.3
 _NEAR: Final = 0.6
 """Counts from the target at which an axis has arrived."""
 _SLIPPED: Final = 2.0
 """Counts that a jaw moves on after a contact before the part counts as lost."""
 _LOCK: Final = 4.0
 """Times its full force that a locked motor withstands (ESTIMATE): gears that lock themselves."""
-_LET_GO: Final = 4.0
+_BACK_OFF: Final = 4.0
 """Counts that an axis goes back to let go of a part (ESTIMATE)."""
 _BLOCKED_S: Final = 0.02
 """Seconds of rest before its target after which an axis is blocked."""
 _BEYOND: Final = 255.0
 """Counts beyond its target that the reference of a blocked axis may go, for the force of the request."""
-_GONE: Final = 4.0
+_FREED: Final = 4.0
 """Counts that a blocked axis moves on when the body in its way has gone: more than a part yields."""
 _LEAD: Final = 1.3
 """Share of the way at which the servo gives its full force that the reference may be ahead."""
@@ -110,7 +110,7 @@ class MotorDrive:
     @property
     def is_still(self) -> bool:
         """Whether it has rested for a while, and has no goal."""
-        return not self._is_going and self._rested > _STILL_S
+        return not self._is_going and self._rested > _AT_REST_S
 
     @property
     def _is_going(self) -> bool:
@@ -150,7 +150,7 @@ class MotorDrive:
 
     def release(self) -> None:
         self.hold()
-        self._reference = self.position - self._sign * _LET_GO
+        self._reference = self.position - self._sign * _BACK_OFF
 
     def command(self, step_s: float) -> tuple[float, float]:
         """The servo's reference and the limit of its force for a step, in the units of the actuator."""
@@ -246,7 +246,7 @@ class MotorDrive:
     def _see_blocked(self) -> None:
         if self._is_blocked:
             on, beyond = self.position - self._blocked_at, self.position - self._target
-            if self._sign * on > _GONE or self._sign * beyond > _NEAR:  # the body in the way has gone
+            if self._sign * on > _FREED or self._sign * beyond > _NEAR:  # the body in the way has gone
                 self._is_blocked = False
                 self._reference = self._sign * min(self._sign * self._reference, self._sign * self._aim)
         elif not (self._is_near or self._is_locked):

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..physics.driven_axis import Drive
     from .world import World
 
-_SLACK: Final = 1e-9
+_TIME_ROUNDING_S: Final = 1e-9
 _HIGHEST_MM: Final = 1000.0
 
 
@@ -139,7 +139,7 @@ class Physics:
                 self._stepper.start()
             self._until, before, self._seen = until, self._seen, self._stepper.steps
             return self._seen != before
-        if world.time + world.step_s > until + _SLACK:
+        if world.time + world.step_s > until + _TIME_ROUNDING_S:
             return False
         try:
             world.step(until)

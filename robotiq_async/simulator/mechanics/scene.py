@@ -8,8 +8,8 @@ from typing import Final
 
 _EDGES: Final = {"box": 3, "cylinder": 2, "rod": 2, "sphere": 1}
 """The lengths that each kind of part has."""
-_FORM: Final = "KIND:SIZE,MASS in millimetres and kilograms, as in box:40x60x80,0.3"
-_PART: Final = re.compile(r"(?P<kind>[a-z]+):(?P<size>[0-9.x]+),(?P<mass>[0-9.]+)(@(?P<at>[0-9.]+))?")
+_PART_FORM: Final = "KIND:SIZE,MASS in millimetres and kilograms, as in box:40x60x80,0.3"
+_PART_TEXT: Final = re.compile(r"(?P<kind>[a-z]+):(?P<size>[0-9.x]+),(?P<mass>[0-9.]+)(@(?P<at>[0-9.]+))?")
 _MOST_MM: Final = 1000.0
 _MOST_KG: Final = 100.0
 
@@ -64,10 +64,10 @@ def parse_scene(text: str) -> Scene:
         return Scene()
     if text.endswith(".xml"):
         return Scene(file=text)
-    found = _PART.fullmatch(text)
+    found = _PART_TEXT.fullmatch(text)
     if found is None or found["kind"] not in _EDGES:
         kinds = ", ".join(_EDGES)
-        raise ValueError(f"physics must be table, FILE.xml or {_FORM} ({kinds}), got {text!r:.100}")
+        raise ValueError(f"physics must be table, FILE.xml or {_PART_FORM} ({kinds}), got {text!r:.100}")
     kind = found["kind"]
     size = tuple(_number("size", each, _MOST_MM) for each in found["size"].split("x"))
     if len(size) != _EDGES[kind]:

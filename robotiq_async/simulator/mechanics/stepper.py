@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _WAKES_S: Final = 0.004
 _STEPS_AT_ONCE: Final = 50
-_LATE_S: Final = 0.1
+_MOST_BEHIND_S: Final = 0.1
 """Behind the clock by so much, it lets simulated time go rather than hurry after it."""
 
 
@@ -74,7 +74,7 @@ class Stepper:
         try:
             while not self._ends.wait(_WAKES_S if world.time + world.step_s > due else 0):
                 due = (self._clock() - began) * self._speedup - let_go
-                late = max(due - world.time - _LATE_S * self._speedup, 0.0)
+                late = max(due - world.time - _MOST_BEHIND_S * self._speedup, 0.0)
                 let_go, due = let_go + late, due - late
                 self._catch_up(due)
                 self.seen = world.look()

@@ -15,7 +15,7 @@ import numpy as np
 from ..physics.bodies import Bodies, Body, Vector
 from .building import OURS
 
-_KINDS: Final = {
+_GEOMETRIES: Final = {
     int(mujoco.mjtGeom.mjGEOM_BOX): ("box", (2.0, 2.0, 2.0)),
     int(mujoco.mjtGeom.mjGEOM_CYLINDER): ("cylinder", (1.0, 2.0)),
     int(mujoco.mjtGeom.mjGEOM_SPHERE): ("sphere", (1.0,)),
@@ -41,7 +41,7 @@ class Watch:
         self._names = [model.joint(number).name.removeprefix(OURS) for number in joints]
         self._at = [int(model.jnt_qposadr[number]) for number in joints]
         self._root = root_of(model)
-        self._geoms = [geom for geom in parts if int(model.geom_type[geom]) in _KINDS]
+        self._geoms = [geom for geom in parts if int(model.geom_type[geom]) in _GEOMETRIES]
         self._shapes = [_shape(model, geom) for geom in self._geoms]
 
     def look(self, data: Any, *, is_aside: bool) -> Look:
@@ -80,6 +80,6 @@ def links_of(model: Any, root: int) -> dict[int, str]:
 
 
 def _shape(model: Any, geom: int) -> tuple[str, tuple[float, ...]]:
-    kind, factors = _KINDS[int(model.geom_type[geom])]
+    kind, factors = _GEOMETRIES[int(model.geom_type[geom])]
     size = model.geom_size[geom][: len(factors)] * np.array(factors)
     return kind, tuple(size.tolist())

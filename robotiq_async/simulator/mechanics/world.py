@@ -37,9 +37,9 @@ _LIFTING: Final = 0.1
 """Speed of the mount, in m/s: slow for an arm."""
 _INSIDE: Final = 0.0005
 """Depth in metres from which a part is in the gripper, and does not only touch it."""
-_SLACK: Final = 1e-6
+_ROUNDING_SHARE: Final = 1e-6
 """Share of a step that rounding may take from a time."""
-_FAR: Final = 100.0
+_OUT_OF_SIGHT_M: Final = 100.0
 """Height in metres of a part that was taken away."""
 
 
@@ -117,7 +117,7 @@ class World:
         """Let one step pass, or all that are due until a time while nothing moves."""
         motors, step_s = self._motors, self.step_s
         if self._sleeps and self._lifted == self._height and all(motor.is_still for motor in motors):
-            self.time += int((until - self.time) / step_s + _SLACK) * step_s
+            self.time += int((until - self.time) / step_s + _ROUNDING_SHARE) * step_s
             self._data.time = self.time
             return
         if self._parts:
@@ -255,7 +255,7 @@ class World:
             if not aside:
                 self._put()
         if aside:
-            self._put(_FAR if self._is_taken else 0.0)
+            self._put(_OUT_OF_SIGHT_M if self._is_taken else 0.0)
 
     def _let_go(self) -> None:
         for each in self._hands:

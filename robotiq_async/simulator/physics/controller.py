@@ -66,7 +66,7 @@ _MOVING, _SOME_STOPPED, _ALL_STOPPED, _ALL_ARRIVED = range(4)
 Statuses = tuple[ObjectStatus, ...]
 
 
-class _Entry(NamedTuple):
+class _TrailPoint(NamedTuple):
     since: float
     statuses: Statuses
 
@@ -75,12 +75,12 @@ class StatusTrail:
     """The object status of each axis over time. Times are simulated seconds and never decrease."""
 
     def __init__(self, first: Statuses) -> None:
-        self._entries = deque([_Entry(-math.inf, first)])
+        self._entries = deque([_TrailPoint(-math.inf, first)])
 
     def note(self, time: float, statuses: Statuses, lag: float) -> None:
         if statuses == self._entries[-1].statuses:
             return
-        self._entries.append(_Entry(time, statuses))
+        self._entries.append(_TrailPoint(time, statuses))
         while self._entries[1].since <= time - lag:
             self._entries.popleft()
             if len(self._entries) == 1:

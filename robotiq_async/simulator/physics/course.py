@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 if TYPE_CHECKING:
     from robotiq_async.calibration.motion_profile import MotionProfile
 
-_SHORT: Final = 0.51
+_LEFT_TO_PRESS: Final = 0.51
 """Counts that are left when an axis begins to press: the last count of its reading is yet to come."""
 _LAST_COUNT: Final = 0.5
 """Share of its pressing after which the last count comes, if that is before the report."""
@@ -99,7 +99,7 @@ def of_a_jaw(
     way = abs(end - here)
     sign = math.copysign(1.0, end - here)
     landing = min(profile.landing, way) if lands else 0.0
-    short = min(_SHORT, way) if presses else 0.0
+    short = min(_LEFT_TO_PRESS, way) if presses else 0.0
     knots = [Knot(time, here)]
     if landing > short:
         time += (way - landing) / rate

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from .bodies import Bodies
     from .driven_axis import Mechanism
 
-_LONGEST: Final = 1e9
+_FOREVER_S: Final = 1e9
 _CYCLE: Final = 0.005
 """Device cycle of a 3-Finger: its registers are renewed at 200 Hz (manual)."""
 
@@ -107,12 +107,12 @@ class SimulatedGripper:
         """
         number = check_int("seed", seed, 0, sys.maxsize)
         limit, seed_or_none = check_scissor_limit(scissor_limit), number if spread else None
-        self._speedup = check_number("speedup", speedup, 0, _LONGEST)
+        self._speedup = check_number("speedup", speedup, 0, _FOREVER_S)
         if self._speedup == 0:
             raise ValueError(f"speedup must be above 0, got {speedup!r}")
         kind = model_of(model)
         cycle = (_CYCLE if kind.has_modes else 0.0) if device_cycle is None else device_cycle
-        self._cycle = check_seconds("device_cycle", cycle, 0, _LONGEST)
+        self._cycle = check_seconds("device_cycle", cycle, 0, _FOREVER_S)
         self._physics = physics
         if physics is not None:
             physics.attach(kind, clock, self._speedup)
@@ -195,7 +195,7 @@ class SimulatedGripper:
             TypeError: off_time is not a number.
             ValueError: off_time is negative.
         """
-        seconds = check_seconds("off_time", off_time, 0, _LONGEST)
+        seconds = check_seconds("off_time", off_time, 0, _FOREVER_S)
         self.power_off()
         self._off_until = self._time + seconds
 
@@ -280,7 +280,7 @@ class SimulatedGripper:
             fault = self._controller.model.fault(fault)
         if fault is Fault.NONE:
             raise ValueError("fault must be a code in 1..15, got 0; clear_faults() ends faults")
-        lasts = None if duration is None else check_seconds("duration", duration, 0, _LONGEST)
+        lasts = None if duration is None else check_seconds("duration", duration, 0, _FOREVER_S)
         self._catch_up()
         self._controller.faults.begin(fault, self._time, lasts)
         self._controller.update(self._time)
@@ -412,7 +412,7 @@ class SimulatedGripper:
 
     @device_cycle.setter
     def device_cycle(self, value: float) -> None:
-        self._cycle = check_seconds("device_cycle", value, 0, _LONGEST)
+        self._cycle = check_seconds("device_cycle", value, 0, _FOREVER_S)
 
     @property
     def speedup(self) -> float:

@@ -8,7 +8,7 @@ from typing import Final
 
 from robotiq_async.values.checks import check_flag, check_seconds
 
-_LONGEST: Final = 1e9
+_FOREVER_S: Final = 1e9
 
 QUICK_ACTIVATION: Final = 4.2
 """Seconds of an activation at full speed: the fingers close and open (thesis, table A1.1)."""
@@ -64,9 +64,9 @@ class Habits:
             ValueError: a time is negative.
         """
         for name in ("activation_time", "status_lag", "write_spacing"):
-            check_seconds(name, getattr(self, name), 0, _LONGEST)
+            check_seconds(name, getattr(self, name), 0, _FOREVER_S)
         if self.silence_fault != math.inf:
-            check_seconds("silence_fault", self.silence_fault, 0, _LONGEST)
+            check_seconds("silence_fault", self.silence_fault, 0, _FOREVER_S)
         for name in (
             "echoes_limits",
             "lets_go_on_halt",

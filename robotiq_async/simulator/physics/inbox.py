@@ -13,7 +13,7 @@ from robotiq_async.values.request import Request
 
 from .controller import ZEROS
 
-_HISTORY: Final = 10_000
+_MOST_KEPT_IMAGES: Final = 10_000
 _ROUNDING: Final = 1e-9
 
 
@@ -42,7 +42,7 @@ class Inbox:
         self._model = model
         self.image: reg.Registers = ZEROS
         self.pending: deque[tuple[float, Request]] = deque()
-        self.writes: deque[HeardWrite] = deque(maxlen=_HISTORY)
+        self.writes: deque[HeardWrite] = deque(maxlen=_MOST_KEPT_IMAGES)
         self._kept_at: float | None = None
 
     def checked(self, address_offset: int, registers: Sequence[int]) -> reg.Registers:

@@ -24,7 +24,7 @@ _GRAMS: dict[Surface, tuple[tuple[int, int, int], ...]] = {
     ),
 }
 # fmt: on
-_STEP = 25
+_FORCE_STEP = 25
 _RESOLUTION_G = 10
 
 
@@ -53,9 +53,9 @@ class SimulatedScale:
             TypeError: force is not an int.
             ValueError: force is outside 0..255.
         """
-        at, past = divmod(check_byte("force", force), _STEP)
+        at, past = divmod(check_byte("force", force), _FORCE_STEP)
         lower, upper = self._rows[at], self._rows[min(at + 1, len(self._rows) - 1)]
-        share = past / _STEP
+        share = past / _FORCE_STEP
         low = min(lower) + (min(upper) - min(lower)) * share
         high = max(lower) + (max(upper) - max(lower)) * share
         return round(self._random.uniform(low, high) / _RESOLUTION_G) * _RESOLUTION_G

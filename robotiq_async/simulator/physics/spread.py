@@ -23,7 +23,7 @@ SEED: Final = 4
 """Seed with which an open hand reads 7, 6, 6, as the manual prints it."""
 _TOLERANCE: Final = 2
 _MOST_OVERRUN: Final = 2
-_EARLY_S: Final = 0.02
+_MOST_EARLY_S: Final = 0.02
 
 
 class Spread:
@@ -67,7 +67,7 @@ class Spread:
 
     def early(self, contact: int) -> float:
         """Seconds before its last count at which a jaw's contact is reported; mostly 0: after it."""
-        return _EARLY_S if self._figure(f"reports contact {contact} early", -1, 1) > 0 else 0.0
+        return _MOST_EARLY_S if self._figure(f"reports contact {contact} early", -1, 1) > 0 else 0.0
 
     def _figure(self, what: str, low: int, high: int) -> int:
         """A whole number in low..high for one purpose; 0 without a spread."""

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 from pymodbus.framer import FramerRTU
 
 _CRC: Final = 2
-_LONGEST: Final = 256
+_LONGEST_FRAME: Final = 256
 _EXCEPTION: Final = 0x80
 
 
@@ -28,13 +28,13 @@ class _Length(NamedTuple):
         return None if len(line) <= self.count_at else self.fixed + line[self.count_at]
 
 
-_SHORT: Final = _Length(8)
+_OF_EIGHT: Final = _Length(8)
 _WITH_DATA: Final = _Length(9, 6)
 _READ_REPLY: Final = _Length(5, 2)
 _LENGTHS: Final[dict[int, tuple[_Length, ...]]] = {
-    **dict.fromkeys((1, 2, 3, 4), (_SHORT, _READ_REPLY)),
-    **dict.fromkeys((5, 6), (_SHORT,)),
-    **dict.fromkeys((15, 16), (_WITH_DATA, _SHORT)),
+    **dict.fromkeys((1, 2, 3, 4), (_OF_EIGHT, _READ_REPLY)),
+    **dict.fromkeys((5, 6), (_OF_EIGHT,)),
+    **dict.fromkeys((15, 16), (_WITH_DATA, _OF_EIGHT)),
     22: (_Length(10),),
     23: (_Length(13, 10), _READ_REPLY),
 }
@@ -58,5 +58,5 @@ def size_of_others(line: bytearray) -> int | None:
     for size in known:
         if size <= len(line) and has_checksum(bytes(line[:size])):
             return size
-    may_come = None in sizes or any(len(line) < size <= _LONGEST for size in known)
+    may_come = None in sizes or any(len(line) < size <= _LONGEST_FRAME for size in known)
     return None if may_come else 0

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from ..physics.gripper import SimulatedGripper
     from ..troubles.fault_injector import FaultInjector
 
-_REQUEST, _STATUS = RTU_REGISTERS.request, RTU_REGISTERS.status
-_WRITABLE: Final = (0, _REQUEST)
-_READABLE: Final = (0, _REQUEST, _STATUS)
+_REQUEST_START, _STATUS_START = RTU_REGISTERS.request, RTU_REGISTERS.status
+_WRITABLE: Final = (0, _REQUEST_START)
+_READABLE: Final = (0, _REQUEST_START, _STATUS_START)
 _ILLEGAL_FUNCTION, _ILLEGAL_ADDRESS, _ILLEGAL_VALUE = 1, 2, 3
 """Exception codes (Modbus Application Protocol, chapter 7)."""
 _MOST_READ: Final = 125
@@ -26,7 +26,7 @@ _MOST_WRITTEN_AND_READ: Final = 121
 """Registers in one request (Modbus Application Protocol, 6.3, 6.12 and 6.17)."""
 
 
-class _RefusedError(Exception):
+class _RequestRefusedError(Exception):
     """A request that gets an exception instead of a reply."""
 
     def __init__(self, code: int) -> None:
@@ -56,9 +56,9 @@ class RegisterBank:
         """Carry out a request, all of it or nothing; return the reply, or the exception that refuses it."""
         try:
             if pdu[0] not in functions or pdu[0] in self._troubles.refused_functions:
-                raise _RefusedError(_ILLEGAL_FUNCTION)
+                raise _RequestRefusedError(_ILLEGAL_FUNCTION)
             return pdu[:1] + self._carry_out(pdu[0], pdu[1:])
-        except _RefusedError as refused:
+        except _RequestRefusedError as refused:
             return bytes((pdu[0] | 0x80, refused.code))
 
     def _carry_out(self, function: int, data: bytes) -> bytes:
@@ -93,18 +93,18 @@ class RegisterBank:
         for block in blocks:
             if block <= address and address + count <= block + self._troubles.served_registers:
                 return block
-        raise _RefusedError(_ILLEGAL_ADDRESS)
+        raise _RequestRefusedError(_ILLEGAL_ADDRESS)
 
     def _registers(self, function: int, block: int) -> Registers:
         function_of_the_status = READ_HOLDING if self._troubles.reads_only_with_function_3 else READ_INPUT
-        if block == _STATUS or (block == 0 and function == function_of_the_status):
+        if block == _STATUS_START or (block == 0 and function == function_of_the_status):
             return self._gripper.status_registers()
         return self._gripper.request_registers
 
 
 def _check(is_right: bool) -> None:
     if not is_right:
-        raise _RefusedError(_ILLEGAL_VALUE)
+        raise _RequestRefusedError(_ILLEGAL_VALUE)
 
 
 def _content(data: bytes, most: int) -> bytes:

@@ -33,7 +33,7 @@ REFUSED: Final = b"?"
 ACKNOWLEDGED: Final = b"ack"
 LONGEST_LINE: Final = 256
 
-_STATUS: Final = {
+_STATUS_FIELDS: Final = {
     "ACT": reg.gACT,
     "GTO": reg.gGTO,
     "STA": reg.gIMC,
@@ -44,7 +44,7 @@ _STATUS: Final = {
     "COU": reg.gCU[0],
 }
 """Names that a GET reads from the status; two also name a value of a request. COU is the current in 10 mA."""
-_REQUEST: Final = {
+_REQUEST_FIELDS: Final = {
     "ACT": reg.rACT,
     "GTO": reg.rGTO,
     "ATR": reg.rATR,
@@ -54,10 +54,10 @@ _REQUEST: Final = {
     "FOR": reg.rFR[0],
 }
 """Names that a SET writes."""
-_REGISTERS: Final = 3
+_WRITTEN_WORDS: Final = 3
 _BARE: Final = 1
 """The unit, which lines do not have, of a question without an end of line."""
-_DIGITS: Final = {"FLT": 2, "PRE": 3}
+_PADDED: Final = {"FLT": 2, "PRE": 3}
 """Digits that a value is shown with (a session with a real gripper, and the vendor's script)."""
 _ABOUT: Final = {
     "DRI": "RUNNING",
@@ -73,10 +73,10 @@ _ABOUT: Final = {
 firmware, serial number, cycles. All values but DRI and VER are made up; the last three are not explained."""
 
 
-_NAMES: Final = frozenset({"SID", *_STATUS, *_REQUEST, *_ABOUT})
+_VARIABLES: Final = frozenset({"SID", *_STATUS_FIELDS, *_REQUEST_FIELDS, *_ABOUT})
 
 
-class _RefusedError(Exception):
+class _UnknownLineError(Exception):
     """A line that is not understood."""
 
 
@@ -110,7 +110,7 @@ class UrcapResponder(Responder):
     def _bare(self, inbox: bytearray) -> Frame | None:
         """Cut out a question without an end of line."""
         words = bytes(inbox).split(b" ")
-        if len(words) != 2 or words[0] != b"GET" or words[1].decode("ascii", "replace") not in _NAMES:
+        if len(words) != 2 or words[0] != b"GET" or words[1].decode("ascii", "replace") not in _VARIABLES:
             return None
         line = bytes(inbox)
         inbox.clear()
@@ -131,7 +131,7 @@ class UrcapResponder(Responder):
         return True
 
     def _get(self, name: str) -> bytes:
-        return f"{name} {self._shown(name)}\n".encode() if name in _NAMES else REFUSED
+        return f"{name} {self._shown(name)}\n".encode() if name in _VARIABLES else REFUSED
 
     def _shown(self, name: str) -> str:
         """The value of a variable as it is shown."""
@@ -141,11 +141,11 @@ class UrcapResponder(Responder):
             return _ABOUT[name]
         if self.fault_injector.is_unreadable:
             return UNREADABLE
-        if name in _STATUS:
-            value = _STATUS[name].read(self.gripper.status_registers())
+        if name in _STATUS_FIELDS:
+            value = _STATUS_FIELDS[name].read(self.gripper.status_registers())
         else:
-            value = _REQUEST[name].read(self.gripper.request_registers)
-        return f"{value:0{_DIGITS.get(name, 1)}}"
+            value = _REQUEST_FIELDS[name].read(self.gripper.request_registers)
+        return f"{value:0{_PADDED.get(name, 1)}}"
 
     def close(self) -> None:
         super().close()
@@ -154,35 +154,35 @@ class UrcapResponder(Responder):
     def _set(self, names: list[str], values: list[str]) -> bytes:
         try:
             pairs = [self._checked(name, value) for name, value in zip(names, values, strict=True)]
-        except _RefusedError:
+        except _UnknownLineError:
             return REFUSED
-        asked = [(field, number) for field, number in pairs if field is not None]
-        if asked and self.fault_injector.loses_set():
+        changes = [(field, number) for field, number in pairs if field is not None]
+        if changes and self.fault_injector.loses_set():
             return ACKNOWLEDGED
-        if asked and not self._waiting and not self.fault_injector.set_spacing:
-            self._take(asked)
-        elif asked:
-            self._waiting += asked
+        if changes and not self._waiting and not self.fault_injector.set_spacing:
+            self._take(changes)
+        elif changes:
+            self._waiting += changes
             if self._taking is None:
                 self._take_later()
         return ACKNOWLEDGED
 
     def _checked(self, name: str, value: str) -> tuple[Field | None, int]:
         """The field that a variable sets, and its value; SID sets none."""
-        field = _REQUEST.get(name)
+        field = _REQUEST_FIELDS.get(name)
         if not (value.isascii() and value.isdigit() and len(value) <= 3):
-            raise _RefusedError
+            raise _UnknownLineError
         number = int(value)
         is_value = field is not None and number < 1 << field.width
         if not (number == self._unit if name == "SID" else is_value):
-            raise _RefusedError
+            raise _UnknownLineError
         return field, number
 
-    def _take(self, asked: Iterable[tuple[Field, int]]) -> None:
+    def _take(self, changes: Iterable[tuple[Field, int]]) -> None:
         image = list(self.gripper.request_registers)
-        for field, number in asked:
+        for field, number in changes:
             field.write(image, number)
-        self.gripper.write(0, image[:_REGISTERS])
+        self.gripper.write(0, image[:_WRITTEN_WORDS])
 
     # -- one by one ------------------------------------------------------------------------------------------
 

@@ -35,12 +35,12 @@ if TYPE_CHECKING:
 SCHEMA: Final = 1
 _SPEEDS: Final = (0, 64, 255)
 """The speeds of stage 6."""
-_SHORT_S: Final = 0.001
+_NO_DELAY_S: Final = 0.001
 """An exchange over TCP that takes no longer needs no delay."""
 _SLOW_LINK_S: Final = 0.01
-_BYTE_S: Final = 10 / 115200
+_USUAL_BYTE_S: Final = 10 / 115200
 _TIMERS_S: Final = 0.0004
-_WATCH_S: Final = 0.005
+_WATCH_STEP_S: Final = 0.005
 """Seconds between two reads of a watch, if they take less."""
 _MOST_SEEDS: Final = 3000
 _FORGOTTEN_S: Final = 4.0
@@ -63,7 +63,7 @@ _HAD: Final = frozenset(
 """The checks that a simulator can have otherwise."""
 
 
-class Server(Protocol):
+class RunningServer(Protocol):
     """A running server of the gripper."""
 
     @property
@@ -133,7 +133,7 @@ class Likeness:
         if report.get("schema") != SCHEMA:
             raise ValueError(f"the schema of report must be {SCHEMA}, got {report.get('schema')!r}")
         try:
-            return _Reading(report).likeness()
+            return _ReportReader(report).likeness()
         except (KeyError, TypeError, AttributeError, IndexError) as error:
             raise ValueError(f"this is no report of robotiq-async verify: {error!r}") from error
 
@@ -153,7 +153,7 @@ class Likeness:
             speedup=speedup,
         )
 
-    async def begin(self, server: Server) -> None:
+    async def begin(self, server: RunningServer) -> None:
         """Give the link of a running server the times and the troubles of the report."""
         for trouble in self.troubles:
             await server.fault_injector.begin(trouble)
@@ -162,14 +162,14 @@ class Likeness:
         if server.link in ("rtu", "rtu+tcp"):
             count = self.model.rtu.count
             # A read has 8 bytes, and its reply 5 beside the registers.
-            rest = self.exchange_s - (13 + 2 * count) * _BYTE_S - _TIMERS_S
+            rest = self.exchange_s - (13 + 2 * count) * _USUAL_BYTE_S - _TIMERS_S
             line: Any = server  # which keeps this silence
             line.reply_silence = max(line.reply_silence, rest)
-        elif self.exchange_s > _SHORT_S:
+        elif self.exchange_s > _NO_DELAY_S:
             await server.fault_injector.begin(Trouble("delay", self.exchange_s))
 
 
-class _Reading:
+class _ReportReader:
     """One report, read."""
 
     def __init__(self, report: Mapping[str, Any]) -> None:
@@ -239,7 +239,7 @@ class _Reading:
 
     def _late(self) -> float:
         """Seconds from an acknowledgement to its effect, and from a change to the read that shows it."""
-        return (self._seconds("write.echo", "p50_ms") or 0.0) + (self._exchange_s + _WATCH_S) / 2
+        return (self._seconds("write.echo", "p50_ms") or 0.0) + (self._exchange_s + _WATCH_STEP_S) / 2
 
     def _cycle(self) -> float | None:
         echo = self._seconds("write.echo", "p50_ms")

@@ -22,7 +22,7 @@ from . import corruption
 from .corruption import Corruption, Parts, Reply
 
 LONGEST_TROUBLE_S: Final = 86400.0
-_EVENT: Final = 0.0
+_MOMENT: Final = 0.0
 _CONDITION: Final = math.inf
 
 On = Literal["read", "write", "any"]
@@ -47,7 +47,7 @@ class TroubleKind(NamedTuple):
     """
 
     meaning: str
-    lasts: float = _EVENT
+    lasts: float = _MOMENT
     value: float | None = None
     low: float = 0.0
     high: float = 0.0
@@ -79,7 +79,7 @@ class TroubleKind(NamedTuple):
     def can_hit_once(self) -> bool:
         """Whether it makes sense to have it for a single reply or a single moment."""
         is_about_one = self in (KINDS["silence"], KINDS["lost-set"])
-        return self.lasts == _EVENT or self.corruption is not None or is_about_one
+        return self.lasts == _MOMENT or self.corruption is not None or is_about_one
 
 
 KINDS: Final[dict[str, TroubleKind]] = {
@@ -87,7 +87,7 @@ KINDS: Final[dict[str, TroubleKind]] = {
     "delay": TroubleKind("replies come VALUE seconds later", _CONDITION, 0.05, 0, 10, corruption.delay),
     "late": TroubleKind(
         "a reply comes VALUE seconds later, after the client has given up",
-        *(_EVENT, 0.7, 0, 10, corruption.delay),
+        *(_MOMENT, 0.7, 0, 10, corruption.delay),
     ),
     "drop": TroubleKind("a reply is lost; its request was carried out", corruption=corruption.drop),
     "half": TroubleKind("only the first half of a reply comes", corruption=corruption.half),
@@ -129,10 +129,10 @@ KINDS: Final[dict[str, TroubleKind]] = {
         "a reply has a wrong checksum", corruption=corruption.wrong_checksum, link="rtu"
     ),
     "byte-before": TroubleKind(
-        "a byte VALUE comes before a reply", _EVENT, 0, 0, 255, corruption.byte_before, link="rtu"
+        "a byte VALUE comes before a reply", _MOMENT, 0, 0, 255, corruption.byte_before, link="rtu"
     ),
     "byte-after": TroubleKind(
-        "a byte VALUE comes after a reply", _EVENT, 0, 0, 255, corruption.byte_after, link="rtu"
+        "a byte VALUE comes after a reply", _MOMENT, 0, 0, 255, corruption.byte_after, link="rtu"
     ),
     "seven-bits": TroubleKind(
         "replies lose the highest bit of each byte", _CONDITION, corruption=corruption.seven_bits, link="rtu"
@@ -145,7 +145,7 @@ KINDS: Final[dict[str, TroubleKind]] = {
     ),
     "exception": TroubleKind(
         "a request is answered by exception VALUE",
-        *(_EVENT, 4, 1, 255, corruption.refusal),
+        *(_MOMENT, 4, 1, 255, corruption.refusal),
         link="tcp",
         is_modbus=True,
     ),
@@ -188,7 +188,7 @@ KINDS: Final[dict[str, TroubleKind]] = {
     "idle-reset": TroubleKind(
         "the gripper loses its activation when no request comes for VALUE seconds", _CONDITION, 5.0, 0, 3600
     ),
-    "foreign": TroubleKind("another client sends all axes to VALUE", _EVENT, 128, 0, 255),
+    "foreign": TroubleKind("another client sends all axes to VALUE", _MOMENT, 128, 0, 255),
     "slow-device": TroubleKind("requests take effect VALUE seconds after they came", _CONDITION, 0.2, 0, 10),
     "interference": TroubleKind("the scissor is blocked: fault 0x0A, after 20 s 0x0E", _CONDITION),
     "fault": TroubleKind("the gripper reports fault VALUE", _CONDITION, 9, 1, 15),

@@ -19,8 +19,8 @@ from .kinematics import JAW_JOINTS
 from .model import HandModel, Joint, Mimic, RigidLink, Shape
 from .shapes import box, cylinder, pad
 
-_ROOT: Final = "robotiq_hande_link"
-_MASS: Final = 1.07
+_ROOT_LINK: Final = "robotiq_hande_link"
+_HAND_E_KG: Final = 1.07
 _FINGER_MASS: Final = 0.06
 _HEIGHT: Final = 0.099
 _SIDES: Final = {"left": 1.0, "right": -1.0}
@@ -30,11 +30,11 @@ _SIDES: Final = {"left": 1.0, "right": -1.0}
 def hand_e() -> HandModel:
     """The description of the Hand-E."""
     names = {side: f"robotiq_hande_{side}_finger" for side in _SIDES}
-    links = {_ROOT: RigidLink(_ROOT, _MASS - 2 * _FINGER_MASS, _base())}
+    links = {_ROOT_LINK: RigidLink(_ROOT_LINK, _HAND_E_KG - 2 * _FINGER_MASS, _base())}
     links |= {name: RigidLink(name, _FINGER_MASS, _finger(_SIDES[side])) for side, name in names.items()}
     return HandModel(
         name="robotiq_hande",
-        root=_ROOT,
+        root=_ROOT_LINK,
         links=links,
         joints=tuple(_joint(side, name) for side, name in names.items()),
         stand=Pose(),
@@ -48,7 +48,7 @@ def _joint(side: str, child: str) -> Joint:
     jaw, name = JAW_JOINTS[HAND_E], f"{child}_joint"
     return Joint(
         name,
-        _ROOT,
+        _ROOT_LINK,
         child,
         Pose((0.0, 0.0, _HEIGHT)),
         (_SIDES[side], 0.0, 0.0),

@@ -18,7 +18,7 @@ from .model import HandModel
 from .urdf_writer import as_text, numbers
 
 GROUP: Final = "gripper"
-_NOTE: Final = (
+_COMMENT: Final = (
     " Every collision between links of the gripper is disabled. With an arm, say which link carries it:"
     ' <end_effector name="NAME" parent_link="LINK OF THE ARM" group="{group}" /> '
 )
@@ -34,7 +34,7 @@ def write_srdf(model: HandModel, states: Mapping[str, Mapping[str, float]], pref
     """
     group = prefix + GROUP
     robot = ET.Element("robot", name=model.name)
-    robot.append(ET.Comment(_NOTE.format(group=group)))
+    robot.append(ET.Comment(_COMMENT.format(group=group)))
     links = ET.SubElement(robot, "group", name=group)
     for link in model.links:
         ET.SubElement(links, "link", name=prefix + link)

@@ -38,7 +38,7 @@ from .kinematics import BASE, FINGER_NAMES, MIDDLE, PALM, TIP
 from .model import HandModel, Joint, Mimic, RigidLink, Shape, Tendon
 from .shapes import box, cylinder, pad, sphere
 
-_MASS: Final = 2.3
+_THREE_FINGER_KG: Final = 2.3
 _LINK_MASSES: Final = (0.06, 0.10, 0.06, 0.05)
 """Masses of link_0 to link_3 of a finger; the palm has the rest (ESTIMATE)."""
 _OUT: Final = (pi / 2, 0.0, 0.0)
@@ -49,7 +49,7 @@ _VELOCITY: Final = 2.0
 _MIDDLE_SPRING: Final = (0.1, -3.0)
 """Stiffness in N m/rad and rest angle: holds the joint with 0.3 N m, below the torque of the least force."""
 _TIP_STIFFNESS: Final = 1.0
-_SHARED: Final = (BASE[1][1] / BASE[1][0]) / (MIDDLE[1][1] / (MIDDLE[1][0] - MIDDLE[0][0]))
+_PULL: Final = (BASE[1][1] / BASE[1][0]) / (MIDDLE[1][1] / (MIDDLE[1][0] - MIDDLE[0][0]))
 """Degrees of the base that cost the motor as much as one degree of the middle joint: 5/9."""
 
 
@@ -99,7 +99,7 @@ _FEET: Final = {
 @cache
 def three_finger() -> HandModel:
     """The description of the 3-Finger."""
-    links = {"palm": RigidLink("palm", _MASS - 3 * sum(_LINK_MASSES), _palm())}
+    links = {"palm": RigidLink("palm", _THREE_FINGER_KG - 3 * sum(_LINK_MASSES), _palm())}
     joints: list[Joint] = []
     for finger, name in FINGER_NAMES.items():
         parts = zip(_LINK_MASSES, _FINGER, strict=True)
@@ -167,7 +167,7 @@ def _limit(degrees: float) -> float:
 
 def _tendons(name: str) -> tuple[Tendon, Tendon]:
     base, middle, tip = (f"{name}_joint_{n}" for n in (1, 2, 3))
-    motor = Tendon(name, {base: 1.0, middle: _SHARED})
+    motor = Tendon(name, {base: 1.0, middle: _PULL})
     # From parallel inwards alone: a part that presses the tip outwards meets the stop.
     parallel = Tendon(f"{name}_parallel", {base: 1.0, tip: 1.0}, 0.0, pi, _TIP_STIFFNESS)
     return motor, parallel

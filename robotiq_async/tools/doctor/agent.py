@@ -24,7 +24,7 @@ AGENT_ANSWER_S: Final = 1.0
 PROBE_TRIES: Final = 3  # attempts: just after a connection was made the first answers may be empty
 AGENT_PROBES: Final = 100  # requests for measuring the round trip
 WATCH_S: Final = 2.0  # seconds of listening to statuses
-_READ: Final = frozenset({"version", "window", "statistics", "problem", "state", "address", "holder"})
+_INFO_KEYS: Final = frozenset({"version", "window", "statistics", "problem", "state", "address", "holder"})
 LOST_SHARE: Final = 0.01  # accepted share of lost statuses
 
 
@@ -33,7 +33,7 @@ async def examine_agent(name: GripperName, bus: Bus, report: ReportFinding) -> N
     asker = _Asker(name, bus)
     await _describe(asker, report)
     report(Finding(Level.GOOD, "access", "the agent answers"))
-    listener = _Listener(name)
+    listener = _MessageSorter(name)
     undo = bus.subscribe(name.key("*"), listener.hear)
     try:
         began = now()
@@ -75,12 +75,12 @@ class _Asker:
         if answer.to != self._name.base or answer.number not in (0, call.number):
             raise AgentError("the answer to info belongs to another request")
         info = answer.outcome(RobotiqStatus.from_raw)
-        if not isinstance(info, dict) or not info.keys() >= _READ:
+        if not isinstance(info, dict) or not info.keys() >= _INFO_KEYS:
             raise AgentError(f"the agent's description of the gripper has another format: {info!r:.200}")
         return info
 
 
-class _Listener:
+class _MessageSorter:
     """Sorts the messages under the keys of a gripper."""
 
     def __init__(self, name: GripperName) -> None:
@@ -160,7 +160,7 @@ def _report_round_trip(times: list[float], window: float, report: ReportFinding)
     report(Finding(level, "round trip", found, advice))
 
 
-def _report_statuses(listener: _Listener, seconds: float, info: Fields, report: ReportFinding) -> None:
+def _report_statuses(listener: _MessageSorter, seconds: float, info: Fields, report: ReportFinding) -> None:
     if listener.misrouted:
         found = f"{listener.misrouted} messages about another gripper came under this one's key; dropped"
         advice = "zenoh does that after a link has been down; clients notice. Restarting the client ends it."
@@ -186,7 +186,7 @@ def _report_statuses(listener: _Listener, seconds: float, info: Fields, report: 
         report(Finding(Level.DOUBT, "statuses", found, advice))
 
 
-def _report_gripper(listener: _Listener, info: Fields, report: ReportFinding) -> None:
+def _report_gripper(listener: _MessageSorter, info: Fields, report: ReportFinding) -> None:
     problem, state = info["problem"], str(info["state"])
     if problem or state == State.DISCONNECTED.name:
         found = f"its agent cannot reach it: {problem or 'the link is down'}"

@@ -112,7 +112,7 @@ _MAY: Final = {
     Role.HALT: "may watch and halt",
     Role.OPERATE: "may watch, halt and command",
 }
-_NEW: Final = "The owner of the authority can make a new one: robotiq-async fleet keys."
+_NEW_KEYS: Final = "The owner of the authority can make a new one: robotiq-async fleet keys."
 
 
 def examine_keys(folder: Path, report: ReportFinding, *, now: datetime) -> None:
@@ -137,10 +137,10 @@ def _report_dates(begins: datetime, ends: datetime, now: datetime, report: Repor
         report(Finding(Level.BAD, "certificate", found, "Set the clock of this computer."))
         raise GiveUpError
     if now > ends:
-        report(Finding(Level.BAD, "certificate", f"ended on {ends:%Y-%m-%d}", _NEW))
+        report(Finding(Level.BAD, "certificate", f"ended on {ends:%Y-%m-%d}", _NEW_KEYS))
         raise GiveUpError
     if ends - now < EXPIRES_SOON:
-        report(Finding(Level.DOUBT, "certificate", f"ends on {ends:%Y-%m-%d}", _NEW))
+        report(Finding(Level.DOUBT, "certificate", f"ends on {ends:%Y-%m-%d}", _NEW_KEYS))
     else:
         report(Finding(Level.GOOD, "certificate", f"holds until {ends:%Y-%m-%d}"))
 

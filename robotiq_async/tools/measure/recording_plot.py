@@ -33,9 +33,9 @@ LINE_WIDTHS: Final = {"A": 2.0, "B": 1.3, "C": 0.7, "SCISSOR": 1.0}
 """Fingers that move together overlap: the first curve is the widest, and shows at the sides."""
 JAW_WIDTH: Final = 1.2
 SCISSOR: Final = str(Finger.SCISSOR.name)
-OPENING: Final = "opening, mm"
+OPENING_LABEL: Final = "opening, mm"
 FAULT_COLOR: Final = "crimson"
-FAULT: Final[dict[str, Any]] = {"color": FAULT_COLOR, "alpha": 0.1, "lw": 0, "zorder": 0.4}
+FAULT_STYLE: Final[dict[str, Any]] = {"color": FAULT_COLOR, "alpha": 0.1, "lw": 0, "zorder": 0.4}
 CONTACT: Final[dict[str, Any]] = {"alpha": 0.16, "lw": 0, "zorder": 0.5}
 LANE: Final[dict[str, Any]] = {"alpha": 0.6, "lw": 0, "zorder": 0.5}
 GAP: Final[dict[str, Any]] = {
@@ -45,12 +45,12 @@ GAP: Final[dict[str, Any]] = {
     "lw": 0,
     "zorder": 0.3,
 }
-REQUEST: Final[dict[str, Any]] = {"color": "0.25", "lw": 0.8, "ls": (0, (3, 1.5)), "zorder": 2.5}
+REQUEST_STYLE: Final[dict[str, Any]] = {"color": "0.25", "lw": 0.8, "ls": (0, (3, 1.5)), "zorder": 2.5}
 COUNT_TICKS: Final = (0, 50, 100, 150, 200, 255)
 BESIDE: Final = 1.15  # inches of a recording beside its panels
 LABEL_SIZE: Final = 0.08  # inches between two labels
 LETTER: Final = 0.064  # inches of a character of a label
-ROW: Final = 0.17  # height of a row of labels, where the positions have 3
+ROW_HEIGHT: Final = 0.17  # height of a row of labels, where the positions have 3
 PLOT_ROWS: Final = 6  # of labels, at most; where they do not suffice, labels are cut
 
 
@@ -78,7 +78,7 @@ def draw(recordings: Sequence[RecordingCurves]) -> Figure:
     placed = [placed_labels(each, begin, end, LETTER / inside) for each in labels]
     rows = max((each.row + 1 for column in placed for each in column), default=0)
     panels = [panel for panel in PANELS if any(panel.axes_of(each) for each in recordings)]
-    heights = [ROW * max(rows, 1), *(panel.height for panel in panels)]
+    heights = [ROW_HEIGHT * max(rows, 1), *(panel.height for panel in panels)]
     figure = new_figure(inches * len(recordings), 1.3 + 0.8 * sum(heights))
     grid = figure.subplots(
         len(heights),
@@ -144,7 +144,7 @@ def _draw_panel(panel: Panel, axes: Axes, curves: RecordingCurves, inches: float
     for name, each in drawn.items():
         width = LINE_WIDTHS[name] if len(curves.axes) > 1 else JAW_WIDTH
         draw_axis(axes, curves.seconds, each, {"color": CURVE_COLORS[name], "lw": width}, inches)
-    if axes.get_ylabel() == OPENING:
+    if axes.get_ylabel() == OPENING_LABEL:
         _add_counts(axes, next(iter(drawn.values())))
     if panel.is_of_scissor is not True:
         _add_legend(panel, axes, curves)
@@ -156,7 +156,7 @@ def _draw_position(
     columns = round(inches * PIXELS)
     axes.plot(*outline(seconds, _in_mm(each, each.position), columns), **line)
     wanted = outline(seconds, _in_mm(each, each.requested), columns)
-    axes.plot(*wanted, drawstyle="steps-post", **REQUEST)
+    axes.plot(*wanted, drawstyle="steps-post", **REQUEST_STYLE)
 
 
 def _draw_current(axes: Axes, seconds: Values, each: AxisCurves, line: dict[str, Any], inches: float) -> None:
@@ -182,7 +182,7 @@ def _unit(panel: Panel, drawn: dict[str, AxisCurves]) -> str:
         return "current, mA"
     if panel.is_of_scissor:
         return "scissor, counts"
-    return OPENING if all(len(each.mm) for each in drawn.values()) else "position, counts"
+    return OPENING_LABEL if all(len(each.mm) for each in drawn.values()) else "position, counts"
 
 
 def _add_counts(axes: Axes, axis: AxisCurves) -> None:
@@ -206,7 +206,7 @@ def _shade(panel: Panel, axes: Axes, curves: RecordingCurves, inches: float) -> 
         for begin, end in merged(each.contacts, pixel) if name in shaded else ():
             axes.axvspan(begin, end, color=CURVE_COLORS[name], **lane)
     for begin, end in curves.faults:
-        axes.axvspan(begin, end, **FAULT)
+        axes.axvspan(begin, end, **FAULT_STYLE)
     for begin, end in curves.gaps:
         axes.axvspan(begin, end, **GAP)
 
@@ -222,11 +222,11 @@ def _add_legend(panel: Panel, axes: Axes, curves: RecordingCurves) -> None:
     else:
         names = [JAW_NAME] if is_jaw else list(panel.axes_of(curves))
         handles = dict(zip(names, axes.lines[::2], strict=False))
-        handles["request"] = Line2D([], [], **REQUEST)
+        handles["request"] = Line2D([], [], **REQUEST_STYLE)
         if any(each.contacts for each in curves.axes.values()):
             shade = CONTACT | {"color": CURVE_COLORS["A"]} if is_jaw else LANE | {"color": "0.5"}
             handles["contact"] = Patch(**shade)
-        handles |= {"fault": Patch(**FAULT)} if curves.faults else {}
+        handles |= {"fault": Patch(**FAULT_STYLE)} if curves.faults else {}
         handles |= {"no status": Patch(**GAP)} if curves.gaps else {}
     place: Any = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.1, "frameon": False}
     space: Any = {"ncols": 8, "handlelength": 1.6, "columnspacing": 1, "fontsize": 7}

@@ -127,7 +127,7 @@ def read_curves(
     Raises:
         RecordingError: a message does not have a recorder's format.
     """
-    reading = _Reading()
+    reading = _PartialCurves()
     first: int | None = None
     for entry in entries:
         first = entry.nanoseconds if first is None else first
@@ -146,7 +146,7 @@ def read_curves(
 
 
 @dataclass
-class _Reading:
+class _PartialCurves:
     """The part that has been read so far."""
 
     description: str = ""

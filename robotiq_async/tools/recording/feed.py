@@ -88,7 +88,7 @@ class Message:
     sequence: int = 0  # the number of its status; commands and events are counted from 1
 
 
-class _Source:
+class _FeedSource:
     """A stream of a hand that reopens when it ends."""
 
     def __init__(self, open_stream: Callable[[], Stream[Any]], publish: Callable[[Any], None]) -> None:
@@ -136,10 +136,10 @@ class Feed:
         self._inhibits = InhibitEvents(hand)
         self._epoch = 0.0
         self._counts = {COMMAND: 0, EVENT: 0}
-        self._sources: tuple[_Source, ...] = (
-            _Source(lambda: hand.statuses(FEED_BUFFER), self._publish_status),
-            _Source(hand.requests, self._publish_request),
-            _Source(hand.transitions, self._publish_transition),
+        self._sources: tuple[_FeedSource, ...] = (
+            _FeedSource(lambda: hand.statuses(FEED_BUFFER), self._publish_status),
+            _FeedSource(hand.requests, self._publish_request),
+            _FeedSource(hand.transitions, self._publish_transition),
         )
         self._tasks: list[asyncio.Task[None]] = []
 

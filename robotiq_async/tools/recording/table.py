@@ -30,7 +30,7 @@ _FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
 """A spreadsheet takes a text that begins with one of these for a formula."""
 _MAY_LACK: Final = ("B", "C", "SCISSOR")
 """The axes that a sibling of the 3-Finger does not have."""
-_NEW: Final = ("opening_mm", "open_fraction")
+_LATER_COLUMNS: Final = ("opening_mm", "open_fraction")
 """Columns that recordings of earlier versions do not have."""
 CURRENT_COLUMN: Final = "current_ma"
 """The column that recordings over a URCap do not have."""
@@ -108,7 +108,7 @@ def _value(fields: Properties, name: str, kind: str) -> Any:  # noqa: ANN401  # 
         return fields.get(name)
     if axis not in fields and axis in _MAY_LACK:
         return None
-    if key in _NEW or key == CURRENT_COLUMN:
+    if key in _LATER_COLUMNS or key == CURRENT_COLUMN:
         return fields[axis].get(key)
     return fields[axis][key] if axis else fields[name]
 
@@ -128,7 +128,7 @@ def _cell(value: object) -> object:
     return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
 
 
-_KINDS: Final = {STATUS: "status", EVENT: "event"}
+_ROW_KINDS: Final = {STATUS: "status", EVENT: "event"}
 
 
 class CsvFile:
@@ -141,7 +141,7 @@ class CsvFile:
 
     def take(self, message: Message) -> None:
         """Add a row for a status. Events set the state of the following rows; commands have no row."""
-        kind = _KINDS.get(message.topic)
+        kind = _ROW_KINDS.get(message.topic)
         if kind and (row := self._table.row(kind, message.nanoseconds, json.loads(message.data))):
             self._line(row)
 

@@ -204,11 +204,11 @@ class StageWatch:
             raise EndError("foreign", f"{why}: it echoes {found}")
 
 
-def _may_echo(asked: tuple[int, ...], shown: tuple[int, ...]) -> bool:
+def _may_echo(request: tuple[int, ...], shown: tuple[int, ...]) -> bool:
     """Whether an echo repeats a request; one beyond a limit may be echoed as the limit."""
-    return asked[:2] == shown[:2] and all(
+    return request[:2] == shown[:2] and all(
         wanted == got or wanted <= got <= LIMITS[0] or LIMITS[1] <= got <= wanted
-        for wanted, got in zip(asked[2:], shown[2:], strict=True)
+        for wanted, got in zip(request[2:], shown[2:], strict=True)
     )
 
 

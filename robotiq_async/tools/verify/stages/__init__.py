@@ -48,13 +48,13 @@ class Stage(NamedTuple):
 
 
 ACTIVATION: Final = 3  # the stage that activates
-_NOTHING: Final = ("nothing", "", "", "")
+_MOVES_NOTHING: Final = ("nothing", "", "", "")
 _WAY: Final = "the fingers' whole way, and the way of anything that they could push; no hand, no cable"
-_SLOWEST: Final = "the slowest speed (20 to 30 mm/s by the manuals), the weakest force"
+_GENTLY: Final = "the slowest speed (20 to 30 mm/s by the manuals), the weakest force"
 
 STAGES: Final = (
-    Stage(0, "this computer", reading.host, *_NOTHING, "1 s"),
-    Stage(1, "reading only", reading.reading, *_NOTHING, "3 minutes"),
+    Stage(0, "this computer", reading.host, *_MOVES_NOTHING, "1 s"),
+    Stage(1, "reading only", reading.reading, *_MOVES_NOTHING, "3 minutes"),
     Stage(
         *(2, "writing with rGTO = 0", writing.writing),
         "nothing should; stay clear: the stage checks this",
@@ -73,7 +73,7 @@ STAGES: Final = (
         *(4, "one axis at a time", first_motions.single_axis),
         "A, then B, then C, then the scissor, each there and back; you say which one moved",
         "30 counts of 255, about an eighth of the way",
-        *(_SLOWEST, _WAY, "1 minute"),
+        *(_GENTLY, _WAY, "1 minute"),
         jaw_moves="the jaw, there and back; you say what moved",
     ),
     Stage(
@@ -96,14 +96,14 @@ STAGES: Final = (
         *(7, "something soft", soft_part.soft_part),
         "A, B and C close on a block of foam that you put there, and open again",
         "until they touch it",
-        *(_SLOWEST, "your hands, once the foam lies there", "2 minutes"),
+        *(_GENTLY, "your hands, once the foam lies there", "2 minutes"),
         jaw_moves="the jaw closes on a block of foam that you put there, and opens again; a second time FAST",
     ),
     Stage(
         *(8, "loss of client, cable and power; emergency stop", loss.loss),
         "finger A there and back, and ALL FINGERS in activations that the stage requests",
         "60 counts of 255; the activations to the stops",
-        *(_SLOWEST, _WAY, "10 minutes, with your hands on cable and switches"),
+        *(_GENTLY, _WAY, "10 minutes, with your hands on cable and switches"),
         jaw_moves="THE JAW, there and back, and in activations that the stage requests",
     ),
     Stage(

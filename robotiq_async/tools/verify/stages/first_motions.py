@@ -13,14 +13,14 @@ from ..catalogue import EndError
 from ..motions import ACTIVATION_S, activate, are_near, in_place, motion_envelope
 from ..watch import StageWatch
 
-SECONDS: Final = ACTIVATION_S + 20
+FIRST_MOTIONS_S: Final = ACTIVATION_S + 20
 USUAL_S: Final = 20.0
 ROOM: Final = 1.5  # activation_timeout is this many times the duration of the activation
 
 
 async def activation(bench: Bench) -> None:
     """Reset and activate, and check the status after it."""
-    watch = bench.watch(SECONDS)
+    watch = bench.watch(FIRST_MOTIONS_S)
     took = await activate(watch)
     status = await watch.watch_for(1.0)
     found = f"{took:.1f} s"

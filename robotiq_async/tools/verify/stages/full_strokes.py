@@ -13,7 +13,7 @@ from ..catalogue import EndError, Figure
 from ..motions import in_place, resting_envelope
 from ..watch import AxesAtRest, StageWatch
 
-SECONDS: Final = 180.0
+FULL_STROKES_S: Final = 180.0
 SPEEDS: Final = (0, 64, 255)
 STROKE_S: Final = 20.0  # twice the time of the slowest one
 SCISSOR_SPEED: Final = 64
@@ -25,7 +25,7 @@ PART_OF_STROKE: Final = 0.9
 
 async def full_strokes(bench: Bench) -> None:
     """Move the scissor with open fingers, then the fingers, slowly at first."""
-    watch = bench.watch(SECONDS)
+    watch = bench.watch(FULL_STROKES_S)
     start = await watch.look()
     await watch.write(in_place(start))
     await _fingers_to(bench, watch, start, OPEN, 64)

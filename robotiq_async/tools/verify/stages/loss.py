@@ -12,7 +12,7 @@ from ..catalogue import EndError, Figure
 from ..motions import MARGIN, activate, are_near, in_place, motion_envelope
 from ..watch import ENTER, StageWatch
 
-SECONDS: Final = 900.0
+LOSS_S: Final = 900.0
 LOSS_STEP: Final = 60
 CLIENT_AWAY_S: Final = 4.0  # longer than the motion takes
 BEGINS_S: Final = 1.0
@@ -110,7 +110,7 @@ async def _first_motion(bench: Bench, watch: StageWatch, image: Request, home: d
 async def _alone(bench: Bench) -> None:
     """Leave the gripper without a client for a while, longer and longer."""
     alone = 0.0
-    watch = bench.watch(SECONDS)
+    watch = bench.watch(LOSS_S)
     for seconds in bench.lengths.alone:
         await bench.link.close()
         await watch.pause(seconds)
@@ -206,7 +206,7 @@ async def _activated_again(bench: Bench) -> bool:
     """Ask the person, reset and activate; return whether it is active then."""
     if not await bench.person.consents(RESET_AGAIN):
         raise EndError("declined", "the new activation was not confirmed")
-    watch = bench.watch(SECONDS, allows_faults=True)
+    watch = bench.watch(LOSS_S, allows_faults=True)
     try:
         await activate(watch)
     except EndError as end:

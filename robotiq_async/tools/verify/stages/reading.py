@@ -155,8 +155,8 @@ async def _answers(bench: Bench, registers: RegisterMap) -> bool:
         words = str(error)
     finally:
         await link.close()
-    asked = f"unit {registers.device_id}, function {registers.read_function} at {registers.status}"
-    bench.keep(RecordedExchange(began, loop.time(), "probe", words=f"{asked}: {words}"))
+    question = f"unit {registers.device_id}, function {registers.read_function} at {registers.status}"
+    bench.keep(RecordedExchange(began, loop.time(), "probe", words=f"{question}: {words}"))
     await asyncio.sleep(CLOSED_S)
     return bool(block)
 

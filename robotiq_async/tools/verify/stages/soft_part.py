@@ -11,7 +11,7 @@ from ..catalogue import EndError, Figure
 from ..motions import MARGIN, are_near, in_place, resting_envelope
 from ..watch import ENTER, AxesAtRest, StageWatch
 
-SECONDS: Final = 60.0
+SOFT_PART_S: Final = 60.0
 FOAM_CLOSE_S: Final = 15.0
 LEFT_S: Final = 5.0
 STANDS_S: Final = 0.5
@@ -37,7 +37,7 @@ async def soft_part(bench: Bench) -> None:
     person = bench.person
     if not await person.consents(PLACE):
         raise EndError("declined", "the foam was not confirmed: the fingers did not close")
-    watch = bench.watch(SECONDS)
+    watch = bench.watch(SOFT_PART_S)
     start = await watch.look()
     home = {finger: start.position(finger) for finger in bench.fingers}
     watch.confine(resting_envelope(start, bench.fingers))
@@ -57,7 +57,7 @@ async def soft_part(bench: Bench) -> None:
 
 
 async def _open(bench: Bench, home: dict[Finger, int]) -> None:
-    watch = bench.watch(SECONDS)
+    watch = bench.watch(SOFT_PART_S)
     now = await watch.look()
     await watch.write(replace(in_place(now), go=True).with_positions(home))
     if await watch.until(lambda status: are_near(status, home, MARGIN), FOAM_CLOSE_S) is None:
@@ -73,7 +73,7 @@ async def _at_speed(bench: Bench, home: dict[Finger, int], slowly: RobotiqStatus
         return
     if answer is None:
         raise EndError("declined", "the question about the foam was not answered")
-    watch = bench.watch(SECONDS)
+    watch = bench.watch(SOFT_PART_S)
     start = await watch.look()
     watch.confine(resting_envelope(start, bench.fingers))
     held = (await _close(bench, watch, start, SPEED_MAX)).end

@@ -13,7 +13,7 @@ from ..catalogue import EndError, Figure
 from ..motions import MARGIN, are_near, go, in_place, motion_envelope
 from ..watch import AxesAtRest, StageWatch
 
-SECONDS: Final = 90.0
+STOPPING_S: Final = 90.0
 SPEED: Final = 64
 STOPPING_COUNTS: Final = 80
 LEG_S: Final = 12.0
@@ -23,7 +23,7 @@ COUNTS: Final = 10
 
 async def stopping(bench: Bench) -> None:
     """Write rGTO = 0, rGTO = 1 again, a new request, and a hold, each half way."""
-    watch = bench.watch(SECONDS)
+    watch = bench.watch(STOPPING_S)
     start = await watch.look()
     if any(start.position(finger) > 100 for finger in bench.fingers):
         raise EndError("refused", "the fingers are not open; begin with --from 3")

@@ -13,7 +13,7 @@ from ..catalogue import NO_OPTIONS, Figure, Options
 from ..motions import as_found
 from ..watch import StageWatch, describe
 
-SECONDS: Final = 60.0
+WRITING_S: Final = 60.0
 WRITE_STILL_S: Final = 1.0
 WRITE_PROBES: Final = 20
 ECHO_S: Final = 0.02
@@ -30,7 +30,7 @@ WRITE_LATE_S: Final = 0.0005  # a first image was late if it took LATE times the
 
 async def writing(bench: Bench) -> None:
     """Write the same image, then positions without rGTO, then pairs of images close together."""
-    watch = bench.watch(SECONDS)
+    watch = bench.watch(WRITING_S)
     watch.need_active(False)
     before = await watch.look()
     image = as_found(before)

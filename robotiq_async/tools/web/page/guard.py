@@ -34,13 +34,13 @@ HEADERS: Final = {
     "x-content-type-options": "nosniff",
     "x-frame-options": "DENY",
 }
-_PAGE: Final = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Robotiq gripper</title>
+_PASSWORD_PAGE: Final = """<!doctype html><html lang="en"><meta charset="utf-8"><title>Robotiq gripper</title>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="color-scheme" content="light dark">
 <style>body{font:1.1em sans-serif;max-width:30em;margin:15vh auto;padding:0 1em}
 input,button{font:inherit;padding:.4em}
 </style><h1>Robotiq gripper</h1>"""
-_FORM: Final = """<form method="post" action="/"><label>Password <input type="password"
+_PASSWORD_FORM: Final = """<form method="post" action="/"><label>Password <input type="password"
  name="password" autofocus autocomplete="current-password"></label> <button>Enter</button></form>"""
 
 
@@ -73,12 +73,12 @@ class Guard:
 
     async def _ask(self, scope: AsgiMessage, receive: Receive, send: AsgiSend) -> None:
         if scope["method"] != "POST":
-            await _answer(send, 200, _FORM)
+            await _answer(send, 200, _PASSWORD_FORM)
             return
         password = parse_qs((await _body(receive)).decode("utf-8", "replace")).get("password", [""])[0]
         address = scope["client"][0]
         if self._waiting[address] >= WAITING:
-            await _answer(send, 429, f"<p>Too many attempts at a time: try again.</p>{_FORM}")
+            await _answer(send, 429, f"<p>Too many attempts at a time: try again.</p>{_PASSWORD_FORM}")
             return
         self._waiting[address] += 1
         try:
@@ -91,7 +91,7 @@ class Guard:
         if right:
             await self._let_in(send)
         else:
-            await _answer(send, 403, f"<p>That is not the password.</p>{_FORM}")
+            await _answer(send, 403, f"<p>That is not the password.</p>{_PASSWORD_FORM}")
 
     async def _let_in(self, send: AsgiSend) -> None:
         location = f"{self._access.settings.folder}/"
@@ -129,7 +129,7 @@ async def _answer(send: AsgiSend, status: int, words: str, more: dict[str, str] 
     }
     headers = [(name.encode(), value.encode("latin-1")) for name, value in fields.items()]
     await send({"type": "http.response.start", "status": status, "headers": headers})
-    await send({"type": "http.response.body", "body": (_PAGE + words).encode()})
+    await send({"type": "http.response.body", "body": (_PASSWORD_PAGE + words).encode()})
 
 
 def _with_headers(send: AsgiSend) -> AsgiSend:

@@ -179,8 +179,8 @@ class PageMirror:
             return
         number = next(self._numbers)
         self._answers[number] = answered
-        asked = {"page": page, "number": number, "at": at, "hand": hand, "name": name, "arguments": arguments}
-        self._say({"do": asked})
+        call = {"page": page, "number": number, "at": at, "hand": hand, "name": name, "arguments": arguments}
+        self._say({"do": call})
 
     def gone(self, page: str) -> None:
         """Hold the motions of a page that has ended, or whose browser is lost."""

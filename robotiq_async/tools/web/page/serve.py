@@ -29,7 +29,7 @@ MESSAGE_MAX: Final = 65_536
 """Limit of a websocket message in bytes."""
 
 
-class _Connection(H11Protocol):
+class _PageConnection(H11Protocol):
     """A connection that has to send a request soon. Strangers must not keep browsers away.
 
     If there are too many, the oldest without a request is closed: a browser sends one at once, and gets in.
@@ -41,7 +41,9 @@ class _Connection(H11Protocol):
         super().connection_made(transport)
         self.since = self.loop.time()
         if len(self.connections) > MOST_CONNECTIONS:
-            silent = [each for each in self.connections if isinstance(each, _Connection) and each.is_silent]
+            silent = [
+                each for each in self.connections if isinstance(each, _PageConnection) and each.is_silent
+            ]
             min(silent, key=lambda each: each.since, default=self).transport.abort()
         self.loop.call_later(HEAD_S, self._close_if_silent)
 
@@ -54,7 +56,7 @@ class _Connection(H11Protocol):
             self.transport.abort()
 
 
-class _Server(uvicorn.Server):
+class _UvicornServer(uvicorn.Server):
     """A server that leaves signals alone, and reports when it serves."""
 
     def __init__(self, config: uvicorn.Config) -> None:
@@ -90,7 +92,7 @@ def run(settings: PageSettings, listening: socket.socket, pipes: Pipes) -> None:
     port = listening.getsockname()[1]
     config = uvicorn.Config(
         Guard(_application(settings, mirror), Access(settings, port)),
-        http=_Connection,  # h11: httptools accepts any number of headers
+        http=_PageConnection,  # h11: httptools accepts any number of headers
         proxy_headers=False,
         log_level="critical",
         access_log=False,
@@ -119,14 +121,14 @@ def _application(settings: PageSettings, mirror: PageMirror) -> FastAPI:
 
 
 async def _serve(config: uvicorn.Config, listening: socket.socket, mirror: PageMirror, pipes: Pipes) -> None:
-    server, loop = _Server(config), asyncio.get_running_loop()
+    server, loop = _UvicornServer(config), asyncio.get_running_loop()
     threading.Thread(target=_hear, args=(pipes, mirror, loop, server), daemon=True).start()
     beating = loop.create_task(_beat(mirror, server, pipes, listening.getsockname()[1]))
     await server.serve(sockets=[listening])
     beating.cancel()
 
 
-async def _beat(mirror: PageMirror, server: _Server, pipes: Pipes, port: int) -> None:
+async def _beat(mirror: PageMirror, server: _UvicornServer, pipes: Pipes, port: int) -> None:
     await server.serving.wait()
     pipes.say({"serving": port})
     while True:
@@ -134,7 +136,7 @@ async def _beat(mirror: PageMirror, server: _Server, pipes: Pipes, port: int) ->
         mirror.beat()
 
 
-def _hear(pipes: Pipes, mirror: PageMirror, loop: asyncio.AbstractEventLoop, server: _Server) -> None:
+def _hear(pipes: Pipes, mirror: PageMirror, loop: asyncio.AbstractEventLoop, server: _UvicornServer) -> None:
     # In a thread: not every system can wait for a pipe in an event loop.
     with suppress(RuntimeError):  # the loop has been closed
         for line in pipes.lines():

@@ -42,7 +42,7 @@ _FOOT_M: Final = 0.0214
 _BASE_JOINT: Final = 0.020 + 0j
 _BASE_LINK: Final = 0.050 - 0.028j
 _MIDDLE_M: Final = 0.039
-_BENT: Final = radians(30)
+_BEND: Final = radians(30)
 """Angle between base and middle link, and back at the tip, when all angles are 0."""
 _HALF_BASE_M: Final = 0.0095
 _HALF_MIDDLE_M: Final = 0.0085
@@ -161,10 +161,10 @@ def _bent_around(height: float, radius: float) -> tuple[float, float, float]:
     bar = complex(height, _INWARDS_M)
     base = _within(_towards(bar - _BASE_JOINT, radius + _HALF_BASE_M) - cmath.phase(_BASE_LINK), BASE)
     knee = _BASE_JOINT + _BASE_LINK * cmath.exp(1j * base)
-    heading = base - _BENT
+    heading = base - _BEND
     middle = _within(_towards(bar - knee, radius + _HALF_MIDDLE_M) - heading, MIDDLE)
     last = knee + cmath.rect(_MIDDLE_M, heading + middle)
-    tip = _within(_towards(bar - last, radius + _PAD_M) - heading - middle - _BENT, TIP)
+    tip = _within(_towards(bar - last, radius + _PAD_M) - heading - middle - _BEND, TIP)
     return base, middle, tip
 
 

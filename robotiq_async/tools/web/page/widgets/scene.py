@@ -44,7 +44,7 @@ TURNED: Final = 2e-4
 MOVED: Final = 2e-5
 """The same of a joint that slides, in metres."""
 
-Calls = list[list[Any]]
+SceneCalls = list[list[Any]]
 
 
 class HandFigure:
@@ -74,9 +74,9 @@ class HandFigure:
             self._groups[joint.child] = group
             self._fill(joint.child)
 
-    def turn(self, angles: Mapping[str, float]) -> Calls:
+    def turn(self, angles: Mapping[str, float]) -> SceneCalls:
         """Turn the joints; returns the calls for the browser."""
-        calls: Calls = []
+        calls: SceneCalls = []
         for joint in self._model.moving:
             angle = angles[joint.name]
             least = MOVED if joint.slides else TURNED
@@ -133,13 +133,13 @@ class SceneParts:
         self._groups: list[Object3D] = []
         self._poses: list[Pose] = []
 
-    def show(self, parts: Sequence[Shape]) -> Calls:
+    def show(self, parts: Sequence[Shape]) -> SceneCalls:
         """Draw them where they are now; returns the calls for the browser."""
         kinds = [(part.kind, part.size) for part in parts]
         if parts and kinds != self._kinds:
             self._make(parts)
             self._kinds = kinds
-        calls: Calls = []
+        calls: SceneCalls = []
         for group in self._groups:
             group.visible(bool(parts))
         for number, part in enumerate(parts):
@@ -237,13 +237,13 @@ class HandScene:
 
     def _show_ghost(
         self, model: HandModel, ghost: HandFigure, hand: HandMirror, status: RobotiqStatus
-    ) -> Calls:
+    ) -> SceneCalls:
         away = _away(status) if status.go_echo and status.is_activated and not hand.is_lost else Finger(0)
         for finger, links in model.fingers.items():
             for link in links:
                 ghost.show(link, is_shown=bool(finger & away))
-        asked = dict(zip(joint_names(status.model), requested_angles(status), strict=True))
-        return ghost.turn(model.completed(asked)) if away else []
+        wanted = dict(zip(joint_names(status.model), requested_angles(status), strict=True))
+        return ghost.turn(model.completed(wanted)) if away else []
 
     def _show_contacts(self, drawing: Drawing, hand: HandMirror, status: RobotiqStatus) -> None:
         opacity = STALE if hand.is_lost else 1.0
