@@ -350,10 +350,13 @@ class Course:
         # A fault stops the axes, and gDT shows a motion.
         if axis not in status.moving or status.fault.is_serious:
             return at
+        forward = 1 if request > at else -1
         for kept, each in reversed(self._kept):
-            if axis not in each.moving or asked - kept > BASELINE_S:
+            way = forward * (first.position(axis) - each.position(axis))
+            if axis not in each.moving or asked - kept > BASELINE_S or way < 0:
                 break
-            since, first = kept, each
+            if way:  # a jaw shows a motion for a while before it begins to move
+                since, first = kept, each
         time = asked - since
         place = at if time == 0 else at + int((at - first.position(axis)) * seconds / time)
         return sorted((at, place, request))[1]

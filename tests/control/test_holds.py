@@ -15,6 +15,7 @@ from robotiq_async import (
     ObjectStatus,
     State,
 )
+from robotiq_async.values.model import HAND_E, TWO_FINGER_85, Model
 from robotiq_async.values.status import RobotiqStatus
 from tests.control.other_client import going_to, moved_by_another
 from tests.control.scan import Scan, started
@@ -277,6 +278,33 @@ def test_a_hold_drives_an_axis_hardly_back(device_cycle: float, speed: int, goal
     back = way - abs(scan.positions()[A] - at)
     assert back <= 2 * 3
     assert way <= 1 + 130 * (device_cycle + 0.02)
+
+
+@pytest.mark.parametrize("back_and_forth", [False, True])
+@pytest.mark.parametrize("model", [TWO_FINGER_85, HAND_E])
+def test_a_hold_drives_a_jaw_that_has_just_begun_to_move_hardly_back(
+    model: Model, back_and_forth: bool
+) -> None:
+    """It shows a motion 80 ms before it begins one: its speed came out low, and it drove 70 counts back."""
+    scan = Scan(device_cycle=0.2, model=model)
+    scan.start()
+    scan.moved(10, A, speed=255)
+    scan.move(250, A, speed=255)
+    scan.until(lambda: scan.positions()[A] > 60)
+    if back_and_forth:
+        scan.move(0, A, speed=255)
+        highest = [0]
+
+        def has_turned() -> bool:
+            highest[0] = max(highest[0], scan.positions()[A])
+            return scan.positions()[A] < highest[0] - 30
+
+        scan.until(has_turned)
+    at, travel = scan.positions()[A], scan.gripper.travel(A)
+    scan.hold(A)
+    scan.run(1.5)
+    back = scan.gripper.travel(A) - travel - abs(scan.positions()[A] - at)
+    assert back <= 2 * 15
 
 
 def test_a_reply_that_was_read_late_tells_no_speed(scan: Scan) -> None:
