@@ -168,9 +168,13 @@ class HandKind(ABC):
             self._check_running()
             if (status := self._newest_status) is None:
                 raise NotStartedError("no status has been read yet: start the hand first")
-            if self.state is State.DISCONNECTED:
+            if self._is_link_down:
                 raise ConnectionLostError("the link is down: the present status of the gripper is not known")
             return status
+
+    @property
+    def _is_link_down(self) -> bool:
+        return self.state is State.DISCONNECTED
 
     def _check_may_listen(self) -> None:
         """Refuse another thread or loop while the hand runs: neither streams nor listeners are locked."""

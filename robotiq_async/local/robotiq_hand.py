@@ -466,6 +466,11 @@ class RobotiqHand(Hand):
     def _newest_status(self) -> RobotiqStatus | None:
         return None if self._session is None else self._session.controller.status
 
+    @property
+    def _is_link_down(self) -> bool:
+        """Whether the newest status is from before a loss of the link, also while the hand stops."""
+        return self._session is not None and self._session.controller.evidence.condition is None
+
     def _no_status_for(self, seconds: float) -> ConnectionLostError:
         if self._session is None or self.state is not State.DISCONNECTED:
             return super()._no_status_for(seconds)

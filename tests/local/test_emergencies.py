@@ -23,7 +23,7 @@ from robotiq_async.values.request import Request
 from robotiq_async.values.states import SEQUENCES
 from tests.conftest import Clock
 from tests.fake_transport import Wire
-from tests.grippers import lose_link
+from tests.grippers import lose_link, until_moving
 from tests.virtual import VirtualLoop
 
 pytestmark = pytest.mark.virtual_time
@@ -219,6 +219,24 @@ async def test_a_stop_over_a_new_link_does_not_activate_a_gripper_that_lost_its_
     await hand.stop()
     assert not [write for write in gripper.writes[writes:] if write.registers[0] & 0x0100]
     assert not gripper.is_moving
+
+
+async def test_a_hand_that_stops_without_a_link_does_not_say_that_nothing_moves(
+    server: SimulatorServer, gripper: SimulatedGripper
+) -> None:
+    """It said so in an activation that went on: its last status counted as if the link were there."""
+    hand = RobotiqHand(server.address, reconnect=ReconnectPolicy(first_delay=5.0))
+    await hand.start(activate=False)
+    activating = asyncio.create_task(hand.activate())
+    await until_moving(server, hand)
+    await lose_link(server, hand)
+    stopping = asyncio.create_task(hand.stop())
+    await asyncio.sleep(0.01)
+    assert hand.state is State.DO_SHUTDOWN
+    assert gripper.is_moving
+    with pytest.raises(ConnectionLostError):
+        hand.is_moving  # noqa: B018
+    await asyncio.gather(activating, stopping, return_exceptions=True)
 
 
 async def test_a_loop_that_is_held_up_is_not_held_up_more_by_reading_again() -> None:
