@@ -46,6 +46,8 @@ class Wire(Exchanging):
         """At the next reading, once."""
         self.is_slow = False
         """Whether answers are on their way until this is False again."""
+        self.is_awaited = False
+        """Whether an answer is on its way for that reason."""
 
     async def open(self) -> None:
         self.is_open = True
@@ -54,8 +56,10 @@ class Wire(Exchanging):
         if self.breaks:
             self.breaks = self.is_open = False
             raise ConnectionLostError("unplugged")
-        while self.is_slow:  # noqa: ASYNC110  # another thread sets it
+        while self.is_slow:
+            self.is_awaited = True
             await asyncio.sleep(0.001)
+        self.is_awaited = False
         return self.look(lambda gripper: gripper.status_registers())
 
     async def write(self, registers: Sequence[int]) -> None:
