@@ -87,8 +87,8 @@ canary: $(RELEASE)/.complete  ## Test with the newest of all dependencies, in an
 typed: $(RELEASE)/.complete  ## Count the names whose type pyright knows; fewer than 98 % fail (a minute; needs the package index and npm's)
 	@$(RELEASE)/bin/python -m tests.release.typed
 
-soak: $(STAMP)  ## Move a MODEL=3f under random faults for MINUTES=30 over LINK=tcp (rtu, urcap, tunnel), and print figures
-	@$(BIN)/python -m tests.adversity.soak --minutes $(MINUTES) --link $(LINK) --model $(MODEL) --hands $(HANDS) --silent $(SILENT)
+soak: $(STAMP)  ## Move a MODEL=3f under random faults for MINUTES=30 over LINK=tcp (rtu, urcap, tunnel), and print figures; with VIRTUAL=1 in a twentieth of the time
+	@$(BIN)/python -m tests.adversity.soak --minutes $(MINUTES) --link $(LINK) --model $(MODEL) --hands $(HANDS) --silent $(SILENT) $(if $(VIRTUAL),--virtual --starved)
 
 habits: $(STAMP)  ## Everything under fault once more, with HABITS="status-lag; silence-fault; write-spacing"
 	@HABITS="$(HABITS)" $(BIN)/python -m pytest tests/adversity

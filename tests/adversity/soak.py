@@ -1,12 +1,15 @@
-"""Moves under random faults for as long as you like, in real time and over real connections.
+"""Moves under random faults for as long as you like, over real connections or in virtual time.
 
     python -m tests.adversity.soak --minutes 30 --link rtu --hands 2
+    python -m tests.adversity.soak --minutes 300 --link rtu --virtual --starved
 
 A hand, a simulated gripper and everything that watches them share one event loop. In cycles of some
 seconds two users move axes, cancel, halt and run control loops, while the fault injector cuts, delays,
 corrupts and refuses, and the application holds up the loop now and then. After each cycle everything comes to
 rest and is compared. Several hands do so beside each other, on a serial line with one port for all of them.
-With ``--silent`` others on that line look all the time for grippers that do not answer.
+With ``--silent`` others on that line look all the time for grippers that do not answer. With ``--starved``
+the loop is also held up for seconds. With ``--virtual`` an hour takes some minutes, and a seed always takes
+the same course.
 Exits with 1 when a promise was broken.
 """
 
@@ -25,7 +28,9 @@ from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
+
+import pytest
 
 from robotiq_async import JAW, Finger, Model, MoveResult, RobotiqError, RobotiqHand, State, Tunnel
 from robotiq_async.link.line import LONGEST_HUSH_S
@@ -35,7 +40,7 @@ from robotiq_async.values.model import MODELS, THREE_FINGER, model_of
 from robotiq_async.values.registers import RTU_REGISTERS
 from robotiq_async.values.states import RUNNING
 from tests.adversity.fuzz import resident
-from tests.adversity.watch import LoopWatch, WriteWatch, check
+from tests.adversity.watch import LoopWatch, VirtualLoopWatch, WriteWatch, check
 from tests.adversity.world import (
     MODEL,
     RtuServer,
@@ -49,8 +54,13 @@ from tests.adversity.world import (
 )
 from tests.arms import Arm
 from tests.serial_line import SerialLine
+from tests.virtual_line import VirtualLine
+
+Cable = SerialLine | VirtualLine
 
 SPEEDUP = 5.0
+HOLD_UPS_S = (0.03, 0.1, 0.6)
+STARVED_S = (*HOLD_UPS_S, 2.0, 6.0)
 CYCLE_S = (4.0, 12.0)
 FOR_EVER_S = 1e6
 WRITE_S = 1.0
@@ -86,18 +96,31 @@ MOVES_EVERYTHING = ("foreign", "release")
 OF_A_SCISSOR = "interference"
 
 
+class Setting(NamedTuple):
+    """The options of a run; links and numbers are those of the command line."""
+
+    link: str = "tcp"
+    model: Model = MODEL
+    hands: int = 1
+    silent: int = 0
+    seed: int = 1
+    is_starved: bool = False
+
+
 @dataclass
 class Soak:
-    """One run."""
+    """One hand in a run."""
 
     world: World
-    line: SerialLine | None
+    line: Cable | None
     """The line that this run may pull out."""
     rng: random.Random
     loop: LoopWatch
     writes: WriteWatch
     write_s: float
     """Longest time that a write may take."""
+    hold_ups: tuple[float, ...]
+    """Seconds for which the application holds up the loop at a time."""
     arm: Arm | None = None
     """The arm at whose tool the gripper is, if there is one."""
     figures: Counter[str] = field(default_factory=Counter)
@@ -119,7 +142,7 @@ class Soak:
         before = self.world.travels()
         self.writes.forget()
         self.everything_moved = False
-        ends = time.monotonic() + self.rng.uniform(*CYCLE_S)
+        ends = self.loop.now + self.rng.uniform(*CYCLE_S)
         # Two users, on axes of their own where there are enough, else one: sharing an axis supersedes.
         masks = {axes & pair or axes for pair in (Finger.A | Finger.B, Finger.C | Finger.SCISSOR)}
         users = [self.user(mask, ends) for mask in masks]
@@ -138,7 +161,7 @@ class Soak:
     async def user(self, axes: Finger, ends: float) -> None:
         """A user who moves these axes."""
         calls = (self.move, self.move, self.set_position, self.control_loop, self.cancelled_move, self.halt)
-        while time.monotonic() < ends:
+        while self.loop.now < ends:
             mask = Finger(int(axes) & self.rng.randrange(1, 16)) or axes
             await self.rng.choice(calls)(mask)
             if self.hand.state not in RUNNING and self.rng.random() < 0.3:
@@ -201,9 +224,9 @@ class Soak:
 
     async def bounded(self, what: str, seconds: float, call: Awaitable[Any]) -> Any:
         """A call ends in time. What the application and other processes took is not the library's."""
-        began = time.monotonic() - self.loop.lost
+        began = self.loop.now - self.loop.lost
         result = await call
-        took = time.monotonic() - self.loop.lost - began
+        took = self.loop.now - self.loop.lost - began
         if took > seconds:
             self.breach(f"{what} took {took:.2f} s")
         return result
@@ -213,7 +236,7 @@ class Soak:
         kinds = [trouble for trouble in TROUBLES if KINDS[trouble.kind].fits(self.world.server.link)]
         if Finger.SCISSOR not in self.hand.model.all_axes:
             kinds = [kind for kind in kinds if kind.kind != OF_A_SCISSOR]
-        while time.monotonic() < ends:
+        while self.loop.now < ends:
             await asyncio.sleep(self.rng.uniform(0.1, 1.5))
             if self.line is not None and self.rng.random() < 0.1:
                 await self.pull(self.line)
@@ -232,7 +255,7 @@ class Soak:
                     self.writes.forget()
                     self.world.gripper.images.clear()
 
-    async def pull(self, line: SerialLine) -> None:
+    async def pull(self, line: Cable) -> None:
         self.figures["trouble: line pulled"] += 1
         line.pull()
         await asyncio.sleep(self.rng.choice((0.02, 0.5)))
@@ -240,9 +263,9 @@ class Soak:
 
     async def application(self, ends: float) -> None:
         """The program around the hand holds up the loop now and then."""
-        while time.monotonic() < ends:
+        while self.loop.now < ends:
             await asyncio.sleep(self.rng.uniform(0.5, 4.0))
-            self.loop.hold_up(self.rng.choice((0.03, 0.1, 0.6)))
+            self.loop.hold_up(self.rng.choice(self.hold_ups))
             self.figures["loop held up"] += 1
 
     async def rest(self) -> None:
@@ -277,31 +300,41 @@ class Soak:
 
 
 @contextlib.asynccontextmanager
-async def soaks(
-    link: str, model: Model, hands: int, silent: int, seed: int, loop: LoopWatch
-) -> AsyncIterator[list[Soak]]:
+async def soaks(setting: Setting, loop: LoopWatch) -> AsyncIterator[list[Soak]]:
     """Everything in place, the hands started."""
+    link, model, hands, silent, seed, is_starved = setting
     async with contextlib.AsyncExitStack() as stack:
-        line: SerialLine | None = None
+        line: Cable | None = None
         if link == "rtu":
-            # In memory: pulling and plugging makes and removes a link, and a busy disk takes its time.
-            memory = "/dev/shm" if Path("/dev/shm").is_dir() else None  # noqa: ASYNC240
-            folder = Path(stack.enter_context(tempfile.TemporaryDirectory(dir=memory)))
-            line = stack.enter_context(SerialLine(folder, hands))
+            line = stack.enter_context(line_for(hands, loop))
         them = []
         others = hands + silent - 1 if line is not None else 0
         write_s = WRITE_S + others * TURNS * TURN_S
         for number in range(hands):
-            gripper = StampedGripper(speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP, model=model)
+            gripper = StampedGripper(
+                asyncio.get_running_loop().time, speedup=SPEEDUP, device_cycle=0.005 * SPEEDUP, model=model
+            )
             world, arm = await stack.enter_async_context(started(gripper, link, line, number))
             pulled = line if number == 0 else None
-            them.append(
-                Soak(world, pulled, random.Random(seed + number), loop, WriteWatch(model), write_s, arm)
-            )
+            rng, hold_ups = random.Random(seed + number), STARVED_S if is_starved else HOLD_UPS_S
+            them.append(Soak(world, pulled, rng, loop, WriteWatch(model), write_s, hold_ups, arm))
         for number in range(hands, hands + silent):
             assert line is not None, "others need a line"
             stack.enter_context(looking(f"rtu://{line.near}", RTU_REGISTERS.device_id + number))
         yield them
+
+
+@contextlib.contextmanager
+def line_for(hands: int, loop: LoopWatch) -> Iterator[Cable]:
+    """The serial line of so many hands."""
+    if isinstance(loop, VirtualLoopWatch):
+        with pytest.MonkeyPatch.context() as patch:
+            yield VirtualLine(patch)
+        return
+    # In memory: pulling and plugging makes and removes a link, and a busy disk takes its time.
+    memory = "/dev/shm" if Path("/dev/shm").is_dir() else None
+    with tempfile.TemporaryDirectory(dir=memory) as folder, SerialLine(Path(folder), hands) as line:
+        yield line
 
 
 @contextlib.contextmanager
@@ -314,7 +347,7 @@ def looking(address: str, unit: int) -> Iterator[None]:
 
 @contextlib.asynccontextmanager
 async def started(
-    gripper: StampedGripper, link: str, line: SerialLine | None, number: int
+    gripper: StampedGripper, link: str, line: Cable | None, number: int
 ) -> AsyncIterator[tuple[World, Arm | None]]:
     """A gripper with its server, and a hand; of several on a line it is the one with this number.
 
@@ -324,7 +357,8 @@ async def started(
     unit = None
     if line is not None:
         unit = RTU_REGISTERS.device_id + number
-        server = RtuServer(line.fars[number], gripper, device_id=unit)
+        far = line.FAR if isinstance(line, VirtualLine) else line.fars[number]
+        server = RtuServer(far, gripper, device_id=unit)
     else:
         server = SERVERS[link](gripper)
     async with contextlib.AsyncExitStack() as stack:
@@ -341,26 +375,24 @@ async def started(
             await asyncio.gather(watching, return_exceptions=True)
 
 
-async def run(
-    minutes: float, link: str, model: Model, hands: int, silent: int, seed: int, loop: LoopWatch
-) -> int:
+async def run(minutes: float, setting: Setting, loop: LoopWatch) -> int:
     """Run it and print the figures as a table.
 
     Returns:
         The exit code.
     """
-    began, memory = time.monotonic(), 0
-    async with soaks(link, model, hands, silent, seed, loop) as them:
+    began, memory = loop.now, 0
+    async with soaks(setting, loop) as them:
         last_word = began
-        while time.monotonic() - began < 60 * minutes:
+        while loop.now - began < 60 * minutes:
             await asyncio.gather(*(it.cycle() for it in them))
             for it in them:
                 it.look()
             await asyncio.gather(*(it.restart() for it in them))
-            if not memory and time.monotonic() - began > 60 * minutes / 4:
+            if not memory and loop.now - began > 60 * minutes / 4:
                 memory = resident()  # by now what grows once has grown: histories, samples, caches
-            if time.monotonic() - last_word > 60:
-                last_word = time.monotonic()
+            if loop.now - last_word > 60:
+                last_word = loop.now
                 done = sum(it.figures["moves done"] for it in them)
                 broken = sum(len(it.broken) for it in them)
                 passed = (last_word - began) / 60
@@ -370,15 +402,15 @@ async def run(
     figures = sum((it.figures for it in them), Counter[str]())
     broken = sum(len(it.broken) for it in them)
     rows = [
-        ("minutes", f"{(time.monotonic() - began) / 60:.1f}"),
+        ("minutes", f"{(loop.now - began) / 60:.1f}"),
         ("promises broken", str(broken)),
         *((name, str(figures[name])) for name in sorted(figures)),
         ("longest stall that statistics saw, ms", f"{1000 * max(it.longest_stall for it in them):.0f}"),
         ("longest hold by library, simulator and checks, ms", f"{1000 * loop.hold.longest:.1f}"),
         ("memory growth in the last three quarters, MiB", f"{(resident() - memory) / 2**20:.1f}"),
     ]
-    beside = f" beside {silent} silent" if silent else ""
-    head = [(f"{hands} {model.title}{beside}, {link}", "figure"), ("--", "--")]
+    beside = f" beside {setting.silent} silent" if setting.silent else ""
+    head = [(f"{setting.hands} {setting.model.title}{beside}, {setting.link}", "figure"), ("--", "--")]
     print("\n".join(f"| {name} | {value} |" for name, value in head + rows))  # noqa: T201
     return 1 if broken else 0
 
@@ -399,6 +431,8 @@ def main() -> int:
     parser.add_argument("--silent", type=int, default=0, help="hands on an rtu line without a gripper")
     parser.add_argument("--model", type=model_of, default=MODEL, help=f"one of {', '.join(MODELS)}")
     parser.add_argument("--seed", type=int, default=int(time.time()), help="of everything that is random")
+    parser.add_argument("--virtual", action="store_true", help="in virtual time: an hour takes some minutes")
+    parser.add_argument("--starved", action="store_true", help="the loop is held up for seconds, too")
     options = parser.parse_args()
     if options.link == "urcap" and options.model is THREE_FINGER:
         parser.error("a UR has no 3-Finger: --model 2f85, for example")
@@ -409,10 +443,11 @@ def main() -> int:
     # Most garbage here is that of the checks: it is collected between cycles, when nothing is measured.
     gc.freeze()
     gc.disable()
-    loop = LoopWatch()
+    loop = VirtualLoopWatch() if options.virtual else LoopWatch()
     with asyncio.Runner(loop_factory=loop.make_loop) as runner:
-        them = options.link, options.model, options.hands, options.silent
-        return runner.run(run(options.minutes, *them, options.seed, loop))
+        hands = options.hands, options.silent
+        setting = Setting(options.link, options.model, *hands, options.seed, options.starved)
+        return runner.run(run(options.minutes, setting, loop))
 
 
 if __name__ == "__main__":

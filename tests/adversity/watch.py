@@ -11,8 +11,8 @@ from collections.abc import Iterator
 
 from robotiq_async.values.model import Model
 from robotiq_async.values.request import AxisRequest, Request
-from tests.adversity.world import LONGEST_HOLD_S, UrcapServer, World
-from tests.virtual import HoldWatch
+from tests.adversity.world import LONGEST_HOLD_S, StampedGripper, UrcapServer, World
+from tests.virtual import HoldWatch, VirtualClock, VirtualLoop
 
 
 class _WatchedSelector(selectors.DefaultSelector):
@@ -36,6 +36,11 @@ class LoopWatch:
         self.hold = HoldWatch()
         self._deliberate = 0.0
 
+    @property
+    def now(self) -> float:
+        """The time, in seconds."""
+        return time.monotonic()
+
     def make_loop(self) -> asyncio.AbstractEventLoop:
         return asyncio.SelectorEventLoop(_WatchedSelector(self.hold))
 
@@ -50,6 +55,30 @@ class LoopWatch:
     def lost(self) -> float:
         """Seconds that the application and other processes have taken so far."""
         return self._deliberate + self.hold.waiting()
+
+
+class VirtualLoopWatch(LoopWatch):
+    """The same of a loop in virtual time: there no one else takes any."""
+
+    _loop: VirtualLoop
+
+    @property
+    def now(self) -> float:
+        return self._loop.time()
+
+    def make_loop(self) -> asyncio.AbstractEventLoop:
+        clock = VirtualClock()
+        clock.hold = self.hold
+        self._loop = VirtualLoop(clock)
+        return self._loop
+
+    def hold_up(self, seconds: float) -> None:
+        self._loop.hold_up(seconds)
+        self._deliberate += seconds
+
+    @property
+    def lost(self) -> float:
+        return self._deliberate
 
 
 class WriteWatch:
