@@ -103,7 +103,7 @@ class Cell:
     def images(self, since: int) -> list[Request]:
         """The images that the gripper got, from a number of writes on."""
         gripper = self.world.gripper
-        return [Request.from_registers(registers, gripper.model) for registers, _ in gripper.images[since:]]
+        return [Request.from_registers(each.registers, gripper.model) for each in gripper.images[since:]]
 
 
 # -- the write ---------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from robotiq_async.values.model import Model
 from robotiq_async.values.request import AxisRequest, Request
-from tests.adversity.world import LONGEST_HOLD_S, StampedGripper, UrcapServer, World
+from tests.adversity.world import LONGEST_HOLD_S, UrcapServer, World
 from tests.virtual import HoldWatch, VirtualClock, VirtualLoop
 
 
@@ -108,22 +108,27 @@ class WriteWatch:
     def check(self, world: World) -> Iterator[str]:
         """The errors of the writes since the last look."""
         images, world.gripper.images = world.gripper.images, []
-        for registers, positions in images:
-            image = Request.from_registers(registers, self._model)
-            self._newest.append(f"{registers[:3]} at {positions}")
+        for written in images:
+            image = Request.from_registers(written.registers, self._model)
+            asked = [(each.position, each.speed, each.force) for each in image.axes]
+            places = f"at {written.positions}, shown at {written.shown}"
+            self._newest.append(f"{written.time:.4f} go={image.go:d} {asked} {places}")
             if not image.go:
                 # No request moves an axis; and the next one must not be the one that was halted.
                 self._last = [None] * len(self._model.axes)
                 continue
-            for at, (request, position) in enumerate(zip(image.axes, positions, strict=True)):
+            for at, request in enumerate(image.axes):
                 if request == self._last[at]:
                     continue
-                # A request to stay is no motion, however often.
-                stays = self._model.has_reached(request.position, position)
+                # A request to stay is no motion, however often. Nor is a hold, which asks an axis to be where
+                # it was last seen: while it sets off, that is where it stood, with the settings of its motion
+                # if they were written before the position.
+                position, shown = written.positions[at], written.shown[at]
+                stays = self._model.has_reached(request.position, position) or request.position == shown
                 if request in self._past[at] and not stays:
                     axis = self._model.axes[at]
                     yield f"{axis!r}, at {position}, was asked again for what it was before: {request}"
-                    yield f"after {' | '.join(self._newest)}"
+                    yield "\n".join(("after", *self._newest, world.server.told(written.time)))
                 self._past[at].add(request)
                 self._last[at] = request
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 import os
 from bisect import bisect_left, bisect_right
+from collections import deque
 from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -30,7 +31,7 @@ from robotiq_async.simulator.server.urcap_server import UNREADABLE, UrcapRespond
 from robotiq_async.simulator.troubles.fault_injector import FaultInjector
 from robotiq_async.values import registers as reg
 from robotiq_async.values.model import Model, model_of
-from robotiq_async.values.registers import Field, Registers, gFLT, gIMC
+from robotiq_async.values.registers import Field, Registers, gFLT, gIMC, gPO
 from robotiq_async.values.request import Request
 from tests.arms import Arm, DoosanController, ToolLine, tunnel_of
 from tests.grippers import activate_beforehand
@@ -42,6 +43,10 @@ HABITS = parse_troubles(os.environ.get("HABITS", ""))
 """Troubles that every gripper here has besides, by the environment. The promises stay the same."""
 MODEL = model_of(os.environ.get("MODEL"))
 """The gripper of every world that names no other, by the environment. Some scenes need three fingers."""
+MOST_SAID = 20_000
+"""Requests and replies that are kept: those of a cycle of the soak."""
+MOST_TOLD = 16
+"""Those that are told where a status is wrong."""
 SPEEDUP = 5.0
 """Of the gripper only: the link and the hand keep to their own times."""
 
@@ -54,37 +59,63 @@ WAITS = (5, 6, 7, 11)
 """Faults with which a gripper waits for an activation, or to release."""
 
 
+class Written(NamedTuple):
+    """An image that was written.
+
+    Attributes:
+        time: when.
+        registers: it.
+        positions: where the axes were.
+        shown: where the last status before it showed them.
+    """
+
+    time: float
+    registers: Registers
+    positions: tuple[int, ...]
+    shown: tuple[int, ...]
+
+
 class StampedGripper(SimulatedGripper):
     """Writes a number into each status, so that no two in a row are alike.
 
     Its place is the current of the scissor, or on a jaw, of which only three registers are read, the fault of
     a controller. A current that changes is progress: where there is none, the number stays.
 
+    The current has seven bits: with the eighth, one status in ten that has lost its highest bits (seven-bits)
+    would keep a right checksum and a number of before. The checksum does not see four wrong bits that are as
+    far apart as the terms of its polynomial, or eight times as far: those of gSTA, of the scissor's gDT and
+    current, and of the checksum itself are.
+
     Attributes:
         stamps: when each status was given out, and its number.
-        images: every image that was written, with where the axes were; of a SET that is taken one by one
-            that of its GTO alone.
+        images: every image that was written; of a SET that is taken one by one that of its GTO alone.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.stamps: list[tuple[float, int]] = []
-        self.images: list[tuple[Registers, tuple[int, ...]]] = []
+        self.images: list[Written] = []
         self._number = 0
+        self._shown = self._positions()
 
     def status_registers(self) -> Registers:
         registers = super().status_registers()
         has_modes = self.model.has_modes
         if not (has_modes and (gIMC.read(registers) == 0 or gFLT.read(registers) in WAITS)):
-            self._number = (self._number + 1) % (256 if has_modes else 16)
+            self._number = (self._number + 1) % (128 if has_modes else 16)
         self.stamps.append((self._clock(), self._number))
+        self._shown = tuple(place.read(registers) for place, _ in zip(gPO, self.model.axes, strict=False))
         if has_modes:
             return (*registers[:7], self._number << 8)
         return (registers[0], registers[1] & 0x0FFF | self._number << 12, *registers[2:])
 
     def write(self, address_offset: int, registers: Sequence[int]) -> None:
         super().write(address_offset, registers)
-        self.images.append((self.request_registers, tuple(map(self.position, self.model.axes))))
+        written = Written(self._clock(), self.request_registers, self._positions(), self._shown)
+        self.images.append(written)
+
+    def _positions(self) -> tuple[int, ...]:
+        return tuple(map(self.position, self.model.axes))
 
 
 def stamp_of(status: RobotiqStatus) -> int:
@@ -116,21 +147,51 @@ class Heard:
         event: asyncio.Event = self._responder.asked
         return event
 
+    def told(self, until: float) -> str:
+        """The last requests and replies before a time, as bytes."""
+        said = [each for each in self._responder.said if each.time <= until]
+        return "\n".join(map(str, said[-MOST_TOLD:]))
+
+
+class Said(NamedTuple):
+    """A request that came in, or a reply and the parts of it that were sent; None if the line was cut."""
+
+    time: float
+    frame: bytes
+    parts: tuple[tuple[float, bytes], ...] | None = ()
+    is_reply: bool = False
+
+    def __str__(self) -> str:
+        text = f"{self.time:.4f} {'reply' if self.is_reply else 'asked'} {self.frame.hex(' ')}"
+        if not self.is_reply or self.parts == ((0.0, self.frame),):
+            return text
+        parts = [f"{part.hex(' ')} after {delay:g} s" for delay, part in self.parts or ()]
+        return f"{text}, sent as {', '.join(parts) or 'nothing'}"
+
 
 class Hears(Responder):
-    """Notes when each request for this gripper came in."""
+    """Notes when each request for this gripper came in, and what was said."""
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.heard: list[float] = []
         self.asked = asyncio.Event()
+        self.said: deque[Said] = deque(maxlen=MOST_SAID)
 
     def take(self, inbox: bytearray) -> Frame | None:
         frame = super().take(inbox)  # type: ignore[safe-super]
         if frame is not None and self._is_meant(frame.unit):
-            self.heard.append(asyncio.get_running_loop().time())
+            now = asyncio.get_running_loop().time()
+            self.heard.append(now)
+            self.said.append(Said(now, frame.pdu))
             self.asked.set()
         return frame
+
+    def deliver(self, reply: bytes) -> Iterable[tuple[float, bytes]] | None:
+        delivered = super().deliver(reply)
+        parts = None if delivered is None else tuple(delivered)
+        self.said.append(Said(asyncio.get_running_loop().time(), reply, parts, is_reply=True))
+        return parts
 
 
 class TcpServer(Heard, SimulatorServer):
@@ -288,10 +349,13 @@ class World:
             index = bisect_right(given_at, status.timestamp) - 1
             while index >= 0 and self.gripper.stamps[index][1] != stamp_of(status):
                 index -= 1
-            assert index >= 0, f"never sent: {status!r}"
+            assert index >= 0, f"never sent: {status!r}\n{self.server.told(status.timestamp)}"
             newer = bisect_right(self.server.heard, given_at[index])
             asked_again = self.server.heard[newer : bisect_left(self.server.heard, status.timestamp)]
-            assert not asked_again, f"{status!r} answers an older request: asked again at {asked_again}"
+            assert not asked_again, (
+                f"{status!r}, given at {given_at[index]:.4f}, answers an older request: asked again "
+                f"{len(asked_again)} times since\n{self.server.told(status.timestamp)}"
+            )
 
     def check_loop(self) -> None:
         if self.loop.longest_hold >= LONGEST_HOLD_S:
