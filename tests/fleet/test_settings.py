@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from robotiq_async import Finger, MoveTimeoutError, State
+from robotiq_async import Finger, MotionInhibitedError, MoveSupersededError, MoveTimeoutError, State
 from robotiq_async.fleet.remote.lease_state import OwnSettings
 from robotiq_async.fleet.remote.remote_hand import RemoteHand
 from robotiq_async.fleet.wire.envelope import unpack_call
@@ -18,7 +18,7 @@ from robotiq_async.values.request import Request
 from robotiq_async.values.status import RobotiqStatus
 from tests.fleet.lab import Lab, lab
 from tests.fleet.world import World, world
-from tests.virtual import inside
+from tests.virtual import inside, virtual
 
 A, ALL = Finger.A, Finger.ALL
 MOTIONS: dict[str, Any] = {
@@ -185,6 +185,58 @@ async def test_nothing_is_restored_while_one_client_stays_the_last_holder(
     await hand.acquire()
     await hand.set_position(30, A)
     assert Request.from_registers(here.gripper.request_registers).axes[0].force == 99
+
+
+async def of_another_client(here: Lab) -> None:
+    """Another client gives all axes a speed and a force of its own."""
+    async with here.client("other", control=False) as other:
+        await other.take()
+        await other.set_force(7)
+        await other.set_speed(7)
+        await other.release()
+
+
+@virtual
+async def test_a_force_that_a_superseded_move_replaced_on_its_way_is_not_an_older_one() -> None:
+    """``set_force(158)`` was answered as done, and 151, the one before it, was written."""
+    async with lab(poll_interval=0.1) as here, here.client() as hand:
+        await hand.set_force(151, A)
+        await of_another_client(here)
+        await hand.acquire()
+        await anext(here.local.statuses())  # all that follows comes before the next poll
+        written = len(here.gripper.writes)
+        setting = asyncio.create_task(hand.set_force(158, A))
+        await asyncio.sleep(0)
+        moving = asyncio.create_task(hand.move(109, A, force=159))
+        await asyncio.sleep(0)
+        positions = [asyncio.create_task(hand.set_position(110, A))]
+        with pytest.raises(MoveSupersededError):
+            await moving
+        positions.append(asyncio.create_task(hand.set_position(111, A)))
+        await asyncio.sleep(0)
+        assert len(here.gripper.writes) == written
+        await asyncio.gather(setting, *positions)
+        assert Request.from_registers(here.gripper.request_registers).axes[0].force == 159
+
+
+@inside(lab)
+async def test_a_setting_that_an_inhibit_drops_or_refuses_is_not_on_its_way(
+    here: Lab, hand: RemoteHand
+) -> None:
+    await hand.set_force(151, A)
+    await of_another_client(here)
+    await hand.acquire()
+    dropped = asyncio.create_task(hand.set_force(158, A))
+    await asyncio.sleep(0)
+    await hand.inhibit("a guard")
+    refused = asyncio.create_task(hand.move(20, A, speed=3))
+    for each in (dropped, refused):
+        with pytest.raises(MotionInhibitedError):
+            await each
+    await hand.permit()
+    await hand.set_position(30, A)
+    image = Request.from_registers(here.gripper.request_registers).axes[0]
+    assert (image.speed, image.force) == (128, 151)
 
 
 def of_settings(here: World) -> list[Fields]:

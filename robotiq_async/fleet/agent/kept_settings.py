@@ -51,7 +51,7 @@ class KeptSettings:
 
     def grant(self, client: str) -> None:
         """A client gets the lease."""
-        self._ordered.clear()
+        self.drop_orders()
         if client != self._holder:
             self._holder = client
             self._has.clear()
@@ -74,6 +74,10 @@ class KeptSettings:
                 with suppress(RobotiqError):  # the hand refuses the command, too
                     self._hand.command(axis, **own)
 
+    def drop_orders(self) -> None:
+        """The hand has dropped the requests that it had not sent."""
+        self._ordered.clear()
+
     def end(self, settings: Mapping[Setting, int], *, is_done: bool) -> None:
         """A command has ended: its values were carried out, or are no longer on their way."""
         ended = {each: value for each, value in settings.items() if self._ordered.get(each) == value}
@@ -84,7 +88,7 @@ class KeptSettings:
 
     def observe(self, what: object) -> None:
         if isinstance(what, Transition) and what.target not in RUNNING:
-            self._ordered.clear()  # the hand drops values that were not acknowledged
+            self.drop_orders()
         if not (isinstance(what, SentRequest) and what.acknowledged and what.request.activate):
             return
         before, self._gripper = self._gripper, settings_in(what)

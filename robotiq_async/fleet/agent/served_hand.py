@@ -309,6 +309,7 @@ class ServedHand:
             # Otherwise a control loop of the holder would move the fingers again within 10 ms.
             self.end_lease("halted", call.label)
         if inhibit is not None:
+            self._settings.drop_orders()
             self._inhibit_changed()
         self._jobs.start(Job("halt", call, query), self._stop_now(inhibit))
 
@@ -350,7 +351,9 @@ class ServedHand:
         self._jobs.begin(job, work)
 
     def _job_ended(self, job: Job, is_done: bool) -> None:
-        self._settings.end(settings_of(job.carries), is_done=is_done)
+        # Speed and force of a move that was superseded or cancelled are still written, with the next image.
+        if is_done or job.was_refused:
+            self._settings.end(settings_of(job.carries), is_done=is_done)
         if is_done:
             self._fingers.are_commanded(moved_by(job.carries))
 
