@@ -234,26 +234,32 @@ class Storm:
                 late = image.at - asked[-1] if asked else float("inf")
                 if late <= NONE_LATE_S:
                     latest = max(latest, late)
-                elif value not in self.restored(what, own, image.at):
+                elif value not in self.restored(what, own, images, image.at):
                     wrong.append(f"{what} {value} at {image.at:.3f}, before {before}, late {late:.2f}")
             before = value
         return wrong, latest
 
-    def restored(self, what: str, own: list[Note], at: float) -> set[int]:
+    def restored(self, what: str, own: list[Note], images: list[Image], at: float) -> set[int]:
         """The values that a motion may restore: the holder's last, the rival's, or the usual ones.
 
-        The holder's last is the newest that was carried out, or a later one of unknown outcome.
+        The holder's last is the newest that was carried out, or a later one of unknown outcome that the
+        gripper got in time.
         """
         last: set[int] = {USUAL[what]}
         for note in own:
             if note.begun <= at:
                 if note.outcome == "done" and note.end <= at:
                     last = {note.asked[what]}
-                elif note.word != "nothing was done":
+                elif note.word != "nothing was done" and self.came_in_time(what, note, images):
                     last |= {note.asked[what]}
         rivals = [note for note in self.rivals if what in note.asked and note.begun <= at]
         last |= {OF_RIVAL[what]} if rivals else set()
         return last | ({USUAL[what]} if not any(note.outcome == "done" for note in rivals) else set())
+
+    def came_in_time(self, what: str, note: Note, images: list[Image]) -> bool:
+        first = bisect_left(images, note.begun, key=attrgetter("at"))
+        last = bisect_right(images, note.begun + NONE_LATE_S, key=attrgetter("at"))
+        return any(getattr(image, what) == note.asked[what] for image in images[first:last])
 
     def is_false(self, note: Note, images: list[Image]) -> bool:
         begun = bisect_left(images, note.begun, key=attrgetter("at"))

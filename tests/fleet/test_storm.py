@@ -29,8 +29,14 @@ def test_the_judge_finds_an_older_setting_and_a_late_one() -> None:
     right = [Image(1.05, 0, 9, 10), Image(2.05, 0, 9, 200)]
     assert judge(asked).wrong("force", right)[0] == []
     assert len(judge(asked).wrong("force", [*right, Image(5.0, 0, 9, 10)])[0]) == 1
-    late = [Note(1.0, {"force": 10}, 1.1, "done"), Note(2.0, {"force": 200}, 2.1, "E: nothing was done")]
-    assert len(judge(late).wrong("force", [right[0], Image(4.0, 0, 9, 200)])[0]) == 1
+    refused, unknown = (
+        [asked[0], Note(2.0, {"force": 200}, 2.1, f"E: {words}")]
+        for words in ("nothing was done", "may have been carried out")
+    )
+    for late in (refused, unknown):
+        assert len(judge(late).wrong("force", [right[0], Image(4.0, 0, 9, 200)])[0]) == 1
+    between = [right[0], Image(2.5, 0, 9, 200), Image(3.0, 0, 9, 10), Image(4.0, 0, 9, 200)]
+    assert judge(unknown).wrong("force", between)[0] == [], "it came in time, and is restored"
 
 
 def test_the_judge_finds_a_false_outcome() -> None:
