@@ -136,7 +136,8 @@ def _argument(option: Option) -> object:
     if option.default is not None:
         return Annotated[float, Parameter(metavar="SECONDS", help=f"{option.help}, {low:g}..{high:g}.")]
     convert = _integer("the value", int(low), int(high))
-    text = f"{option.help} (default: {option.tcp} on TCP, {option.rtu} serial)."
+    usual = f"{option.tcp}" if option.tcp == option.rtu else f"{option.tcp} on TCP, {option.rtu} serial"
+    text = f"{option.help} (default: {usual})."
     return Annotated[int | None, Parameter(converter=convert, metavar=f"{low:g}..{high:g}", help=text)]
 
 

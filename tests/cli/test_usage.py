@@ -80,6 +80,16 @@ def test_the_help_of_an_option_is_one_line_of_the_source() -> None:
             assert re.match(r"    [a-z0-9_]+: ", line), f"it would break there in any terminal: {line}"
 
 
+def test_the_default_of_an_option_is_said_once_if_no_wire_has_another(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "300")
+    assert main(["status", "--help"]) == 0
+    out = capsys.readouterr().out
+    assert "default: 16)" in out
+    assert "default: 4 on TCP, 3 serial)" in out
+
+
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out.strip() == robotiq_async.__version__

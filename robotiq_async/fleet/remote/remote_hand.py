@@ -55,7 +55,7 @@ class RemoteHand(Hand):
       gripper, it loses the lease. ConnectionLostError means no answer within 2 s: the fingers MAY STILL MOVE.
     * :meth:`inhibit` and :meth:`permit` are the agent's, for all its clients: they need a started hand and no
       lease. The inhibit outlasts leases, and restarts of the agent. A permit lifts what this hand has heard
-      of; a later halt stays, and AgentError is raised.
+      of; a later halt stays, and RobotiqStateError is raised.
     * Millimetres and fractions follow the ``stroke`` of the agent's hand. What is sent are counts.
     * :attr:`state` is DISCONNECTED also while the agent is silent; that is a transition, too. Some statuses
       may be missing, and :meth:`grip_events` follows those that arrived.
