@@ -437,6 +437,41 @@ async def test_a_recording_that_never_gets_a_thread_has_failed(
     gc.collect()  # a file that was left open is a ResourceWarning here, and not in a later test
 
 
+class JumpingLoop(asyncio.SelectorEventLoop):
+    """Its clock can jump, as if something had held it up; other threads are not held up."""
+
+    jumped = 0.0
+
+    def time(self) -> float:
+        return super().time() + self.jumped
+
+    def hold_up_after(self, turns: int, seconds: float) -> None:
+        if turns:
+            self.call_soon(self.hold_up_after, turns - 1, seconds)
+        else:
+            self.jumped += seconds
+
+
+@pytest.mark.parametrize("turns", [1, 6, 9, 12])
+def test_a_loop_that_is_held_up_at_the_end_is_no_disk_that_does_not_answer(
+    tmp_path: Path, turns: int
+) -> None:
+    """The disk had long answered, and the recording was given up: its file had no end."""
+
+    async def record() -> Recorder:
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, JumpingLoop)
+        async with RobotiqHand("sim://?speedup=20") as hand, Recorder(hand, tmp_path / "it.csv") as recorder:
+            await hand.move(100)
+            loop.hold_up_after(turns, 11.0)
+        return recorder
+
+    with asyncio.Runner(loop_factory=JumpingLoop) as runner:
+        recorder = runner.run(record())
+    assert not recorder.has_failed
+    assert recorder.saved == recorder.recorded > 0
+
+
 async def test_a_file_that_is_deleted_meanwhile_is_a_failure(hand: RobotiqHand, file: Path) -> None:
     with pytest.raises(RecordingError, match="deleted"):  # noqa: PT012
         async with Recorder(hand, file) as recorder:

@@ -27,7 +27,7 @@ from types import TracebackType
 from typing import Final, Protocol, Self
 
 from ...hands import Hand
-from ...runtime import Log, NoThreadError, in_a_thread, wait_shielded, write_all
+from ...runtime import Limit, Log, NoThreadError, in_a_thread, wait_shielded, write_all
 from ...sync import RobotiqHand as BlockingHand
 from ...sync.robotiq_hand import caller_of
 from ..errors import RecordingError
@@ -278,14 +278,14 @@ class Recorder:
         await self._feed.stop()
         self._over.set()
         try:
-            async with asyncio.timeout(DISK_S):
+            with Limit(DISK_S) as limit:
                 await self._saving
                 if not self._failed.done():
                     self._format.finish()
                     await self._save()
                 await in_a_thread(self._file.close)
-        except TimeoutError:
-            self._fail(f"the disk does not answer within {DISK_S:g} s")
+            if limit.is_over:
+                self._fail(f"the disk does not answer within {DISK_S:g} s")
         except NoThreadError as error:
             self._fail(str(error))
             self._file.close()  # no thread of the recorder uses it: the last one has ended
