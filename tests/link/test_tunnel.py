@@ -23,7 +23,7 @@ from robotiq_async import (
 from robotiq_async.simulator import SimulatedGripper
 from robotiq_async.values.model import TWO_FINGER_85
 from tests.grippers import activate_beforehand
-from tests.virtual import until
+from tests.virtual import VirtualLoop, until
 
 pytestmark = pytest.mark.virtual_time
 
@@ -321,6 +321,21 @@ async def test_an_opening_that_takes_too_long_is_cancelled() -> None:
     with pytest.raises(ConnectFailedError, match=r"no connection within 0\.5 s"):
         await RobotiqHand(tunnel, model="2f85", connect_timeout=0.5).start()
     assert cancelled
+
+
+async def test_an_opening_outlasts_a_loop_that_is_held_up() -> None:
+    """It was given up, although the time of the block counts for no limit."""
+    tunnel, loop = await arm(), asyncio.get_running_loop()
+    assert isinstance(loop, VirtualLoop)
+
+    async def take_three_steps() -> None:
+        for _ in range(3):
+            await asyncio.sleep(0.2)
+
+    tunnel.open = take_three_steps  # type: ignore[method-assign]
+    loop.call_later(0.25, loop.hold_up, 2.0)
+    async with RobotiqHand(tunnel, model="2f85", connect_timeout=1.0) as hand:
+        assert hand.state is State.RUNNING_IDLE
 
 
 async def test_two_hands_do_not_share_a_tunnel() -> None:

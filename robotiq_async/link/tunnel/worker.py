@@ -8,8 +8,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any, Final, TypeVar
 
 from ...runtime.concurrency import LateError
-from ...runtime.limit import HELD_S
-from ..watchdog import GRACE_S
+from ...runtime.limit import Limit
 
 T = TypeVar("T")
 
@@ -39,12 +38,9 @@ class Worker:
         loop = asyncio.get_running_loop()
         ended = loop.create_future()
         call = self._put(work, lambda: ended.set_result(None))
-        due = loop.time() + seconds
         try:
-            await asyncio.wait({ended}, timeout=seconds)
-            if not ended.done() and loop.time() - due > HELD_S:
-                # The loop was blocked: a result that waits by now is in time.
-                await asyncio.wait({ended}, timeout=GRACE_S)
+            with Limit(seconds):
+                await asyncio.wait({ended})
         finally:
             call.give_up()
         if not ended.done():
